@@ -1,0 +1,4 @@
+"""throwcollect: databases of robot throws from many simulations at once."""
+
+__version__ = "0.1.0"
+__all__ = ["__version__"]

@@ -1,0 +1,308 @@
+"""Every key of the configuration with its type, unit, bounds, default and meaning.
+
+A key is written once, here. The reference in ``docs/configuration.md`` and the JSON Schema are printed from it.
+Units are part of the name: ``_s``, ``_m``, ``_kg``, ``_hz``, ``_mps2``; angles are radians.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, PositiveInt, model_validator
+
+NonNegativeFloat = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Angle = Annotated[float, Field(ge=-6.3, le=6.3, allow_inf_nan=False)]
+Name = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]*$", max_length=64)]
+
+
+class Section(BaseModel):
+    """Base of all sections: unknown keys are errors, values never change."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True, allow_inf_nan=False)
+
+
+class RobotConfig(Section):
+    """The robot and how its motors follow commands."""
+
+    name: Literal["talos"] = "talos"
+    """Robot model: Talos of PAL Robotics, `talos_reduced` of example-robot-data, with its base fixed."""
+    base_height_m: Annotated[float, Field(ge=0.5, le=2.0)] = 1.01927
+    """Height of the fixed base link above the ground."""
+    posture: dict[str, Angle] = {}
+    """Joint angles that replace those of the half-sitting posture, for joints that the task does not move."""
+    locked: Literal["auto", "none"] | list[str] = "auto"
+    """Joints simulated as rigid: `auto` locks what the task does not move, `none` simulates all 32, or a list."""
+    position_gain_per_s: Annotated[float, Field(gt=0, le=1000)] = 100.0
+    """Velocity commanded per radian of position error; Bullet's position gain is this times the time step."""
+    velocity_gain: Annotated[float, Field(gt=0, le=1)] = 1.0
+    """Share of the velocity error that a motor removes in one step [-]."""
+    effort_scale: Annotated[float, Field(gt=0, le=10)] = 1.0
+    """Factor on the effort limits of all joints [-]."""
+
+
+class ToolConfig(Section):
+    """The throwing spoon: a handle and a cone of thin walls, fixed to the right gripper."""
+
+    name: Literal["spoon"] = "spoon"
+    """Tool model."""
+    handle_length_m: Annotated[float, Field(ge=0.05, le=0.5)] = 0.15
+    """Length of the handle, along -z of the gripper's base link."""
+    handle_width_m: Annotated[float, Field(ge=0.004, le=0.05)] = 0.012
+    """Width and thickness of the handle."""
+    mount_offset_m: Annotated[float, Field(ge=0.0, le=0.3)] = 0.10
+    """Distance from the gripper's base link to the handle's upper end."""
+    cup_walls: Annotated[int, Field(ge=4, le=24)] = 6
+    """Number of flat walls that form the cone; each costs about 5 µs a step."""
+    cup_floor_radius_m: Annotated[float, Field(gt=0, le=0.05)] = 0.004
+    """Radius of the cone at its bottom."""
+    cup_rim_radius_m: Annotated[float, Field(gt=0, le=0.2)] = 0.045
+    """Radius of the cone at its rim."""
+    cup_depth_m: Annotated[float, Field(gt=0, le=0.2)] = 0.032
+    """Depth of the cone."""
+    wall_thickness_m: Annotated[float, Field(gt=0, le=0.02)] = 0.004
+    """Thickness of the cone's walls."""
+    mass_kg: Annotated[float, Field(gt=0, le=2)] = 0.12
+    """Mass of the whole spoon."""
+
+    @model_validator(mode="after")
+    def _cone_opens(self) -> ToolConfig:
+        if self.cup_rim_radius_m <= self.cup_floor_radius_m:
+            raise ValueError("cup_rim_radius_m must be larger than cup_floor_radius_m, or the cup holds no ball")
+        return self
+
+
+class BallConfig(Section):
+    """The ball."""
+
+    mass_kg: Annotated[float, Field(gt=0, le=2)] = 0.045
+    """Mass."""
+    radius_m: Annotated[float, Field(ge=0.005, le=0.1)] = 0.025
+    """Radius."""
+    friction: Annotated[float, Field(ge=0, le=2)] = 0.5
+    """Coulomb friction of the ball [-]; Bullet multiplies it with that of the body it touches."""
+    restitution: Annotated[float, Field(ge=0, le=1)] = 0.0
+    """Coefficient of restitution of the ball [-]; Bullet multiplies it with that of the body it touches."""
+    drag_coefficient: Annotated[float, Field(ge=0, le=2)] = 0.0
+    """Drag coefficient of a sphere [-]; about 0.47 in air. Quadratic drag acts during the whole trial."""
+
+
+class SceneConfig(Section):
+    """The rest of the world."""
+
+    gravity_mps2: Annotated[float, Field(gt=0, le=30)] = 9.81
+    """Gravity, downwards."""
+    landing_height_m: Annotated[float, Field(ge=0, le=2)] = 0.0
+    """Height of the landing plane: a throw lands when the ball's lowest point crosses it, downwards."""
+    air_density_kgpm3: Annotated[float, Field(ge=0, le=10)] = 1.2
+    """Density of the air, for the ball's drag."""
+    spoon_friction: Annotated[float, Field(ge=0, le=2)] = 0.5
+    """Coulomb friction of the spoon and the robot's links [-]."""
+
+
+class SimConfig(Section):
+    """How the simulation computes."""
+
+    physics_hz: Annotated[int, Field(ge=100, le=10000)] = 500
+    """Physics steps per simulated second; also the controllers' update rate."""
+    solver_iterations: Annotated[int, Field(ge=1, le=1000)] = 50
+    """Iterations of Bullet's constraint solver per step."""
+    settle_s: Annotated[float, Field(ge=0, le=2)] = 0.05
+    """Simulated time for which the ball settles in the spoon before a trial."""
+    command_delay_s: Annotated[float, Field(ge=0, le=0.2)] = 0.0
+    """Time between a controller's command and the motor acting on it."""
+    real_time_factor: Annotated[float, Field(gt=0)] | None = None
+    """Upper bound of simulated over real time, for onlookers; none: as fast as it can."""
+    max_trial_s: Annotated[float, Field(gt=0, le=60)] = 6.0
+    """Simulated time after which a trial is ended as `timeout`."""
+
+
+class MinimumJerk(Section):
+    """q(t) = q0 + (q1 - q0) s((t/T)^gamma), s(x) = 10x³ - 15x⁴ + 6x⁵."""
+
+    family: Literal["minimum_jerk"] = "minimum_jerk"
+    """Trajectory family."""
+    gamma: Annotated[float, Field(ge=0.5, le=3)] = 1.2
+    """Time warp [-]: above 1 the speed peak comes later."""
+
+
+class DynamicMovementPrimitive(Section):
+    """Joint-space discrete DMP: tau z' = alpha_z (beta_z (g - y) - z) + f(x), tau y' = z, tau x' = -alpha_x x."""
+
+    family: Literal["dmp"]
+    """Trajectory family."""
+    basis_functions: Annotated[int, Field(ge=2, le=500)] = 20
+    """Number of Gaussian basis functions of each joint."""
+    weights: dict[str, list[float]] = {}
+    """Weights of the forcing term of each moving joint; a joint that is absent has zero weights [rad/s²·s²]."""
+    alpha_z: PositiveFloat = 48.0
+    """Stiffness constant of the transformation system [-]; beta_z is alpha_z / 4 (critically damped)."""
+    alpha_x: PositiveFloat = 2.0
+    """Decay constant of the phase [-]."""
+
+    @model_validator(mode="after")
+    def _weights_fit(self) -> DynamicMovementPrimitive:
+        for joint, weights in self.weights.items():
+            if len(weights) != self.basis_functions:
+                raise ValueError(
+                    f"weights of {joint}: {len(weights)} numbers for {self.basis_functions} basis functions"
+                )
+        return self
+
+
+class ThrowConfig(Section):
+    """The task `throw`: the arm swings from `start` to `end`; the ball leaves the spoon when the spoon brakes."""
+
+    name: Literal["throw"] = "throw"
+    """Task."""
+    start: dict[str, Angle] = {
+        "torso_1_joint": 0.0,
+        "arm_right_1_joint": 1.5,
+        "arm_right_2_joint": -2.6,
+        "arm_right_3_joint": -1.57,
+        "arm_right_4_joint": -1.9,
+        "arm_right_5_joint": 0.0,
+        "arm_right_6_joint": 0.0,
+        "arm_right_7_joint": -0.1,
+    }
+    """Joint angles at the start of each trial; the spoon must open upwards."""
+    end: dict[str, Angle] = {
+        "torso_1_joint": 0.0,
+        "arm_right_1_joint": 1.5,
+        "arm_right_2_joint": -2.6,
+        "arm_right_4_joint": -0.5,
+        "arm_right_7_joint": 0.5,
+    }
+    """Joint angles at the end of the motion. The joints named here are the moving ones, even if end equals start."""
+    duration_s: Annotated[float, Field(ge=0.1, le=10)] = 1.0
+    """Duration of the motion (tau of a DMP)."""
+    trajectory: Annotated[MinimumJerk | DynamicMovementPrimitive, Field(discriminator="family")] = MinimumJerk()
+    """How the joints go from start to end."""
+    points_hz: Annotated[float, Field(ge=5, le=1000)] = 50.0
+    """Points per second of the joint trajectories that are sent to the controllers (quintic between them)."""
+    recatch_gap_s: Annotated[float, Field(ge=0, le=1)] = 0.02
+    """The ball counts as released when it has been out of the spoon for this long."""
+
+    @model_validator(mode="after")
+    def _moving_joints_start_somewhere(self) -> ThrowConfig:
+        if missing := sorted(set(self.end) - set(self.start)):
+            raise ValueError(f"end names joints without a start: {', '.join(missing)}")
+        if not self.end:
+            raise ValueError("end names no joint, so nothing would move")
+        return self
+
+
+class Range(Section):
+    """An interval to draw from."""
+
+    min: float
+    """Lower bound, in the unit of the key."""
+    max: float
+    """Upper bound, in the unit of the key."""
+    scale: Literal["linear", "log"] = "linear"
+    """Whether the value or its logarithm is spread evenly."""
+    count: PositiveInt | None = None
+    """Number of grid points, both ends included; for the sampler `grid` only."""
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Range:
+        if not self.min <= self.max:
+            raise ValueError(f"min {self.min} is above max {self.max}")
+        if self.scale == "log" and self.min <= 0:
+            raise ValueError(f"a logarithmic scale needs min above 0, got {self.min}")
+        return self
+
+
+class Values(Section):
+    """A set of values to choose from."""
+
+    values: Annotated[list[float], Field(min_length=1)]
+    """The values, in the unit of the key."""
+
+
+class SweepConfig(Section):
+    """Which parameters vary from trial to trial, and how they are drawn."""
+
+    sampler: Literal["grid", "uniform", "latin_hypercube", "sobol", "list"] = "sobol"
+    """How points are drawn; `list` reads them from `file`."""
+    parameters: dict[str, Range | Values] = {}
+    """Dotted configuration keys (`task.duration_s`, `ball.mass_kg`, ...) and what they range over."""
+    file: str | None = None
+    """CSV or Parquet file with one row a trial and dotted keys as columns; for the sampler `list`."""
+
+
+class RecordConfig(Section):
+    """What is recorded, and how it is cut into files."""
+
+    rate_hz: Annotated[int, Field(ge=10, le=10000)] = 250
+    """Recorded samples per simulated second; must divide `sim.physics_hz`."""
+    topics: list[Literal["joint_states", "ball/odometry", "controller_state", "tf", "clock"]] = [
+        "joint_states",
+        "ball/odometry",
+    ]
+    """Recorded topics; the first two are always needed, as throws are judged from them."""
+    zstd_level: Annotated[int, Field(ge=1, le=19)] = 1
+    """Compression level of the MCAP chunks."""
+    trials_per_shard: PositiveInt = 1000
+    """Trials in one MCAP file."""
+
+    @model_validator(mode="after")
+    def _judged_topics(self) -> RecordConfig:
+        if missing := [t for t in ("joint_states", "ball/odometry") if t not in self.topics]:
+            raise ValueError(f"throws are judged from {' and '.join(missing)}; add to topics")
+        return self
+
+
+class RunConfig(Section):
+    """How a collection is run; nothing in this section changes the dataset."""
+
+    simulations: Annotated[int, Field(ge=1, le=256)] = 2
+    """Number of simulations, unless `-n` says otherwise."""
+    runtime: Literal["auto", "local"] = "auto"
+    """Where the nodes run."""
+    router_port: Annotated[int, Field(ge=0, le=65535)] = 0
+    """TCP port of the router on the loopback interface; 0 takes a free one, 7447 is the port ROS nodes look for."""
+    domain_id: Annotated[int, Field(ge=0, le=232)] = 0
+    """ROS domain."""
+    trial_timeout_s: PositiveFloat = 60.0
+    """Real time that a simulation may take for one trial before it counts as lost."""
+    start_timeout_s: PositiveFloat = 60.0
+    """Real time within which the first simulation must be ready."""
+    retries: Annotated[int, Field(ge=0, le=100)] = 3
+    """How often a trial is given to another simulation before it is recorded as failed."""
+    restarts: Annotated[int, Field(ge=0, le=1000)] = 10
+    """How often one simulation is restarted before it is given up."""
+
+
+class Config(Section):
+    """One collection: from the robot to the dataset."""
+
+    name: Name = "throws"
+    """Name of the collection and of its files."""
+    seed: Annotated[int, Field(ge=0, lt=2**32)] = 0
+    """Root of all randomness."""
+    trials: PositiveInt | None = None
+    """Number of trials; none for `grid` and `list` means all points."""
+    robot: RobotConfig = RobotConfig()
+    """The robot."""
+    tool: ToolConfig = ToolConfig()
+    """The tool in its hand."""
+    ball: BallConfig = BallConfig()
+    """The ball."""
+    scene: SceneConfig = SceneConfig()
+    """The rest of the world."""
+    sim: SimConfig = SimConfig()
+    """How the simulation computes."""
+    task: ThrowConfig = ThrowConfig()
+    """What the robot does."""
+    sweep: SweepConfig = SweepConfig()
+    """What varies from trial to trial."""
+    record: RecordConfig = RecordConfig()
+    """What is recorded."""
+    run: RunConfig = RunConfig()
+    """How it is run."""
+
+    @model_validator(mode="after")
+    def _rates_divide(self) -> Config:
+        if self.sim.physics_hz % self.record.rate_hz:
+            raise ValueError(f"record.rate_hz {self.record.rate_hz} does not divide sim.physics_hz {self.sim.physics_hz}")
+        return self

@@ -1,0 +1,109 @@
+"""Every error that throwcollect raises on purpose, as a tree.
+
+::
+
+    ThrowcollectError                exit 1
+    ├── ConfigError                  exit 2   the request is wrong; nothing has been started
+    │   └── PlanError                exit 2   the sweep yields no trial that could be run
+    ├── WorkerError                  exit 3   a process of the run could not be started or was lost for good
+    ├── DatasetError                 exit 4   a dataset is missing, torn or contradicts itself
+    └── Interrupted                  exit 130 stopped by the user; what is finished is on disk
+
+A message has up to five facts, in this order: where, what was wrong and what was got; what would be right; the
+evidence; what to try.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+
+class ThrowcollectError(Exception):
+    """Root of all errors raised on purpose.
+
+    Args:
+        message: Where and what: one line.
+        expected: What would have been right.
+        evidence: What was seen: the tail of a log, a path.
+        hint: One command or one edit that gets further.
+    """
+
+    exit_code = 1
+
+    def __init__(
+        self, message: str, *, expected: str | None = None, evidence: str | None = None, hint: str | None = None
+    ) -> None:
+        self.message = message
+        self.expected = expected
+        self.evidence = evidence
+        self.hint = hint
+        super().__init__(message)
+
+    def __str__(self) -> str:
+        lines = [self.message]
+        for label, text in (("expected", self.expected), ("evidence", self.evidence), ("try", self.hint)):
+            if text:
+                lines.append(f"  {label}: " + text.replace("\n", "\n    "))
+        return "\n".join(lines)
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One thing that is wrong in a configuration."""
+
+    message: str
+    """What was wrong, what was got and what would be right."""
+    key: str = ""
+    """Dotted path of the key."""
+    path: Path | None = None
+    """File that holds the key; None when it came from the command line."""
+    line: int | None = None
+    """Line in that file, counted from 1."""
+
+    def __str__(self) -> str:
+        where = str(self.path) if self.path else ""
+        if where and self.line is not None:
+            where += f":{self.line}"
+        return ": ".join(part for part in (where, self.key, self.message) if part)
+
+
+class ConfigError(ThrowcollectError):
+    """The request is wrong; nothing has been started.
+
+    Args:
+        problems: All problems that were found, at least one; or a single sentence.
+        expected: What would have been right.
+        hint: One command or one edit that gets further.
+    """
+
+    exit_code = 2
+
+    def __init__(
+        self, problems: str | Sequence[Problem], *, expected: str | None = None, hint: str | None = None
+    ) -> None:
+        self.problems = [Problem(problems)] if isinstance(problems, str) else list(problems)
+        super().__init__("\n".join(map(str, self.problems)), expected=expected, hint=hint)
+
+
+class PlanError(ConfigError):
+    """The sweep yields no trial that could be run."""
+
+
+class WorkerError(ThrowcollectError):
+    """A process of the run could not be started or was lost for good."""
+
+    exit_code = 3
+
+
+class DatasetError(ThrowcollectError):
+    """A dataset is missing, torn or contradicts itself."""
+
+    exit_code = 4
+
+
+class Interrupted(ThrowcollectError):
+    """Stopped by the user; what is finished is on disk."""
+
+    exit_code = 130
