@@ -1,0 +1,86 @@
+"""The values that describe an episode, free of any encoding."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Recorded samples of one trial, one row a sample, evenly spaced; world frame: x forward, y left, z up.
+
+    Attributes:
+        stamps_ns: Simulated time [ns], shape ``(n_samples,)``, int64.
+        position: Joint positions [rad], shape ``(n_samples, 32)``, in the order of `talos.JOINTS`.
+        velocity: Joint velocities [rad/s], shape ``(n_samples, 32)``.
+        effort: Torques applied by the motors [Nm], shape ``(n_samples, 32)``; 0 for locked joints.
+        ball_position: Ball centre in world [m], shape ``(n_samples, 3)``.
+        ball_orientation_xyzw: Unit quaternion, ball to world, shape ``(n_samples, 4)``.
+        ball_linear_velocity: In world [m/s], shape ``(n_samples, 3)``.
+        ball_angular_velocity: In world [rad/s], shape ``(n_samples, 3)``.
+    """
+
+    stamps_ns: NDArray[np.int64]
+    position: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+    effort: NDArray[np.float64]
+    ball_position: NDArray[np.float64]
+    ball_orientation_xyzw: NDArray[np.float64]
+    ball_linear_velocity: NDArray[np.float64]
+    ball_angular_velocity: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Contact:
+    """An interval in which the ball was pressed against one body (normal force above zero).
+
+    Attributes:
+        body: ``spoon``, ``ground``, or the name of the robot link.
+        start_ns: Simulated time of the first physics step with force [ns].
+        end_ns: Simulated time of the first physics step without [ns]; None when it lasted to the end.
+    """
+
+    body: str
+    start_ns: int
+    end_ns: int | None
+
+
+@dataclass(frozen=True)
+class GoalOutcome:
+    """How the goal of one controller ended (control_msgs/action/FollowJointTrajectory).
+
+    Attributes:
+        controller: Name of the controller.
+        status: Of action_msgs/msg/GoalStatus: 4 succeeded, 5 canceled, 6 aborted, 2 still executing at the end.
+        error_code: Of the action's result.
+        error_string: Of the action's result.
+    """
+
+    controller: str
+    status: int
+    error_code: int
+    error_string: str
+
+
+@dataclass(frozen=True)
+class EpisodeHeader:
+    """What is known of an episode besides its samples.
+
+    Attributes:
+        trial: Number of the trial.
+        start_ns: Simulated time of the first sample [ns].
+        end_reason: ``landed`` (crossed the landing plane), ``rest``, or ``timeout``.
+        contacts: All contacts of the ball, by start time.
+        goals: One entry per controller that had a goal.
+        samples: Number of samples.
+    """
+
+    trial: int
+    start_ns: int
+    end_reason: str
+    contacts: tuple[Contact, ...]
+    goals: tuple[GoalOutcome, ...]
+    samples: int

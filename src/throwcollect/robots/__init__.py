@@ -1,0 +1,1 @@
+"""Robots: joints, controllers, limits, and the description that the physics loads."""

@@ -1,0 +1,27 @@
+"""A joint trajectory as plain arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class JointTrajectory:
+    """Points in joint space over time, at rest before the first point and after the last.
+
+    Attributes:
+        joints: Joint names, shape ``(n_joints,)``.
+        times: Time since the start [s], strictly increasing, shape ``(n_points,)``.
+        positions: [rad], shape ``(n_points, n_joints)``.
+        velocities: [rad/s], shape ``(n_points, n_joints)``.
+        accelerations: [rad/s²], shape ``(n_points, n_joints)``.
+    """
+
+    joints: tuple[str, ...]
+    times: NDArray[np.float64]
+    positions: NDArray[np.float64]
+    velocities: NDArray[np.float64]
+    accelerations: NDArray[np.float64]
