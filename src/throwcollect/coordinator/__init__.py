@@ -1,0 +1,1 @@
+"""The coordinator: gives trials to simulations and their episodes to the dataset."""
