@@ -1,0 +1,33 @@
+"""Joint trajectory control: the arithmetic and decisions of ros2_controllers, without ROS or physics.
+
+A `JointTrajectoryController` is driven by a clock and measured states; it knows neither messages nor simulations.
+"""
+
+from throwcollect.control.controller import JointTrajectoryController
+from throwcollect.control.goal import JointTolerance, Trajectory, TrajectoryGoal, TrajectoryPoint
+from throwcollect.control.outcome import (
+    ControllerState,
+    ErrorCode,
+    GoalResult,
+    GoalStatus,
+    JointState,
+    TrajectoryState,
+)
+from throwcollect.control.parameters import Constraints, ControllerParameters, JointConstraints
+
+__all__ = [
+    "Constraints",
+    "ControllerParameters",
+    "ControllerState",
+    "ErrorCode",
+    "GoalResult",
+    "GoalStatus",
+    "JointConstraints",
+    "JointState",
+    "JointTolerance",
+    "JointTrajectoryController",
+    "Trajectory",
+    "TrajectoryGoal",
+    "TrajectoryPoint",
+    "TrajectoryState",
+]

@@ -1,0 +1,101 @@
+"""What a controller reports: results of goals, and its state after an update."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from throwcollect.control.goal import TrajectoryPoint
+
+
+class GoalStatus(IntEnum):
+    """How a goal ended (action_msgs/msg/GoalStatus)."""
+
+    SUCCEEDED = 4
+    CANCELED = 5
+    ABORTED = 6
+
+
+class ErrorCode(IntEnum):
+    """Why a goal ended (control_msgs/action/FollowJointTrajectory)."""
+
+    SUCCESSFUL = 0
+    INVALID_GOAL = -1
+    PATH_TOLERANCE_VIOLATED = -4
+    GOAL_TOLERANCE_VIOLATED = -5
+
+
+@dataclass(frozen=True)
+class GoalResult:
+    """The end of a goal.
+
+    Attributes:
+        goal_id: Identity of the goal, as it was submitted.
+        status: How it ended.
+        error_code: Why.
+        error_string: Why, in words; empty for a cancelled goal.
+        stamp_ns: Time of the decision [ns].
+    """
+
+    goal_id: Hashable
+    status: GoalStatus
+    error_code: ErrorCode
+    error_string: str
+    stamp_ns: int
+
+
+@dataclass(frozen=True)
+class JointState:
+    """Measured state of a controller's joints.
+
+    Attributes:
+        positions: [rad], shape ``(n_joints,)``.
+        velocities: [rad/s], shape ``(n_joints,)``; not used without a velocity state interface.
+    """
+
+    positions: NDArray[np.float64]
+    velocities: NDArray[np.float64] | None = None
+
+
+@dataclass(frozen=True)
+class ControllerState:
+    """What an update has seen and done: content of action feedback and of the controller's state topic.
+
+    Fields are in the controller's joint order and empty where there is no interface.
+
+    Attributes:
+        stamp_ns: Time of the update [ns].
+        joint_names: Joints of the controller.
+        desired: What was due (``reference`` of the state topic), timed by the trajectory's clock.
+        actual: What was measured (``feedback`` of the state topic), timed by the time that has really passed.
+        error: Desired minus actual positions; velocities are 0, as no velocity is commanded.
+        output: Commanded positions.
+    """
+
+    stamp_ns: int
+    joint_names: tuple[str, ...]
+    desired: TrajectoryPoint
+    actual: TrajectoryPoint
+    error: TrajectoryPoint
+    output: TrajectoryPoint
+
+
+@dataclass(frozen=True)
+class TrajectoryState:
+    """The trajectory at a time that was asked for (control_msgs/srv/QueryTrajectoryState).
+
+    Attributes:
+        success: Whether the time lies between the first update and the end.
+        positions: [rad], shape ``(n_joints,)``; after the end the last point, before the start the measured state.
+        velocities: [rad/s], shape ``(n_joints,)``; None if unknown.
+        accelerations: [rad/s²], shape ``(n_joints,)``; None if unknown.
+    """
+
+    success: bool
+    positions: NDArray[np.float64]
+    velocities: NDArray[np.float64] | None = None
+    accelerations: NDArray[np.float64] | None = None

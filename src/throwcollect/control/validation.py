@@ -1,0 +1,133 @@
+"""Which trajectories a controller refuses, and why.
+
+The rules and their texts are those of ros2_controllers (Jazzy, 4.42), which clients know; each text goes on with the
+value and the limit. Stricter than upstream: sizes are checked before contents, and repeated joints, numbers that are
+not finite and a negative first time are refused, as upstream would command nonsense or crash.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from throwcollect.control.goal import Trajectory, Values
+from throwcollect.control.parameters import ControllerParameters
+
+END_VELOCITY_LIMIT = float(np.finfo(np.float32).eps)
+"""Largest magnitude of a last point's velocity that counts as zero [rad/s] (ros2_controllers)."""
+
+
+def refusal(trajectory: Trajectory, parameters: ControllerParameters, now_ns: int) -> str | None:
+    """Reason for which a trajectory cannot be executed.
+
+    Args:
+        trajectory: What has been asked for.
+        parameters: Those of the controller.
+        now_ns: Current time [ns].
+
+    Returns:
+        One sentence for the first rule that is broken, or None if the trajectory can be executed.
+    """
+    return (
+        _wrong_joints(trajectory, parameters)
+        or _wrong_sizes(trajectory)
+        or _not_finite(trajectory)
+        or _moving_end(trajectory, parameters)
+        or _over_already(trajectory, now_ns)
+        or _wrong_times(trajectory)
+        or _effort(trajectory)
+    )
+
+
+def _wrong_joints(trajectory: Trajectory, parameters: ControllerParameters) -> str | None:
+    names, joints = trajectory.joint_names, parameters.joints
+    if not parameters.allow_partial_joints_goal and len(names) != len(joints):
+        counts = f"expected all {len(joints)} of {_listed(joints)}; got {len(names)}: {_listed(names)}"
+        return f"Joints on incoming trajectory don't match the controller joints. ({counts})"
+    if not len(names):
+        return f"Empty joint names on incoming trajectory. (expected some of {_listed(joints)})"
+    if not len(trajectory.points):
+        return "Empty trajectory received. (expected at least 1 point; got 0)"
+    for name in names:
+        if name not in joints:
+            return f"Incoming joint {name} doesn't match the controller's joints. (expected {_listed(joints)})"
+    for index, name in enumerate(names):
+        if name in names[:index]:
+            return f"Joint {name} is named more than once on incoming trajectory. (got {_listed(names)})"
+    return None
+
+
+def _wrong_sizes(trajectory: Trajectory) -> str | None:
+    expected = len(trajectory.joint_names)
+    for index, point in enumerate(trajectory.points):
+        fields = (
+            ("positions", point.positions),
+            ("velocities", point.velocities),
+            ("accelerations", point.accelerations),
+        )
+        for field, values in fields:
+            size = len(values)
+            if size != expected and (size or field == "positions"):
+                return f"Mismatch between joint_names size ({expected}) and {field} ({size}) at point #{index}."
+    return None
+
+
+def _not_finite(trajectory: Trajectory) -> str | None:
+    fields: tuple[tuple[str, Callable[[int], Values]], ...] = (
+        ("Position", lambda index: trajectory.points[index].positions),
+        ("Velocity", lambda index: trajectory.points[index].velocities),
+        ("Acceleration", lambda index: trajectory.points[index].accelerations),
+    )
+    for field, values_of in fields:
+        present = [index for index in range(len(trajectory.points)) if len(values_of(index))]
+        values = np.array([values_of(index) for index in present], dtype=np.float64)
+        if not np.isfinite(values).all():
+            row, column = np.argwhere(~np.isfinite(values))[0]
+            where = f"{field} of joint {trajectory.joint_names[column]} at point #{present[row]}"
+            return f"{where} is not finite: {values[row, column]}"
+    return None
+
+
+def _moving_end(trajectory: Trajectory, parameters: ControllerParameters) -> str | None:
+    if parameters.allow_nonzero_velocity_at_trajectory_end:
+        return None
+    velocities = trajectory.points[-1].velocities
+    for joint, velocity in zip(trajectory.joint_names, velocities, strict=False):
+        if abs(velocity) > END_VELOCITY_LIMIT:
+            text = f"Velocity of last trajectory point of joint {joint} is not zero: {velocity:.15f}"
+            return f"{text} (limit {END_VELOCITY_LIMIT:.3g} rad/s)"
+    return None
+
+
+def _over_already(trajectory: Trajectory, now_ns: int) -> str | None:
+    if not trajectory.stamp_ns:
+        return None
+    end_ns = trajectory.stamp_ns + trajectory.points[-1].time_from_start_ns
+    if end_ns >= now_ns:
+        return None
+    times = f"non-zero start time ({trajectory.stamp_ns / 1e9:f}) that ends in the past ({end_ns / 1e9:f})"
+    return f"Received trajectory with {times} (expected an end at {now_ns / 1e9:f} or later)"
+
+
+def _wrong_times(trajectory: Trajectory) -> str | None:
+    times_ns = [point.time_from_start_ns for point in trajectory.points]
+    if times_ns[0] < 0:
+        return f"Time of point 0 is negative, it is {times_ns[0] / 1e9:f} (expected 0 or more)"
+    for index in range(1, len(times_ns)):
+        if times_ns[index] <= times_ns[index - 1]:
+            values = f"it is {times_ns[index - 1] / 1e9:f} and {times_ns[index] / 1e9:f} respectively"
+            return f"Time between points {index - 1} and {index} is not strictly increasing, {values}"
+    return None
+
+
+def _effort(trajectory: Trajectory) -> str | None:
+    for index, point in enumerate(trajectory.points):
+        if len(point.effort):
+            rule = "Trajectories with effort fields are only supported for controllers using the 'effort' command"
+            return f"{rule} interface. (expected none; got {len(point.effort)} values at point #{index})"
+    return None
+
+
+def _listed(names: Sequence[str]) -> str:
+    return ", ".join(names) or "none"

@@ -1,0 +1,282 @@
+"""Driving a controller: many updates at once do what single ones do; misuse is told."""
+
+from __future__ import annotations
+
+import dataclasses
+import sys
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from throwcollect.control import (
+    Constraints,
+    ControllerParameters,
+    JointConstraints,
+    JointState,
+    JointTolerance,
+    JointTrajectoryController,
+    Trajectory,
+    TrajectoryGoal,
+    TrajectoryPoint,
+)
+
+from .bench import JOINTS, PERIOD_NS, SHIPPED, TALOS, Bench, Plant, constrained, goal, seconds, to
+
+UPDATES = 120
+positions = st.tuples(*[st.floats(-3, 3)] * 3)
+tolerance = st.sampled_from([0.0, 0.0, 0.005, 0.1, 0.4])
+
+
+@st.composite
+def trajectories(draw: st.DrawFn) -> Trajectory:
+    names = draw(st.permutations(JOINTS))[: draw(st.sampled_from([3, 3, 1, 2]))]
+    values = st.tuples(*[st.floats(-3, 3)] * len(names))
+    time_ns, points = draw(st.sampled_from([0, 1, PERIOD_NS, 123_456_789])), []
+    for _ in range(draw(st.integers(1, 4))):
+        content = draw(st.integers(0, 2))
+        velocities = draw(values) if content > 0 else ()
+        points.append(TrajectoryPoint(time_ns, draw(values), velocities, draw(values) if content > 1 else ()))
+        time_ns += draw(st.sampled_from([1, PERIOD_NS, 55_555_555, 200_000_000]))
+    return Trajectory(names, points, draw(st.sampled_from([None, None, seconds(1000.3), seconds(1000.9)])))
+
+
+@st.composite
+def goals(draw: st.DrawFn) -> TrajectoryGoal:
+    asked = st.lists(st.builds(JointTolerance, st.sampled_from(JOINTS), st.sampled_from([0.0, -1.0, 0.2])), max_size=2)
+    late_ns = draw(st.sampled_from([0, 0, seconds(-1), seconds(0.05), 1]))
+    return TrajectoryGoal(draw(trajectories()), draw(asked), draw(asked), late_ns)
+
+
+@st.composite
+def parameter_sets(draw: st.DrawFn) -> ControllerParameters:
+    limits = {joint: JointConstraints(draw(st.sampled_from([0.0, 0.0, 0.0, 0.3])), draw(tolerance)) for joint in JOINTS}
+    return ControllerParameters(
+        JOINTS,
+        state_interfaces=draw(st.sampled_from([("position",), ("position", "velocity")])),
+        allow_partial_joints_goal=True,
+        allow_nonzero_velocity_at_trajectory_end=True,
+        interpolation_method=draw(st.sampled_from(["splines", "splines", "none"])),
+        constraints=Constraints(goal_time=draw(st.sampled_from([0.0, 0.1])), joints=limits),
+    )
+
+
+requests = st.one_of(goals(), trajectories(), st.just("cancel"), st.just("reset"))
+schedules = st.dictionaries(st.integers(0, UPDATES - 1), requests, max_size=3)
+
+
+class Side:
+    """One controller with its plant; `advance` makes updates, singly or many at once."""
+
+    def __init__(self, parameters: ControllerParameters, kind: str) -> None:
+        self.bench = Bench(parameters, Plant(kind, velocity=0.5))
+        self.commands: list[np.ndarray] = []
+
+    def ask(self, request: object, goal_id: int) -> None:
+        controller, now_ns = self.bench.controller, self.bench.now_ns
+        if isinstance(request, TrajectoryGoal):
+            controller.submit(goal_id, request, now_ns)
+        elif isinstance(request, Trajectory):
+            controller.replace(request, now_ns)
+        elif request == "cancel":
+            controller.cancel(controller.goal_id)
+        else:
+            controller.reset(now_ns, self.bench.plant.measured())
+
+    def step(self) -> None:
+        self.bench.step()
+        self.commands.append(self.bench.commands[self.bench.k])
+
+    def take(self, n_updates: int) -> None:
+        rows = self.bench.controller.take(n_updates)
+        assert rows.shape == (n_updates, 3)
+        for row in rows:
+            measured = self.bench.plant.measured()
+            self.bench.plant.apply(row)
+            self.commands.append(np.array(row))
+        self.bench.controller.observe(measured)
+        self.bench.now_ns += n_updates * PERIOD_NS
+        self.bench.k += n_updates
+        assert self.bench.controller.pop_results() == ()
+
+    def outcome(self) -> dict[str, object]:
+        controller = self.bench.controller
+        now_ns = self.bench.now_ns
+        queries = [controller.query(now_ns + offset) for offset in (-PERIOD_NS, 0, 1, 77 * PERIOD_NS)]
+        return plain((controller.state(), controller.command, controller.goal_id, self.bench.results, queries))
+
+
+def plain(value: object) -> object:
+    """Nested lists, so that whole states can be compared at once."""
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if dataclasses.is_dataclass(value):
+        return [plain(getattr(value, field.name)) for field in dataclasses.fields(value)]
+    if isinstance(value, (list, tuple)):
+        return [plain(item) for item in value]
+    return value
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    parameters=parameter_sets(),
+    kind=st.sampled_from(["ideal", "frozen", "offset", "lag"]),
+    schedule=schedules,
+    chunks=st.lists(st.integers(1, 60), min_size=1, max_size=6),
+)
+def test_many_updates_at_once_equal_single_updates(parameters, kind, schedule, chunks) -> None:
+    single, bulk = Side(parameters, kind), Side(parameters, kind)
+    for k in range(UPDATES):
+        if k in schedule:
+            single.ask(schedule[k], k)
+            single.bench.collect()
+        single.step()
+    k, turn = 0, 0
+    while k < UPDATES:
+        if k in schedule:
+            bulk.ask(schedule[k], k)
+            bulk.bench.collect()
+        next_request = min([at for at in schedule if at > k], default=UPDATES)
+        n_updates = min(bulk.bench.controller.next_decision(), chunks[turn % len(chunks)], next_request - k)
+        if n_updates:
+            bulk.take(n_updates)
+        else:
+            bulk.step()
+        k, turn = k + max(1, n_updates), turn + 1
+    assert np.array_equal(single.commands, bulk.commands)
+    assert single.outcome() == bulk.outcome()
+
+
+def test_only_the_first_update_and_those_at_the_end_of_a_goal_need_a_look() -> None:
+    bench = Bench(TALOS)
+    assert bench.controller.next_decision() == sys.maxsize
+    bench.send(goal(to(1.0, 2.1)))
+    assert bench.controller.next_decision() == 0
+    bench.step()
+    assert bench.controller.next_decision() == 98
+    assert bench.controller.take(98)[[0, 97], 0] == pytest.approx([1.12, 2.09])
+    assert bench.controller.next_decision() == 0
+    bench.plant.position = bench.controller.command
+    bench.step()
+    assert [result.status for _, result in bench.results] == [4]
+    assert bench.controller.next_decision() == sys.maxsize
+
+
+def test_path_tolerances_need_a_look_in_every_update() -> None:
+    bench = Bench(constrained(trajectory=0.5))
+    bench.send(goal(to(1.0, 2.1)))
+    for _ in range(100):
+        assert bench.controller.next_decision() == 0
+        bench.step()
+    assert bench.controller.next_decision() == sys.maxsize
+
+
+def test_trajectories_from_the_topic_need_a_look_once_they_are_late() -> None:
+    bench = Bench(TALOS)
+    bench.controller.replace(goal(to(1.0, 2.1)).trajectory, bench.now_ns)
+    bench.step()
+    assert bench.controller.next_decision() == 160
+    bench.controller.take(160)
+    assert bench.controller.next_decision() == 0
+
+
+def test_an_idle_controller_repeats_one_row() -> None:
+    commands = Bench().controller.take(1_000_000)
+    assert commands.shape == (1_000_000, 3)
+    assert commands.strides[0] == 0
+
+
+def test_a_trajectory_of_years_is_computed_in_parts() -> None:
+    bench = Bench()
+    bench.send(goal(to(1.5e9, 2.1)))
+    bench.step()
+    commands = np.vstack([bench.controller.take(n) for n in (4000, 4000, 1)])
+    assert commands[-1][0] == pytest.approx(1.1 + 8002 * 0.01 / 1.5e9, abs=1e-15)
+
+
+def test_more_updates_than_allowed_cannot_be_taken() -> None:
+    bench = Bench()
+    bench.send(goal(to(1.0, 2.1)))
+    with pytest.raises(ValueError, match="c: cannot take 1 updates; expected 0 to 0"):
+        bench.controller.take(1)
+    assert bench.controller.take(0).shape == (0, 3)
+    bench.step()
+    with pytest.raises(ValueError, match="c: cannot take -1 updates; expected 0 to 98"):
+        bench.controller.take(-1)
+
+
+def test_the_measured_state_is_unknown_between_take_and_observe() -> None:
+    bench = Bench()
+    bench.send(goal(to(1.0, 2.1)))
+    bench.step()
+    bench.controller.take(10)
+    for call in (lambda: bench.controller.cancel("A"), bench.controller.state, lambda: bench.controller.query(0)):
+        with pytest.raises(ValueError, match="c: the measured state is unknown; call observe after take"):
+            call()
+    bench.controller.observe(JointState(np.array((1.21, 2.1, 3.1)), np.zeros(3)))
+    assert bench.controller.state().actual.positions[0] == 1.21
+    assert bench.controller.cancel("A")
+    assert bench.controller.take(5)[:, 0] == pytest.approx(1.21)
+
+
+def test_what_is_measured_or_commanded_cannot_be_changed_from_outside() -> None:
+    bench = Bench()
+    with pytest.raises(ValueError, match="read-only"):
+        bench.controller.command[0] = 9.0
+    position = np.array((1.1, 2.1, 3.1))
+    command = bench.controller.update(bench.now_ns, PERIOD_NS, JointState(position, np.zeros(3)))
+    position[0] = 9.0
+    assert bench.controller.state().actual.positions[0] == 1.1
+    with pytest.raises(ValueError, match="read-only"):
+        command[0] = 9.0
+
+
+def test_cancel_tells_whether_the_goal_was_being_executed() -> None:
+    bench = Bench()
+    bench.send(goal(to(0.0, 2.1)), "A")
+    assert not bench.controller.cancel("B")
+    assert bench.controller.cancel("A")
+    assert not bench.controller.cancel("A")
+    assert not bench.controller.cancel(None)
+
+
+def test_joint_order_of_a_goal_does_not_matter() -> None:
+    ordered, shuffled = Bench(), Bench()
+    ordered.send(TrajectoryGoal(Trajectory(JOINTS, [TrajectoryPoint(seconds(0.5), (1, 2, 3), (0, 0, 0), (1, 2, 3))])))
+    names = ("j3", "j1", "j2")
+    shuffled.send(TrajectoryGoal(Trajectory(names, [TrajectoryPoint(seconds(0.5), (3, 1, 2), (0, 0, 0), (3, 1, 2))])))
+    ordered.step(60)
+    shuffled.step(60)
+    assert all(np.array_equal(ordered.commands[k], shuffled.commands[k]) for k in range(1, 61))
+
+
+def test_misuse_is_told() -> None:
+    with pytest.raises(ValueError, match="c: period_ns must be above 0, got 0"):
+        JointTrajectoryController("c", SHIPPED, period_ns=0)
+    controller = JointTrajectoryController("c", SHIPPED, period_ns=PERIOD_NS)
+    measured = JointState(np.zeros(3), np.zeros(3))
+    with pytest.raises(ValueError, match="c: the controller is not active"):
+        controller.update(0, PERIOD_NS, measured)
+    with pytest.raises(ValueError, match=r"c: measured shape \(2,\); expected \(3,\)"):
+        controller.activate(0, JointState(np.zeros(3), np.zeros(2)))
+    with pytest.raises(ValueError, match=r"c: measured shape \(\); expected \(3,\)"):
+        controller.activate(0, JointState(np.zeros(3)))
+    assert not controller.active
+    controller.activate(0, measured)
+    with pytest.raises(ValueError, match="c: there was no update yet"):
+        controller.state()
+    with pytest.raises(ValueError, match="c: cannot be activated, it is active"):
+        controller.activate(0, measured)
+    with pytest.raises(ValueError, match="c: parameter interpolation_method is read-only"):
+        controller.parameters = dataclasses.replace(SHIPPED, interpolation_method="none")
+
+
+def test_refusals_and_stops_are_logged(caplog: pytest.LogCaptureFixture) -> None:
+    bench = Bench(constrained(trajectory=0.1), Plant("frozen"))
+    bench.send(goal())
+    bench.controller.replace(goal(to(1.0, 2.1)).trajectory, bench.now_ns)
+    bench.step(20)
+    refused, stopped = (record.getMessage() for record in caplog.records)
+    assert refused.startswith("c: Empty trajectory received.")
+    assert stopped.startswith("c: Aborted due to path tolerance violation: joint j1")

@@ -1,0 +1,80 @@
+"""Tolerances of goals, as upstream resolves them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from throwcollect.control.goal import JointTolerance, Trajectory, TrajectoryGoal
+from throwcollect.control.parameters import Constraints, JointConstraints
+from throwcollect.control.tolerances import Tolerances, default_tolerances, goal_tolerances, violations
+
+from .bench import JOINTS, seconds
+
+LIMITS = JointConstraints(trajectory=0.1, goal=0.1)
+DEFAULTS = default_tolerances(Constraints(goal_time=0.1, joints=dict.fromkeys(JOINTS, LIMITS)), JOINTS)
+
+
+def resolved(path=(), goal=(), late_ns: int = 0) -> tuple[list[float], list[float], int]:
+    tolerances = goal_tolerances(TrajectoryGoal(Trajectory((), ()), path, goal, late_ns), DEFAULTS, JOINTS, "c")
+    return tolerances.path.tolist(), tolerances.goal.tolist(), tolerances.goal_time_ns
+
+
+UNCHANGED = ([0.1, 0.1, 0.1], [0.1, 0.1, 0.1], seconds(0.1))
+
+
+def test_a_goal_without_tolerances_has_the_defaults() -> None:
+    assert resolved() == UNCHANGED
+
+
+def test_positive_numbers_replace_in_any_order_of_joints() -> None:
+    path = [JointTolerance("j3", 0.4), JointTolerance("j1", 0.2), JointTolerance("j2", 0.3)]
+    goal = [JointTolerance("j2", 2.1, 0.5, 0.5), JointTolerance("j1", 1.1)]
+    assert resolved(path, goal, seconds(2)) == ([0.2, 0.3, 0.4], [1.1, 2.1, 0.1], seconds(2))
+
+
+def test_minus_one_switches_off() -> None:
+    off = [JointTolerance(joint, -1.0, -1.0, -1.0) for joint in JOINTS]
+    assert resolved(off, off, seconds(-1)) == ([0, 0, 0], [0, 0, 0], 0)
+    assert resolved([JointTolerance("j1", -1.0 + 1e-8)]) == ([0, 0.1, 0.1], *UNCHANGED[1:])
+
+
+ILLEGAL = [
+    ((), (), seconds(-123)),
+    ([JointTolerance("j1", 0.5), JointTolerance("j2", -123)], (), 0),
+    ([JointTolerance("j1", 0.5, -123)], (), seconds(2)),
+    ([JointTolerance("j1", 0.5, 0, -123)], (), 0),
+    ((), [JointTolerance("j1", 0.5), JointTolerance("j2", -1.1)], 0),
+    ((), [JointTolerance("j1", 0.5), JointTolerance("joint123")], seconds(2)),
+    ([JointTolerance("joint123", 0.5)], [JointTolerance("j1", 0.5)], 0),
+]
+
+
+@pytest.mark.parametrize(("path", "goal", "late_ns"), ILLEGAL)
+def test_one_illegal_number_or_joint_brings_all_defaults_back(path, goal, late_ns, caplog) -> None:
+    assert resolved(path, goal, late_ns) == UNCHANGED
+    (record,) = caplog.records
+    assert record.getMessage().startswith("c: ")
+    assert record.getMessage().endswith("Using default tolerances.")
+
+
+def test_joints_without_constraints_are_not_checked() -> None:
+    tolerances = default_tolerances(Constraints(joints={"j2": JointConstraints(goal=0.5)}), JOINTS)
+    assert (tolerances.checks_path, tolerances.checks_goal) == (False, True)
+    assert tolerances.goal.tolist() == [0, 0.5, 0]
+
+
+def test_an_error_equal_to_the_tolerance_is_within_it() -> None:
+    error = np.array((0.5, -0.5000001, 7.0))
+    assert violations(error, np.array((0.5, 0.5, 0.0)), JOINTS) == (
+        "joint j2 has position error -0.500000 rad, tolerance 0.500000 rad"
+    )
+    assert violations(error, Tolerances(np.ones(3), np.full(3, 8.0), 0).goal, JOINTS) == ""
+
+
+def test_all_joints_outside_are_named() -> None:
+    text = violations(np.array((1.0, 0.0, -2.0)), np.full(3, 0.25), JOINTS)
+    assert text == (
+        "joint j1 has position error 1.000000 rad, tolerance 0.250000 rad; "
+        "joint j3 has position error -2.000000 rad, tolerance 0.250000 rad"
+    )
