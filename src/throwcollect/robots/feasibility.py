@@ -1,0 +1,177 @@
+"""Whether Talos can follow a joint trajectory: position, velocity and effort limits, and collisions with itself."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pinocchio
+from numpy.typing import NDArray
+
+from throwcollect.config.schema import Config, ToolConfig
+from throwcollect.errors import ConfigError
+from throwcollect.robots.clearance import GRIPPER, MARGIN_M, Clearance, spoon_mount
+from throwcollect.robots.description import locked_joints, start_posture
+from throwcollect.robots.interpolation import sample_quintic
+from throwcollect.robots.model import joint_limits, urdf_path
+from throwcollect.robots.spoon import ball_seat, inertia
+from throwcollect.robots.talos import JOINTS
+from throwcollect.robots.trajectory import JointTrajectory
+
+_CHECKED_HZ = 100
+_CHECKED_LEAST = 100
+_CLEARANCE_STEP_RAD = 0.02
+_POSITION_SLACK_RAD = 1e-6
+
+Motion = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
+
+
+class Feasibility:
+    """Checks joint trajectories against the limits of Talos.
+
+    One object serves all trials of a collection: what a trial changes (posture, masses, gravity, limits) is set per
+    check, and only other dimensions of the spoon cost the time to rebuild its shapes.
+
+    Args:
+        config: Configuration of the collection.
+
+    Raises:
+        ConfigError: If Talos' files cannot be read.
+    """
+
+    def __init__(self, config: Config) -> None:
+        try:
+            self._model = pinocchio.buildModelFromUrdf(str(urdf_path()))
+        except (ValueError, RuntimeError) as error:
+            raise ConfigError(f"{urdf_path()}: cannot be read as robot description: {error}") from error
+        self._data = self._model.createData()
+        self._columns = np.array([self._model.idx_qs[self._model.getJointId(joint)] for joint in JOINTS])
+        gripper = self._model.frames[self._model.getFrameId(GRIPPER, pinocchio.BODY)]
+        self._hand = gripper.parentJoint
+        self._gripper_placement = gripper.placement
+        self._bare_hand = self._model.inertias[self._hand].copy()
+        self._limits = joint_limits()
+        self._tool = config.tool
+        self._clearance = Clearance(self._model, config.tool)
+
+    def check(self, config: Config, trajectory: JointTrajectory) -> str | None:
+        """Reason why the robot cannot follow a trajectory, if there is one.
+
+        The curve between the points is checked at 100 Hz and at 100 instants at least, for collisions whenever a joint
+        has gone on by 0.02 rad. Joints that the trajectory does not move rest at the trial's start posture. Torques are
+        those of inverse dynamics plus viscous friction; the spoon and the ball count as part of the hand throughout,
+        also after the ball has left. The effort of locked joints is not limited, as they are simulated as rigid.
+        Collisions are those of the robot and the spoon; what the ball hits is for the judge of the throw.
+
+        Args:
+            config: Configuration of the trial.
+            trajectory: Its joint trajectory.
+
+        Returns:
+            None if it is feasible, else one sentence with joint or links, instant, value and limit: of the first kind
+            that is violated, in the order position, velocity, effort, collision. Of limits, it tells the worst
+            violation; of collisions, the first.
+
+        Raises:
+            ConfigError: If the posture or the choice of locked joints is wrong, or the ball does not fit the spoon.
+        """
+        posture = np.array(list(start_posture(config).values()))
+        locked = locked_joints(config)
+        instants = max(_CHECKED_LEAST, math.ceil(trajectory.times[-1] * _CHECKED_HZ)) + 1
+        times = np.linspace(0.0, trajectory.times[-1], instants)
+        motion = _whole_body(trajectory, times, posture)
+        positions, velocities, _ = motion
+        limits = self._limits
+        middle, half = (limits.upper + limits.lower) / 2, (limits.upper - limits.lower) / 2
+        if worst := _worst(positions - middle, half + _POSITION_SLACK_RAD):
+            row, joint = worst
+            side, limit = ("upper", limits.upper) if positions[worst] > middle[joint] else ("lower", limits.lower)
+            return (
+                f"{JOINTS[joint]} is at {positions[worst]:.4g} rad at {times[row]:.3f} s; "
+                f"its {side} limit is {limit[joint]:.4g} rad"
+            )
+        if worst := _worst(velocities, limits.velocity):
+            row, joint = worst
+            return (
+                f"{JOINTS[joint]} moves at {abs(velocities[worst]):.4g} rad/s at {times[row]:.3f} s; "
+                f"its limit is {limits.velocity[joint]:.4g} rad/s"
+            )
+        efforts = self.efforts(config, motion)
+        limit = limits.effort * np.where([joint in locked for joint in JOINTS], np.inf, config.robot.effort_scale)
+        if worst := _worst(efforts, limit):
+            row, joint = worst
+            return (
+                f"{JOINTS[joint]} needs {abs(efforts[worst]):.4g} Nm at {times[row]:.3f} s; "
+                f"its limit is {limit[joint]:.4g} Nm"
+            )
+        rows = _spread(positions)
+        if approach := self._clearance_of(config.tool).first_approach(self._model_order(positions[rows])):
+            return (
+                f"{' and '.join(approach.links)} {_gap(approach.distance_m)} at {times[rows[approach.index]]:.3f} s; "
+                f"they must stay {MARGIN_M * 1000:.3g} mm apart"
+            )
+        return None
+
+    def efforts(self, config: Config, motion: Motion) -> NDArray[np.float64]:
+        """Torques that a motion needs, with spoon and ball in the hand.
+
+        Args:
+            config: Configuration of the trial.
+            motion: Positions [rad], velocities [rad/s] and accelerations [rad/s²], each of shape ``(n, 32)`` in the
+                order of `talos.JOINTS`.
+
+        Returns:
+            [Nm], shape ``(n, 32)``, in the order of `talos.JOINTS`.
+
+        Raises:
+            ConfigError: If the ball does not fit the spoon.
+        """
+        seat = np.array(ball_seat(config.tool, config.ball.radius_m))
+        ball = pinocchio.Inertia.FromSphere(config.ball.mass_kg, config.ball.radius_m)
+        load = inertia(config.tool) + pinocchio.SE3(np.eye(3), seat).act(ball)
+        placement = self._gripper_placement * spoon_mount(config.tool)
+        self._model.inertias[self._hand] = self._bare_hand + placement.act(load)
+        self._model.gravity.linear = np.array([0.0, 0.0, -config.scene.gravity_mps2])
+        rows = zip(*map(self._model_order, motion), strict=True)
+        torques = np.array([pinocchio.rnea(self._model, self._data, *row) for row in rows])
+        needed: NDArray[np.float64] = torques[:, self._columns] + self._limits.damping * motion[1]
+        return needed
+
+    def _clearance_of(self, tool: ToolConfig) -> Clearance:
+        if tool != self._tool:
+            self._clearance = Clearance(self._model, tool)
+            self._tool = tool
+        return self._clearance
+
+    def _model_order(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        ordered = np.empty_like(values)
+        ordered[:, self._columns] = values
+        return ordered
+
+
+def _whole_body(trajectory: JointTrajectory, times: NDArray[np.float64], posture: NDArray[np.float64]) -> Motion:
+    """Motion of all joints, each array of shape ``(n, 32)``, in the order of `talos.JOINTS`."""
+    columns = [JOINTS.index(joint) for joint in trajectory.joints]
+    whole = tuple(np.tile(rest, (len(times), 1)) for rest in (posture, np.zeros_like(posture), np.zeros_like(posture)))
+    for array, sampled in zip(whole, sample_quintic(trajectory, times), strict=True):
+        array[:, columns] = sampled
+    return whole[0], whole[1], whole[2]
+
+
+def _spread(positions: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Rows between which some joint has moved by at least `_CLEARANCE_STEP_RAD`, with the first and the last row."""
+    travel = np.cumsum(np.abs(np.diff(positions, axis=0)).max(axis=1))
+    passed = np.diff(np.floor(travel / _CLEARANCE_STEP_RAD), prepend=0.0) > 0
+    passed[-1] = True
+    return np.append(0, np.flatnonzero(passed) + 1)
+
+
+def _worst(values: NDArray[np.float64], limits: NDArray[np.float64]) -> tuple[int, int] | None:
+    """Row and column of the largest magnitude over its limit; None when no limit is exceeded."""
+    shares = np.abs(values) / limits
+    row, column = np.unravel_index(int(np.argmax(shares)), shares.shape)
+    return (int(row), int(column)) if shares[row, column] > 1 else None
+
+
+def _gap(distance_m: float) -> str:
+    return "overlap" if distance_m < 0 else f"are {distance_m * 1000:.1f} mm apart"

@@ -1,0 +1,174 @@
+"""What is in a Bullet world, and how it is set up: ground, robot with spoon, ball.
+
+Only the ball collides, with everything. Talos' shapes overlap each other at rest, and with fewer pairs the order in
+which Bullet solves contacts cannot come to depend on what happened before.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import pybullet
+
+from throwcollect.config.schema import Config
+from throwcollect.errors import ConfigError, WorkerError
+from throwcollect.robots.description import SPOON, Description
+from throwcollect.sim.contacts import Surface
+
+BASE = -1
+"""Link number of the first link of a body."""
+
+_GROUND_GROUP, _ROBOT_GROUP, _BALL_GROUP = 1, 2, 4
+
+
+@dataclass(frozen=True)
+class Scenery:
+    """What stays the same from trial to trial: ground and robot.
+
+    Attributes:
+        robot: Body number of the robot.
+        joints: Joint numbers of the moving joints, in the order of the description.
+        spoon: Link number of the spoon.
+        names: Name of each surface that can press on the ball: ``ground``, ``spoon`` or a link of the robot.
+    """
+
+    robot: int
+    joints: list[int]
+    spoon: int
+    names: Mapping[Surface, str]
+
+
+def connect() -> int:
+    """Start an empty world in this process.
+
+    Returns:
+        Number of the physics client.
+
+    Raises:
+        WorkerError: If Bullet refuses, as it does when one process has very many worlds.
+    """
+    client = int(pybullet.connect(pybullet.DIRECT))
+    if client < 0:
+        raise WorkerError("Bullet could not start a physics world", hint="close other worlds of this process")
+    return client
+
+
+def load_scenery(client: int, description: Description, *, base_height: float, solid_ground: bool) -> Scenery:
+    """Empty the world and load ground and robot into it.
+
+    Args:
+        client: Physics client.
+        description: The robot.
+        base_height: Height of its fixed base [m].
+        solid_ground: Whether the ground stops the ball.
+
+    Raises:
+        ConfigError: If Bullet cannot load the description.
+    """
+    pybullet.resetSimulation(physicsClientId=client)
+    plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, planeNormal=[0, 0, 1], physicsClientId=client)
+    ground = pybullet.createMultiBody(0, plane, physicsClientId=client)
+    robot = _load_robot(client, description.urdf, base_height)
+    links = range(BASE, pybullet.getNumJoints(robot, physicsClientId=client))
+    root = pybullet.getBodyInfo(robot, physicsClientId=client)[0].decode()
+    joints = {}
+    names = {(ground, BASE): "ground", (robot, BASE): root}
+    for number in links[1:]:
+        info = pybullet.getJointInfo(robot, number, physicsClientId=client)
+        joints[info[1].decode()] = number
+        names[robot, number] = info[12].decode()
+    spoon = next(link for (_, link), name in names.items() if name == SPOON)
+    names[robot, spoon] = "spoon"
+    for body, link in names:
+        group, mask = (_GROUND_GROUP, _BALL_GROUP * solid_ground) if body == ground else (_ROBOT_GROUP, _BALL_GROUP)
+        pybullet.setCollisionFilterGroupMask(body, link, group, mask, physicsClientId=client)
+    return Scenery(
+        robot=robot, joints=[joints[joint] for joint in description.moving], spoon=spoon, names=MappingProxyType(names)
+    )
+
+
+def _load_robot(client: int, urdf: str, base_height: float) -> int:
+    with tempfile.NamedTemporaryFile("w", prefix="throwcollect-", suffix=".urdf", encoding="utf-8") as file:
+        file.write(urdf)
+        file.flush()
+        try:
+            return int(
+                pybullet.loadURDF(
+                    file.name,
+                    basePosition=[0, 0, base_height],
+                    useFixedBase=True,
+                    flags=pybullet.URDF_USE_INERTIA_FROM_FILE,
+                    physicsClientId=client,
+                )
+            )
+        except pybullet.error as error:
+            raise ConfigError(f"Bullet cannot load the robot's description: {error}") from error
+
+
+def load_ball(client: int, radius: float) -> int:
+    """Put a ball into the world, out of the way.
+
+    Args:
+        client: Physics client.
+        radius: Its radius [m]; it cannot be changed later.
+
+    Returns:
+        Its body number.
+    """
+    sphere = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=radius, physicsClientId=client)
+    ball = int(pybullet.createMultiBody(1, sphere, basePosition=[0, 0, 100], physicsClientId=client))
+    renew_pairs(client, ball)
+    return ball
+
+
+def renew_pairs(client: int, ball: int) -> None:
+    """Let the ball collide with everything, and forget all contacts that it had.
+
+    Args:
+        client: Physics client.
+        ball: Body number of the ball.
+    """
+    pybullet.setCollisionFilterGroupMask(ball, BASE, _BALL_GROUP, _GROUND_GROUP | _ROBOT_GROUP, physicsClientId=client)
+
+
+def set_physics(client: int, scenery: Scenery, ball: int, config: Config) -> None:
+    """Set time step, solver, gravity, masses and surfaces; all of them, so that nothing of the trial before remains.
+
+    Args:
+        client: Physics client.
+        scenery: Ground and robot.
+        ball: Body number of the ball.
+        config: Of it, ``ball``, ``scene`` and ``sim`` matter.
+    """
+    pybullet.setPhysicsEngineParameter(
+        fixedTimeStep=1 / config.sim.physics_hz,
+        numSolverIterations=config.sim.solver_iterations,
+        enableConeFriction=0,
+        deterministicOverlappingPairs=1,
+        physicsClientId=client,
+    )
+    pybullet.setGravity(0, 0, -config.scene.gravity_mps2, physicsClientId=client)
+    # Bullet's default damping of 0.04/s is no physics and would shorten a throw by 6 cm.
+    undamped = {"linearDamping": 0, "angularDamping": 0}
+    pybullet.changeDynamics(
+        ball,
+        BASE,
+        mass=config.ball.mass_kg,
+        lateralFriction=config.ball.friction,
+        restitution=config.ball.restitution,
+        physicsClientId=client,
+        **undamped,
+    )
+    for body, link in scenery.names:
+        # Bullet multiplies restitutions, so the ball's alone decides.
+        pybullet.changeDynamics(
+            body,
+            link,
+            lateralFriction=config.scene.spoon_friction,
+            restitution=1,
+            physicsClientId=client,
+            **undamped,
+        )

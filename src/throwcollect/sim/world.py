@@ -1,0 +1,298 @@
+"""The physics of a trial: one robot with a spoon, one ball, from the start state to the end."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+import pybullet
+
+from throwcollect.config.schema import Config
+from throwcollect.episode.record import Contact, Samples
+from throwcollect.robots.description import locked_joints, physics_description, start_posture
+from throwcollect.robots.spoon import ball_seat
+from throwcollect.sim.bullet import BASE, connect, load_ball, load_scenery, renew_pairs, set_physics
+from throwcollect.sim.contacts import ContactLog, Surface
+from throwcollect.sim.motors import Motors
+from throwcollect.sim.recording import BallState, Row, to_samples
+
+_NS_PER_S = 1_000_000_000
+_REST_S = 0.5
+_REST_SPEED = 0.01
+
+
+class World:
+    """One Bullet world in this process, used for one trial after the other.
+
+    `reset` puts it into the start state of a trial, which is a pure function of the trial's configuration, bit for bit.
+    `run` then takes physics steps until the trial ends:
+
+    - ``landed``: the ball's lowest point has crossed the landing plane downwards, out of the spoon;
+    - ``rest``: the arm has moved and stands still, and the ball has been lying on something for half a second;
+    - ``timeout``: the longest duration is over.
+
+    A trial ends with a sample, so that the recorded samples enclose the crossing. On a landing plane at height zero the
+    trial ends before the ground could stop the ball; the ground is there for planes above it.
+
+    Args:
+        config: Configuration of the first trial.
+
+    Raises:
+        ConfigError: If the configuration does not describe a world (see `reset`).
+        WorkerError: If Bullet refuses to start another world in this process.
+    """
+
+    _ball: int
+    _settled: Row
+    _settled_pressing: frozenset[Surface]
+
+    def __init__(self, config: Config) -> None:
+        self._client = connect()
+        self._scenery_key: object = None
+        self._start_key: object = None
+        self._radius = math.nan
+        self.reset(config)
+
+    def close(self) -> None:
+        """Free the world; it cannot be used afterwards."""
+        pybullet.disconnect(self._client)
+
+    @property
+    def moving(self) -> tuple[str, ...]:
+        """Names of the joints that are simulated and commanded, in the order of `talos.JOINTS`."""
+        return self._moving
+
+    @property
+    def stamp_ns(self) -> int:
+        """Simulated time now [ns]."""
+        return self._stamp_ns(self._steps)
+
+    @property
+    def steps(self) -> int:
+        """Number of physics steps taken in this trial."""
+        return self._steps
+
+    @property
+    def recorded(self) -> int:
+        """Number of samples recorded in this trial, the start state included."""
+        return len(self._rows)
+
+    def reset(self, trial: Config, *, start_ns: int = 0) -> None:
+        """Put the world into the start state of a trial and record it as the first sample.
+
+        Cheap if the trial has the physics and the start posture of the one before; otherwise the ball settles anew,
+        and if the robot, its tool, or what is locked has changed, all is loaded anew.
+
+        Args:
+            trial: Configuration of the trial.
+            start_ns: Simulated time of the start state [ns].
+
+        Raises:
+            ConfigError: If the posture or the choice of locked joints is wrong, the ball falls through the spoon, or
+                the robot's files cannot be read.
+        """
+        key = (trial.robot, trial.tool, trial.ball, trial.scene, trial.sim, trial.task.start, tuple(trial.task.end))
+        if key != self._start_key:
+            self._start_key = None
+            self._load(trial)
+            self._settle(trial)
+            self._start_key = key
+        self._place(self._settled)
+        sim, ball = trial.sim, trial.ball
+        self._start_ns = start_ns
+        self._steps = 0
+        self._hz = sim.physics_hz
+        self._stride = sim.physics_hz // trial.record.rate_hz
+        self._last_step = math.ceil(sim.max_trial_s * sim.physics_hz)
+        self._landing_height = trial.scene.landing_height_m + ball.radius_m
+        self._drag = ball.drag_coefficient * trial.scene.air_density_kgpm3 * math.pi * ball.radius_m**2 / 2
+        self._motors = self._make_motors(trial)
+        self._contacts = ContactLog(self._scenery.names)
+        self._contacts.update(self._settled_pressing, 0)
+        self._record_start()
+        self._sampled_target = self._motors.target
+        self._has_moved = False
+        self._resting_since = 0
+        self._end_reason: str | None = None
+
+    @property
+    def end_reason(self) -> str | None:
+        """Why the trial ended: ``landed``, ``rest`` or ``timeout``; None while it goes on."""
+        return self._end_reason
+
+    def run(self, commands: Iterable[Sequence[float]], *, stop_at_end: bool = True) -> int:
+        """Take one physics step for each command, or fewer if the trial ends.
+
+        Args:
+            commands: For each step, the position of each moving joint wanted at its end [rad], as plain floats.
+            stop_at_end: Whether to take no more steps once the trial has ended.
+
+        Returns:
+            Number of steps taken.
+        """
+        first = self._steps
+        for command in commands:
+            if stop_at_end and self._end_reason is not None:
+                break
+            self._motors.follow(command)
+            if self._drag:
+                self._apply_drag()
+            pybullet.stepSimulation(physicsClientId=self._client)
+            self._steps += 1
+            self._contacts.update(self._pressing(), self._steps)
+            if self._steps % self._stride == 0:
+                self._rows.append(self._read())
+                self._end_reason = self._end_reason or self._judge()
+        return self._steps - first
+
+    def samples(self, first: int = 0, last: int | None = None) -> Samples:
+        """Recorded samples as arrays.
+
+        Args:
+            first: Number of the first sample.
+            last: Number after the last sample; None for all.
+        """
+        numbers = range(len(self._rows))[first:last]
+        stamps = np.array([self._stamp_ns(number * self._stride) for number in numbers], dtype=np.int64)
+        return to_samples(self._rows[first:last], stamps, self._moving, self._locked)
+
+    def contacts(self) -> tuple[Contact, ...]:
+        """All intervals in which something pressed on the ball, by start time."""
+        return self._contacts.intervals(self._stamp_ns)
+
+    def joint_positions(self) -> list[float]:
+        """Position of each moving joint now [rad]."""
+        return [state[0] for state in self._joint_states()]
+
+    @property
+    def ball(self) -> BallState:
+        """The ball now; when set before the first step, the start state is recorded anew."""
+        row = self._read()
+        return BallState(*row.pose, *row.twist)
+
+    @ball.setter
+    def ball(self, state: BallState) -> None:
+        pybullet.resetBasePositionAndOrientation(
+            self._ball, state.position, state.orientation_xyzw, physicsClientId=self._client
+        )
+        pybullet.resetBaseVelocity(
+            self._ball, state.linear_velocity, state.angular_velocity, physicsClientId=self._client
+        )
+        if self._steps == 0:
+            self._record_start()
+
+    def _load(self, trial: Config) -> None:
+        """Load what differs from the trial before in shape: ground, robot and ball, or the ball alone."""
+        solid_ground = trial.scene.landing_height_m > 0
+        key = (trial.robot.base_height_m, trial.tool, locked_joints(trial), solid_ground)
+        if key != self._scenery_key:
+            self._scenery_key = None
+            self._radius = math.nan
+            description = physics_description(trial)
+            self._scenery = load_scenery(
+                self._client, description, base_height=trial.robot.base_height_m, solid_ground=solid_ground
+            )
+            self._moving, self._locked = description.moving, description.locked
+            self._scenery_key = key
+        if self._radius != trial.ball.radius_m:
+            if not math.isnan(self._radius):
+                pybullet.removeBody(self._ball, physicsClientId=self._client)
+            self._ball = load_ball(self._client, trial.ball.radius_m)
+            self._radius = trial.ball.radius_m
+
+    def _settle(self, trial: Config) -> None:
+        """Find the state in which the ball has come to rest in the spoon of the still robot."""
+        client, scenery = self._client, self._scenery
+        seat = ball_seat(trial.tool, trial.ball.radius_m)
+        posture = start_posture(trial)
+        self._start = [posture[joint] for joint in self._moving]
+        set_physics(client, scenery, self._ball, trial)
+        for joint, angle in zip(scenery.joints, self._start, strict=True):
+            pybullet.resetJointState(scenery.robot, joint, angle, physicsClientId=client)
+        spoon = pybullet.getLinkState(
+            scenery.robot, scenery.spoon, computeForwardKinematics=True, physicsClientId=client
+        )
+        centre, _ = pybullet.multiplyTransforms(spoon[4], spoon[5], seat, [0, 0, 0, 1])
+        at_rest = BallState(position=centre)
+        self._place(
+            Row(
+                joints=[(angle, 0.0) for angle in self._start],
+                pose=(at_rest.position, at_rest.orientation_xyzw),
+                twist=(at_rest.linear_velocity, at_rest.angular_velocity),
+            )
+        )
+        motors = self._make_motors(trial)
+        # At least one step, as contact forces and motor torques are those of the last one.
+        for _ in range(max(1, round(trial.sim.settle_s * trial.sim.physics_hz))):
+            motors.follow(self._start)
+            pybullet.stepSimulation(physicsClientId=client)
+        self._settled = self._read()
+        self._settled_pressing = self._pressing()
+
+    def _place(self, row: Row) -> None:
+        """Put robot and ball into a state, leaving nothing behind of what went on before.
+
+        Bullet's own snapshots do not achieve that: they keep pairs of shapes that once came close, and with them the
+        order in which contacts are solved. `renew_pairs` forgets those.
+        """
+        for joint, state in zip(self._scenery.joints, row.joints, strict=True):
+            pybullet.resetJointState(self._scenery.robot, joint, state[0], state[1], physicsClientId=self._client)
+        renew_pairs(self._client, self._ball)
+        pybullet.resetBasePositionAndOrientation(self._ball, *row.pose, physicsClientId=self._client)
+        pybullet.resetBaseVelocity(self._ball, *row.twist, physicsClientId=self._client)
+
+    def _record_start(self) -> None:
+        # Contact forces and motor torques of the settled state: Bullet has none before the first step.
+        now = self._read()
+        self._rows = [now._replace(joints=self._settled.joints)]
+
+    def _make_motors(self, trial: Config) -> Motors:
+        scenery = self._scenery
+        return Motors(self._client, scenery.robot, scenery.joints, moving=self._moving, start=self._start, config=trial)
+
+    def _stamp_ns(self, step: int) -> int:
+        return self._start_ns + step * _NS_PER_S // self._hz
+
+    def _judge(self) -> str | None:
+        """Whether the trial ends with the sample just recorded, and why."""
+        before, now = self._rows[-2:]
+        has_contact = bool(self._contacts.bodies)
+        if now.pose[0][2] < self._landing_height <= before.pose[0][2] and "spoon" not in self._contacts.bodies:
+            return "landed"
+        stands_still = self._motors.target == self._sampled_target
+        self._sampled_target = self._motors.target
+        self._has_moved |= not stands_still
+        if not (has_contact and stands_still and self._has_moved and math.hypot(*now.twist[0]) < _REST_SPEED):
+            self._resting_since = self._steps
+        elif self._steps - self._resting_since >= _REST_S * self._hz:
+            return "rest"
+        return "timeout" if self._steps >= self._last_step else None
+
+    def _apply_drag(self) -> None:
+        position, _ = pybullet.getBasePositionAndOrientation(self._ball, physicsClientId=self._client)
+        velocity, _ = pybullet.getBaseVelocity(self._ball, physicsClientId=self._client)
+        factor = -self._drag * math.hypot(*velocity)
+        force = [factor * component for component in velocity]
+        pybullet.applyExternalForce(
+            self._ball, BASE, force, position, pybullet.WORLD_FRAME, physicsClientId=self._client
+        )
+
+    def _pressing(self) -> frozenset[Surface]:
+        # Bullet also lists points that are merely close; those have no normal force (field 9).
+        points = pybullet.getContactPoints(self._ball, physicsClientId=self._client)
+        return frozenset([(point[2], point[4]) for point in points if point[9] > 0])
+
+    def _joint_states(self) -> Sequence[tuple[Any, ...]]:
+        states: Sequence[tuple[Any, ...]] = pybullet.getJointStates(
+            self._scenery.robot, self._scenery.joints, physicsClientId=self._client
+        )
+        return states
+
+    def _read(self) -> Row:
+        return Row(
+            joints=self._joint_states(),
+            pose=pybullet.getBasePositionAndOrientation(self._ball, physicsClientId=self._client),
+            twist=pybullet.getBaseVelocity(self._ball, physicsClientId=self._client),
+        )

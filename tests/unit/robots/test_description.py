@@ -1,0 +1,147 @@
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import numpy as np
+import pinocchio
+import pytest
+
+from throwcollect.config.schema import Config, RobotConfig
+from throwcollect.errors import ConfigError
+from throwcollect.robots import description
+from throwcollect.robots.description import full_description, locked_joints, physics_description, start_posture
+from throwcollect.robots.model import half_sitting, share_directory
+from throwcollect.robots.talos import JOINTS
+
+CONFIG = Config()
+MOVED = tuple(CONFIG.task.end)
+
+
+def with_robot(**values):
+    return CONFIG.model_copy(update={"robot": RobotConfig.model_construct(**{**dict(CONFIG.robot), **values})})
+
+
+def configuration(model, posture):
+    q = pinocchio.neutral(model)
+    for name, angle in posture.items():
+        if model.existJointName(name):
+            q[model.idx_qs[model.getJointId(name)]] = angle
+    return q
+
+
+def collision_shapes(urdf, posture):
+    """Mesh names or primitive types with their places in the world, for a posture."""
+    model = pinocchio.buildModelFromXML(urdf)
+    geometry = pinocchio.buildGeomFromUrdfString(
+        model, urdf, pinocchio.GeometryType.COLLISION, package_dirs=[str(share_directory())]
+    )
+    data, places = model.createData(), geometry.createData()
+    pinocchio.updateGeometryPlacements(model, data, geometry, places, configuration(model, posture))
+    return sorted(
+        (Path(shape.meshPath).name, *np.round(place.translation, 9), *np.round(place.rotation.ravel(), 9))
+        for shape, place in zip(geometry.geometryObjects, places.oMg, strict=True)
+    )
+
+
+def test_the_same_configuration_gives_the_same_bytes():
+    assert physics_description(CONFIG) == physics_description(Config())
+    assert full_description(CONFIG) == full_description(Config())
+
+
+def test_by_default_what_the_task_does_not_move_is_locked():
+    made = physics_description(CONFIG)
+    assert made.moving == tuple(joint for joint in JOINTS if joint in MOVED)
+    assert set(made.locked) == set(JOINTS) - set(MOVED)
+    assert set(pinocchio.buildModelFromXML(made.urdf).names[1:]) == set(MOVED)
+
+
+def test_nothing_is_locked_on_demand():
+    made = physics_description(with_robot(locked="none"))
+    assert made.moving == JOINTS
+    assert made.locked == {}
+    assert set(pinocchio.buildModelFromXML(made.urdf).names[1:]) == set(JOINTS)
+
+
+def test_a_list_locks_just_these():
+    made = physics_description(with_robot(locked=["head_1_joint", "leg_left_4_joint"]))
+    assert list(made.locked) == ["leg_left_4_joint", "head_1_joint"]
+    assert len(made.moving) == 30
+
+
+def test_locking_a_joint_that_the_task_moves_is_refused():
+    with pytest.raises(ConfigError, match=r"arm_right_4_joint cannot be locked, as task\.end moves it"):
+        locked_joints(with_robot(locked=["head_1_joint", "arm_right_4_joint"]))
+
+
+def test_locking_a_joint_that_talos_lacks_is_refused():
+    with pytest.raises(ConfigError, match="Talos has no joint tail_joint"):
+        physics_description(with_robot(locked=["tail_joint"]))
+
+
+def test_the_task_decides_a_joints_start_before_the_posture_and_half_sitting():
+    posture = start_posture(with_robot(posture={"arm_right_4_joint": -1.0, "head_1_joint": 0.3}))
+    assert posture["arm_right_4_joint"] == CONFIG.task.start["arm_right_4_joint"]
+    assert posture["head_1_joint"] == 0.3
+    assert posture["leg_left_4_joint"] == half_sitting()["leg_left_4_joint"] != 0
+    assert tuple(posture) == JOINTS
+
+
+@pytest.mark.parametrize("text", ["<robot", "<robot name='talos'><link name='base_link'/></robot>"])
+def test_files_that_cannot_be_used_are_named(text, tmp_path, monkeypatch):
+    path = tmp_path / "broken.urdf"
+    path.write_text(text, encoding="utf-8")
+    monkeypatch.setattr(description, "urdf_path", lambda: path)
+    with pytest.raises(ConfigError, match=r"broken\.urdf: "):
+        physics_description(CONFIG)
+
+
+def test_the_full_description_holds_talos_and_the_spoon():
+    robot = ElementTree.fromstring(full_description(CONFIG))  # noqa: S314
+    assert {j.get("name") for j in robot.iter("joint") if j.get("type") == "revolute"} == set(JOINTS)
+    mount = robot.find("joint[@name='spoon_joint']")
+    assert mount.find("parent").get("link") == "gripper_right_base_link"
+    assert mount.find("child").get("link") == "spoon_link"
+    spoon = robot.find("link[@name='spoon_link']")
+    assert len(spoon.findall("collision")) == len(spoon.findall("visual")) == 1 + CONFIG.tool.cup_walls
+    assert all(mesh.get("filename").startswith("package://") for mesh in robot.iter("mesh"))
+
+
+@pytest.mark.parametrize("make", [full_description, lambda config: physics_description(config).urdf])
+def test_the_right_gripper_has_no_collision_shapes(make):
+    robot = ElementTree.fromstring(make(CONFIG))  # noqa: S314
+    gripper = [link for link in robot.iter("link") if link.get("name").startswith("gripper_right_")]
+    assert not any(link.findall("collision") for link in gripper)
+    left = [mesh.get("filename") for mesh in robot.iterfind("link/collision/geometry/mesh")]
+    assert any("gripper" in name for name in left)
+
+
+@pytest.mark.parametrize("locked", ["auto", "none", ["head_1_joint"]])
+def test_merging_keeps_the_dynamics_of_the_moving_joints(locked):
+    config = with_robot(locked=locked)
+    made = physics_description(config)
+    merged = pinocchio.buildModelFromXML(made.urdf)
+    full = pinocchio.buildModelFromXML(full_description(config))
+    random = np.random.default_rng(3)
+    for _ in range(5):
+        angles, speeds, accelerations = (
+            dict(zip(made.moving, random.uniform(-1, 1, len(made.moving)), strict=True)) for _ in range(3)
+        )
+        torques = [
+            dict(zip(model.names[1:], pinocchio.rnea(model, model.createData(), *arguments), strict=True))
+            for model in (merged, full)
+            for arguments in [
+                (
+                    configuration(model, {**made.locked, **angles}),
+                    configuration(model, speeds),
+                    configuration(model, accelerations),
+                )
+            ]
+        ]
+        for joint in made.moving:
+            assert torques[0][joint] == pytest.approx(torques[1][joint], abs=1e-9)
+
+
+def test_merging_keeps_every_collision_shape_in_its_place():
+    posture = start_posture(CONFIG)
+    assert collision_shapes(physics_description(CONFIG).urdf, posture) == collision_shapes(
+        full_description(CONFIG), posture
+    )
