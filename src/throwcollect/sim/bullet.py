@@ -83,7 +83,10 @@ def load_scenery(client: int, description: Description, *, base_height: float, s
     spoon = next(link for (_, link), name in names.items() if name == SPOON)
     names[robot, spoon] = "spoon"
     for body, link in names:
-        group, mask = (_GROUND_GROUP, _BALL_GROUP * solid_ground) if body == ground else (_ROBOT_GROUP, _BALL_GROUP)
+        group, mask = _ROBOT_GROUP, _BALL_GROUP
+        if body == ground:
+            # Without a group as well as without a mask: Bullet lets a pair collide if either side wants to.
+            group, mask = (_GROUND_GROUP, _BALL_GROUP) if solid_ground else (0, 0)
         pybullet.setCollisionFilterGroupMask(body, link, group, mask, physicsClientId=client)
     return Scenery(
         robot=robot, joints=[joints[joint] for joint in description.moving], spoon=spoon, names=MappingProxyType(names)

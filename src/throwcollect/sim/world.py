@@ -77,7 +77,7 @@ class World:
     @property
     def recorded(self) -> int:
         """Number of samples recorded in this trial, the start state included."""
-        return len(self._rows)
+        return self._forgotten + len(self._rows)
 
     def reset(self, trial: Config, *, start_ns: int = 0) -> None:
         """Put the world into the start state of a trial and record it as the first sample.
@@ -151,12 +151,18 @@ class World:
         """Recorded samples as arrays.
 
         Args:
-            first: Number of the first sample.
+            first: Number of the first sample; those that are forgotten are left out.
             last: Number after the last sample; None for all.
         """
-        numbers = range(len(self._rows))[first:last]
+        numbers = range(self.recorded)[max(first, self._forgotten) : last]
         stamps = np.array([self._stamp_ns(number * self._stride) for number in numbers], dtype=np.int64)
-        return to_samples(self._rows[first:last], stamps, self._moving, self._locked)
+        rows = self._rows[numbers.start - self._forgotten : numbers.stop - self._forgotten]
+        return to_samples(rows, stamps, self._moving, self._locked)
+
+    def forget_samples(self) -> None:
+        """Drop the recorded samples but the last two, so that a world can go on for ever; numbers go on counting."""
+        self._forgotten += len(self._rows[:-2])
+        self._rows = self._rows[-2:]
 
     def contacts(self) -> tuple[Contact, ...]:
         """All intervals in which something pressed on the ball, by start time."""
@@ -247,6 +253,7 @@ class World:
         # Contact forces and motor torques of the settled state: Bullet has none before the first step.
         now = self._read()
         self._rows = [now._replace(joints=self._settled.joints)]
+        self._forgotten = 0
 
     def _make_motors(self, trial: Config) -> Motors:
         scenery = self._scenery

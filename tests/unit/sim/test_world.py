@@ -114,6 +114,12 @@ def test_a_throw_ends_with_the_first_sample_below_the_landing_plane(world):
     assert world.run(motion(CONFIG, world.moving)) == 0
 
 
+def test_the_ground_does_not_touch_a_ball_that_lands_at_height_zero(world):
+    samples = throw(world)
+    assert [contact.body for contact in world.contacts()] == ["spoon"]
+    assert samples.ball_linear_velocity[-1, 0] == samples.ball_linear_velocity[-20, 0]
+
+
 def test_on_demand_steps_go_on_after_the_end(world):
     throw(world)
     assert world.run([motion(CONFIG, world.moving)[-1]] * 10, stop_at_end=False) == 10

@@ -1,0 +1,79 @@
+"""`throwcollect dataset ...`: what is in a dataset, and whether it is whole."""
+
+from __future__ import annotations
+
+import json as jsonlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import typer
+
+from throwcollect.dataset.inspect import digest, info
+from throwcollect.dataset.verify import verify
+from throwcollect.errors import DatasetError
+
+
+def show_info(directory: Path, *, json: bool) -> None:
+    """Print what a dataset holds.
+
+    Raises:
+        DatasetError: If the directory holds no finished dataset.
+    """
+    found = info(directory).as_dict()
+    typer.echo(jsonlib.dumps(found, indent=2) if json else describe(found), nl=json)
+
+
+def show_verification(directory: Path, *, json: bool) -> None:
+    """Print what is wrong with a dataset.
+
+    Raises:
+        DatasetError: If anything is, or the directory holds no finished dataset.
+    """
+    findings = verify(directory)
+    if json:
+        typer.echo(jsonlib.dumps([finding.as_dict() for finding in findings], indent=2))
+    else:
+        for finding in findings:
+            typer.echo(str(finding))
+    if findings:
+        raise DatasetError(f"{directory}: {len(findings)} finding{'s' if len(findings) > 1 else ''}")
+    if not json:
+        typer.echo(f"{directory}: nothing wrong")
+
+
+def show_digest(directory: Path) -> None:
+    """Print one hash over all episodes in trial order.
+
+    Raises:
+        DatasetError: If the directory holds no finished dataset, or an episode is damaged.
+    """
+    typer.echo(digest(directory))
+
+
+def describe(found: Mapping[str, Any]) -> str:
+    """Summary of a dataset in words, one fact a line.
+
+    Args:
+        found: `Info` as dictionary; `wall_s` [s] beside it is told, too.
+    """
+    outcomes = ", ".join(f"{count} {outcome}" for outcome, count in found["outcomes"].items())
+    lines = {
+        "trials": f"{found['trials']}: {outcomes}",
+        "landing": _landing(found["landing"]),
+        "episodes": f"{found['episodes']} with {found['samples']} samples, {found['duration_s']:.0f} s of simulated time",
+        "files": f"{found['shards']} MCAP, {found['recordings_bytes'] / 1e6:.1f} MB; all {found['size_bytes'] / 1e6:.1f} MB",
+        "topics": ", ".join(f"{topic} ({count})" for topic, count in found["topics"].items()),
+        "digest": found["digest"],
+    }
+    if "wall_s" in found:
+        lines["took"] = f"{found['wall_s']:.1f} s, {found['episodes'] / found['wall_s']:.1f} throws/s from start to end"
+    width = max(map(len, lines))
+    return "".join(f"{key:{width}}  {text}\n" for key, text in lines.items())
+
+
+def _landing(landing: Mapping[str, Any] | None) -> str:
+    if landing is None:
+        return "no ball landed"
+    x, y = landing["x_m"], landing["y_m"]
+    return f"x {x[0]:.3f} to {x[1]:.3f} m, y {y[0]:.3f} to {y[1]:.3f} m"

@@ -1,0 +1,107 @@
+"""What people see while a collection runs: a progress bar on a terminal, plain lines elsewhere."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Mapping
+from types import TracebackType
+from typing import Any, Protocol
+
+_LINE_EVERY_S = 2.0
+
+
+class Display(Protocol):
+    """Shows the progress of a run; a context manager."""
+
+    def __enter__(self) -> Display: ...
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None: ...
+
+    def update(self, progress: Mapping[str, Any]) -> None:
+        """Show a progress report of the coordinator."""
+
+    def say(self, line: str) -> None:
+        """Show a line that stays."""
+
+
+def display(*, quiet: bool) -> Display:
+    """The display that fits where standard error goes.
+
+    Args:
+        quiet: Show nothing but lines that are said.
+    """
+    if sys.stderr.isatty() and not quiet:
+        return _Bar()
+    return _Lines(quiet=quiet)
+
+
+def counts(progress: Mapping[str, Any]) -> str:
+    """Landed and failed throws, simulations and speed, in one line without markup."""
+    parts = [f"{progress['landed']} landed", f"{progress['failed']} failed"]
+    if progress["lost"]:
+        parts.append(f"{progress['lost']} lost")
+    alive = progress["simulations"]
+    parts.append(f"{alive} simulation{'' if alive == 1 else 's'}")
+    parts.append(f"{progress['throws_per_s']:.1f} throws/s")
+    return ", ".join(parts)
+
+
+class _Lines:
+    def __init__(self, *, quiet: bool) -> None:
+        self._quiet = quiet
+        self._next = 0.0
+
+    def __enter__(self) -> _Lines:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        pass
+
+    def update(self, progress: Mapping[str, Any]) -> None:
+        now = time.monotonic()
+        if self._quiet or (now < self._next and progress["ended"] < progress["total"]):
+            return
+        self._next = now + _LINE_EVERY_S
+        self.say(f"{progress['ended']}/{progress['total']} throws: {counts(progress)}")
+
+    def say(self, line: str) -> None:
+        print(line, file=sys.stderr, flush=True)
+
+
+class _Bar:
+    def __init__(self) -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+        self._progress = Progress(
+            TextColumn("throws"),
+            BarColumn(bar_width=24),
+            MofNCompleteColumn(),
+            TextColumn("{task.description}"),
+            TextColumn("ETA"),
+            TimeRemainingColumn(),
+            console=Console(stderr=True),
+        )
+        self._task = self._progress.add_task("waiting for simulations", total=None)
+
+    def __enter__(self) -> _Bar:
+        self._progress.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._progress.stop()
+
+    def update(self, progress: Mapping[str, Any]) -> None:
+        self._progress.update(
+            self._task, total=progress["total"], completed=progress["ended"], description=counts(progress)
+        )
+
+    def say(self, line: str) -> None:
+        self._progress.console.print(line, markup=False, highlight=False)

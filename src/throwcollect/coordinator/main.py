@@ -1,0 +1,54 @@
+"""The coordinator's process."""
+
+from __future__ import annotations
+
+import signal
+import time
+from pathlib import Path
+from types import FrameType
+
+from throwcollect import ros
+from throwcollect.coordinator.node import Coordinator
+from throwcollect.dataset.writer import DatasetWriter
+from throwcollect.errors import Interrupted
+
+_IDLE_S = 0.05
+
+
+def run(directory: Path) -> None:
+    """Collect every trial of the plan in `directory`, and finish the dataset.
+
+    SIGINT and SIGTERM drain: running trials are finished and written, no new one is started.
+
+    Args:
+        directory: Directory of the dataset, as `prepare` left it.
+
+    Raises:
+        DatasetError: If the directory holds no plan, or cannot be written.
+        Interrupted: If a signal ended the collection before its last trial.
+    """
+    writer = DatasetWriter.open(directory)
+    ros.init()
+    node = Coordinator(writer.plan, writer)
+
+    def drain(number: int, frame: FrameType | None) -> None:
+        node.drain()
+
+    signal.signal(signal.SIGINT, drain)
+    signal.signal(signal.SIGTERM, drain)
+    executor = ros.SingleThreadedExecutor()
+    executor.add_node(node)
+    started = time.monotonic()
+    try:
+        while not node.finished:
+            executor.spin_once(timeout_sec=0.0 if node.backlog else _IDLE_S)
+            if node.backlog:
+                node.write_one()
+        node.report()
+        if not node.complete:
+            raise Interrupted(f"interrupted; what is finished is in {directory}")
+        writer.finish(wall_s=time.monotonic() - started)
+    finally:
+        writer.close()
+        node.destroy_node()
+        ros.shutdown()

@@ -1,0 +1,210 @@
+"""The coordinator node: finds simulations, leases trials, judges throws, fills the dataset."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections import Counter, deque
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from throwcollect.config.schema import Config
+from throwcollect.config.values import is_physics
+from throwcollect.coordinator.goals import FollowJointTrajectory, TrialGoals, trial_goals
+from throwcollect.coordinator.leases import Leases
+from throwcollect.coordinator.simulation_client import EPISODE_TOPIC, SimulationClient
+from throwcollect.dataset.writer import DatasetWriter
+from throwcollect.episode.message import Episode, unpack
+from throwcollect.errors import DatasetError
+from throwcollect.interfaces import get_message
+from throwcollect.robots.description import start_posture
+from throwcollect.robots.model import joint_limits
+from throwcollect.robots.talos import CONTROLLERS, controller_of
+from throwcollect.robots.trajectory import JointTrajectory
+from throwcollect.ros import Node, QoSProfile
+from throwcollect.ros.qos import DurabilityPolicy
+from throwcollect.sweep.plan import Plan, Trial
+from throwcollect.tasks.throw import Outcome, judge
+from throwcollect.tasks.trajectory import throw_trajectory
+
+String: Any = get_message("std_msgs/msg/String")
+
+PROGRESS_TOPIC = "/coordinator/progress"
+PROGRESS_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+_DISCOVERY_PERIOD_S = 0.1
+_REPORT_PERIOD_S = 0.2
+_RATE_WINDOW_S = 10.0
+"""Throws per second are averaged over this time."""
+
+
+@dataclass(frozen=True)
+class _Setup:
+    """Everything that is worked out of a trial before it is leased."""
+
+    config: Config
+    trajectory: JointTrajectory
+    goals: TrialGoals
+    physics: Mapping[str, float]
+
+
+class Coordinator(Node):
+    """Leases the trials of a plan to the simulations in the ROS graph and writes their episodes.
+
+    Args:
+        plan: The trials.
+        writer: The dataset that is filled.
+    """
+
+    def __init__(self, plan: Plan, writer: DatasetWriter) -> None:
+        super().__init__("coordinator")
+        self._plan = plan
+        self._writer = writer
+        self._config = plan.config
+        self._trials: dict[int, Trial] = {trial.number: trial for trial in plan.trials if trial.refused is None}
+        self._leases = Leases(self._trials, retries=self._config.run.retries)
+        self._limits = joint_limits()
+        self._simulations: dict[str, SimulationClient] = {}
+        self._setups: dict[int, _Setup] = {}
+        self._backlog: deque[tuple[Episode, _Setup]] = deque()
+        self._outcomes: Counter[str] = Counter()
+        self._ends: deque[tuple[float, int]] = deque([(time.monotonic(), 0)])
+        self._draining = False
+        self._last_simulation_seen = time.monotonic()
+        joints = self._config.task.end
+        self._controllers = tuple(
+            name for name in CONTROLLERS if name in {controller_of(joint) for joint in joints}
+        )
+        self._progress = self.create_publisher(String, PROGRESS_TOPIC, PROGRESS_QOS)
+        self.create_timer(_DISCOVERY_PERIOD_S, self._discover)
+        self.create_timer(_REPORT_PERIOD_S, self.report)
+
+    @property
+    def backlog(self) -> int:
+        """Number of episodes that have arrived but are not written yet."""
+        return len(self._backlog)
+
+    @property
+    def finished(self) -> bool:
+        """Whether every trial has ended and is written; while draining, whether no trial is running any more."""
+        if self._backlog:
+            return False
+        return self._leases.finished or (self._draining and self._leases.leased == 0)
+
+    @property
+    def complete(self) -> bool:
+        """Whether every trial of the plan has ended."""
+        return self._leases.finished
+
+    def drain(self) -> None:
+        """Lease no more trials; those that run are finished."""
+        self._draining = True
+
+    def write_one(self) -> None:
+        """Judge and write the oldest episode of the backlog.
+
+        Raises:
+            DatasetError: If the dataset cannot be written.
+        """
+        episode, setup = self._backlog.popleft()
+        result = judge(
+            episode.samples(), episode.header, config=setup.config, trajectory=setup.trajectory, limits=self._limits
+        )
+        self._writer.append(episode, result)
+        self._outcomes[result.outcome.value] += 1
+
+    def report(self) -> None:
+        """Publish the progress, as JSON in a std_msgs/String."""
+        now = time.monotonic()
+        ended = self._leases.ended
+        self._ends.append((now, ended))
+        while self._ends[0][0] < now - _RATE_WINDOW_S:
+            self._ends.popleft()
+        since, before = self._ends[0]
+        landed = self._outcomes[Outcome.LANDED.value]
+        lost = self._outcomes[Outcome.LOST.value]
+        progress = {
+            "total": self._leases.total,
+            "ended": ended,
+            "landed": landed,
+            "failed": self._outcomes.total() - landed - lost,
+            "lost": lost,
+            "outcomes": dict(self._outcomes),
+            "simulations": len(self._simulations),
+            "throws_per_s": (ended - before) / (now - since) if now > since else 0.0,
+        }
+        self._progress.publish(String(data=json.dumps(progress)))
+
+    def _discover(self) -> None:
+        offered = {
+            topic.removesuffix(f"/{EPISODE_TOPIC}")
+            for topic, types in self.get_topic_names_and_types()
+            if topic.endswith(f"/{EPISODE_TOPIC}") and "std_msgs/msg/UInt8MultiArray" in types
+            if self.count_publishers(topic)
+        }
+        for namespace in offered - self._simulations.keys():
+            self._simulations[namespace] = SimulationClient(
+                self,
+                namespace,
+                controllers=self._controllers,
+                action_type=FollowJointTrajectory,
+                on_episode=self._receive,
+                on_refusal=self._take_back,
+            )
+        for namespace in self._simulations.keys() - offered:
+            self._take_back(namespace, "left the ROS graph")
+            self._simulations.pop(namespace).destroy()
+        now = time.monotonic()
+        for namespace, simulation in list(self._simulations.items()):
+            if now > simulation.deadline:
+                self._take_back(namespace, f"no episode within {self._config.run.trial_timeout_s:g} s")
+            self._lease(namespace)
+
+    def _lease(self, namespace: str) -> None:
+        simulation = self._simulations.get(namespace)
+        if simulation is None or self._draining or self._leases.held_by(namespace) is not None:
+            return
+        if not simulation.ready():
+            return
+        trial = self._leases.lease(namespace)
+        if trial is None:
+            return
+        setup = self._setups.get(trial) or self._setup(trial)
+        self._setups[trial] = setup
+        simulation.deadline = time.monotonic() + self._config.run.trial_timeout_s
+        simulation.begin(trial, setup.physics, setup.goals)
+
+    def _setup(self, number: int) -> _Setup:
+        trial = self._trials[number]
+        config = self._plan.config_of(trial)
+        trajectory = throw_trajectory(config)
+        physics = {key: value for key, value in trial.values.items() if is_physics(key)}
+        return _Setup(config, trajectory, trial_goals(trajectory, start_posture(config)), physics)
+
+    def _receive(self, namespace: str, message: bytes) -> None:
+        try:
+            episode = unpack(message)
+        except DatasetError as error:
+            self.get_logger().warning(f"{namespace}: unreadable episode: {error}")
+            return
+        trial = episode.header.trial
+        if not self._leases.complete(namespace, trial):
+            self.get_logger().warning(f"{namespace}: trial {trial} came too late and was dropped")
+            return
+        self._simulations[namespace].abandon()
+        self._lease(namespace)
+        self._backlog.append((episode, self._setups.pop(trial)))
+
+    def _take_back(self, namespace: str, reason: str) -> None:
+        self._simulations[namespace].abandon()
+        trial = self._leases.held_by(namespace)
+        if trial is None:
+            return
+        self.get_logger().warning(f"{namespace}: trial {trial} is given to another simulation: {reason}")
+        if (given_up := self._leases.fail(namespace, reason)) is not None:
+            number, reasons = given_up
+            self._setups.pop(number)
+            self._writer.append_lost(number, "; ".join(reasons))
+            self._outcomes[Outcome.LOST.value] += 1
+

@@ -1,0 +1,129 @@
+"""One simulation as the coordinator sees it: what it is sent for a trial, and what it answers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from throwcollect.coordinator.goals import TrialGoals
+from throwcollect.interfaces import get_message, get_service
+from throwcollect.ros import Node, Parameter, QoSProfile
+from throwcollect.ros.action import ActionClient
+from throwcollect.ros.qos import HistoryPolicy, ReliabilityPolicy
+
+ResetSimulation: Any = get_service("simulation_interfaces/srv/ResetSimulation")
+SetParametersAtomically: Any = get_service("rcl_interfaces/srv/SetParametersAtomically")
+UInt8MultiArray: Any = get_message("std_msgs/msg/UInt8MultiArray")
+FOLLOW_JOINT_TRAJECTORY = "control_msgs/action/FollowJointTrajectory"
+
+EPISODE_TOPIC = "episode"
+EPISODE_QOS = QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy.RELIABLE)
+
+
+class SimulationClient:
+    """Clients for the services and actions of one simulation.
+
+    Args:
+        node: The coordinator.
+        namespace: Namespace of the simulation, such as ``/sim_0``.
+        controllers: Controllers that trials send goals to.
+        action_type: The FollowJointTrajectory action.
+        on_episode: Called with the serialised message of an episode.
+        on_refusal: Called with the reason when the simulation refuses a trial.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        namespace: str,
+        *,
+        controllers: tuple[str, ...],
+        action_type: Any,
+        on_episode: Callable[[str, bytes], None],
+        on_refusal: Callable[[str, str], None],
+    ) -> None:
+        self.namespace = namespace
+        self.deadline = float("inf")
+        """Monotonic time [s] at which the running trial counts as lost."""
+        self._node = node
+        self._on_refusal = on_refusal
+        self._generation = 0
+        name = namespace.strip("/")
+        self._parameters = node.create_client(
+            SetParametersAtomically, f"{namespace}/{name}/set_parameters_atomically"
+        )
+        self._reset = node.create_client(ResetSimulation, f"{namespace}/reset_simulation")
+        self._actions = {
+            controller: ActionClient(node, action_type, f"{namespace}/{controller}/follow_joint_trajectory")
+            for controller in controllers
+        }
+        self._episodes = node.create_subscription(
+            UInt8MultiArray,
+            f"{namespace}/{EPISODE_TOPIC}",
+            lambda message: on_episode(namespace, message),
+            EPISODE_QOS,
+            raw=True,
+        )
+
+    def ready(self) -> bool:
+        """Whether everything that a trial needs is offered."""
+        return (
+            self._parameters.service_is_ready()
+            and self._reset.service_is_ready()
+            and all(action.server_is_ready() for action in self._actions.values())
+        )
+
+    def begin(self, trial: int, physics: Mapping[str, float], goals: TrialGoals) -> None:
+        """Start a trial.
+
+        All requests leave at once: a node handles its inputs in the order of their arrival. Should they be handled in
+        another order, the trial's number in the episode, which is set together with the physics, would not fit, or the
+        reset would abort the goals; either way the lease runs out and the trial is run again.
+
+        Args:
+            trial: Number of the trial.
+            physics: Swept parameters of the simulation under their dotted keys.
+            goals: Joint trajectory goals.
+        """
+        self._generation += 1
+        generation = self._generation
+        parameters = [
+            Parameter("trial.number", value=trial),
+            Parameter("trial.controllers", value=list(goals.controllers)),
+            *(Parameter(key, value=float(value)) for key, value in physics.items()),
+        ]
+        request = SetParametersAtomically.Request(parameters=[item.to_parameter_msg() for item in parameters])
+        self._parameters.call_async(request).add_done_callback(
+            lambda future: self._check(
+                generation, future.result().result.successful, f"parameters: {future.result().result.reason}"
+            )
+        )
+        self._reset.call_async(ResetSimulation.Request(scope=ResetSimulation.Request.SCOPE_ALL)).add_done_callback(
+            lambda future: self._check(
+                generation, future.result().result.result == 1, f"reset: {future.result().result.error_message}"
+            )
+        )
+        for controller, goal in zip(goals.controllers, goals.goals, strict=True):
+            self._actions[controller].send_goal_async(goal).add_done_callback(
+                lambda future, controller=controller: self._check(
+                    generation, future.result().accepted, f"{controller} refused the goal; its log says why"
+                )
+            )
+
+    def abandon(self) -> None:
+        """Forget the running trial: late answers to it are ignored."""
+        self._generation += 1
+        self.deadline = float("inf")
+
+    def destroy(self) -> None:
+        """Take all clients off the graph."""
+        self.abandon()
+        for action in self._actions.values():
+            action.destroy()
+        self._node.destroy_subscription(self._episodes)
+        self._node.destroy_client(self._reset)
+        self._node.destroy_client(self._parameters)
+
+    def _check(self, generation: int, successful: bool, reason: str) -> None:
+        if generation == self._generation and not successful:
+            self._on_refusal(self.namespace, reason)

@@ -1,0 +1,1 @@
+"""Where the nodes of a run live: start them, watch them, restart them, stop them."""

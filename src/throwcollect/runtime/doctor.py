@@ -1,0 +1,134 @@
+"""What this machine can do for a collection, in plain words."""
+
+from __future__ import annotations
+
+import http.client
+import os
+import shutil
+import socket
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Literal
+
+from throwcollect.errors import ConfigError
+from throwcollect.robots.model import urdf_path
+
+_GIB = 1024**3
+_SIMULATION_MEMORY_GIB = 0.3
+"""Resident memory of one simulation, generously."""
+
+_ROS_ROUTER_PORT = 7447
+"""Port where ROS 2 nodes on rmw_zenoh_cpp look for a router."""
+
+_LEAST_DISK_GIB = 1.0
+
+
+@dataclass(frozen=True)
+class Check:
+    """One finding about the machine.
+
+    Attributes:
+        name: What was looked at.
+        status: `ok`, `note` (collections run, with a restriction), or `problem` (they do not).
+        finding: What was found and what follows from it.
+    """
+
+    name: str
+    status: Literal["ok", "note", "problem"]
+    finding: str
+
+
+def _python() -> Check:
+    found = ".".join(map(str, sys.version_info[:3]))
+    if not (3, 10) <= sys.version_info[:2] <= (3, 11):
+        return Check("python", "problem", f"{found}; pybullet has wheels for Python 3.10 and 3.11")
+    return Check("python", "ok", found)
+
+
+def _cores() -> Check:
+    cores = len(os.sched_getaffinity(0))
+    return Check("cores", "ok", f"{cores}; up to {cores} simulations run side by side (`-n {cores}`)")
+
+
+def _memory() -> Check:
+    for line in Path("/proc/meminfo").read_text(encoding="ascii").splitlines():
+        if line.startswith("MemAvailable:"):
+            available = int(line.split()[1]) * 1024 / _GIB
+            room = int(available / _SIMULATION_MEMORY_GIB)
+            status: Literal["ok", "problem"] = "ok" if room >= 1 else "problem"
+            return Check("memory", status, f"{available:.1f} GiB available, enough for {room} simulations")
+    return Check("memory", "note", "/proc/meminfo does not say what is available")
+
+
+def _pybullet() -> Check:
+    if find_spec("pybullet") is None:
+        return Check("pybullet", "problem", "not installed; try: pip install pybullet==3.2.7")
+    return Check("pybullet", "ok", version("pybullet"))
+
+
+def _robot() -> Check:
+    try:
+        path = urdf_path()
+        return Check("robot", "ok", f"Talos of example-robot-data {version('example-robot-data')}, {path}")
+    except (ConfigError, PackageNotFoundError) as error:
+        return Check("robot", "problem", str(error).replace("\n", "; "))
+
+
+class _UnixConnection(http.client.HTTPConnection):
+    def __init__(self, path: str) -> None:
+        super().__init__("localhost", timeout=2.0)
+        self._path = path
+
+    def connect(self) -> None:
+        self.sock = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        self.sock.settimeout(self.timeout)
+        self.sock.connect(self._path)
+
+
+def _docker() -> Check:
+    path = os.environ.get("DOCKER_HOST", "unix:///var/run/docker.sock").removeprefix("unix://")
+    connection = _UnixConnection(path)
+    try:
+        connection.request("GET", "/version")
+        answer = connection.getresponse()
+        server = answer.getheader("Server") or "an engine"
+        return Check("docker", "ok", f"{server} answers at {path}")
+    except OSError as error:
+        return Check("docker", "note", f"no engine answers at {path} ({error.strerror or error}); runs use processes")
+    finally:
+        connection.close()
+
+
+def _port() -> Check:
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind(("127.0.0.1", _ROS_ROUTER_PORT))
+        except OSError as error:
+            return Check(
+                "ports", "note", f"{_ROS_ROUTER_PORT} is taken ({error.strerror}); runs use a free port by default"
+            )
+    return Check("ports", "ok", f"{_ROS_ROUTER_PORT}, where ROS nodes look for a router, is free")
+
+
+def _disk(directory: Path) -> Check:
+    free = shutil.disk_usage(directory).free / _GIB
+    status: Literal["ok", "problem"] = "ok" if free >= _LEAST_DISK_GIB else "problem"
+    return Check("disk", status, f"{free:.1f} GiB free in {directory}")
+
+
+def examine(directory: Path) -> list[Check]:
+    """Look at everything a collection needs.
+
+    Args:
+        directory: Where datasets would be written.
+
+    Returns:
+        The findings, in a fixed order.
+    """
+    checks: list[Callable[[], Check]] = [_python, _cores, _memory, _pybullet, _robot, _docker, _port]
+    return [*(check() for check in checks), _disk(directory)]

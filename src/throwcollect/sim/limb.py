@@ -1,0 +1,132 @@
+"""One limb: its joint trajectory controller, and which of its joints the physics moves."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from throwcollect.control import ControllerParameters, JointState, JointTrajectoryController, Trajectory, TrajectoryGoal
+from throwcollect.episode.record import ControllerSamples
+
+_LOCKED_TOLERANCE_RAD = 1e-6
+
+
+class Limb:
+    """A controller bound to the joints of a world.
+
+    Joints that are locked are measured where they are locked, and goals that would move them are refused.
+
+    Args:
+        name: Name of the controller.
+        joints: Its joints, in order.
+        moving: The world's moving joints, in order.
+        period_ns: Control period [ns].
+    """
+
+    def __init__(self, name: str, joints: Sequence[str], *, moving: Sequence[str], period_ns: int) -> None:
+        self.name = name
+        self.controller = JointTrajectoryController(name, ControllerParameters.talos(joints), period_ns=period_ns)
+        self._joints = tuple(joints)
+        self._own = [index for index, joint in enumerate(joints) if joint in moving]
+        self._worlds = [moving.index(joints[index]) for index in self._own]
+        self._posture = np.zeros(len(joints))
+        self._elapsed_ns: list[int] = []
+        self._points: list[NDArray[np.float64]] = []
+
+    @property
+    def moves(self) -> bool:
+        """Whether the commands may still change, so that the limb must be driven."""
+        return not self.controller.at_rest
+
+    def reset(self, time_ns: int, posture: Mapping[str, float]) -> None:
+        """Hold a posture; a goal that is being executed is aborted.
+
+        Args:
+            time_ns: Time now [ns].
+            posture: Angle of each joint [rad].
+        """
+        self._posture = np.array([posture[joint] for joint in self._joints])
+        measured = JointState(self._posture.copy())
+        if self.controller.active:
+            self.controller.reset(time_ns, measured)
+        else:
+            self.controller.activate(time_ns, measured)
+        # Begins the hold, so that an idle limb need not be driven.
+        self.controller.update(time_ns, 0, measured)
+        self._elapsed_ns, self._points = [], []
+
+    def submit(self, goal_id: Hashable, goal: TrajectoryGoal, now_ns: int) -> str | None:
+        """Give the controller a goal.
+
+        Returns:
+            None if it is accepted, else the reason of the refusal.
+        """
+        return self._locked_refusal(goal.trajectory) or self.controller.submit(goal_id, goal, now_ns)
+
+    def follow(self, trajectory: Trajectory, now_ns: int) -> str | None:
+        """Let the controller follow a trajectory that is no goal.
+
+        Returns:
+            None if it is accepted, else the reason of the refusal.
+        """
+        return self._locked_refusal(trajectory) or self.controller.replace(trajectory, now_ns)
+
+    def measured(self, positions: Sequence[float]) -> JointState:
+        """State of this limb's joints.
+
+        Args:
+            positions: Position of each of the world's moving joints [rad].
+        """
+        state = self._posture.copy()
+        state[self._own] = [positions[index] for index in self._worlds]
+        return JointState(state)
+
+    def update(self, time_ns: int, period_ns: int, positions: Sequence[float], command: NDArray[np.float64]) -> None:
+        """One control period with a look at the measured state.
+
+        Args:
+            time_ns: Time of this update [ns].
+            period_ns: Time since the update before [ns].
+            positions: Position of each of the world's moving joints [rad].
+            command: Command of each of the world's moving joints, written in place [rad].
+        """
+        row = self.controller.update(time_ns, period_ns, self.measured(positions))
+        command[self._worlds] = row[self._own]
+
+    def take(self, commands: NDArray[np.float64]) -> None:
+        """Many control periods that need no look at the measured state.
+
+        Args:
+            commands: Commands of the world's moving joints, shape ``(n_updates, n_moving)``, written in place [rad].
+        """
+        commands[:, self._worlds] = self.controller.take(len(commands))[:, self._own]
+
+    def keep_state(self) -> None:
+        """Keep the controller's set points of this instant as a sample; call it right after `update`."""
+        state = self.controller.state()
+        desired = state.desired
+        self._elapsed_ns.append(desired.time_from_start_ns)
+        points = (desired.positions, desired.velocities, desired.accelerations, state.output.positions)
+        self._points.append(np.stack([np.asarray(point) for point in points]))
+
+    def kept_states(self) -> ControllerSamples:
+        """Set points kept by `keep_state` since the last reset."""
+        table = np.array(self._points).reshape(-1, 4, len(self._joints))
+        elapsed = np.array(self._elapsed_ns, dtype=np.int64)
+        return ControllerSamples(elapsed, table[:, 0], table[:, 1], table[:, 2], table[:, 3])
+
+    def _locked_refusal(self, trajectory: Trajectory) -> str | None:
+        for column, joint in enumerate(trajectory.joint_names):
+            if joint not in self._joints or self._joints.index(joint) in self._own:
+                continue
+            held = self._posture[self._joints.index(joint)]
+            for point in trajectory.points:
+                wanted = point.positions[column] if column < len(point.positions) else held
+                if not abs(wanted - held) <= _LOCKED_TOLERANCE_RAD:
+                    return (
+                        f"{self.name}: {joint} is locked at {held:.6g} rad (robot.locked) and cannot go to "
+                        f"{wanted:.6g} rad"
+                    )
+        return None

@@ -1,0 +1,54 @@
+"""The process of one simulation."""
+
+from __future__ import annotations
+
+import signal
+from pathlib import Path
+from types import FrameType
+
+from throwcollect import ros
+from throwcollect.config.loader import load
+from throwcollect.sim.node import SimulationNode
+from throwcollect.sim.simulation import Simulation
+
+_IDLE_S = 1.0
+
+
+def run(config: Path, *, name: str) -> None:
+    """Serve one simulation until SIGTERM or SIGINT, or until a client sets its state to quitting.
+
+    Inputs are looked at between slices of a running trial; otherwise the process sleeps until one arrives.
+
+    Args:
+        config: YAML file of the collection.
+        name: Name of the node and of its namespace.
+
+    Raises:
+        ConfigError: If the configuration cannot be used.
+        WorkerError: If the physics engine does not start.
+    """
+    simulation = Simulation(load(config))
+    ros.init()
+    node = SimulationNode(name, simulation)
+    executor = ros.SingleThreadedExecutor()
+    executor.add_node(node)
+    stopped = False
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        nonlocal stopped
+        stopped = True
+        executor.wake()
+
+    signal.signal(signal.SIGINT, stop)
+    signal.signal(signal.SIGTERM, stop)
+    try:
+        while not stopped and not node.quitting:
+            if simulation.running:
+                simulation.advance()
+                executor.spin_once(timeout_sec=0.0)
+            else:
+                executor.spin_once(timeout_sec=_IDLE_S)
+            node.follow_up()
+    finally:
+        node.destroy_node()
+        ros.shutdown()

@@ -1,0 +1,128 @@
+"""The ROS 2 node of one simulation: everything that a client of the real robot, or of a simulator, expects."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from throwcollect.config.schema import Config
+from throwcollect.config.values import is_physics, leaves, sweepable_keys, with_values
+from throwcollect.episode.channels import Channels
+from throwcollect.episode.chunk import ChunkEncoder, encode_message
+from throwcollect.episode.message import pack
+from throwcollect.episode.record import Samples
+from throwcollect.errors import ConfigError
+from throwcollect.interfaces import get_message
+from throwcollect.robots.description import full_description
+from throwcollect.ros import Node, QoSProfile, Time
+from throwcollect.ros.qos import DurabilityPolicy, HistoryPolicy
+from throwcollect.sim.limb_interface import LimbInterface
+from throwcollect.sim.simulation import Simulation, State, TrialSetup
+from throwcollect.sim.simulation_control import SimulationControl
+
+SetParametersResult: Any = get_message("rcl_interfaces/msg/SetParametersResult")
+UInt8MultiArray: Any = get_message("std_msgs/msg/UInt8MultiArray")
+
+_LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+_SAMPLED = QoSProfile(depth=100)
+_WHOLE = QoSProfile(history=HistoryPolicy.KEEP_ALL)
+"""Every episode reaches every subscriber, however slow it is."""
+
+_NO_LIMIT = 0.0
+
+
+class SimulationNode(Node):
+    """Serves one simulation under ``/<name>``.
+
+    Args:
+        name: Name of the node and of its namespace.
+        simulation: What it serves.
+    """
+
+    def __init__(self, name: str, simulation: Simulation) -> None:
+        super().__init__(name, namespace=f"/{name}")
+        self._simulation = simulation
+        config = simulation.config
+        # The simulation is the source of its time, so the clock is set and not subscribed to.
+        self.get_clock().activate(True)
+        self._declare_parameters(config)
+        description = full_description(config)
+        self._publish_latched(Channels(config, description))
+        self._encoder = ChunkEncoder(Channels(config, description), level=config.record.zstd_level)
+        self._live = [
+            (topic, self.create_publisher(get_message(topic.type_name), topic.name.lstrip("/"), _SAMPLED))
+            for topic in Channels(_everything(config), description).recorded.values()
+        ]
+        self._interfaces = {name: LimbInterface(self, simulation, name) for name in simulation.limbs}
+        SimulationControl(self, simulation)
+        # Last, as coordinators take its presence for that of the whole simulation.
+        self._episodes = self.create_publisher(UInt8MultiArray, "episode", _WHOLE)
+
+    @property
+    def quitting(self) -> bool:
+        """Whether a client has asked the simulation to quit."""
+        return self._simulation.state == State.QUITTING
+
+    def follow_up(self) -> None:
+        """Tell the world what has happened since the last call: time, samples, feedback, results, the episode."""
+        simulation = self._simulation
+        self.get_clock().set_ros_time_override(Time(nanoseconds=simulation.now_ns))
+        for controller, result in simulation.pop_results():
+            self._interfaces[controller].finish(result)
+        self._publish_samples()
+        for interface in self._interfaces.values():
+            interface.publish_state()
+        if (episode := simulation.episode()) is not None:
+            header, samples, states = episode
+            self._episodes.publish(pack(header, self._encoder.encode(samples, states)))
+
+    def _publish_samples(self) -> None:
+        listened = [(topic, publisher) for topic, publisher in self._live if publisher.get_subscription_count()]
+        if not listened:
+            return
+        samples: Samples = self._simulation.fresh_samples()
+        for index in range(len(samples)):
+            for topic, publisher in listened:
+                publisher.publish(encode_message(topic, samples, index, {}))
+
+    def _publish_latched(self, channels: Channels) -> None:
+        self._latched = []
+        for channel, message in channels.latched_messages(0).items():
+            publisher = self.create_publisher(get_message(channel.type_name), channel.topic.lstrip("/"), _LATCHED)
+            publisher.publish(message)
+            self._latched.append(publisher)
+
+    def _declare_parameters(self, config: Config) -> None:
+        values = dict(leaves(config))
+        self._physics = [key for key in sweepable_keys(config) if is_physics(key)]
+        self.declare_parameter("trial.number", self._simulation.setup.number)
+        self.declare_parameter("trial.controllers", [""])
+        self.declare_parameter("sim.real_time_factor", config.sim.real_time_factor or _NO_LIMIT)
+        for key in self._physics:
+            self.declare_parameter(key, float(values[key]))
+        self.add_on_set_parameters_callback(self._set_up)
+
+    def _set_up(self, parameters: Any) -> Any:
+        """Take over parameters: those of the trial and the physics take effect with the next reset."""
+        setup = self._simulation.setup
+        values = {parameter.name: parameter.value for parameter in parameters}
+        number = int(values.get("trial.number", setup.number))
+        controllers = tuple(filter(None, values.get("trial.controllers", setup.controllers)))
+        if unknown := [name for name in controllers if name not in self._simulation.limbs]:
+            return SetParametersResult(successful=False, reason=f"no controller {unknown[0]!r}")
+        try:
+            config = with_values(setup.config, {key: values[key] for key in self._physics if key in values})
+        except ConfigError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        factor = values.get("sim.real_time_factor", _NO_LIMIT)
+        if factor < 0:
+            return SetParametersResult(successful=False, reason="sim.real_time_factor must not be negative")
+        if "sim.real_time_factor" in values:
+            self._simulation.real_time_factor = factor or None
+        self._simulation.setup = TrialSetup(number, controllers, config)
+        return SetParametersResult(successful=True)
+
+
+def _everything(config: Config) -> Config:
+    """The configuration, recording all topics that come with every sample."""
+    record = config.record.model_copy(update={"topics": ["joint_states", "ball/odometry", "tf", "clock"]})
+    return config.model_copy(update={"record": record})
