@@ -60,7 +60,7 @@ def describe(found: Mapping[str, Any]) -> str:
     outcomes = ", ".join(f"{count} {outcome}" for outcome, count in found["outcomes"].items())
     lines = {
         "trials": f"{found['trials']}: {outcomes}",
-        "landing": _landing(found["landing"]),
+        "landing": _landing(found.get("landing")),
         "episodes": f"{found['episodes']} with {found['samples']} samples, {found['duration_s']:.0f} s of simulated time",
         "files": f"{found['shards']} MCAP, {found['recordings_bytes'] / 1e6:.1f} MB; all {found['size_bytes'] / 1e6:.1f} MB",
         "topics": ", ".join(f"{topic} ({count})" for topic, count in found["topics"].items()),

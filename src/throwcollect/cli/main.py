@@ -9,7 +9,6 @@ from enum import Enum
 from pathlib import Path
 from typing import Annotated
 
-import click
 import typer
 
 import throwcollect
@@ -158,9 +157,9 @@ def router(
     ] = "tcp/127.0.0.1:7447",
 ) -> None:
     """Run the router that all nodes connect to."""
-    from throwcollect.ros.router import run
+    from throwcollect.ros.router import serve
 
-    run(listen)
+    serve(listen)
 
 
 @app.command(rich_help_panel="Nodes, as `up` starts them")
@@ -185,12 +184,8 @@ def coordinator(directory: DatasetArgument) -> None:
 def main() -> None:
     """Entry point: run a command, print errors as messages, exit with their codes."""
     try:
-        code = app(standalone_mode=False)
-    except click.exceptions.Abort:
-        code = 130
-    except click.ClickException as error:
-        error.show()
-        code = 2
+        app()
+        code = 0
     except KeyboardInterrupt:
         code = 130
     except BrokenPipeError:

@@ -6,13 +6,15 @@ Units are part of the name: ``_s``, ``_m``, ``_kg``, ``_hz``, ``_mps2``; angles 
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+import math
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, PositiveInt, model_validator
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, PositiveFloat, PositiveInt, Tag, model_validator
 
-NonNegativeFloat = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Angle = Annotated[float, Field(ge=-6.3, le=6.3, allow_inf_nan=False)]
-Name = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]*$", max_length=64)]
+from throwcollect.config.kinds import Angle, ContradictionError, Joint, Name
+
+_BETWEEN_TRIALS_S = 10
+"""Simulated time between the slots of two trials: results of a trial's goals expire before the next one."""
 
 
 class Section(BaseModel):
@@ -28,9 +30,9 @@ class RobotConfig(Section):
     """Robot model: Talos of PAL Robotics, `talos_reduced` of example-robot-data, with its base fixed."""
     base_height_m: Annotated[float, Field(ge=0.5, le=2.0)] = 1.01927
     """Height of the fixed base link above the ground."""
-    posture: dict[str, Angle] = {}
+    posture: dict[Joint, Angle] = {}
     """Joint angles that replace those of the half-sitting posture, for joints that the task does not move."""
-    locked: Literal["auto", "none"] | list[str] = "auto"
+    locked: Literal["auto", "none"] | list[Joint] = "auto"
     """Joints simulated as rigid: `auto` locks what the task does not move, `none` simulates all 32, or a list."""
     position_gain_per_s: Annotated[float, Field(gt=0, le=1000)] = 100.0
     """Velocity commanded per radian of position error; Bullet's position gain is this times the time step."""
@@ -67,7 +69,12 @@ class ToolConfig(Section):
     @model_validator(mode="after")
     def _cone_opens(self) -> ToolConfig:
         if self.cup_rim_radius_m <= self.cup_floor_radius_m:
-            raise ValueError("cup_rim_radius_m must be larger than cup_floor_radius_m, or the cup holds no ball")
+            raise ContradictionError(
+                {
+                    "cup_rim_radius_m": f"{self.cup_rim_radius_m} m should be above cup_floor_radius_m, "
+                    f"{self.cup_floor_radius_m} m, or the cup holds no ball"
+                }
+            )
         return self
 
 
@@ -81,7 +88,7 @@ class BallConfig(Section):
     friction: Annotated[float, Field(ge=0, le=2)] = 0.5
     """Coulomb friction of the ball [-]; Bullet multiplies it with that of the body it touches."""
     restitution: Annotated[float, Field(ge=0, le=1)] = 0.0
-    """Coefficient of restitution of the ball [-]; Bullet multiplies it with that of the body it touches."""
+    """Coefficient of restitution between the ball and whatever it touches [-]."""
     drag_coefficient: Annotated[float, Field(ge=0, le=2)] = 0.0
     """Drag coefficient of a sphere [-]; about 0.47 in air. Quadratic drag acts during the whole trial."""
 
@@ -96,7 +103,7 @@ class SceneConfig(Section):
     air_density_kgpm3: Annotated[float, Field(ge=0, le=10)] = 1.2
     """Density of the air, for the ball's drag."""
     spoon_friction: Annotated[float, Field(ge=0, le=2)] = 0.5
-    """Coulomb friction of the spoon and the robot's links [-]."""
+    """Coulomb friction of the spoon, the robot's links and the ground [-]."""
 
 
 class SimConfig(Section):
@@ -121,7 +128,7 @@ class MinimumJerk(Section):
 
     family: Literal["minimum_jerk"] = "minimum_jerk"
     """Trajectory family."""
-    gamma: Annotated[float, Field(ge=0.5, le=3)] = 1.2
+    gamma: Annotated[float, Field(ge=0.67, le=3)] = 1.2
     """Time warp [-]: above 1 the speed peak comes later."""
 
 
@@ -132,8 +139,8 @@ class DynamicMovementPrimitive(Section):
     """Trajectory family."""
     basis_functions: Annotated[int, Field(ge=2, le=500)] = 20
     """Number of Gaussian basis functions of each joint."""
-    weights: dict[str, list[float]] = {}
-    """Weights of the forcing term of each moving joint; a joint that is absent has zero weights [rad/s²·s²]."""
+    weights: dict[Joint, list[float]] = {}
+    """Weights of the forcing term of each moving joint; a joint that is absent has zero weights [rad]."""
     alpha_z: PositiveFloat = 48.0
     """Stiffness constant of the transformation system [-]; beta_z is alpha_z / 4 (critically damped)."""
     alpha_x: PositiveFloat = 2.0
@@ -141,12 +148,27 @@ class DynamicMovementPrimitive(Section):
 
     @model_validator(mode="after")
     def _weights_fit(self) -> DynamicMovementPrimitive:
-        for joint, weights in self.weights.items():
-            if len(weights) != self.basis_functions:
-                raise ValueError(
-                    f"weights of {joint}: {len(weights)} numbers for {self.basis_functions} basis functions"
-                )
+        wrong = {
+            f"weights.{joint}": f"should be basis_functions = {self.basis_functions} numbers, got {len(weights)}"
+            for joint, weights in self.weights.items()
+            if len(weights) != self.basis_functions
+        }
+        if wrong:
+            raise ContradictionError(wrong)
         return self
+
+
+def _family(value: Any) -> str | None:
+    if isinstance(value, BaseModel):
+        return type(value).__name__
+    family = value.get("family", "minimum_jerk") if isinstance(value, dict) else None
+    return {"minimum_jerk": "MinimumJerk", "dmp": "DynamicMovementPrimitive"}.get(str(family))
+
+
+Trajectory = Annotated[
+    Annotated[MinimumJerk, Tag("MinimumJerk")] | Annotated[DynamicMovementPrimitive, Tag("DynamicMovementPrimitive")],
+    Discriminator(_family),
+]
 
 
 class ThrowConfig(Section):
@@ -154,7 +176,7 @@ class ThrowConfig(Section):
 
     name: Literal["throw"] = "throw"
     """Task."""
-    start: dict[str, Angle] = {
+    start: dict[Joint, Angle] = {
         "torso_1_joint": 0.0,
         "arm_right_1_joint": 1.5,
         "arm_right_2_joint": -2.6,
@@ -165,7 +187,7 @@ class ThrowConfig(Section):
         "arm_right_7_joint": -0.1,
     }
     """Joint angles at the start of each trial; the spoon must open upwards."""
-    end: dict[str, Angle] = {
+    end: dict[Joint, Angle] = {
         "torso_1_joint": 0.0,
         "arm_right_1_joint": 1.5,
         "arm_right_2_joint": -2.6,
@@ -175,7 +197,7 @@ class ThrowConfig(Section):
     """Joint angles at the end of the motion. The joints named here are the moving ones, even if end equals start."""
     duration_s: Annotated[float, Field(ge=0.1, le=10)] = 1.0
     """Duration of the motion (tau of a DMP)."""
-    trajectory: Annotated[MinimumJerk | DynamicMovementPrimitive, Field(discriminator="family")] = MinimumJerk()
+    trajectory: Trajectory = MinimumJerk()
     """How the joints go from start to end."""
     points_hz: Annotated[float, Field(ge=5, le=1000)] = 50.0
     """Points per second of the joint trajectories that are sent to the controllers (quintic between them)."""
@@ -184,10 +206,17 @@ class ThrowConfig(Section):
 
     @model_validator(mode="after")
     def _moving_joints_start_somewhere(self) -> ThrowConfig:
-        if missing := sorted(set(self.end) - set(self.start)):
-            raise ValueError(f"end names joints without a start: {', '.join(missing)}")
+        wrong = {f"end.{joint}": "start should name this joint, too" for joint in self.end if joint not in self.start}
         if not self.end:
-            raise ValueError("end names no joint, so nothing would move")
+            wrong["end"] = "names no joint, so nothing would move"
+        if isinstance(self.trajectory, DynamicMovementPrimitive):
+            wrong |= {
+                f"trajectory.weights.{joint}": "end does not name this joint, so it does not move"
+                for joint in self.trajectory.weights
+                if joint not in self.end
+            }
+        if wrong:
+            raise ContradictionError(wrong)
         return self
 
 
@@ -205,10 +234,15 @@ class Range(Section):
 
     @model_validator(mode="after")
     def _ordered(self) -> Range:
-        if not self.min <= self.max:
-            raise ValueError(f"min {self.min} is above max {self.max}")
-        if self.scale == "log" and self.min <= 0:
-            raise ValueError(f"a logarithmic scale needs min above 0, got {self.min}")
+        wrong = {}
+        if self.min > self.max:
+            wrong["min"] = f"should be at most max, {self.max}, got {self.min}"
+        elif self.scale == "log" and self.min <= 0:
+            wrong["min"] = f"should be above 0 on a logarithmic scale, got {self.min}"
+        if self.count == 1 and self.min < self.max:
+            wrong["count"] = "should be 2 or more, as both min and max are grid points"
+        if wrong:
+            raise ContradictionError(wrong)
         return self
 
 
@@ -219,15 +253,49 @@ class Values(Section):
     """The values, in the unit of the key."""
 
 
+def _parameter_kind(value: Any) -> str | None:
+    if isinstance(value, BaseModel):
+        return type(value).__name__
+    if not isinstance(value, dict):
+        return None
+    return "Values" if "values" in value else "Range"
+
+
+Parameter = Annotated[Annotated[Range, Tag("Range")] | Annotated[Values, Tag("Values")], Discriminator(_parameter_kind)]
+
+
 class SweepConfig(Section):
     """Which parameters vary from trial to trial, and how they are drawn."""
 
     sampler: Literal["grid", "uniform", "latin_hypercube", "sobol", "list"] = "sobol"
     """How points are drawn; `list` reads them from `file`."""
-    parameters: dict[str, Range | Values] = {}
+    parameters: dict[str, Parameter] = {}
     """Dotted configuration keys (`task.duration_s`, `ball.mass_kg`, ...) and what they range over."""
     file: str | None = None
-    """CSV or Parquet file with one row a trial and dotted keys as columns; for the sampler `list`."""
+    """CSV or Parquet file with one row a trial and dotted keys as columns; for the sampler `list`.
+
+    A relative path starts at the directory of the configuration file."""
+
+    @model_validator(mode="after")
+    def _sampler_has_what_it_reads(self) -> SweepConfig:
+        wrong = {}
+        if self.sampler == "list":
+            if self.file is None:
+                wrong["file"] = "missing; the sampler list should have a CSV or Parquet file"
+            if self.parameters:
+                wrong["parameters"] = "should be left out, as the sampler list takes keys and values from its file"
+        elif self.file is not None:
+            wrong["file"] = f"should be left out, as the sampler {self.sampler} reads no file"
+        for key, parameter in self.parameters.items():
+            if not isinstance(parameter, Range):
+                continue
+            if self.sampler == "grid" and parameter.count is None:
+                wrong[f"parameters.{key}.count"] = "missing; the sampler grid should know how many points to take"
+            elif self.sampler not in ("grid", "list") and parameter.count is not None:
+                wrong[f"parameters.{key}.count"] = f"should be left out, as the sampler {self.sampler} has no grid"
+        if wrong:
+            raise ContradictionError(wrong)
+        return self
 
 
 class RecordConfig(Section):
@@ -248,7 +316,7 @@ class RecordConfig(Section):
     @model_validator(mode="after")
     def _judged_topics(self) -> RecordConfig:
         if missing := [t for t in ("joint_states", "ball/odometry") if t not in self.topics]:
-            raise ValueError(f"throws are judged from {' and '.join(missing)}; add to topics")
+            raise ContradictionError({"topics": f"should hold {' and '.join(missing)}, from which throws are judged"})
         return self
 
 
@@ -280,7 +348,7 @@ class Config(Section):
     """Name of the collection and of its files."""
     seed: Annotated[int, Field(ge=0, lt=2**32)] = 0
     """Root of all randomness."""
-    trials: PositiveInt | None = None
+    trials: Annotated[int, Field(ge=1, le=10_000_000)] | None = None
     """Number of trials; none for `grid` and `list` means all points."""
     robot: RobotConfig = RobotConfig()
     """The robot."""
@@ -302,7 +370,24 @@ class Config(Section):
     """How it is run."""
 
     @model_validator(mode="after")
-    def _rates_divide(self) -> Config:
+    def _sections_agree(self) -> Config:
+        wrong = {}
         if self.sim.physics_hz % self.record.rate_hz:
-            raise ValueError(f"record.rate_hz {self.record.rate_hz} does not divide sim.physics_hz {self.sim.physics_hz}")
+            wrong["record.rate_hz"] = f"should divide sim.physics_hz, {self.sim.physics_hz}, got {self.record.rate_hz}"
+        if isinstance(self.robot.locked, list) and (moving := [j for j in self.robot.locked if j in self.task.end]):
+            wrong["robot.locked"] = f"should not hold joints that task.end moves, got {', '.join(moving)}"
+        for joint in self.robot.posture:
+            if joint in self.task.start:
+                wrong[f"robot.posture.{joint}"] = "should be left out, as task.start sets this joint"
+        if wrong:
+            raise ContradictionError(wrong)
         return self
+
+    def trial_start_ns(self, number: int) -> int:
+        """Simulated time at which a trial starts [ns]; the slots of different trials never overlap.
+
+        Args:
+            number: Number of the trial, from 0; time 0 itself is left out, as it means "unset" in ROS.
+        """
+        slot_s = math.ceil(self.sim.max_trial_s) + _BETWEEN_TRIALS_S
+        return (number + 1) * slot_s * 10**9

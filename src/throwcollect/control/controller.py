@@ -81,6 +81,13 @@ class JointTrajectoryController:
         return self._goal_id
 
     @property
+    def at_rest(self) -> bool:
+        """Whether, unless it is told something new, every further command equals the last and nothing is decided."""
+        if self._goal_id is not None or self._incoming is not None:
+            return False
+        return self._holding or (self._followed().past_end and self.next_decision() == sys.maxsize)
+
+    @property
     def command(self) -> NDArray[np.float64]:
         """Last commanded positions [rad], shape ``(n_joints,)``, read-only."""
         return self._command

@@ -32,6 +32,34 @@ class Samples:
     ball_linear_velocity: NDArray[np.float64]
     ball_angular_velocity: NDArray[np.float64]
 
+    def __len__(self) -> int:
+        return len(self.stamps_ns)
+
+    def __getitem__(self, rows: slice) -> Samples:
+        return Samples(**{name: column[rows] for name, column in vars(self).items()})
+
+
+@dataclass(frozen=True)
+class ControllerSamples:
+    """Set points of one joint trajectory controller, one row a sample, joints in the controller's order.
+
+    Attributes:
+        elapsed_ns: Time since the start of its trajectory [ns], shape ``(n_samples,)``, int64.
+        position: Reference position [rad], shape ``(n_samples, n_joints)``.
+        velocity: Reference velocity [rad/s], shape ``(n_samples, n_joints)``.
+        acceleration: Reference acceleration [rad/s²], shape ``(n_samples, n_joints)``.
+        output: Commanded position [rad], shape ``(n_samples, n_joints)``.
+    """
+
+    elapsed_ns: NDArray[np.int64]
+    position: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+    acceleration: NDArray[np.float64]
+    output: NDArray[np.float64]
+
+    def __getitem__(self, rows: slice) -> ControllerSamples:
+        return ControllerSamples(**{name: column[rows] for name, column in vars(self).items()})
+
 
 @dataclass(frozen=True)
 class Contact:

@@ -10,8 +10,7 @@ from throwcollect.ros import Future, Node
 from throwcollect.ros.action import ActionServer, CancelResponse, GoalResponse
 from throwcollect.sim.simulation import Simulation
 
-FollowJointTrajectoryControllerState: Any = get_message("control_msgs/msg/JointTrajectoryControllerState")
-JointTrajectory: Any = get_action("control_msgs/action/FollowJointTrajectory")
+FollowJointTrajectory: Any = get_action("control_msgs/action/FollowJointTrajectory")
 JointTrajectoryControllerState: Any = get_message("control_msgs/msg/JointTrajectoryControllerState")
 JointTrajectory: Any = get_message("trajectory_msgs/msg/JointTrajectory")
 JointTrajectoryPoint: Any = get_message("trajectory_msgs/msg/JointTrajectoryPoint")

@@ -7,7 +7,8 @@ from typing import Any
 import throwcollect
 from throwcollect.interfaces import get_message, get_service
 from throwcollect.ros import Node
-from throwcollect.sim.simulation import EntityState, Simulation, State
+from throwcollect.sim.recording import BallState
+from throwcollect.sim.simulation import Simulation, State
 
 GetSimulatorFeatures: Any = get_service("simulation_interfaces/srv/GetSimulatorFeatures")
 GetSimulationState: Any = get_service("simulation_interfaces/srv/GetSimulationState")
@@ -132,7 +133,7 @@ class SimulationControl:
             )
         position, orientation = state.pose.position, state.pose.orientation
         linear, angular = state.twist.linear, state.twist.angular
-        entity = EntityState(
+        entity = BallState(
             (position.x, position.y, position.z),
             (orientation.x, orientation.y, orientation.z, orientation.w),
             (linear.x, linear.y, linear.z),

@@ -1,0 +1,211 @@
+"""A YAML file as plain values that remember their lines, and overrides from the command line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from ruamel.yaml import YAML
+from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
+
+from throwcollect.config.problems import Location, dotted
+from throwcollect.errors import ConfigError, Problem
+
+_TAG = "tag:yaml.org,2002:"
+_SWEPT = ("sweep", "parameters")
+_SWEPT_FIELDS = ("min", "max", "scale", "count", "values")
+
+
+class Document:
+    """Values of a configuration file and of overrides, with the place where each was written.
+
+    Args:
+        path: The file.
+
+    Raises:
+        ConfigError: If the file cannot be read or is not YAML.
+
+    Attributes:
+        values: Plain dictionaries, lists, text, numbers, truth values and None.
+        problems: What was wrong with keys and overrides themselves.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.values: dict[str, Any] = {}
+        self.problems: list[Problem] = []
+        self._path = path
+        self._lines: dict[Location, int | None] = {}
+        try:
+            node = _compose(_text_of(path))
+        except YAMLError as error:
+            raise ConfigError([Problem(f"not valid YAML: {_reason(error)}", path=path, line=_line(error))]) from error
+        if node is None:
+            raise ConfigError([Problem("the file is empty", path=path)], expected="keys such as task and sweep")
+        if not isinstance(node, MappingNode):
+            problem = Problem("the file should hold keys and values", path=path, line=node.start_mark.line + 1)
+            raise ConfigError([problem], expected="keys such as task and sweep")
+        self.values = self._plain(node, (), in_file=True)
+
+    def problem(self, location: Location, sentence: str) -> Problem:
+        """A problem with the value or key at a location, wherever that was written."""
+        for length in range(len(location), 0, -1):
+            if location[:length] in self._lines:
+                line = self._lines[location[:length]]
+                return Problem(sentence, dotted(location), self._path if line else None, line)
+        return Problem(sentence, dotted(location), self._path)
+
+    def override(self, assignment: str) -> None:
+        """Replace one key; what is wrong with the override joins the problems.
+
+        Args:
+            assignment: Dotted key, equals sign and value, as in ``task.duration_s=1.1``; the value is read as YAML.
+        """
+        key, equals, text = assignment.partition("=")
+        key = key.strip()
+        if not equals or not all(key.split(".")):
+            self.problems.append(Problem(f"an override should be KEY=VALUE, got {assignment!r}"))
+            return
+        try:
+            node = _compose(text)
+        except YAMLError as error:
+            self.problems.append(Problem(f"not valid YAML: {_reason(error)}; got {text!r}", key))
+            return
+        holder: Any = self.values
+        location: Location = ()
+        *above, last = _parts(key)
+        for part in above:
+            index = _index(holder, part)
+            location = (*location, index)
+            if isinstance(holder, dict) and holder.get(part) is None:
+                holder[part] = {}
+                self._lines[location] = None
+            holder = holder[index] if _holds(holder, index) else None
+        index = _index(holder, last)
+        if not isinstance(holder, dict) and not _holds(holder, index):
+            self.problems.append(Problem(f"nothing of this name can be set; got {text!r}", key))
+            return
+        location = (*location, index)
+        self._lines = {known: line for known, line in self._lines.items() if known[: len(location)] != location}
+        self._lines[location] = None
+        holder[index] = self._plain(node, location, in_file=False)
+
+    def _plain(self, node: Node | None, location: Location, *, in_file: bool, inside: tuple[Node, ...] = ()) -> Any:
+        if node is None:
+            return None
+        if node in inside:
+            self._note(node, location, "an alias cannot be inside its own anchor", in_file=in_file)
+            return None
+        inside = (*inside, node)
+        if isinstance(node, MappingNode) and node.tag == _TAG + "map":
+            return self._mapping(node, location, in_file=in_file, inside=inside)
+        if isinstance(node, SequenceNode) and node.tag == _TAG + "seq":
+            items = []
+            for index, item in enumerate(node.value):
+                self._lines[(*location, index)] = item.start_mark.line + 1 if in_file else None
+                items.append(self._plain(item, (*location, index), in_file=in_file, inside=inside))
+            return items
+        try:
+            return _scalar(node)
+        except ValueError as error:
+            self._note(node, location, str(error), in_file=in_file)
+            return None
+
+    def _mapping(
+        self, node: MappingNode, location: Location, *, in_file: bool, inside: tuple[Node, ...]
+    ) -> dict[str, Any]:
+        values: dict[str, Any] = {}
+        first: dict[str, int] = {}
+        for key_node, value_node in node.value:
+            name = key_node.value
+            if not isinstance(name, str):
+                self._note(key_node, location, "a key should be a word", in_file=in_file)
+            elif name in values:
+                line = f", first in line {first[name]}" if in_file else ""
+                self._note(key_node, (*location, name), f"the key is here twice{line}", in_file=in_file)
+            else:
+                first[name] = key_node.start_mark.line + 1
+                self._lines[(*location, name)] = first[name] if in_file else None
+                values[name] = self._plain(value_node, (*location, name), in_file=in_file, inside=inside)
+        return values
+
+    def _note(self, node: Node, location: Location, sentence: str, *, in_file: bool) -> None:
+        path, line = (self._path, node.start_mark.line + 1) if in_file else (None, None)
+        self.problems.append(Problem(sentence, dotted(location), path, line))
+
+
+def _text_of(path: Path) -> str:
+    try:
+        return path.read_bytes().decode("utf-8")
+    except FileNotFoundError as error:
+        raise ConfigError([Problem("no such file", path=path)]) from error
+    except IsADirectoryError as error:
+        raise ConfigError([Problem("should be a YAML file, got a directory", path=path)]) from error
+    except PermissionError as error:
+        raise ConfigError([Problem("no permission to read the file", path=path)]) from error
+    except OSError as error:
+        raise ConfigError([Problem(f"cannot be read: {error.strerror}", path=path)]) from error
+    except UnicodeDecodeError as error:
+        line = error.object.count(b"\n", 0, error.start) + 1
+        sentence = f"should be UTF-8 text, got the byte 0x{error.object[error.start]:02x}"
+        raise ConfigError([Problem(sentence, path=path, line=line)]) from error
+
+
+def _compose(text: str) -> Node | None:
+    try:
+        node: Node | None = YAML(typ="safe", pure=True).compose(text)
+    except RecursionError as error:
+        raise YAMLError("values are nested too deeply") from error
+    return node
+
+
+def _reason(error: YAMLError) -> str:
+    if isinstance(error, MarkedYAMLError):
+        return ", ".join(filter(None, [error.problem, error.context]))
+    return str(error).partition("\n")[0]
+
+
+def _line(error: YAMLError) -> int | None:
+    mark = (error.problem_mark or error.context_mark) if isinstance(error, MarkedYAMLError) else None
+    return mark.line + 1 if mark else None
+
+
+def _scalar(node: Node) -> Any:
+    """Value of a YAML 1.2 scalar; dates and other extensions stay text.
+
+    Raises:
+        ValueError: If it cannot be read as what its tag says.
+    """
+    constructor = YAML(typ="safe", pure=True).constructor
+    readers = {
+        "null": lambda _: None,
+        "bool": constructor.construct_yaml_bool,
+        "int": constructor.construct_yaml_int,
+        "float": constructor.construct_yaml_float,
+        **dict.fromkeys(("str", "timestamp", "merge", "value"), lambda text: text.value),
+    }
+    tag = str(node.tag).removeprefix(_TAG)
+    if not isinstance(node, ScalarNode) or tag not in readers:
+        raise ValueError(f"the tag {tag} means nothing here")
+    return readers[tag](node)
+
+
+def _parts(key: str) -> tuple[str, ...]:
+    """Parts of a dotted key; the dots inside the key of a swept parameter do not part it."""
+    parts = tuple(key.split("."))
+    if parts[:2] != _SWEPT or len(parts) < 3:
+        return parts
+    rest = parts[2:]
+    within = 1 if rest[-1] in _SWEPT_FIELDS else 2 if rest[-2:-1] == ("values",) else 0
+    swept, field = rest[: len(rest) - within], rest[len(rest) - within :]
+    return (*_SWEPT, ".".join(swept), *field)
+
+
+def _index(holder: Any, part: str) -> str | int:
+    return int(part) if isinstance(holder, list) and part.isdecimal() else part
+
+
+def _holds(holder: Any, index: str | int) -> bool:
+    if isinstance(holder, list):
+        return isinstance(index, int) and index < len(holder)
+    return isinstance(holder, dict) and index in holder

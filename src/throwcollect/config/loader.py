@@ -1,0 +1,139 @@
+"""From a YAML file and overrides to a configuration that is complete and valid, and back to text."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator, Sequence
+from copy import deepcopy
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from throwcollect.config.document import Document
+from throwcollect.config.problems import Finding, Location, dotted, findings
+from throwcollect.config.schema import Config, Range
+from throwcollect.config.values import reason_not_sweepable, with_values
+from throwcollect.errors import ConfigError
+
+_PARAMETERS = ("sweep", "parameters")
+_PLAIN_WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_./-]*")
+_NOT_PLAIN = {"true", "false", "null", "yes", "no", "on", "off", "y", "n"}
+
+
+def load(path: Path, overrides: Sequence[str] = ()) -> Config:
+    """Read a configuration file.
+
+    Args:
+        path: YAML 1.2 file.
+        overrides: ``key=value`` pairs that win over the file, later ones over earlier ones: dotted keys, and values
+            that are read as YAML.
+
+    Returns:
+        The resolved configuration: every key has its value, also where the file leaves it out.
+
+    Raises:
+        ConfigError: If the file cannot be read or anything in it is wrong; it holds all problems, unknown keys first.
+    """
+    document = Document(path)
+    for assignment in overrides:
+        document.override(assignment)
+    config, found = _checked(document.values)
+    problems = [document.problem(each.location, each.sentence) for each in found]
+    unknown = sum(each.unknown for each in found)
+    rest = sorted([*document.problems, *problems[unknown:]], key=lambda problem: problem.line or 0)
+    if rest or unknown or config is None:
+        raise ConfigError([*problems[:unknown], *rest])
+    return config
+
+
+def resolved_yaml(config: Config) -> str:
+    """A configuration with all its keys as YAML that loads back to an equal one."""
+    return "".join(f"{line}\n" for line in _lines(config.model_dump(), ""))
+
+
+def value_as_yaml(value: Any) -> str:
+    """A value of a configuration as YAML in one line."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{value_as_yaml(key)}: {value_as_yaml(each)}" for key, each in value.items()) + "}"
+    if isinstance(value, list):
+        return f"[{', '.join(map(value_as_yaml, value))}]"
+    if isinstance(value, str) and _PLAIN_WORD.fullmatch(value) and value.lower() not in _NOT_PLAIN:
+        return value
+    if isinstance(value, str):
+        return '"' + "".join(_character(character) for character in value) + '"'
+    return json.dumps(value)
+
+
+def _character(character: str) -> str:
+    plain = character.isprintable() and character not in '"\\'
+    return character if plain else f"\\U{ord(character):08x}"
+
+
+def _checked(values: dict[str, Any]) -> tuple[Config | None, list[Finding]]:
+    """Validate values; after a problem go on with defaults in the place of what was wrong, to find what else is."""
+    values = deepcopy(values)
+    found: list[Finding] = []
+    replaced: set[Location] = set()
+    config = None
+    while config is None:
+        try:
+            config = Config.model_validate(values, strict=True)
+            fresh = list(_sweep_findings(config))
+        except ValidationError as error:
+            fresh = findings(error, values)
+        found += [finding for finding in fresh if not any(_about(finding, location) for location in replaced)]
+        places = {finding.location[: 3 if finding.location[:2] == _PARAMETERS else 2] for finding in fresh}
+        removed = {place for place in places if _remove(values, place)}
+        replaced |= places
+        if not removed:
+            break
+    return config, sorted(found, key=lambda finding: not finding.unknown)
+
+
+def _about(finding: Finding, location: Location) -> bool:
+    """Whether a finding may be about a default that stands at a location, not about what was written."""
+    words = re.findall(r"\w+", finding.sentence)
+    within = finding.location[: len(location)] == location
+    return within or location[-1] in words or (finding.unknown and dotted(location) in finding.key)
+
+
+def _remove(values: dict[str, Any], location: Location) -> bool:
+    """Remove what is at a location, or else the section in which it is missing; whether there was something."""
+    holder: Any = values
+    for part in location[:-1]:
+        holder = holder.get(part) if isinstance(holder, dict) else None
+    if isinstance(holder, dict) and location[-1] in holder:
+        del holder[location[-1]]
+        return True
+    return values.pop(str(location[0]), None) is not None
+
+
+def _sweep_findings(config: Config) -> Iterator[Finding]:
+    sampler = config.sweep.sampler
+    if config.sweep.parameters and sampler != "grid" and config.trials is None:
+        yield Finding(("trials",), f"missing; the sampler {sampler} should know how many trials to draw")
+    for key, parameter in config.sweep.parameters.items():
+        location: Location = (*_PARAMETERS, key)
+        if reason := reason_not_sweepable(config, key):
+            yield Finding(location, reason, unknown=reason.startswith("unknown key"))
+            continue
+        if isinstance(parameter, Range):
+            values: dict[Location, float] = {("min",): parameter.min, ("max",): parameter.max}
+        else:
+            values = {("values", index): value for index, value in enumerate(parameter.values)}
+        for part, value in values.items():
+            try:
+                with_values(config, {key: value})
+            except ConfigError as error:
+                yield Finding((*location, *part), error.problems[0].message)
+
+
+def _lines(values: dict[str, Any], indent: str) -> Iterator[str]:
+    for key, value in values.items():
+        if isinstance(value, dict) and value:
+            yield f"{indent}{value_as_yaml(key)}:"
+            yield from _lines(value, indent + "  ")
+        else:
+            yield f"{indent}{value_as_yaml(key)}: {value_as_yaml(value)}"

@@ -1,0 +1,160 @@
+"""From what pydantic finds to sentences about keys."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+from typing import Any
+
+from pydantic import ValidationError
+from pydantic_core import ErrorDetails
+
+from throwcollect.config.kinds import ContradictionError
+from throwcollect.config.shape import Shape, shape_of
+
+_RANGE_ERRORS = ("greater_than", "greater_than_equal", "less_than", "less_than_equal")
+_LONGEST_QUOTE = 60
+
+Location = tuple[str | int, ...]
+"""Keys and list indices from the root of a configuration to a value."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something that is wrong at one place.
+
+    Attributes:
+        location: Where; need not exist.
+        sentence: What was wrong, what was got and what would be right.
+        unknown: Whether the key itself is wrong, not its value.
+    """
+
+    location: Location
+    sentence: str
+    unknown: bool = False
+
+    @property
+    def key(self) -> str:
+        """Dotted key of the place."""
+        return dotted(self.location)
+
+
+def dotted(location: Location) -> str:
+    """Dotted key of a place."""
+    return ".".join(map(str, location))
+
+
+def unknown_key(name: str, known: list[str]) -> str:
+    """Sentence for a key that does not exist.
+
+    Args:
+        name: The key.
+        known: All keys that would be right in its place.
+    """
+    if near := get_close_matches(name, known, 1):
+        return f"unknown key; did you mean '{near[0]}'?"
+    return "unknown key; " + (f"known keys here: {', '.join(known)}" if known else "no keys are expected here")
+
+
+def quoted(value: Any) -> str:
+    """A value as its author would know it again."""
+    if isinstance(value, str):
+        return repr(value if len(value) <= _LONGEST_QUOTE else value[:_LONGEST_QUOTE] + "…")
+    if isinstance(value, Mapping):
+        return "keys and values"
+    if isinstance(value, list):
+        return "a list"
+    if value is None:
+        return "nothing"
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def findings(error: ValidationError, values: Any, *, above: Location = ()) -> list[Finding]:
+    """Everything that pydantic found, one finding a key, unknown keys first.
+
+    Args:
+        error: What pydantic raised.
+        values: The values that it was given.
+        above: Where in a configuration these values are.
+    """
+    found: dict[Location, Finding] = {}
+    for details in error.errors(include_url=False):
+        for finding in _findings(details, values, above):
+            # A union reports once for each alternative; the sentence speaks of all of them anyway.
+            found.setdefault(finding.location, finding)
+    for location in [place[:length] for place in found for length in range(len(place))]:
+        # Of the alternatives of a union, the one that got as far as an item is meant.
+        found.pop(location, None)
+    unknown = [finding for finding in found.values() if finding.unknown]
+    meant = {(*finding.location[:-1], _nearest(finding)) for finding in unknown}
+    rest = [finding for finding in found.values() if not finding.unknown and finding.location not in meant]
+    return [*unknown, *rest]
+
+
+def _nearest(finding: Finding) -> str:
+    return finding.sentence.partition("did you mean '")[2].partition("'")[0]
+
+
+def _findings(details: ErrorDetails, values: Any, above: Location) -> Iterator[Finding]:
+    location, shape = _located(details, values, above)
+    kind, value = details["type"], details["input"]
+    cause = details.get("ctx", {}).get("error")
+    if kind == "extra_forbidden":
+        known = list(_section(details, values, above).keys)
+        yield Finding(location, unknown_key(str(location[-1]), known), unknown=True)
+    elif isinstance(cause, ContradictionError):
+        for key, sentence in cause.sentences.items():
+            yield Finding((*location, *_split(key)), sentence)
+    elif cause is not None:
+        yield Finding(location, str(cause), unknown=details["loc"][-1:] == ("[key]",))
+    elif kind == "missing":
+        yield Finding(location, f"missing; should be {shape}")
+    elif kind == "union_tag_not_found" and isinstance(value, Mapping):
+        families = [word for each in shape.alternatives for word in each.child("family").choices]
+        words = " or ".join(f"'{family}'" for family in families)
+        yield Finding((*location, "family"), _should_be(words, value["family"], families))
+    else:
+        yield Finding(location, _should_be(str(shape), value, shape.choices) + _radians(kind, shape, value))
+
+
+def _should_be(words: str, value: Any, choices: list[str]) -> str:
+    near = get_close_matches(value, choices, 1) if isinstance(value, str) else []
+    return f"should be {words}, got {quoted(value)}" + (f"; did you mean '{near[0]}'?" if near else "")
+
+
+def _radians(kind: str, shape: Shape, value: Any) -> str:
+    if kind not in _RANGE_ERRORS or shape.unit != "rad":
+        return ""
+    return f"; angles are in radians: {value:g} degrees are {math.radians(value):.4f}"
+
+
+def _located(details: ErrorDetails, values: Any, above: Location) -> tuple[Location, Shape]:
+    """Where an error is, without the names of models and unions that pydantic mixes into its locations."""
+    location, shape, here = list(above), shape_of(above), values
+    parts = details["loc"]
+    for index, part in enumerate(parts):
+        inside = part in here if isinstance(here, Mapping) else isinstance(here, list) and isinstance(part, int)
+        last_is_missing = details["type"] == "missing" and index == len(parts) - 1
+        if inside or last_is_missing:
+            location.append(part)
+            shape = shape.child(part)
+            here = here[part] if inside else None
+        else:
+            shape = next((each for each in shape.alternatives if each.node.get("title") == part), shape)
+    return tuple(location), shape
+
+
+def _section(details: ErrorDetails, values: Any, above: Location) -> Shape:
+    container = ErrorDetails(type="section", loc=details["loc"][:-1], msg="", input=None)
+    return _located(container, values, above)[1]
+
+
+def _split(key: str) -> Location:
+    """Parts of a dotted key of a contradiction; the dots in the key of a swept parameter do not part it."""
+    head, found, rest = key.partition("parameters.")
+    if found and not head:
+        name, _, field = rest.rpartition(".")
+        return ("parameters", name, field)
+    return tuple(key.split("."))

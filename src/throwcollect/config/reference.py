@@ -1,0 +1,107 @@
+"""The reference of all keys, printed from the models: ``python -m throwcollect.config.reference``."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from throwcollect.config.kinds import JOINT_NAMES
+from throwcollect.config.loader import value_as_yaml
+from throwcollect.config.schema import Config, DynamicMovementPrimitive, Section
+from throwcollect.config.shape import Shape, json_schema, root
+from throwcollect.config.values import sweepable_keys
+
+__all__ = ["json_schema", "page"]
+
+_INTRODUCTION = """\
+# Configuration
+
+<!-- Printed by `python -m throwcollect.config.reference`; edit the docstrings in config/schema.py instead. -->
+
+A configuration is a YAML 1.2 file. Every key may be left out, unless it is marked as required; `throwcollect config`
+prints all keys with the values that they then have, and `throwcollect config --schema` the JSON Schema for editors.
+Units are part of the names; angles are in radians. A key that does not exist, a value out of bounds and a key that is
+there twice are errors, and all of them are reported at once.
+
+`--set KEY=VALUE` replaces one key, such as `--set task.duration_s=1.1` or `--set 'record.topics=[joint_states,
+ball/odometry, clock]'`. The value is read as YAML; later ones win. Items of lists go by their index from 0.
+"""
+
+_SAMPLERS = """\
+### Samplers
+
+| sampler | points | with more `trials` |
+|---|---|---|
+| `grid` | all combinations, the last key fastest; `trials` takes the first ones | same first points |
+| `uniform` | independent, evenly distributed | same first points |
+| `latin_hypercube` | one point in each of `trials` strips of every key | all points change, as the strips do |
+| `sobol` | scrambled Sobol' sequence, the most even one; any number of trials | same first points |
+| `list` | the rows of `sweep.file`; `trials` takes the first ones | same first points |
+
+The file of the sampler `list` is CSV (UTF-8, commas, a header line) or Parquet; its columns are named with dotted keys.
+A set of `values` is drawn from in equal shares. Everything is drawn from `seed`.
+"""
+
+
+def page() -> str:
+    """The reference of all keys, as Markdown."""
+    return "\n".join([_INTRODUCTION, *_sections(root(), "")])
+
+
+def _sections(shape: Shape, prefix: str) -> Iterator[str]:
+    yield _table(shape, prefix)
+    for name, child in shape.keys.items():
+        key = prefix + name
+        alternatives = child.alternatives
+        if key == "sweep.parameters":
+            for parameter in child.child("").alternatives:
+                yield f"### `sweep.parameters.<key>`: {_sentence(parameter)}\n"
+                yield _table(parameter, "")
+            yield f"{_SAMPLERS}\n### Keys that may be swept\n\n{_swept()}\n"
+        elif len(alternatives) > 1 and all(each.keys for each in alternatives):
+            for each in alternatives:
+                family = each.child("family").choices[0]
+                yield f"### `{key}` with `family: {family}`\n\n{each.node['description']}\n"
+                yield _table(each, f"{key}.")
+        elif child.keys:
+            yield f"## `{key}`\n\n{child.node['description']}\n"
+            yield from _sections(child, f"{key}.")
+
+
+def _table(shape: Shape, prefix: str) -> str:
+    rows = ["| key | holds | default | meaning |", "|---|---|---|---|"]
+    for name, child in shape.keys.items():
+        if child.keys and "default" in child.node and len(child.alternatives) == 1:
+            continue
+        cells = [f"`{prefix}{name}`", str(child), _default(child, name, shape), _sentence(child)]
+        rows.append("| " + " | ".join(cells) + " |")
+    return "\n".join(rows) + "\n"
+
+
+def _sentence(shape: Shape) -> str:
+    return re.sub(r"\s+", " ", shape.node["description"])
+
+
+def _default(child: Shape, name: str, holder: Shape) -> str:
+    if name in holder.node.get("required", []):
+        return "required"
+    return f"`{value_as_yaml(child.node['default'])}`"
+
+
+def _swept() -> str:
+    config = Config()
+    weights = {joint: [0.0] * 2 for joint in config.task.end}
+    primitive = DynamicMovementPrimitive(family="dmp", basis_functions=2, weights=weights)
+    learned: Section = config.task.model_copy(update={"trajectory": primitive})
+    keys = [*sweepable_keys(config), *sweepable_keys(config.model_copy(update={"task": learned}))]
+    joints = "|".join(JOINT_NAMES)
+    general = dict.fromkeys(re.sub(rf"({joints})(\.\d+)?", _general, key) for key in keys)
+    return ", ".join(f"`{key}`" for key in general) + ".\nA joint must be in `task.end`."
+
+
+def _general(match: re.Match[str]) -> str:
+    return "<joint>.<index>" if match[2] else "<joint>"
+
+
+if __name__ == "__main__":
+    print(page(), end="")

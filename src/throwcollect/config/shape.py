@@ -1,0 +1,149 @@
+"""What a key may hold, in words: read off the JSON Schema of the models, for messages and for the reference."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+from throwcollect.config.schema import Config
+
+_UNITS = {
+    "_per_s": "1/s",
+    "_kgpm3": "kg/m³",
+    "_mps2": "m/s²",
+    "_kg": "kg",
+    "_hz": "Hz",
+    "_m": "m",
+    "_s": "s",
+}
+_NOUNS = {"number": "a number", "integer": "a whole number", "string": "text", "boolean": "true or false"}
+
+
+@cache
+def json_schema() -> dict[str, Any]:
+    """JSON Schema (draft 2020-12) of a configuration file, for editors."""
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **Config.model_json_schema()}
+
+
+@dataclass(frozen=True)
+class Shape:
+    """What a key may hold.
+
+    Attributes:
+        node: Its part of the JSON Schema, without references.
+        unit: Unit of its numbers; empty when they have none.
+    """
+
+    node: dict[str, Any]
+    unit: str = ""
+
+    @property
+    def alternatives(self) -> list[Shape]:
+        """The shapes that a union allows; only the shape itself when it is no union."""
+        nodes = self.node.get("oneOf") or self.node.get("anyOf")
+        return [Shape(_resolved(node), self.unit) for node in nodes] if nodes else [self]
+
+    @property
+    def keys(self) -> dict[str, Shape]:
+        """The keys of a section and their shapes; empty when it is no section."""
+        return {name: self.child(name) for shape in self.alternatives for name in shape.node.get("properties", {})}
+
+    @property
+    def choices(self) -> list[str]:
+        """The words it allows, if there are only some."""
+        return [word for shape in self.alternatives for word in _words_allowed(shape.node)]
+
+    def child(self, part: str | int) -> Shape:
+        """The shape of what is in it under a key or an index; any value when it should hold nothing there."""
+        for shape in self.alternatives:
+            rest = shape.node.get("items" if isinstance(part, int) else "additionalProperties")
+            if node := shape.node.get("properties", {}).get(part) or rest:
+                inherited = self.unit if node.get("type") in ("number", "array", "object") else ""
+                return Shape(_resolved(node), node.get("unit") or _unit(str(part)) or inherited)
+        return Shape({})
+
+    def alternative(self, name: str) -> Shape:
+        """The alternative of a union that a model describes."""
+        return next(shape for shape in self.alternatives if shape.node.get("title") == name)
+
+    def __str__(self) -> str:
+        return " or ".join(dict.fromkeys(_in_words(shape) for shape in self.alternatives))
+
+
+def root() -> Shape:
+    """The shape of a whole configuration."""
+    return Shape(json_schema())
+
+
+def shape_of(parts: Sequence[str | int]) -> Shape:
+    """The shape of what a key of a configuration holds."""
+    shape = root()
+    for part in parts:
+        shape = shape.child(part)
+    return shape
+
+
+def _resolved(node: dict[str, Any]) -> dict[str, Any]:
+    if "$ref" not in node:
+        return node
+    target = json_schema()["$defs"][node["$ref"].rpartition("/")[2]]
+    return {**target, **{key: value for key, value in node.items() if key != "$ref"}}
+
+
+def _unit(key: str) -> str:
+    return next((unit for suffix, unit in _UNITS.items() if key.endswith(suffix)), "")
+
+
+def _words_allowed(node: dict[str, Any]) -> list[str]:
+    return [node["const"]] if "const" in node else list(node.get("enum", []))
+
+
+def _in_words(shape: Shape) -> str:
+    node = shape.node
+    words = _words_allowed(node)
+    if node.get("title") == "Joint":
+        return "a joint's name"
+    if words:
+        listed = [f"'{word}'" for word in words]
+        return " or ".join(listed) if len(listed) < 3 else f"one of {', '.join(listed)}"
+    kind = node.get("type", "anything")
+    if kind == "array":
+        return f"a list of {_plural(str(shape.child(0)))}"
+    if kind == "object":
+        if required := node.get("required"):
+            return "{" + ", ".join(f"{key}: …" for key in required) + "}"
+        if "properties" in node:
+            return "keys and values"
+        names = "joint names" if "propertyNames" in node else "keys"
+        return f"{names}, each with {shape.child('')}"
+    if kind == "null":
+        return "null"
+    if "pattern" in node:
+        return "lower-case letters, digits, - and _, first a letter or digit"
+    bounds = _bounds(node) or (shape.unit and "in")
+    return " ".join(filter(None, [_NOUNS.get(kind, kind), bounds, shape.unit]))
+
+
+def _bounds(node: dict[str, Any]) -> str:
+    low, above = node.get("minimum"), node.get("exclusiveMinimum")
+    high, below = node.get("maximum"), node.get("exclusiveMaximum")
+    if high is None and below is not None and node["type"] == "integer":
+        high, below = below - 1, None
+    if low is not None and high is not None:
+        return f"from {low} to {high}"
+    parts = [
+        f"of {low} or more" if low is not None else "",
+        f"above {above}" if above is not None else "",
+        f"up to {high}" if high is not None else "",
+        f"below {below}" if below is not None else "",
+    ]
+    return " and ".join(filter(None, parts))
+
+
+def _plural(words: str) -> str:
+    for one, many in (("a joint's name", "joint names"), ("a number", "numbers"), ("one of ", "")):
+        if words.startswith(one):
+            return many + words.removeprefix(one)
+    return words

@@ -1,0 +1,100 @@
+"""metadata.yaml of a rosbag2 bag, version 9, as rosbag2 writes and reads it.
+
+Fields and their order are those of ``rosbag2_storage/yaml.hpp`` (ROS 2 Jazzy and later).
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ruamel.yaml import YAML
+
+from throwcollect.episode.channels import Channel
+from throwcollect.interfaces import type_hash
+
+VERSION = 9
+_ROS_DISTRO = "jazzy"
+"""Release whose interface definitions the messages follow."""
+
+
+@dataclass(frozen=True)
+class FileSummary:
+    """What a bag's metadata say of one file.
+
+    Attributes:
+        path: Name of the file.
+        start_ns: Time of its first message [ns].
+        end_ns: Time of its last message [ns].
+        counts: Number of messages of each channel, by the channel's number.
+    """
+
+    path: str
+    start_ns: int
+    end_ns: int
+    counts: Mapping[int, int]
+
+    @property
+    def messages(self) -> int:
+        """Number of messages."""
+        return sum(self.counts.values())
+
+
+def bag_information(
+    files: Sequence[FileSummary], channels: Sequence[Channel], custom_data: Mapping[str, str]
+) -> dict[str, Any]:
+    """The fields of a bag's metadata.
+
+    Args:
+        files: The files of the bag, in order.
+        channels: All channels.
+        custom_data: Facts of our own.
+    """
+    start = min((file.start_ns for file in files), default=0)
+    end = max((file.end_ns for file in files), default=0)
+    return {
+        "version": VERSION,
+        "storage_identifier": "mcap",
+        "duration": {"nanoseconds": end - start},
+        "starting_time": {"nanoseconds_since_epoch": start},
+        "message_count": sum(file.messages for file in files),
+        "topics_with_message_count": [
+            {
+                "topic_metadata": {
+                    "name": channel.topic,
+                    "type": channel.type_name,
+                    "serialization_format": "cdr",
+                    "offered_qos_profiles": [channel.qos.profile],
+                    "type_description_hash": type_hash(channel.type_name),
+                },
+                "message_count": sum(file.counts.get(channel.id, 0) for file in files),
+            }
+            for channel in channels
+        ],
+        "compression_format": "",
+        "compression_mode": "",
+        "relative_file_paths": [file.path for file in files],
+        "files": [
+            {
+                "path": file.path,
+                "starting_time": {"nanoseconds_since_epoch": file.start_ns},
+                "duration": {"nanoseconds": file.end_ns - file.start_ns},
+                "message_count": file.messages,
+            }
+            for file in files
+        ],
+        "custom_data": dict(custom_data),
+        "ros_distro": _ROS_DISTRO,
+    }
+
+
+def to_yaml(data: Mapping[str, Any]) -> str:
+    """YAML text in block style, keys in their order."""
+    yaml = YAML()
+    yaml.width = 4096
+    yaml.representer.ignore_aliases = lambda *_: True
+    stream = io.StringIO()
+    yaml.dump(data, stream)
+    return stream.getvalue()

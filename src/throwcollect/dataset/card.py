@@ -1,0 +1,153 @@
+"""The data card of a dataset: what it holds for whoever finds it, and where it came from.
+
+It is the only file that may differ between two collections of the same configuration.
+"""
+
+from __future__ import annotations
+
+import platform
+import socket
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import datetime, timezone
+from importlib.metadata import version
+
+import pyarrow as pa
+import pyarrow.compute as pc
+
+import throwcollect
+from throwcollect.config.schema import Config
+from throwcollect.dataset.bag import to_yaml
+
+_LIBRARIES = ("pybullet", "numpy", "rosbags", "mcap", "zstandard", "pyarrow", "pin", "example-robot-data")
+_SIZES = ((1_000, "n<1K"), (10_000, "1K<n<10K"), (100_000, "10K<n<100K"), (1_000_000, "100K<n<1M"))
+_MORE = "1M<n<10M"
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """How one collection was run.
+
+    Attributes:
+        finished: When it ended.
+        host: Name of the machine that wrote the dataset.
+        platform: Its system and processor.
+        python: Version of Python.
+        libraries: Versions of the libraries that the data pass through.
+        simulations: Number of simulations; None if not known.
+        wall_s: Real time that it took [s].
+    """
+
+    finished: datetime
+    host: str
+    platform: str
+    python: str
+    libraries: Mapping[str, str]
+    simulations: int | None
+    wall_s: float
+
+    @classmethod
+    def of_this_machine(cls, *, simulations: int | None, wall_s: float) -> Provenance:
+        """Provenance of a collection that ends now, here."""
+        return cls(
+            finished=datetime.now(timezone.utc),
+            host=socket.gethostname(),
+            platform=platform.platform(),
+            python=platform.python_version(),
+            libraries={"throwcollect": throwcollect.__version__, **{name: version(name) for name in _LIBRARIES}},
+            simulations=simulations,
+            wall_s=wall_s,
+        )
+
+
+def count_outcomes(throws: pa.Table) -> dict[str, int]:
+    """Number of trials of each outcome, most frequent first."""
+    counts = {entry["values"]: entry["counts"] for entry in pc.value_counts(throws["outcome"]).to_pylist()}
+    return dict(sorted(counts.items(), key=lambda item: (-item[1], item[0])))
+
+
+def data_card(config: Config, throws: pa.Table, provenance: Provenance) -> str:
+    """README.md of a dataset, with the YAML header that dataset hubs read.
+
+    Args:
+        config: The configuration.
+        throws: One row a trial.
+        provenance: How the collection was run.
+    """
+    size = next((label for limit, label in _SIZES if len(throws) < limit), _MORE)
+    header = {
+        "license": "apache-2.0",
+        "pretty_name": config.name,
+        "task_categories": ["robotics"],
+        "tags": ["robotics", "throwing", "ros2", "mcap", "talos", "simulation"],
+        "size_categories": [size],
+        "configs": [{"config_name": "throws", "data_files": "throws.parquet"}],
+    }
+    lines = [
+        "---",
+        to_yaml(header) + "---",
+        "",
+        f"# {config.name}",
+        "",
+        f"{len(throws)} simulated throws of a ball by the humanoid robot Talos, each with the joint states of the "
+        f"robot and the odometry of the ball at {config.record.rate_hz} Hz. Made with throwcollect.",
+        "",
+        "| outcome | trials |",
+        "|---|---|",
+        *(f"| {outcome} | {count} |" for outcome, count in count_outcomes(throws).items()),
+        "",
+        "## Files",
+        "",
+        "- `metadata.yaml` and `*.mcap`: the recordings, a rosbag2 bag (`ros2 bag info`, Foxglove, `rosbags`, `mcap`).",
+        "- `throws.parquet`: one row a trial: swept values, outcome, release, apex, landing, place of its recording.",
+        "- `plan.parquet`: the trials as they were drawn before the first one ran.",
+        "- `config.yaml`: the configuration; collecting with it again yields the same data.",
+        "",
+        *_ranges(config, throws),
+        "## Limits",
+        "",
+        "Simulated with Bullet: rigid bodies, the base of the robot fixed, ideal motors within effort limits, no "
+        "sensor noise. Throws that failed are kept; `outcome` says how.",
+        "",
+        "## Provenance",
+        "",
+        "| | |",
+        "|---|---|",
+        *(f"| {name} | {value} |" for name, value in _provenance(provenance).items()),
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def _ranges(config: Config, throws: pa.Table) -> list[str]:
+    swept = [name for name in throws.column_names if "." in name]
+    if not swept:
+        return []
+    rows = []
+    for name in swept:
+        limits = pc.min_max(throws[name]).as_py()
+        rows.append(f"| `{name}` | {limits['min']:g} | {limits['max']:g} |")
+    return [
+        "## What varies",
+        "",
+        f"Drawn by the sampler `{config.sweep.sampler}` with seed {config.seed}.",
+        "",
+        "| key | lowest | highest |",
+        "|---|---|---|",
+        *rows,
+        "",
+    ]
+
+
+def _provenance(provenance: Provenance) -> dict[str, str]:
+    facts = {
+        "finished": provenance.finished.isoformat(timespec="seconds"),
+        "host": provenance.host,
+        "platform": provenance.platform,
+        "Python": provenance.python,
+        **provenance.libraries,
+    }
+    if provenance.simulations is not None:
+        facts["simulations"] = str(provenance.simulations)
+    facts["wall time"] = f"{provenance.wall_s:.1f} s"
+    return facts

@@ -1,0 +1,27 @@
+"""What is wrong with a dataset, one thing at a time."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that is wrong.
+
+    Attributes:
+        file: Name of the file in the dataset's directory.
+        place: Where in it: a trial, a byte, a field; empty when it is the file as a whole.
+        problem: What is wrong.
+    """
+
+    file: str
+    place: str
+    problem: str
+
+    def __str__(self) -> str:
+        return ": ".join(part for part in (self.file, self.place, self.problem) if part)
+
+    def as_dict(self) -> dict[str, str]:
+        """The same for JSON."""
+        return asdict(self)

@@ -1,0 +1,164 @@
+"""The channels of a recording: topics with their numbers, types and qualities of service, as rosbag2 stores them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+from throwcollect.config.schema import Config
+from throwcollect.episode.frames import FrameTree, read_frames
+from throwcollect.episode.topics import (
+    Topic,
+    ball_odometry,
+    clock,
+    controller_state,
+    joint_states,
+    transform_message,
+    transforms,
+)
+from throwcollect.errors import ConfigError, Problem
+from throwcollect.interfaces import get_message, serialize
+from throwcollect.robots.talos import CONTROLLERS, controller_of
+
+ROBOT_DESCRIPTION_ID = 1
+TF_STATIC_ID = 2
+JOINT_STATES_ID = 3
+BALL_ODOMETRY_ID = 4
+_CLOCK_ID = 5
+_TF_ID = 6
+_FIRST_CONTROLLER_ID = 7
+
+_INFINITE_S, _INFINITE_NS = 9223372036, 854775807
+"""A duration without end in rmw: 2^63 - 1 ns."""
+
+
+@dataclass(frozen=True)
+class Qos:
+    """Offered quality of service of a reliable publisher that keeps the last messages.
+
+    Attributes:
+        durability: Whether late subscribers are sent the last messages.
+        depth: How many messages are kept.
+    """
+
+    durability: Literal["volatile", "transient_local"]
+    depth: int
+
+    @property
+    def profile(self) -> Mapping[str, object]:
+        """All policies, in the names and order of rosbag2's metadata since version 9."""
+        infinite = {"sec": _INFINITE_S, "nsec": _INFINITE_NS}
+        return {
+            "history": "keep_last",
+            "depth": self.depth,
+            "reliability": "reliable",
+            "durability": self.durability,
+            "deadline": infinite,
+            "lifespan": infinite,
+            "liveliness": "automatic",
+            "liveliness_lease_duration": infinite,
+            "avoid_ros_namespace_conventions": False,
+        }
+
+    @property
+    def text(self) -> str:
+        """The profile as the list in YAML that rosbag2 stores with an MCAP channel."""
+        lines = []
+        for key, value in self.profile.items():
+            if isinstance(value, dict):
+                lines += [f"{key}:", *(f"  {part}: {number}" for part, number in value.items())]
+            else:
+                lines.append(f"{key}: {str(value).lower()}")
+        return "- " + "\n  ".join(lines)
+
+
+_SAMPLED = Qos("volatile", 10)
+_LATCHED = Qos("transient_local", 1)
+_TRANSFORMS = Qos("volatile", 100)
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One topic of a recording.
+
+    Attributes:
+        id: Number of the channel; the same in every dataset.
+        topic: Name of the topic.
+        type_name: Message type, ``package/msg/Type``.
+        qos: Offered quality of service.
+    """
+
+    id: int
+    topic: str
+    type_name: str
+    qos: Qos
+
+
+class Channels:
+    """What is recorded for a configuration.
+
+    Attributes:
+        latched: Channels with one message a file: ``/robot_description`` and ``/tf_static``.
+        recorded: Channels with one message a sample, in the order of their numbers, and what fills them.
+
+    Args:
+        config: The configuration.
+        urdf: URDF text of the robot.
+
+    Raises:
+        ConfigError: If the text is not a URDF, or the task moves a joint that the robot does not have.
+    """
+
+    latched = (
+        Channel(ROBOT_DESCRIPTION_ID, "/robot_description", "std_msgs/msg/String", _LATCHED),
+        Channel(TF_STATIC_ID, "/tf_static", "tf2_msgs/msg/TFMessage", _LATCHED),
+    )
+
+    def __init__(self, config: Config, urdf: str) -> None:
+        self._urdf = urdf
+        self._frames: FrameTree = read_frames(urdf, base_height=config.robot.base_height_m)
+        topics = _topics(config, self._frames)
+        self.recorded: dict[Channel, Topic] = {
+            Channel(number, topic.name, topic.type_name, _TRANSFORMS if number == _TF_ID else _SAMPLED): topic
+            for number, topic in sorted(topics.items())
+        }
+
+    @property
+    def all(self) -> tuple[Channel, ...]:
+        """All channels, by number."""
+        return (*self.latched, *self.recorded)
+
+    def latched_messages(self, stamp_ns: int) -> dict[Channel, bytes]:
+        """CDR messages of the latched channels.
+
+        Args:
+            stamp_ns: Stamp of the static transforms [ns].
+        """
+        description, static = self.latched
+        fixed = [
+            transform_message(frame.parent, frame.child, frame.translation, frame.rotation_xyzw, stamp_ns)
+            for frame in self._frames.fixed
+        ]
+        return {
+            description: serialize(get_message(description.type_name)(data=self._urdf)),
+            static: serialize(get_message(static.type_name)(transforms=fixed)),
+        }
+
+
+def _topics(config: Config, frames: FrameTree) -> dict[int, Topic]:
+    chosen = config.record.topics
+    topics = {JOINT_STATES_ID: joint_states(), BALL_ODOMETRY_ID: ball_odometry()}
+    if "clock" in chosen:
+        topics[_CLOCK_ID] = clock()
+    if "tf" in chosen:
+        topics[_TF_ID] = transforms(frames.moving)
+    if "controller_state" in chosen:
+        try:
+            moved = {controller_of(joint) for joint in config.task.end}
+        except KeyError as error:
+            raise ConfigError([Problem(f"Talos has no joint {error}", "task.end")]) from error
+        for number, name in enumerate(CONTROLLERS, start=_FIRST_CONTROLLER_ID):
+            if name in moved:
+                topics[number] = controller_state(name)
+    return topics

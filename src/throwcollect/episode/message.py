@@ -1,0 +1,150 @@
+"""The one message that carries an episode from a simulation to whoever collects: std_msgs/UInt8MultiArray.
+
+Its layout names two parts of its data: ``header``, an `EpisodeHeader` in JSON, and ``chunk``, an MCAP Chunk record.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import struct
+from dataclasses import asdict
+from functools import cache, cached_property
+
+import numpy as np
+from pydantic import TypeAdapter, ValidationError
+
+from throwcollect.episode.chunk import Chunk, MessageTable
+from throwcollect.episode.layout import MessageLayout
+from throwcollect.episode.record import EpisodeHeader, Samples
+from throwcollect.errors import DatasetError
+from throwcollect.interfaces import get_message
+
+_PARTS = ("header", "chunk")
+_HEADER = TypeAdapter(EpisodeHeader)
+_COUNT = struct.Struct("<I")
+
+
+class Episode:
+    """What one trial yielded, as it travels and rests; decompressed when it is looked at.
+
+    Attributes:
+        header: What is known besides the samples.
+        chunk: The recorded messages, compressed.
+    """
+
+    def __init__(self, header: EpisodeHeader, chunk: Chunk) -> None:
+        self.header = header
+        self.chunk = chunk
+
+    @cached_property
+    def contents(self) -> bytes:
+        """The uncompressed message records.
+
+        Raises:
+            DatasetError: If the chunk is damaged.
+        """
+        return self.chunk.decompress()
+
+    @cached_property
+    def table(self) -> MessageTable:
+        """The message records as a table.
+
+        Raises:
+            DatasetError: If the chunk is damaged, or does not hold one message per channel and sample.
+        """
+        return MessageTable(self.contents, self.header.samples)
+
+    def samples(self) -> Samples:
+        """The samples, as views of the records where possible.
+
+        Raises:
+            DatasetError: If the chunk is damaged, or its messages are laid out otherwise than they are written.
+        """
+        return self.table.samples
+
+    @cached_property
+    def digest(self) -> str:
+        """SHA-256 over the header's JSON, one zero byte and the uncompressed message records, in hexadecimal.
+
+        Raises:
+            DatasetError: If the chunk is damaged.
+        """
+        digest = hashlib.sha256(header_to_json(self.header).encode() + b"\0")
+        digest.update(self.contents)
+        return digest.hexdigest()
+
+
+def header_to_json(header: EpisodeHeader) -> str:
+    """The header in JSON: keys in the order of their declaration, no blanks, ASCII; equal headers give equal text."""
+    return json.dumps(asdict(header), separators=(",", ":"))
+
+
+def header_from_json(text: bytes | str) -> EpisodeHeader:
+    """Read what `header_to_json` writes.
+
+    Raises:
+        DatasetError: If the text is anything else.
+    """
+    try:
+        header = _HEADER.validate_json(text, strict=True)
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(map(str, first["loc"]))
+        raise DatasetError(f"episode header: {place}: {first['msg']}; {error.error_count()} problems in all") from error
+    if header.trial < 0 or header.samples < 1:
+        raise DatasetError(f"episode header: trial {header.trial} with {header.samples} samples")
+    return header
+
+
+@cache
+def _layout() -> MessageLayout:
+    dimension = get_message("std_msgs/msg/MultiArrayDimension")
+    layout = get_message("std_msgs/msg/MultiArrayLayout")(dim=[dimension(label=part) for part in _PARTS])
+    message = get_message("std_msgs/msg/UInt8MultiArray")(layout=layout)
+    return MessageLayout(message, [f"layout.dim.{n}.{key}" for n in range(len(_PARTS)) for key in ("size", "stride")])
+
+
+def pack(header: EpisodeHeader, chunk: Chunk) -> bytes:
+    """The CDR bytes of the message that carries an episode.
+
+    Args:
+        header: What is known besides the samples.
+        chunk: The recorded messages.
+    """
+    parts = (header_to_json(header).encode(), chunk.record())
+    prefix = bytearray(_layout().template)
+    fields = np.frombuffer(prefix, _layout().dtype)
+    for number, part in enumerate(parts):
+        fields[f"layout.dim.{number}.size"] = fields[f"layout.dim.{number}.stride"] = len(part)
+    _COUNT.pack_into(prefix, len(prefix) - _COUNT.size, sum(map(len, parts)))
+    return b"".join((prefix, *parts))
+
+
+def unpack(message: bytes) -> Episode:
+    """Read the message that carries an episode.
+
+    Args:
+        message: CDR bytes of a std_msgs/UInt8MultiArray.
+
+    Raises:
+        DatasetError: If it is not what `pack` writes; the contents of the chunk are not looked at yet.
+    """
+    layout = _layout()
+    length = len(layout.template)
+    if len(message) < length:
+        raise DatasetError(f"episode: a message of {len(message)} bytes", expected=f"at least {length}")
+    fields = np.frombuffer(message[:length], layout.dtype)[0]
+    sizes = [int(fields[f"layout.dim.{number}.size"]) for number in range(len(_PARTS))]
+    (count,) = _COUNT.unpack_from(message, length - _COUNT.size)
+    if not layout.describes(_without_count(message[:length])) or sum(sizes) != count:
+        raise DatasetError(f"episode: not a UInt8MultiArray of the parts {' and '.join(_PARTS)}")
+    if len(message) != length + count:
+        raise DatasetError(f"episode: {len(message) - length} bytes of data", expected=f"{count} as announced")
+    middle = length + sizes[0]
+    return Episode(header_from_json(message[length:middle]), Chunk.parse(message[middle:]))
+
+
+def _without_count(prefix: bytes) -> np.ndarray[tuple[int, int], np.dtype[np.uint8]]:
+    """The bytes before the data with the data's length set to 0, as in the template."""
+    return np.frombuffer(prefix[: -_COUNT.size] + bytes(_COUNT.size), np.uint8).reshape(1, -1)

@@ -1,0 +1,262 @@
+"""The recorded topics: how samples become the numbers of their messages, and back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from throwcollect.episode.frames import WORLD, MovingFrame
+from throwcollect.episode.layout import MessageLayout
+from throwcollect.episode.record import ControllerSamples, Samples
+from throwcollect.interfaces import get_message
+from throwcollect.robots.talos import CONTROLLERS, JOINTS
+
+BALL = "ball"
+"""Name of the ball's frame, fixed to the ball and at its centre."""
+
+_NS_PER_S = 1_000_000_000
+_STAMP = ("header.stamp.sec", "header.stamp.nanosec")
+
+Rows = NDArray[np.void]
+"""Messages of one topic, one a sample: an array of the layout's structured type."""
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Everything that messages are made from.
+
+    Attributes:
+        samples: The samples.
+        controllers: Set points of controllers, by name.
+    """
+
+    samples: Samples
+    controllers: Mapping[str, ControllerSamples]
+
+
+@dataclass(frozen=True)
+class Topic:
+    """One recorded topic.
+
+    Attributes:
+        name: Name of the topic.
+        type_name: Its message type, ``package/msg/Type``.
+        layout: Layout of its messages.
+        fill: Writes what varies into messages that are copies of the layout's template.
+    """
+
+    name: str
+    type_name: str
+    layout: MessageLayout
+    fill: Callable[[Rows, Recording], None]
+
+
+def _put_stamps(rows: Rows, prefix: str, stamps_ns: NDArray[np.int64]) -> None:
+    rows[f"{prefix}.sec"], rows[f"{prefix}.nanosec"] = np.divmod(stamps_ns, _NS_PER_S)
+
+
+def _rotate(quaternion_xyzw: NDArray[np.float64], *vectors: NDArray[np.float64], inverse: bool) -> NDArray[np.float64]:
+    """Vectors turned by unit quaternions, element by element: a row's result does not depend on other rows.
+
+    Args:
+        quaternion_xyzw: Shape ``(n, 4)``.
+        vectors: Each of shape ``(n, 3)``.
+        inverse: Turn the other way.
+
+    Returns:
+        Shape ``(len(vectors), n, 3)``.
+    """
+    x, y, z, w = quaternion_xyzw.T
+    if inverse:
+        x, y, z = -x, -y, -z
+    a, b, c = np.moveaxis(np.stack(vectors), -1, 0)
+    # v' = v + w t + u × t with t = 2 u × v, for a unit quaternion (u, w).
+    ta, tb, tc = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
+    turned = np.empty((len(vectors), len(x), 3))
+    turned[..., 0] = a + w * ta + (y * tc - z * tb)
+    turned[..., 1] = b + w * tb + (z * ta - x * tc)
+    turned[..., 2] = c + w * tc + (x * tb - y * ta)
+    return turned
+
+
+@cache
+def joint_states() -> Topic:
+    """``/joint_states``: sensor_msgs/JointState with all joints of Talos."""
+    kind = "sensor_msgs/msg/JointState"
+    zeros = np.zeros(len(JOINTS))
+    message = get_message(kind)(name=list(JOINTS), position=zeros, velocity=zeros, effort=zeros)
+    return Topic(
+        "/joint_states", kind, MessageLayout(message, [*_STAMP, "position", "velocity", "effort"]), _fill_joint_states
+    )
+
+
+def _fill_joint_states(rows: Rows, recording: Recording) -> None:
+    samples = recording.samples
+    _put_stamps(rows, "header.stamp", samples.stamps_ns)
+    rows["position"] = samples.position
+    rows["velocity"] = samples.velocity
+    rows["effort"] = samples.effort
+
+
+@cache
+def ball_odometry() -> Topic:
+    """``/ball/odometry``: nav_msgs/Odometry; pose in world, twist in the ball's own frame, covariances 0 (unknown)."""
+    kind = "nav_msgs/msg/Odometry"
+    message = get_message(kind)(header=_header(WORLD), child_frame_id=BALL)
+    variable = [*_STAMP, "pose.pose.position", "pose.pose.orientation", "twist.twist.linear", "twist.twist.angular"]
+    return Topic("/ball/odometry", kind, MessageLayout(message, variable), _fill_ball_odometry)
+
+
+def _header(frame: str) -> Any:
+    return get_message("std_msgs/msg/Header")(frame_id=frame)
+
+
+def _fill_ball_odometry(rows: Rows, recording: Recording) -> None:
+    samples = recording.samples
+    _put_stamps(rows, "header.stamp", samples.stamps_ns)
+    rows["pose.pose.position"] = samples.ball_position
+    rows["pose.pose.orientation"] = orientation = samples.ball_orientation_xyzw
+    rows["twist.twist.linear"], rows["twist.twist.angular"] = _rotate(
+        orientation, samples.ball_linear_velocity, samples.ball_angular_velocity, inverse=True
+    )
+
+
+def read_samples(joint_rows: Rows, ball_rows: Rows) -> Samples:
+    """Samples from the messages of `joint_states` and `ball_odometry`.
+
+    Args:
+        joint_rows: Joint states, shape ``(n_samples,)``.
+        ball_rows: Odometry of the ball, shape ``(n_samples,)``.
+
+    Returns:
+        The samples; joint columns and the ball's pose are views of the messages, velocities are turned back to world.
+    """
+    orientation = ball_rows["pose.pose.orientation"]
+    linear, angular = _rotate(
+        orientation, ball_rows["twist.twist.linear"], ball_rows["twist.twist.angular"], inverse=False
+    )
+    return Samples(
+        stamps_ns=joint_rows["header.stamp.sec"].astype(np.int64) * _NS_PER_S + joint_rows["header.stamp.nanosec"],
+        position=joint_rows["position"],
+        velocity=joint_rows["velocity"],
+        effort=joint_rows["effort"],
+        ball_position=ball_rows["pose.pose.position"],
+        ball_orientation_xyzw=orientation,
+        ball_linear_velocity=linear,
+        ball_angular_velocity=angular,
+    )
+
+
+@cache
+def clock() -> Topic:
+    """``/clock``: rosgraph_msgs/Clock, the stamp of each sample."""
+    kind = "rosgraph_msgs/msg/Clock"
+    return Topic("/clock", kind, MessageLayout(get_message(kind)(), ["clock.sec", "clock.nanosec"]), _fill_clock)
+
+
+def _fill_clock(rows: Rows, recording: Recording) -> None:
+    _put_stamps(rows, "clock", recording.samples.stamps_ns)
+
+
+def transforms(frames: tuple[MovingFrame, ...]) -> Topic:
+    """``/tf``: tf2_msgs/TFMessage with the ball in world and every frame that a joint moves.
+
+    Args:
+        frames: The frames; their joints are among `talos.JOINTS`.
+
+    Raises:
+        ValueError: If a joint is not one of Talos.
+    """
+    kind = "tf2_msgs/msg/TFMessage"
+    columns = [JOINTS.index(frame.joint) for frame in frames]
+    pairs = [(WORLD, BALL, (0.0, 0.0, 0.0)), *((frame.parent, frame.child, frame.translation) for frame in frames)]
+    message = get_message(kind)(transforms=[transform_message(*pair, (0.0, 0.0, 0.0, 1.0), 0) for pair in pairs])
+    variable = [f"transforms.{n}.{path}" for n in range(len(pairs)) for path in (*_STAMP, "transform.rotation")]
+    layout = MessageLayout(message, [*variable, "transforms.0.transform.translation"])
+
+    def fill(rows: Rows, recording: Recording) -> None:
+        samples = recording.samples
+        for number in range(len(pairs)):
+            _put_stamps(rows, f"transforms.{number}.header.stamp", samples.stamps_ns)
+        rows["transforms.0.transform.translation"] = samples.ball_position
+        rows["transforms.0.transform.rotation"] = samples.ball_orientation_xyzw
+        for number, (frame, column) in enumerate(zip(frames, columns, strict=True), start=1):
+            rows[f"transforms.{number}.transform.rotation"] = frame.rotation_at(samples.position[:, column])
+
+    return Topic("/tf", kind, layout, fill)
+
+
+def transform_message(
+    parent: str,
+    child: str,
+    translation: tuple[float, float, float],
+    rotation_xyzw: tuple[float, float, float, float],
+    stamp_ns: int,
+) -> Any:
+    """A geometry_msgs/TransformStamped.
+
+    Args:
+        parent: Name of the parent frame.
+        child: Name of the child frame.
+        translation: Child's origin in the parent [m].
+        rotation_xyzw: Unit quaternion, child to parent.
+        stamp_ns: Stamp [ns].
+    """
+    sec, nanosec = divmod(stamp_ns, _NS_PER_S)
+    header = _header(parent)
+    header.stamp = get_message("builtin_interfaces/msg/Time")(sec=sec, nanosec=nanosec)
+    x, y, z = translation
+    qx, qy, qz, qw = rotation_xyzw
+    transform = get_message("geometry_msgs/msg/Transform")(
+        translation=get_message("geometry_msgs/msg/Vector3")(x=x, y=y, z=z),
+        rotation=get_message("geometry_msgs/msg/Quaternion")(x=qx, y=qy, z=qz, w=qw),
+    )
+    return get_message("geometry_msgs/msg/TransformStamped")(header=header, child_frame_id=child, transform=transform)
+
+
+def controller_state(controller: str) -> Topic:
+    """``/<controller>/controller_state``: control_msgs/JointTrajectoryControllerState of one controller.
+
+    Reference, feedback and error have positions and velocities, the reference has accelerations, the output positions.
+
+    Args:
+        controller: Name of one of `talos.CONTROLLERS`.
+    """
+    kind = "control_msgs/msg/JointTrajectoryControllerState"
+    point = get_message("trajectory_msgs/msg/JointTrajectoryPoint")
+    joints = CONTROLLERS[controller]
+    columns = [JOINTS.index(joint) for joint in joints]
+    zeros = np.zeros(len(joints))
+    message = get_message(kind)(
+        joint_names=list(joints),
+        reference=point(positions=zeros, velocities=zeros, accelerations=zeros),
+        feedback=point(positions=zeros, velocities=zeros),
+        error=point(positions=zeros, velocities=zeros),
+        output=point(positions=zeros),
+        speed_scaling_factor=1.0,
+    )
+    points = [f"{part}.{key}" for part in ("reference", "feedback", "error") for key in ("positions", "velocities")]
+    elapsed = [f"{part}.time_from_start.{key}" for part in _TIMED for key in ("sec", "nanosec")]
+    layout = MessageLayout(message, [*_STAMP, *points, *elapsed, "reference.accelerations", "output.positions"])
+
+    def fill(rows: Rows, recording: Recording) -> None:
+        samples, target = recording.samples, recording.controllers[controller]
+        position, velocity = samples.position[:, columns], samples.velocity[:, columns]
+        _put_stamps(rows, "header.stamp", samples.stamps_ns)
+        for part in _TIMED:
+            _put_stamps(rows, f"{part}.time_from_start", target.elapsed_ns)
+        rows["reference.positions"], rows["reference.velocities"] = target.position, target.velocity
+        rows["reference.accelerations"] = target.acceleration
+        rows["feedback.positions"], rows["feedback.velocities"] = position, velocity
+        rows["error.positions"], rows["error.velocities"] = target.position - position, target.velocity - velocity
+        rows["output.positions"] = target.output
+
+    return Topic(f"/{controller}/controller_state", kind, layout, fill)
+
+
+_TIMED = ("reference", "feedback", "error")

@@ -1,0 +1,49 @@
+"""Errors by the names that rclpy gives them, so that node code catches the same ones."""
+
+from __future__ import annotations
+
+from throwcollect.errors import ThrowcollectError
+
+
+class NotInitializedException(ThrowcollectError):  # noqa: N818 - rclpy's name
+    """A node was made, or a context used, before `init` or after `shutdown`."""
+
+
+class ExternalShutdownException(ThrowcollectError):  # noqa: N818
+    """The context was shut down while an executor was spinning."""
+
+
+class InvalidHandle(ThrowcollectError):  # noqa: N818
+    """A publisher, client or the like was used after it, or the session, was closed."""
+
+
+class NameValidationException(ThrowcollectError):  # noqa: N818
+    """Name of a node, namespace, topic, service or parameter that ROS does not allow."""
+
+
+class ParameterException(ThrowcollectError):  # noqa: N818
+    """Root of the errors about parameters."""
+
+
+class ParameterNotDeclaredException(ParameterException):
+    """A parameter was used that the node has not declared."""
+
+
+class ParameterAlreadyDeclaredException(ParameterException):
+    """A parameter was declared twice."""
+
+
+class InvalidParameterTypeException(ParameterException):
+    """A parameter was declared with, or overridden by, a value of another type."""
+
+
+class InvalidParameterValueException(ParameterException):
+    """The value of a parameter was refused by its range or by a callback."""
+
+
+class ParameterImmutableException(ParameterException):
+    """A read-only parameter was to be changed."""
+
+
+class ParameterUninitializedException(ParameterException):
+    """A parameter was read that has a type but no value yet."""

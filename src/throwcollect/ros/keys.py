@@ -1,0 +1,130 @@
+"""Key expressions of rmw_zenoh_cpp (0.2.4 and later): data keys and liveliness tokens.
+
+A data key is ``<domain>/<name>/<DDS type>/<type hash>``. A token announces a node or an endpoint in the ROS graph;
+inside it every slash of a value is written as a percent sign.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+PREFIX = "@ros2_lv"
+"""First chunk of all tokens."""
+
+_NODE_CHUNKS, _ENDPOINT_CHUNKS = 9, 13
+
+
+class EntityKind(str, Enum):
+    """What a token announces."""
+
+    NODE = "NN"
+    PUBLISHER = "MP"
+    SUBSCRIPTION = "MS"
+    SERVICE = "SS"
+    CLIENT = "SC"
+
+
+@dataclass(frozen=True)
+class Token:
+    """A node or an endpoint of the ROS graph.
+
+    Attributes:
+        domain: Domain identifier.
+        session: Identifier of the Zenoh session.
+        node_id: Number of the node in its session.
+        entity_id: Number of the endpoint in its session; that of the node for a node.
+        kind: What is announced.
+        namespace: Absolute namespace of the node.
+        node: Name of the node.
+        name: Absolute name of the topic or service; empty for a node.
+        type: DDS name of the type; empty for a node.
+        type_hash: Type hash; empty for a node.
+        qos: Quality of service as rmw_zenoh_cpp writes it; empty for a node.
+    """
+
+    domain: int
+    session: str
+    node_id: int
+    entity_id: int
+    kind: EntityKind
+    namespace: str
+    node: str
+    name: str = ""
+    type: str = ""
+    type_hash: str = ""
+    qos: str = ""
+
+    def key(self) -> str:
+        """Key expression of the token."""
+        chunks = [PREFIX, str(self.domain), self.session, str(self.node_id), str(self.entity_id), self.kind.value, "%"]
+        chunks += [self.namespace.replace("/", "%"), self.node]
+        if self.kind is not EntityKind.NODE:
+            chunks += [self.name.replace("/", "%"), self.type, self.type_hash, self.qos]
+        return "/".join(chunks)
+
+    @property
+    def ros_type(self) -> str:
+        """ROS name of the type, such as ``sensor_msgs/msg/JointState``."""
+        return ros_type(self.type)
+
+
+def parse_token(key: str) -> Token | None:
+    """Token from its key expression.
+
+    Args:
+        key: Key expression.
+
+    Returns:
+        The token; None if it is malformed, as anybody may declare one. Chunks that later versions append are ignored.
+    """
+    chunks = key.split("/")
+    if len(chunks) < _NODE_CHUNKS or chunks[0] != PREFIX or not all(chunks):
+        return None
+    domain, session, node_id, entity_id, kind, _, namespace, node = chunks[1:_NODE_CHUNKS]
+    if not (domain.isdecimal() and node_id.isdecimal() and entity_id.isdecimal()):
+        return None
+    if kind not in EntityKind._value2member_map_ or (kind != "NN" and len(chunks) < _ENDPOINT_CHUNKS):
+        return None
+    endpoint = chunks[_NODE_CHUNKS:_ENDPOINT_CHUNKS] if kind != "NN" else [""] * 4
+    name, dds, type_hash, qos = endpoint
+    return Token(
+        domain=int(domain),
+        session=session,
+        node_id=int(node_id),
+        entity_id=int(entity_id),
+        kind=EntityKind(kind),
+        namespace=namespace.replace("%", "/"),
+        node=node,
+        name=name.replace("%", "/"),
+        type=dds,
+        type_hash=type_hash,
+        qos=qos,
+    )
+
+
+def dds_type(name: str) -> str:
+    """DDS name of a type: ``a/msg/B`` is ``a::msg::dds_::B_``."""
+    package, kind, short = name.split("/")
+    return f"{package}::{kind}::dds_::{short}_"
+
+
+def ros_type(name: str) -> str:
+    """ROS name of a DDS type; the inverse of `dds_type`. What is no DDS name of a ROS type is returned as it is."""
+    package, _, short = name.partition("::dds_::")
+    return f"{package.replace('::', '/')}/{short.removesuffix('_')}" if short else name
+
+
+def data_key(domain: int, name: str, type_name: str, type_hash: str) -> str:
+    """Key on which a topic's samples or a service's requests travel.
+
+    Args:
+        domain: Domain identifier.
+        name: Absolute name of the topic or service.
+        type_name: ROS name of the message or service type.
+        type_hash: Its type hash; that of the service type for a service.
+
+    Returns:
+        The key expression.
+    """
+    return f"{domain}/{name.strip('/')}/{dds_type(type_name)}/{type_hash}"

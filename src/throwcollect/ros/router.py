@@ -1,0 +1,116 @@
+"""A Zenoh router, as ``ros2 run rmw_zenoh_cpp rmw_zenohd`` is one.
+
+``python -m throwcollect.ros.router --listen tcp/127.0.0.1:7447`` runs until it is told to stop by SIGTERM or SIGINT.
+"""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import socket
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from queue import SimpleQueue
+
+import zenoh
+
+from throwcollect.errors import ConfigError, ThrowcollectError
+from throwcollect.ros.session import router_config
+
+DEFAULT_LISTEN = "tcp/127.0.0.1:7447"
+"""Reachable from this host alone, at the port that nodes connect to by default."""
+
+_PORT_ATTEMPTS = 5
+
+
+@contextmanager
+def router(listen: str = DEFAULT_LISTEN) -> Iterator[str]:
+    """Run a router in this process.
+
+    Args:
+        listen: Endpoint to listen on; port 0 takes a free one.
+
+    Yields:
+        The endpoint that nodes connect to.
+
+    Raises:
+        ConfigError: If the endpoint is malformed.
+        ThrowcollectError: If the router cannot listen on it.
+    """
+    session, endpoint = _open(listen)
+    try:
+        yield endpoint
+    finally:
+        session.close()  # type: ignore[no-untyped-call]
+
+
+def _open(listen: str) -> tuple[zenoh.Session, str]:
+    address, _, port = listen.rpartition(":")
+    wants_any = port == "0"
+    for attempt in range(_PORT_ATTEMPTS):
+        endpoint = f"{address}:{_free_port(address)}" if wants_any else listen
+        try:
+            return zenoh.open(router_config(endpoint)), endpoint
+        except zenoh.ZError as error:
+            # Somebody may have taken the free port in between.
+            if not wants_any or attempt == _PORT_ATTEMPTS - 1:
+                raise ThrowcollectError(
+                    f"the router cannot listen on {endpoint}",
+                    evidence=str(error),
+                    hint="if another router listens there, use it; otherwise choose another port with --listen",
+                ) from error
+    raise ThrowcollectError(f"no free port for {listen}")
+
+
+def _free_port(address: str) -> int:
+    host = address.partition("/")[2].strip("[]")
+    try:
+        family = socket.getaddrinfo(host, None)[0][0]
+        with socket.socket(family, socket.SOCK_STREAM) as probe:
+            probe.bind((host, 0))
+            return int(probe.getsockname()[1])
+    except OSError as error:
+        raise ConfigError(f"cannot listen on {address!r}: {error}", expected="such as tcp/127.0.0.1:0") from error
+
+
+def serve(listen: str = DEFAULT_LISTEN) -> None:
+    """Run a router until SIGTERM or SIGINT, after printing one line that says where it listens.
+
+    Args:
+        listen: Endpoint to listen on; port 0 takes a free one.
+
+    Raises:
+        ConfigError: If the endpoint is malformed.
+        ThrowcollectError: If the router cannot listen on it.
+    """
+    # Not `sigwait`: libraries start threads when they are imported, and one of them would take the signal and die of it.
+    stop: SimpleQueue[int] = SimpleQueue()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda received, _frame: stop.put(received))
+    with router(listen) as endpoint:
+        print(f"router listening on {endpoint}", flush=True)
+        stop.get()
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a router until SIGTERM or SIGINT.
+
+    Args:
+        arguments: Command line; None for that of the process.
+
+    Returns:
+        Exit code.
+    """
+    parser = argparse.ArgumentParser(prog="python -m throwcollect.ros.router", description="Zenoh router")
+    parser.add_argument("--listen", default=DEFAULT_LISTEN, help="endpoint; port 0 takes a free one [%(default)s]")
+    try:
+        serve(parser.parse_args(arguments).listen)
+    except ThrowcollectError as error:
+        print(error, file=sys.stderr)
+        return error.exit_code
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,51 @@
+"""Hashes over what determines a plan and a trial."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Sequence
+
+from throwcollect.config.loader import resolved_yaml
+from throwcollect.config.schema import Config, RunConfig
+from throwcollect.config.values import leaves
+from throwcollect.sweep.points import Points
+
+_FORMAT = "throwcollect trial 1"
+
+# What does not change the samples of a trial: names and numbers of trials, how and where they are run, how fast they
+# are shown, and how samples are packed into files. The root seed acts through the values and the seed of each trial.
+_WITHOUT_EFFECT = frozenset({"name", "trials", "sweep", "run"})
+_WITHOUT_EFFECT_INSIDE = frozenset({"sim.real_time_factor", "record.zstd_level", "record.trials_per_shard"})
+
+
+def config_digest(config: Config) -> str:
+    """SHA-256 in hex over a configuration without its section `run`."""
+    return hashlib.sha256(resolved_yaml(config.model_copy(update={"run": RunConfig()})).encode()).hexdigest()
+
+
+def trial_digests(config: Config, points: Points, seeds: Sequence[int]) -> Iterator[str]:
+    """SHA-256 in hex over everything that determines the samples of each trial.
+
+    The hashed text has one line ``key=value`` for each effective key of the trial's configuration, sorted by key, so
+    it does not matter whether a value was swept or fixed.
+
+    Args:
+        config: Configuration that the trials vary.
+        points: Values of the trials.
+        seeds: Seeds of the trials.
+    """
+    lines = {
+        key: _line(key, value)
+        for key, value in sorted(leaves(config))
+        if key.partition(".")[0] not in _WITHOUT_EFFECT and key not in _WITHOUT_EFFECT_INSIDE
+    }
+    for seed, row in zip(seeds, points.values.tolist(), strict=True):
+        lines["seed"] = _line("seed", seed)
+        for key, value in zip(points.keys, row, strict=True):
+            lines[key] = _line(key, value)
+        yield hashlib.sha256("\n".join([_FORMAT, *lines.values()]).encode()).hexdigest()
+
+
+def _line(key: str, value: object) -> str:
+    return f"{key}={json.dumps(value)}"

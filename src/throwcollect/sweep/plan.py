@@ -1,0 +1,195 @@
+"""The plan: every trial of a collection with its values, seed and hash, written down before anything runs."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from throwcollect.config.schema import Config
+from throwcollect.config.values import reason_not_sweepable, with_values
+from throwcollect.errors import ConfigError, DatasetError, PlanError, Problem
+from throwcollect.sweep.digest import config_digest, trial_digests
+from throwcollect.sweep.samplers import draw_points
+
+_FORMAT = "1"
+_FORMAT_KEY = b"throwcollect.plan_format"
+_CONFIG_KEY = b"throwcollect.config_digest"
+_MOST_REASONS = 5
+
+_NUMBER = re.compile(r"(?<![\w.])-?\d[\d.]*(?:e[-+]?\d+)?")
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One numbered point of the sweep.
+
+    Attributes:
+        number: From 0.
+        values: Value of each swept dotted key, in the key's unit.
+        seed: Seed for anything random in the trial, from the root seed and the number; fits uint64.
+        digest: SHA-256 in hex over everything that determines the trial's samples.
+        refused: Why the trial is not run, or None.
+    """
+
+    number: int
+    values: Mapping[str, float]
+    seed: int
+    digest: str
+    refused: str | None = None
+
+
+@dataclass(frozen=True)
+class Plan:
+    """All trials of a collection, in order: trial n is at index n.
+
+    Attributes:
+        config: Configuration that the trials vary.
+        trials: At least one.
+    """
+
+    config: Config
+    trials: tuple[Trial, ...]
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Swept dotted keys."""
+        return tuple(self.trials[0].values)
+
+    def config_of(self, trial: Trial) -> Config:
+        """Configuration of one trial."""
+        return with_values(self.config, trial.values)
+
+    def write(self, path: Path) -> None:
+        """Write the plan as a Parquet file, whole or not at all; equal plans give equal bytes.
+
+        Columns: ``trial`` int64, ``digest`` string, ``seed`` uint64, ``refused`` string or null, then one float64
+        column per swept key, named like it.
+
+        Raises:
+            DatasetError: If the file cannot be written.
+        """
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        columns: list[Any] = [
+            [trial.number for trial in self.trials],
+            [trial.digest for trial in self.trials],
+            [trial.seed for trial in self.trials],
+            [trial.refused for trial in self.trials],
+            *([trial.values[key] for trial in self.trials] for key in self.keys),
+        ]
+        schema = _schema(self.keys).with_metadata({_FORMAT_KEY: _FORMAT, _CONFIG_KEY: config_digest(self.config)})
+        table = pa.table([pa.array(column, kind) for column, kind in zip(columns, schema.types, strict=True)], schema)
+        beside = path.with_name(path.name + ".part")
+        try:
+            pq.write_table(table, beside, compression="zstd", write_page_checksum=True)
+            os.replace(beside, path)
+        except OSError as error:
+            raise DatasetError(f"{path}: the plan cannot be written: {error.strerror or error}") from error
+
+    @classmethod
+    def read(cls, path: Path, config: Config) -> Plan:
+        """Read a plan that was written for a configuration.
+
+        Args:
+            path: File that `write` wrote.
+            config: The configuration; its section `run` may differ.
+
+        Raises:
+            DatasetError: If the file is missing, damaged, no plan, or the plan of another configuration.
+        """
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        try:
+            table: Any = pq.ParquetFile(path, page_checksum_verification=True).read()
+        except FileNotFoundError as error:
+            raise DatasetError(f"{path}: the plan is missing") from error
+        except (pa.ArrowException, OSError) as error:
+            raise DatasetError(f"{path}: the plan is damaged: {error}") from error
+        metadata = table.schema.metadata or {}
+        keys = tuple(table.column_names[4:])
+        found = metadata.get(_FORMAT_KEY, b"none").decode(errors="replace")
+        if found != _FORMAT or not table.schema.equals(_schema(keys)) or not table.num_rows:
+            raise DatasetError(
+                f"{path}: not a plan that this version reads",
+                expected=f"plan format {_FORMAT}",
+                evidence=f"got {found}",
+            )
+        if metadata.get(_CONFIG_KEY, b"") != config_digest(config).encode():
+            raise DatasetError(f"{path}: the plan belongs to another configuration")
+        for key in keys:
+            if reason := reason_not_sweepable(config, key):
+                raise DatasetError(f"{path}: the plan is damaged: column {key!r}: {reason}")
+        numbers, digests, seeds, refused, *values = (column.to_pylist() for column in table.columns)
+        if numbers != list(range(len(numbers))):
+            raise DatasetError(f"{path}: the trials are not numbered from 0 without gaps")
+        rows = zip(numbers, zip(*values, strict=True), seeds, digests, refused, strict=True)
+        return cls(config, tuple(Trial(n, dict(zip(keys, row, strict=True)), *rest) for n, row, *rest in rows))
+
+
+def make_plan(
+    config: Config, *, check: Callable[[Config], str | None] | None = None, directory: Path | None = None
+) -> Plan:
+    """Draw all trials of a sweep.
+
+    Args:
+        config: Configuration with the sweep.
+        check: Says of the configuration of a trial why it cannot be run, or None when it can. A ConfigError that it
+            raises is such a reason, too.
+        directory: Directory at which a relative `sweep.file` starts; the current one when None.
+
+    Raises:
+        PlanError: If the sweep has no point, or every trial is refused.
+        ConfigError: If the file of the sampler `list` cannot be used.
+    """
+    points = draw_points(config, directory=directory or Path())
+    seeds = [_seed(config.seed, number) for number in range(len(points.values))]
+    rows = zip(points.values.tolist(), seeds, trial_digests(config, points, seeds), strict=True)
+    trials = []
+    for number, (row, seed, digest) in enumerate(rows):
+        values = dict(zip(points.keys, row, strict=True))
+        refused = _refusal(with_values(config, values), check) if check else None
+        trials.append(Trial(number, values, seed, digest, refused))
+    if reasons := [trial.refused for trial in trials if trial.refused is not None]:
+        _check_some_left(reasons, len(trials))
+    return Plan(config, tuple(trials))
+
+
+def _seed(root: int, number: int) -> int:
+    return int(np.random.SeedSequence(root, spawn_key=(number,)).generate_state(1, np.uint64)[0])
+
+
+def _refusal(config: Config, check: Callable[[Config], str | None]) -> str | None:
+    try:
+        return check(config)
+    except ConfigError as error:
+        return str(error)
+
+
+def _check_some_left(reasons: list[str], trials: int) -> None:
+    if len(reasons) < trials:
+        return
+    # Reasons that differ only in their numbers are one; the first of them speaks for all.
+    kinds = [_NUMBER.sub("#", reason) for reason in reasons]
+    examples = dict(zip(reversed(kinds), reversed(reasons), strict=True))
+    listed = [f"{count} × {examples[kind]}" for kind, count in Counter(kinds).most_common(_MOST_REASONS)]
+    raise PlanError(
+        [Problem(f"all {trials} trials are refused: {'; '.join(listed)}", key="sweep")],
+        hint="sweep over smaller ranges or slower motions",
+    )
+
+
+def _schema(keys: Sequence[str]) -> Any:
+    import pyarrow as pa
+
+    kinds = {"trial": pa.int64(), "digest": pa.string(), "seed": pa.uint64(), "refused": pa.string()}
+    kinds |= dict.fromkeys(keys, pa.float64())
+    return pa.schema([pa.field(name, kind, nullable=name == "refused") for name, kind in kinds.items()])

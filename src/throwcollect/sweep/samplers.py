@@ -1,0 +1,127 @@
+"""Samplers: from declared ranges to points. All randomness comes from the root seed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from throwcollect.config.schema import Config, Parameter, Range, Values
+from throwcollect.errors import PlanError, Problem
+from throwcollect.sweep.points import Points
+from throwcollect.sweep.table import read_points
+
+_MOST_TRIALS = 10_000_000
+
+UnitSampler = Callable[[int, int, np.random.Generator], NDArray[np.float64]]
+"""Number of points, number of keys, randomness → points of the unit cube, shape ``(n_trials, n_keys)``."""
+
+
+def draw_points(config: Config, *, directory: Path) -> Points:
+    """Draw the points of all trials.
+
+    The first points of `uniform` and `sobol` do not depend on how many follow, so more trials keep those that exist.
+    `grid` goes through its points with the last key fastest.
+
+    Args:
+        config: Configuration with the sweep.
+        directory: Directory at which a relative `sweep.file` starts.
+
+    Raises:
+        PlanError: If nothing is swept, or `trials` does not fit the sampler.
+        ConfigError: If the file of the sampler `list` cannot be used.
+    """
+    sweep = config.sweep
+    if sweep.file is not None:
+        points = read_points(directory / sweep.file, config)
+        return points.first(_checked_count(config.trials, len(points.values)))
+    if not sweep.parameters:
+        raise PlanError(
+            [Problem("nothing is swept", key="sweep.parameters")],
+            expected="at least one key, such as task.duration_s: {min: 0.9, max: 1.3}",
+        )
+    if sweep.sampler == "grid":
+        return _grid(sweep.parameters, config.trials)
+    if config.trials is None:
+        raise PlanError([Problem(f"missing; the sampler {sweep.sampler} draws any number of trials", key="trials")])
+    randomness = np.random.default_rng(np.random.SeedSequence(config.seed))
+    unit = UNIT_SAMPLERS[sweep.sampler](config.trials, len(sweep.parameters), randomness)
+    columns = [_spread(parameter, unit[:, i]) for i, parameter in enumerate(sweep.parameters.values())]
+    return Points(tuple(sweep.parameters), np.column_stack(columns))
+
+
+def _uniform(count: int, dimensions: int, randomness: np.random.Generator) -> NDArray[np.float64]:
+    return randomness.random((count, dimensions))
+
+
+def _latin_hypercube(count: int, dimensions: int, randomness: np.random.Generator) -> NDArray[np.float64]:
+    # Importing scipy.stats takes about a second, so only those who draw with it do.
+    from scipy.stats import qmc
+
+    points: NDArray[np.float64] = qmc.LatinHypercube(dimensions, seed=randomness).random(count)
+    return points
+
+
+def _sobol(count: int, dimensions: int, randomness: np.random.Generator) -> NDArray[np.float64]:
+    from scipy.stats import qmc
+
+    # The sequence is drawn up to a power of two, as scipy warns of other lengths; its first points stay the same.
+    engine = qmc.Sobol(dimensions, scramble=True, seed=randomness)
+    points: NDArray[np.float64] = engine.random_base2(math.ceil(math.log2(count)))[:count]
+    return points
+
+
+UNIT_SAMPLERS = MappingProxyType[str, UnitSampler](
+    {"uniform": _uniform, "latin_hypercube": _latin_hypercube, "sobol": _sobol}
+)
+"""Samplers that fill the unit cube, by the name they have in `sweep.sampler`."""
+
+
+def _spread(parameter: Parameter, unit: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Values at places from 0 to 1 along a parameter; sets of values get equal shares of the interval."""
+    if isinstance(parameter, Values):
+        return np.array(parameter.values)[(unit * len(parameter.values)).astype(np.int64)]
+    if parameter.scale == "log":
+        low, high = math.log(parameter.min), math.log(parameter.max)
+        spread = np.exp(low + unit * (high - low))
+    else:
+        spread = parameter.min + unit * (parameter.max - parameter.min)
+    return np.clip(spread, parameter.min, parameter.max)
+
+
+def _grid(parameters: dict[str, Parameter], trials: int | None) -> Points:
+    axes = [_axis(parameter) for parameter in parameters.values()]
+    shape = tuple(len(axis) for axis in axes)
+    size = math.prod(shape)
+    if trials is None and size > _MOST_TRIALS:
+        raise PlanError(
+            [Problem(f"the grid has {size} points", key="sweep.parameters")], expected=f"at most {_MOST_TRIALS}"
+        )
+    indices = np.unravel_index(np.arange(_checked_count(trials, size)), shape)
+    columns = [axis[index] for axis, index in zip(axes, indices, strict=True)]
+    return Points(tuple(parameters), np.column_stack(columns))
+
+
+def _axis(parameter: Parameter) -> NDArray[np.float64]:
+    if isinstance(parameter, Values):
+        return np.array(parameter.values)
+    spaced = np.geomspace if parameter.scale == "log" else np.linspace
+    return spaced(parameter.min, parameter.max, _count(parameter))
+
+
+def _count(parameter: Range) -> int:
+    if parameter.count is None:
+        raise ValueError("a range without count has no grid points")
+    return parameter.count
+
+
+def _checked_count(trials: int | None, available: int) -> int:
+    if trials is not None and trials > available:
+        raise PlanError(
+            [Problem(f"should be at most {available}, as the sweep has no more points, got {trials}", key="trials")]
+        )
+    return available if trials is None else trials

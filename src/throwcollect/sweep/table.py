@@ -1,0 +1,149 @@
+"""Points from a CSV or Parquet file: one row a trial, dotted keys as columns."""
+
+from __future__ import annotations
+
+import csv
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from throwcollect.config.schema import Config
+from throwcollect.config.values import reason_not_sweepable, with_values
+from throwcollect.errors import ConfigError, Problem
+from throwcollect.sweep.points import Points
+
+_MOST_PROBLEMS = 20
+
+
+def read_points(path: Path, config: Config) -> Points:
+    """Read the points of the sampler `list`.
+
+    Args:
+        path: File that ends in ``.csv`` (UTF-8, comma, a header line) or ``.parquet``.
+        config: Configuration whose keys the columns are.
+
+    Raises:
+        ConfigError: If the file cannot be read, or its columns or values cannot be used; it holds all problems, or
+            the first 20.
+    """
+    readers = {".csv": _read_csv, ".parquet": _read_parquet}
+    if path.suffix not in readers:
+        raise ConfigError([Problem(f"should end in .csv or .parquet, got '{path.name}'", "sweep.file")])
+    if not path.is_file():
+        raise ConfigError([Problem("no such file", "sweep.file", path)])
+    points, lines = readers[path.suffix](path, config)
+    if not len(points.values):
+        raise ConfigError([Problem("the file has no rows", "sweep.file", path)])
+    _check_values(points, lines, path, config)
+    return points
+
+
+def _read_csv(path: Path, config: Config) -> tuple[Points, list[int] | None]:
+    problems: list[Problem] = []
+    rows: list[list[float]] = []
+    lines: list[int] = []
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            reader = csv.reader(file)
+            keys = tuple(name.strip() for name in next(reader, []))
+            _check_keys(keys, path, config, line=1)
+            for cells in reader:
+                if not cells:
+                    continue
+                row, wrong = _row(keys, cells, path, reader.line_num)
+                problems += wrong
+                rows.append(row)
+                lines.append(reader.line_num)
+                if len(problems) >= _MOST_PROBLEMS:
+                    break
+    except UnicodeDecodeError as error:
+        raise ConfigError([Problem("should be UTF-8 text", "sweep.file", path)]) from error
+    except csv.Error as error:
+        raise ConfigError([Problem(f"not valid CSV: {error}", "sweep.file", path)]) from error
+    except OSError as error:
+        raise ConfigError([Problem(f"cannot be read: {error.strerror}", "sweep.file", path)]) from error
+    if problems:
+        raise ConfigError(problems[:_MOST_PROBLEMS])
+    return Points(keys, np.array(rows).reshape(len(rows), len(keys))), lines
+
+
+def _row(keys: tuple[str, ...], cells: list[str], path: Path, line: int) -> tuple[list[float], list[Problem]]:
+    if len(cells) != len(keys):
+        return [], [Problem(f"should have {len(keys)} values, got {len(cells)}", "", path, line)]
+    row, problems = [], []
+    for key, cell in zip(keys, cells, strict=True):
+        number = _number(cell)
+        row.append(number)
+        if not math.isfinite(number):
+            problems.append(Problem(f"should be a number, got {cell.strip()!r}", key, path, line))
+    return row, problems
+
+
+def _number(cell: str) -> float:
+    try:
+        return float(cell)
+    except ValueError:
+        return math.nan
+
+
+def _read_parquet(path: Path, config: Config) -> tuple[Points, None]:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        table: Any = pq.ParquetFile(path).read()
+    except (pa.ArrowException, OSError) as error:
+        raise ConfigError([Problem(f"cannot be read as Parquet: {error}", "sweep.file", path)]) from error
+    keys = tuple(table.column_names)
+    _check_keys(keys, path, config, line=None)
+    problems = []
+    for key, field in zip(keys, table.schema, strict=True):
+        if not (pa.types.is_floating(field.type) or pa.types.is_integer(field.type)):
+            problems.append(Problem(f"should be a column of numbers, got {field.type}", key, path))
+        elif table[key].null_count:
+            problems.append(Problem(f"should have a number in each row, got {table[key].null_count} nulls", key, path))
+    if problems:
+        raise ConfigError(problems)
+    columns = [np.asarray(table[key].to_numpy(), dtype=np.float64) for key in keys]
+    return Points(keys, np.column_stack(columns)), None
+
+
+def _check_keys(keys: tuple[str, ...], path: Path, config: Config, *, line: int | None) -> None:
+    problems = []
+    for index, key in enumerate(keys):
+        if key in keys[:index]:
+            problems.append(Problem("the column is here twice", key, path, line))
+        elif reason := reason_not_sweepable(config, key):
+            problems.append(Problem(reason, key or f"column {index + 1}", path, line))
+    if not keys:
+        problems.append(Problem("the file is empty", "sweep.file", path))
+    if problems:
+        raise ConfigError(problems, expected="dotted configuration keys as columns")
+
+
+def _check_values(points: Points, lines: list[int] | None, path: Path, config: Config) -> None:
+    problems: list[Problem] = []
+    for key, column in zip(points.keys, points.values.T, strict=True):
+        # What a key allows is an interval, so when both ends fit, all do.
+        if not _refusals(config, key, np.array([column.min(), column.max()])):
+            continue
+        for row, sentence in _refusals(config, key, column):
+            where = "" if lines else f"row {row + 1}: "
+            problems.append(Problem(where + sentence, key, path, lines[row] if lines else None))
+    if problems:
+        raise ConfigError(sorted(problems, key=lambda problem: problem.line or 0)[:_MOST_PROBLEMS])
+
+
+def _refusals(config: Config, key: str, column: NDArray[np.float64]) -> list[tuple[int, str]]:
+    refusals: list[tuple[int, str]] = []
+    for row, value in enumerate(column.tolist()):
+        try:
+            with_values(config, {key: value})
+        except ConfigError as error:
+            refusals.append((row, error.problems[0].message))
+        if len(refusals) == _MOST_PROBLEMS:
+            break
+    return refusals

@@ -1,0 +1,79 @@
+"""Minimum-jerk motion from rest to rest with a time warp."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from throwcollect.config.schema import MinimumJerk
+from throwcollect.errors import ConfigError, Problem
+from throwcollect.robots.trajectory import JointTrajectory
+
+
+def minimum_jerk_trajectory(
+    start: Mapping[str, float], end: Mapping[str, float], *, duration_s: float, family: MinimumJerk, points_hz: float
+) -> JointTrajectory:
+    """Points on ``q(t) = q0 + (q1 - q0) s((t/T)^gamma)``, ``s(x) = 10x³ - 15x⁴ + 6x⁵``, with exact derivatives.
+
+    Near the start the motion grows as ``t^(3 gamma)``, so its acceleration as ``t^(3 gamma - 2)``: it rises from zero
+    when gamma is above 2/3, jumps to ``20 (q1 - q0) / T²`` when gamma is 2/3, and is unbounded below that.
+
+    Args:
+        start: Angle [rad] of at least each joint of `end`.
+        end: Angle [rad] of each moving joint; its order is that of the trajectory's joints.
+        duration_s: T, the time from rest to rest [s].
+        family: The time warp.
+        points_hz: Points per second; the end is always a point.
+
+    Returns:
+        The trajectory; its last point is at rest, exactly at `end`.
+
+    Raises:
+        ConfigError: If gamma is below 2/3.
+    """
+    exponent = 3 * family.gamma - 2
+    if exponent < 0:
+        raise ConfigError(
+            [
+                Problem(
+                    f"got {family.gamma:g}; below 2/3 the acceleration is unbounded at the start of the motion",
+                    key="task.trajectory.gamma",
+                )
+            ],
+            hint="set task.trajectory.gamma to 0.67 or more",
+        )
+    times = point_times(duration_s, points_hz=points_hz)
+    gamma = family.gamma
+    u = times / duration_s
+    x = u**gamma
+    path = x**3 * (10 + x * (6 * x - 15))
+    speed = 30 * gamma * u ** (exponent + 1) * (1 - x) ** 2
+    acceleration = 30 * gamma * u**exponent * (1 - x) * ((3 * gamma - 1) * (1 - x) - 2 * gamma * x)
+    origin = np.array([start[joint] for joint in end])
+    target = np.array(list(end.values()))
+    stroke = target - origin
+    positions = origin + path[:, None] * stroke
+    positions[-1] = target
+    return JointTrajectory(
+        joints=tuple(end),
+        times=times,
+        positions=positions,
+        velocities=speed[:, None] * (stroke / duration_s),
+        accelerations=acceleration[:, None] * (stroke / duration_s**2),
+    )
+
+
+def point_times(duration_s: float, *, points_hz: float) -> NDArray[np.float64]:
+    """Times of evenly spaced points and of the end.
+
+    Args:
+        duration_s: Time of the last point [s].
+        points_hz: Points per second; a point that would come less than a tenth of the spacing before the end is left
+            out, as nearly coincident points make the curve between them ill-conditioned.
+
+    Returns:
+        Times [s] from 0 to exactly `duration_s`, strictly increasing, shape ``(n_points,)`` with at least two.
+    """
+    return np.append(np.arange(max(1, np.ceil(duration_s * points_hz - 0.1))) / points_hz, duration_s)

@@ -1,0 +1,178 @@
+"""The judge of a throw: from recorded samples and contacts to an outcome and its numbers."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from throwcollect.config.schema import Config
+from throwcollect.episode.record import Contact, EpisodeHeader, Samples
+from throwcollect.robots.interpolation import sample_positions
+from throwcollect.robots.model import JointLimits
+from throwcollect.robots.talos import JOINTS
+from throwcollect.robots.trajectory import JointTrajectory
+from throwcollect.tasks.flight import NS_PER_S, Flight, flight_after, release_of, without_impact
+from throwcollect.tasks.outcome import BallState, Outcome, Peak, ThrowResult
+
+__all__ = ["BallState", "Outcome", "Peak", "ThrowResult", "judge"]
+
+_SLACK = 1e-3
+_FAILED_GOALS = {5: "canceled", 6: "aborted"}
+_COLUMNS = {joint: column for column, joint in enumerate(JOINTS)}
+
+
+def judge(
+    samples: Samples,
+    header: EpisodeHeader,
+    *,
+    config: Config,
+    trajectory: JointTrajectory,
+    limits: JointLimits,
+) -> ThrowResult:
+    """Outcome and numbers of one trial.
+
+    The first of these that holds is the outcome; whatever can be measured is measured all the same, so that a throw
+    that landed keeps its landing under any outcome:
+
+    1. ``tracking_failed``: a sample is not finite (then nothing is measured), or a goal was canceled or aborted.
+    2. ``not_released``: no contact with the spoon ended for at least `task.recatch_gap_s` or to the end of the record.
+    3. ``self_hit`` or ``recaught``: between release and landing the ball touched a link of the robot, or the spoon
+       again; what it touched first decides.
+    4. ``timeout``: the ball's lowest point did not cross the landing plane downwards after the release.
+    5. ``limit_violated``: the measured position or velocity of a joint exceeds its limit, or its torque reaches it.
+       Limits count with a tolerance of 0.1 % (of half the range, for positions). Held joints may rest at the end of
+       their range, so positions count for the moving joints only, velocities and torques for all.
+    6. ``landed``.
+
+    Release, apex and landing lie between samples: positions on the cubic through the positions and velocities of both
+    neighbours, velocities linear between them. If the ground has pressed on the ball by the sample after the landing,
+    as it can below a low landing plane, free flight takes that sample's place.
+
+    Args:
+        samples: The recorded trial, at least two samples.
+        header: Contacts, goals and start of the trial; the trajectory starts at its `start_ns`.
+        config: Configuration of the trial.
+        trajectory: What the controllers were sent, followed as quintic curve and then held at its end.
+        limits: Limits of the robot's description; `robot.effort_scale` is applied here.
+    """
+    channels = (samples.position, samples.velocity, samples.effort, samples.ball_position, samples.ball_linear_velocity)
+    if not all(math.isfinite(channel.sum()) for channel in channels):
+        return ThrowResult(Outcome.TRACKING_FAILED, reason="the samples hold numbers that are not finite")
+    result = _joint_measures(samples, header.start_ns, config=config, trajectory=trajectory, limits=limits)
+    release_ns = release_of(header.contacts, gap_s=config.task.recatch_gap_s)
+    touched: list[Contact] = []
+    if release_ns is not None and release_ns <= samples.stamps_ns[-1]:
+        flight = flight_after(samples, start_ns=header.start_ns, release_ns=release_ns)
+        if impacts := [contact.start_ns for contact in header.contacts if contact.body == "ground"]:
+            flight = without_impact(flight, (min(impacts) - header.start_ns) / NS_PER_S, config=config)
+        result = _flight_measures(result, flight, config)
+        end_s = result.landing.time_s if result.landing else math.inf
+        touched = _touches(header, release_ns, end_s)
+        result = replace(result, recontacts=len(touched))
+    outcome, reason = _outcome(result, header, touched)
+    return replace(result, outcome=outcome, reason=reason)
+
+
+def _outcome(result: ThrowResult, header: EpisodeHeader, touched: list[Contact]) -> tuple[Outcome, str | None]:
+    for goal in header.goals:
+        if goal.status in _FAILED_GOALS:
+            detail = f": {goal.error_string}" if goal.error_string else f" with error code {goal.error_code}"
+            return Outcome.TRACKING_FAILED, f"{goal.controller} {_FAILED_GOALS[goal.status]} its goal{detail}"
+    if result.release is None:
+        held = any(contact.body == "spoon" for contact in header.contacts)
+        return Outcome.NOT_RELEASED, "the ball stayed in the spoon" if held else "the ball was never in the spoon"
+    if touched:
+        first = touched[0]
+        time_s = (first.start_ns - header.start_ns) / NS_PER_S
+        if first.body == "spoon":
+            return Outcome.RECAUGHT, f"the spoon touched the ball again at {time_s:.3f} s"
+        return Outcome.SELF_HIT, f"the ball touched {first.body} at {time_s:.3f} s"
+    if result.landing is None:
+        return Outcome.TIMEOUT, f"the ball did not reach the landing plane; the trial ended as {header.end_reason}"
+    if reason := _violation(result):
+        return Outcome.LIMIT_VIOLATED, reason
+    return Outcome.LANDED, None
+
+
+def _violation(result: ThrowResult) -> str | None:
+    if (peak := result.position_peak) and peak.share > 1 + _SLACK:
+        return f"{peak.joint} left its range: {peak.share:.3f} of the way from its middle to its limit"
+    if (peak := result.velocity_peak) and peak.share > 1 + _SLACK:
+        return f"{peak.joint} moved at {peak.share:.3f} of its velocity limit"
+    if (peak := result.effort_peak) and result.effort_saturated_share:
+        return (
+            f"{peak.joint} reached {peak.share:.3f} of its effort limit; efforts were saturated in "
+            f"{result.effort_saturated_share:.1%} of the samples"
+        )
+    return None
+
+
+def _touches(header: EpisodeHeader, release_ns: int, end_s: float) -> list[Contact]:
+    """Contacts with spoon or robot that began, or with the robot also lasted, between release and landing."""
+
+    def counts(contact: Contact) -> bool:
+        if contact.body == "ground" or (contact.start_ns - header.start_ns) / NS_PER_S >= end_s:
+            return False
+        if contact.body == "spoon":
+            return contact.start_ns >= release_ns
+        return contact.end_ns is None or contact.end_ns > release_ns
+
+    return sorted(filter(counts, header.contacts), key=lambda contact: contact.start_ns)
+
+
+def _flight_measures(result: ThrowResult, flight: Flight, config: Config) -> ThrowResult:
+    release = flight.knot_state(0)
+    found = flight.landing(config.scene.landing_height_m + config.ball.radius_m)
+    speed, elevation = _direction(release)
+    result = replace(
+        result,
+        release=release,
+        release_speed_mps=speed,
+        release_elevation_rad=elevation,
+        apex=flight.apex(found[0] + 1 if found else len(flight.times)),
+    )
+    if found:
+        landing = found[1]
+        result = replace(
+            result,
+            landing=landing,
+            flight_time_s=landing.time_s - release.time_s,
+            hit_angle_rad=-_direction(landing)[1],
+        )
+    return result
+
+
+def _direction(ball: BallState) -> tuple[float, float]:
+    """Speed [m/s] and elevation of the direction of flight above the horizontal [rad]."""
+    vx, vy, vz = ball.velocity
+    level = math.hypot(vx, vy)
+    return math.hypot(level, vz), math.atan2(vz, level)
+
+
+def _joint_measures(
+    samples: Samples, start_ns: int, *, config: Config, trajectory: JointTrajectory, limits: JointLimits
+) -> ThrowResult:
+    """Result with the joints' measures alone; its outcome is yet to be decided."""
+    moving = [_COLUMNS[joint] for joint in trajectory.joints]
+    lower, upper = limits.lower[moving], limits.upper[moving]
+    measured = samples.position[:, moving]
+    positions = np.abs(measured - (lower + upper) / 2).max(axis=0) / ((upper - lower) / 2)
+    efforts = np.abs(samples.effort) / (limits.effort * config.robot.effort_scale)
+    desired = sample_positions(trajectory, (samples.stamps_ns - start_ns) / NS_PER_S)
+    errors = np.abs(measured - desired).max(axis=0)
+    return ThrowResult(
+        Outcome.LANDED,
+        position_peak=_peak(positions, trajectory.joints),
+        velocity_peak=_peak(np.abs(samples.velocity).max(axis=0) / limits.velocity, JOINTS),
+        effort_peak=_peak(efforts.max(axis=0), JOINTS),
+        effort_saturated_share=float((efforts >= 1 - _SLACK).any(axis=1).mean()),
+        tracking_error_rad=dict(zip(trajectory.joints, errors.tolist(), strict=True)),
+    )
+
+
+def _peak(shares: NDArray[np.float64], joints: tuple[str, ...]) -> Peak:
+    column = int(np.argmax(shares))
+    return Peak(joint=joints[column], share=float(shares[column]))

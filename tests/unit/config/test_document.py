@@ -1,0 +1,133 @@
+import pytest
+
+from throwcollect.config.document import Document
+from throwcollect.errors import ConfigError
+
+
+@pytest.fixture
+def read(tmp_path):
+    def read(text: str) -> Document:
+        path = tmp_path / "run.yaml"
+        path.write_text(text, encoding="utf-8")
+        return Document(path)
+
+    return read
+
+
+def facts(document: Document) -> list[tuple[str, int | None, str]]:
+    return [(problem.key, problem.line, problem.message) for problem in document.problems]
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("yes", "yes"),
+        ("on", "on"),
+        ("true", True),
+        ("~", None),
+        ("", None),
+        ("1e3", 1000.0),
+        ("1e-07", 1e-7),
+        (".5", 0.5),
+        ("-.inf", float("-inf")),
+        ("010", 10),
+        ("0o17", 15),
+        ("0x1F", 31),
+        ("12:30", "12:30"),
+        ("2020-01-31", "2020-01-31"),
+        ("'1'", "1"),
+        ("[1, [a, {b: 2}]]", [1, ["a", {"b": 2}]]),
+    ],
+)
+def test_values_are_those_of_yaml_1_2(read, text, value):
+    found = read(f"key: {text}\n").values["key"]
+    assert found == value
+    assert type(found) is type(value)
+
+
+def test_anchors_may_be_used_again(read):
+    assert read("a: &range {min: 1}\nb: *range\n").values == {"a": {"min": 1}, "b": {"min": 1}}
+
+
+def test_an_anchor_inside_itself_is_a_problem(read):
+    assert facts(read("a: &a\n  b: *a\n")) == [("a.b", 1, "an alias cannot be inside its own anchor")]
+
+
+def test_a_key_that_is_there_twice_is_a_problem_and_keeps_its_first_value(read):
+    document = read("ball:\n  mass_kg: 1\n  radius_m: 2\n  mass_kg: 3\n")
+    assert facts(document) == [("ball.mass_kg", 4, "the key is here twice, first in line 2")]
+    assert document.values == {"ball": {"mass_kg": 1, "radius_m": 2}}
+
+
+def test_keys_that_are_no_words_are_problems(read):
+    assert facts(read("? [a, b]\n: 1\n")) == [("", 1, "a key should be a word")]
+
+
+def test_tags_that_mean_nothing_are_problems(read):
+    document = read("a: !!python/name:os.system x\nb: !units 3\nc: !!set {x}\n")
+    assert facts(document) == [
+        ("a", 1, "the tag python/name:os.system means nothing here"),
+        ("b", 2, "the tag !units means nothing here"),
+        ("c", 3, "the tag set means nothing here"),
+    ]
+
+
+def test_numbers_of_absurd_length_are_problems(read):
+    assert [(key, line) for key, line, _ in facts(read(f"a: 1\nb: {'9' * 5000}\n"))] == [("b", 2)]
+
+
+def test_a_byte_order_mark_is_no_part_of_the_first_key(read):
+    assert read("\ufeffa: 1\n").values == {"a": 1}
+
+
+@pytest.mark.parametrize(
+    ("location", "line"),
+    [
+        (("a",), 2),
+        (("a", "b"), 3),
+        (("a", "b", 1), 5),
+        (("a", "b", 1, "c"), 5),
+        (("a", "missing"), 2),
+        (("missing",), None),
+    ],
+)
+def test_problems_have_the_line_of_the_key_or_of_what_should_hold_it(read, location, line):
+    document = read("# comment\na:\n  b:\n    - 1\n    - c: 2\n")
+    assert document.problem(location, "wrong").line == line
+
+
+def test_problems_with_overrides_have_no_file(read):
+    document = read("a: {b: 1, c: 2}\n")
+    document.override("a.b=3")
+    document.override("d.e={f: 1}")
+    assert document.values == {"a": {"b": 3, "c": 2}, "d": {"e": {"f": 1}}}
+    places = [
+        document.problem(location, "wrong").path for location in [("a", "b"), ("d",), ("d", "e", "f"), ("a", "c")]
+    ]
+    assert [path is None for path in places] == [True, True, True, False]
+
+
+def test_an_override_wipes_out_the_lines_of_what_it_replaces(read):
+    document = read("a:\n  b: {c: 1}\n")
+    document.override("a.b={d: 2}")
+    assert document.problem(("a", "b", "c"), "missing").path is None
+
+
+def test_overrides_fill_sections_that_are_left_empty(read):
+    document = read("ball:\n")
+    document.override("ball.mass_kg=1")
+    assert document.values == {"ball": {"mass_kg": 1}}
+
+
+@pytest.mark.parametrize("key", ["sweep.parameters.min.max", "sweep.parameters.a.b.c.scale", "sweep.parameters.a.b.c"])
+def test_dots_in_swept_keys_part_nothing_but_their_fields(read, key):
+    document = read("a: 1\n")
+    document.override(f"{key}=1")
+    name, _, field = key.removeprefix("sweep.parameters.").rpartition(".")
+    expected = {f"{name}.{field}": 1} if field == "c" else {name: {field: 1}}
+    assert document.values["sweep"] == {"parameters": expected}
+
+
+def test_yaml_errors_name_the_line(read):
+    with pytest.raises(ConfigError, match=r"run\.yaml:2: not valid YAML: mapping values are not allowed here"):
+        read("a: 1\nb: c: d\n")

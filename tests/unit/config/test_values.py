@@ -1,0 +1,112 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from throwcollect.config.loader import load, resolved_yaml
+from throwcollect.config.schema import Config, DynamicMovementPrimitive, ThrowConfig
+from throwcollect.config.values import leaves, reason_not_sweepable, sweepable_keys, with_values
+from throwcollect.errors import ConfigError
+
+LEARNED = Config(
+    task=ThrowConfig(
+        trajectory=DynamicMovementPrimitive(
+            family="dmp", basis_functions=3, weights={"arm_right_4_joint": [1.0, 2.0, 3.0]}
+        )
+    )
+)
+BOUNDS = {
+    "task.duration_s": (0.1, 10),
+    "task.end.arm_right_4_joint": (-6.3, 6.3),
+    "task.start.torso_1_joint": (-6.3, 6.3),
+    "task.trajectory.alpha_z": (1e-9, 1e9),
+    "task.trajectory.weights.arm_right_4_joint.2": (-1e9, 1e9),
+    "ball.mass_kg": (1e-9, 2),
+    "robot.effort_scale": (1e-9, 10),
+    "sim.command_delay_s": (0, 0.2),
+}
+
+
+@settings(deadline=None, max_examples=40)
+@given(st.fixed_dictionaries({}, optional={key: st.floats(*bounds) for key, bounds in BOUNDS.items()}))
+def test_replaced_values_equal_edited_yaml(tmp_path_factory, values):
+    path = tmp_path_factory.getbasetemp() / "edited.yaml"
+    path.write_text(resolved_yaml(LEARNED))
+    edited = load(path, [f"{key}={value!r}" for key, value in values.items()])
+    assert with_values(LEARNED, values) == edited
+
+
+def test_the_configuration_itself_stays_as_it_is():
+    before = resolved_yaml(LEARNED)
+    with_values(LEARNED, {key: 1.0 for key in BOUNDS if key != "sim.command_delay_s"})
+    assert resolved_yaml(LEARNED) == before
+
+
+def test_numbers_of_numpy_are_numbers():
+    assert with_values(Config(), {"ball.mass_kg": np.float64(0.25)}).ball.mass_kg == 0.25
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"ball.mas_kg": 1}, r"^ball\.mas_kg: unknown key; did you mean 'mass_kg'\?$"),
+        ({"task.end.head_1_joint": 1}, r"^task\.end\.head_1_joint: unknown key; "),
+        (
+            {"task.trajectory.weights.arm_right_4_joint.3": 1},
+            r"^task\.[a-z_.0-9]+\.3: unknown key; known keys here: 0, 1, 2$",
+        ),
+        ({"task.duration_s.x": 1}, r"^task\.duration_s\.x: unknown key; no keys are expected here$"),
+        ({"ball.mass_kg": "1"}, r"^ball\.mass_kg: should be a number above 0 and up to 2 kg, got '1'$"),
+        ({"ball.mass_kg": -1}, r"^ball\.mass_kg: should be a number above 0 and up to 2 kg, got -1$"),
+        (
+            {"task.trajectory.weights.arm_right_4_joint.1": float("nan")},
+            r"^task\.trajectory\.weights\.arm_right_4_joint\.1: should be a number, got nan$",
+        ),
+        (
+            {"task.end.torso_1_joint": 90},
+            r"^task\.end\.torso_1_joint: .*; angles are in radians: 90 degrees are 1\.5708$",
+        ),
+        ({"record.rate_hz": 300}, r"^record\.rate_hz: should divide sim\.physics_hz, 500, got 300$"),
+    ],
+)
+def test_values_that_do_not_fit_are_named(values, message):
+    with pytest.raises(ConfigError, match=message):
+        with_values(LEARNED, values)
+
+
+def test_leaves_are_what_holds_nothing_further():
+    found = dict(leaves(LEARNED))
+    assert found["ball.mass_kg"] == 0.045
+    assert found["task.trajectory.weights.arm_right_4_joint.1"] == 2.0
+    assert found["robot.posture"] == {}
+    assert "task.end" not in found
+
+
+@pytest.mark.parametrize("key", [*BOUNDS, "scene.gravity_mps2", "sim.settle_s", "robot.velocity_gain"])
+def test_what_a_trial_may_change_can_be_swept(key):
+    assert reason_not_sweepable(LEARNED, key) is None
+    assert key in sweepable_keys(LEARNED)
+
+
+@pytest.mark.parametrize(
+    ("key", "reason"),
+    [
+        ("task.durations_s", "unknown key; did you mean 'task.duration_s'?"),
+        (
+            "task.start.arm_right_3_joint",
+            "cannot vary from trial to trial, as task.end does not name arm_right_3_joint",
+        ),
+        ("task.trajectory.basis_functions", "cannot vary from trial to trial"),
+        ("task.trajectory.family", "cannot be swept, as it is not a number"),
+        ("task.points_hz", "cannot vary from trial to trial"),
+        ("task.recatch_gap_s", "cannot vary from trial to trial"),
+        ("tool.mass_kg", "cannot vary from trial to trial"),
+        ("robot.base_height_m", "cannot vary from trial to trial"),
+        ("sim.physics_hz", "cannot vary from trial to trial"),
+        ("run.simulations", "cannot vary from trial to trial"),
+        ("seed", "cannot vary from trial to trial"),
+    ],
+)
+def test_what_a_trial_may_not_change_has_a_reason(key, reason):
+    assert reason_not_sweepable(LEARNED, key) == reason
+    assert key not in sweepable_keys(LEARNED)

@@ -1,0 +1,160 @@
+"""Throws as a simulation would hand them over, without a simulation: joints on their trajectory, a ballistic ball."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from throwcollect.config.schema import Config
+from throwcollect.dataset.writer import DatasetWriter
+from throwcollect.episode.channels import Channels
+from throwcollect.episode.chunk import ChunkEncoder
+from throwcollect.episode.message import Episode, pack, unpack
+from throwcollect.episode.record import Contact, ControllerSamples, EpisodeHeader, GoalOutcome, Samples
+from throwcollect.robots.description import full_description, start_posture
+from throwcollect.robots.interpolation import sample_quintic
+from throwcollect.robots.model import joint_limits
+from throwcollect.robots.talos import CONTROLLERS, JOINTS
+from throwcollect.sweep.plan import Plan, make_plan
+from throwcollect.tasks.flight import ballistic_positions
+from throwcollect.tasks.throw import ThrowResult, judge
+from throwcollect.tasks.trajectory import throw_trajectory
+
+SETTINGS: dict[str, Any] = {
+    "name": "quick",
+    "trials": 7,
+    "record": {"trials_per_shard": 3},
+    "sweep": {"sampler": "uniform", "parameters": {"task.duration_s": {"min": 0.8, "max": 1.2}}},
+}
+RELEASE_S = 0.4
+HOLDING = (0.5, -0.2, 1.3)
+SLOT_NS = 10_000_000_000
+
+Change = Callable[[Samples, EpisodeHeader], tuple[Samples, EpisodeHeader]]
+
+
+def throw(config: Config, trial: int) -> tuple[Samples, EpisodeHeader]:
+    """A throw that lands, as samples and header."""
+    random = np.random.default_rng(trial)
+    rate, hz = config.record.rate_hz, config.sim.physics_hz
+    start_ns = (trial + 1) * SLOT_NS
+    speed = np.array([2.5, 0.1, 2.0]) + 0.2 * random.normal(size=3)
+    held = round(RELEASE_S * rate)
+    path = ballistic_positions(np.array(HOLDING), speed, steps=3 * hz, config=config)[:: hz // rate]
+    flown = int(np.argmax(path[:, 2] < config.ball.radius_m + config.scene.landing_height_m)) + 1
+    count = held + flown
+    times = np.arange(count) / rate
+    position = np.tile(list(start_posture(config).values()), (count, 1))
+    velocity = np.zeros((count, len(JOINTS)))
+    trajectory = throw_trajectory(config)
+    moving = [JOINTS.index(joint) for joint in trajectory.joints]
+    position[:, moving], velocity[:, moving] = sample_quintic(trajectory, times)[:2]
+    effort = np.zeros((count, len(JOINTS)))
+    effort[:, moving] = 5 * np.sin(3 * times)[:, np.newaxis]
+    ball_velocity = np.zeros((count, 3))
+    ball_velocity[held:] = speed - np.outer(np.arange(flown) / rate, [0, 0, config.scene.gravity_mps2])
+    quaternion = np.array([0.1, -0.3, 0.2, 0.9])
+    samples = Samples(
+        stamps_ns=start_ns + np.arange(count, dtype=np.int64) * (1_000_000_000 // rate),
+        position=position,
+        velocity=velocity,
+        effort=effort,
+        ball_position=np.concatenate([np.tile(HOLDING, (held, 1)), path[:flown]]),
+        ball_orientation_xyzw=np.tile(quaternion / np.linalg.norm(quaternion), (count, 1)),
+        ball_linear_velocity=ball_velocity,
+        ball_angular_velocity=np.tile([0.0, 1.0, 0.0], (count, 1)),
+    )
+    release = start_ns + round(RELEASE_S * 1e9)
+    end = int(samples.stamps_ns[-1])
+    contacts = (Contact("spoon", start_ns, release), Contact("ground", end, None))
+    goals = tuple(GoalOutcome(name, 4, 0, "") for name in ("arm_right_controller", "torso_controller"))
+    return samples, EpisodeHeader(trial, start_ns, "landed", contacts, goals, count)
+
+
+class Collection:
+    """A plan and the throws that its trials yield."""
+
+    def __init__(self, settings: dict[str, Any] | None = None) -> None:
+        self.config = Config.model_validate({**SETTINGS, **(settings or {})})
+        self.plan: Plan = make_plan(self.config)
+        self.encoder = ChunkEncoder(Channels(self.config, full_description(self.config)), level=1)
+
+    def episode(self, trial: int, change: Change | None = None) -> Episode:
+        samples, header = throw(self.plan.config_of(self.plan.trials[trial]), trial)
+        if change is not None:
+            samples, header = change(samples, header)
+        targets = {
+            name: ControllerSamples(
+                samples.stamps_ns - header.start_ns,
+                *(np.zeros((len(samples), len(CONTROLLERS[name]))) for _ in range(4)),
+            )
+            for name in ("arm_right_controller", "torso_controller")
+        }
+        return unpack(pack(header, self.encoder.encode(samples, targets)))
+
+    def result(self, episode: Episode) -> ThrowResult:
+        config = self.plan.config_of(self.plan.trials[episode.header.trial])
+        return judge(
+            episode.samples(),
+            episode.header,
+            config=config,
+            trajectory=throw_trajectory(config),
+            limits=joint_limits(),
+        )
+
+    def fill(
+        self, writer: DatasetWriter, trials: Iterable[int], *, lost: Iterable[int] = (), change: Change | None = None
+    ) -> None:
+        for trial in trials:
+            if trial in lost:
+                writer.append_lost(trial, "two simulations were lost")
+            else:
+                episode = self.episode(trial, change)
+                writer.append(episode, self.result(episode))
+
+    def collect(
+        self,
+        directory: Path,
+        trials: Iterable[int] | None = None,
+        *,
+        lost: Iterable[int] = (),
+        change: Change | None = None,
+    ) -> Path:
+        writer = DatasetWriter.create(directory, self.plan)
+        self.fill(writer, range(len(self.plan.trials)) if trials is None else trials, lost=lost, change=change)
+        writer.finish(wall_s=1.5, simulations=2)
+        writer.close()
+        return directory
+
+    def refuse(self, trial: int, reason: str) -> None:
+        """Have the plan refuse one of its trials."""
+        trials = list(self.plan.trials)
+        trials[trial] = replace(trials[trial], refused=reason)
+        self.plan = replace(self.plan, trials=tuple(trials))
+
+
+@pytest.fixture
+def collection() -> Collection:
+    return Collection()
+
+
+@pytest.fixture
+def make_collection() -> type[Collection]:
+    return Collection
+
+
+@pytest.fixture(scope="session")
+def collected(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return Collection().collect(tmp_path_factory.mktemp("collected") / "dataset")
+
+
+@pytest.fixture
+def dataset(collected: Path, tmp_path: Path) -> Path:
+    """A finished dataset that a test may spoil."""
+    return Path(shutil.copytree(collected, tmp_path / "dataset"))

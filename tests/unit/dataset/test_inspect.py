@@ -1,0 +1,69 @@
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from throwcollect.dataset.inspect import digest, info
+from throwcollect.dataset.writer import create
+from throwcollect.episode.message import header_to_json
+from throwcollect.errors import DatasetError
+
+
+def test_info_counts_what_is_there(collection: Any, tmp_path: Path) -> None:
+    collection.refuse(5, "too fast")
+    directory = collection.collect(tmp_path / "dataset", [0, 1, 2, 3, 4, 6], lost=[2])
+    found = info(directory)
+    assert (found.name, found.trials, found.episodes, found.shards) == ("quick", 7, 5, 3)
+    assert found.outcomes == {"landed": 5, "lost": 1, "refused": 1}
+    lengths = [collection.episode(trial).header.samples for trial in (0, 1, 3, 4, 6)]
+    assert found.samples == sum(lengths)
+    assert found.topics["/ball/odometry"] == sum(lengths)
+    assert found.topics["/tf_static"] == 3
+    assert found.duration_s == pytest.approx(sum(length - 1 for length in lengths) / 250)
+    assert found.recordings_bytes == sum(path.stat().st_size for path in directory.glob("*.mcap"))
+    landings = [collection.result(collection.episode(trial)).landing for trial in (0, 1, 3, 4, 6)]
+    assert found.landing is not None
+    assert found.landing["x_m"] == (
+        min(each.position[0] for each in landings),
+        max(each.position[0] for each in landings),
+    )
+    assert json.loads(json.dumps(found.as_dict()))["outcomes"] == found.outcomes
+
+
+def test_info_of_a_dataset_in_which_no_ball_landed(collection: Any, tmp_path: Path) -> None:
+    found = info(collection.collect(tmp_path / "dataset", lost=range(7)))
+    assert (found.episodes, found.shards, found.landing, found.outcomes) == (0, 0, None, {"lost": 7})
+
+
+def test_the_digest_is_that_of_all_episodes_in_order(collection: Any, dataset: Path) -> None:
+    expected = hashlib.sha256()
+    for trial in range(7):
+        episode = collection.episode(trial)
+        header = header_to_json(episode.header).encode()
+        expected.update(hashlib.sha256(header + b"\0" + episode.chunk.decompress()).digest())
+    assert digest(dataset) == info(dataset).digest == expected.hexdigest()
+
+
+def test_the_digest_does_not_depend_on_how_files_are_cut_and_packed(make_collection: Any, tmp_path: Path) -> None:
+    one = make_collection().collect(tmp_path / "one")
+    other = make_collection({"record": {"trials_per_shard": 2}}).collect(tmp_path / "other")
+    assert digest(one) == digest(other)
+
+
+def test_the_digest_of_changed_bytes_is_an_error(dataset: Path) -> None:
+    path = dataset / "metadata.yaml"
+    path.write_text(path.read_text().replace(info(dataset).digest, "0" * 64))
+    with pytest.raises(DatasetError, match="digest"):
+        digest(dataset)
+
+
+def test_an_unfinished_dataset_and_no_dataset_are_told_apart(collection: Any, tmp_path: Path) -> None:
+    with pytest.raises(DatasetError, match="holds no dataset"):
+        info(tmp_path)
+    create(tmp_path / "dataset", collection.plan)
+    with pytest.raises(DatasetError, match="the dataset is not finished"):
+        info(tmp_path / "dataset")

@@ -1,0 +1,370 @@
+"""Each defect that is planted is found, and named with its file and place."""
+
+from __future__ import annotations
+
+import json
+import re
+import struct
+import zlib
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+import zstandard
+from mcap.opcode import Opcode
+
+from throwcollect.dataset.mcap_reader import Record, StoredEpisode, opened
+from throwcollect.dataset.verify import verify
+from throwcollect.dataset.writer import create
+from throwcollect.episode.record import EpisodeHeader, Samples
+from throwcollect.episode.topics import joint_states
+from throwcollect.errors import DatasetError
+
+SHARD = "quick_00001.mcap"
+FIRST = 3
+"""First trial of that shard."""
+
+
+def stored(path: Path, trial: int) -> StoredEpisode:
+    offset = pq.read_table(path.parent / "throws.parquet")["chunk_offset"].to_pylist()[trial]
+    with opened(path) as contents:
+        return contents.episode(offset)
+
+
+def record_of(path: Path, opcode: Opcode, *, holding: bytes = b"", last: bool = False) -> Record:
+    with opened(path) as contents:
+        found = [record for record in contents.records() if record.opcode == opcode and holding in record.data]
+    return found[-1] if last else found[0]
+
+
+def flip(path: Path, offset: int, bit: int = 1) -> None:
+    data = bytearray(path.read_bytes())
+    data[offset] ^= bit
+    path.write_bytes(data)
+
+
+def change_table(path: Path, column: str, row: int, value: object) -> None:
+    table = pq.read_table(path)
+    values = table[column].to_pylist()
+    values[row] = value
+    index = table.schema.get_field_index(column)
+    pq.write_table(
+        table.set_column(index, table.schema.field(index), pa.array(values, table.schema.types[index])), path
+    )
+
+
+def replace_text(path: Path, old: str, new: str) -> None:
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+
+
+def chunk_contents(directory: Path) -> None:
+    flip(directory / SHARD, stored(directory / SHARD, 4).chunk.offset + 2000)
+
+
+def chunk_crc(directory: Path) -> None:
+    flip(directory / SHARD, stored(directory / SHARD, 4).chunk.offset + 9 + 24)
+
+
+def chunk_end_time(directory: Path) -> None:
+    flip(directory / SHARD, stored(directory / SHARD, 4).chunk.offset + 9 + 8)
+
+
+def message_index(directory: Path) -> None:
+    flip(directory / SHARD, stored(directory / SHARD, 5).indexes[1].offset + 200)
+
+
+def stored_digest(directory: Path) -> None:
+    facts = stored(directory / SHARD, 3).facts
+    flip(directory / SHARD, facts.offset + facts.data.index(b"digest") + 12)
+
+
+def header_contact(directory: Path) -> None:
+    facts = stored(directory / SHARD, 3).facts
+    # The contact ends 1 ns later: valid, but not what was hashed.
+    flip(directory / SHARD, facts.offset + facts.data.index(b'"end_ns":40400000000') + len('"end_ns":40400000000') - 1)
+
+
+def torn(directory: Path) -> None:
+    data = (directory / SHARD).read_bytes()
+    (directory / SHARD).write_bytes(data[: len(data) * 2 // 3])
+
+
+def missing_footer(directory: Path) -> None:
+    footer = record_of(directory / SHARD, Opcode.FOOTER)
+    (directory / SHARD).write_bytes((directory / SHARD).read_bytes()[: footer.offset])
+
+
+def trailing_bytes(directory: Path) -> None:
+    data = (directory / SHARD).read_bytes()
+    (directory / SHARD).write_bytes(data + data[-8:])
+
+
+def statistics(directory: Path) -> None:
+    flip(directory / SHARD, record_of(directory / SHARD, Opcode.STATISTICS).offset + 9)
+
+
+def chunk_index(directory: Path) -> None:
+    flip(directory / SHARD, record_of(directory / SHARD, Opcode.CHUNK_INDEX, last=True).offset + 9 + 16)
+
+
+def footer_crc(directory: Path) -> None:
+    flip(directory / SHARD, record_of(directory / SHARD, Opcode.FOOTER).offset + 9 + 16)
+
+
+def data_crc(directory: Path) -> None:
+    flip(directory / SHARD, record_of(directory / SHARD, Opcode.DATA_END).offset + 9)
+
+
+def profile(directory: Path) -> None:
+    flip(directory / SHARD, record_of(directory / SHARD, Opcode.HEADER).offset + 9 + 4)
+
+
+def channel_qos(directory: Path) -> None:
+    channel = record_of(directory / SHARD, Opcode.CHANNEL, holding=b"/ball/odometry")
+    flip(directory / SHARD, channel.offset + channel.data.index(b"depth: 10") + 8)
+
+
+def schema_name(directory: Path) -> None:
+    schema = record_of(directory / SHARD, Opcode.SCHEMA)
+    flip(directory / SHARD, schema.offset + 9 + 2 + 4, bit=0x20)
+
+
+def bag_copy(directory: Path) -> None:
+    copy = record_of(directory / SHARD, Opcode.METADATA, holding=b"serialized_metadata")
+    flip(directory / SHARD, copy.offset + copy.data.index(b"version: 9") + 9)
+
+
+def shard_gone(directory: Path) -> None:
+    (directory / SHARD).unlink()
+
+
+def shards_swapped(directory: Path) -> None:
+    one, other = (directory / "quick_00000.mcap").read_bytes(), (directory / SHARD).read_bytes()
+    (directory / "quick_00000.mcap").write_bytes(other)
+    (directory / SHARD).write_bytes(one)
+
+
+def measured_landing(directory: Path) -> None:
+    change_table(directory / "throws.parquet", "landing_x_m", 2, 1.25)
+
+
+def outcome(directory: Path) -> None:
+    change_table(directory / "throws.parquet", "outcome", 4, "timeout")
+
+
+def row_digest(directory: Path) -> None:
+    change_table(directory / "throws.parquet", "digest", 4, "0" * 64)
+
+
+def row_offset(directory: Path) -> None:
+    change_table(directory / "throws.parquet", "chunk_offset", 4, 17)
+
+
+def row_lost(directory: Path) -> None:
+    for column, value in (("outcome", "lost"), ("shard", None)):
+        change_table(directory / "throws.parquet", column, 4, value)
+
+
+def row_invented(directory: Path) -> None:
+    change_table(directory / "throws.parquet", "outcome", 4, "lost")
+
+
+def swept_value(directory: Path) -> None:
+    change_table(directory / "throws.parquet", "task.duration_s", 6, 0.9)
+
+
+def refused_row(directory: Path) -> None:
+    change_table(directory / "throws.parquet", "outcome", 6, "refused")
+
+
+def row_missing(directory: Path) -> None:
+    path = directory / "throws.parquet"
+    pq.write_table(pq.read_table(path).slice(0, 6), path)
+
+
+def plan_of_another(directory: Path) -> None:
+    replace_text(directory / "config.yaml", "seed: 0", "seed: 1")
+
+
+def config_broken(directory: Path) -> None:
+    (directory / "config.yaml").write_text("trials: many\n")
+
+
+def bag_count(directory: Path) -> None:
+    replace_text(directory / "metadata.yaml", "message_count: ", "message_count: 1")
+
+
+def bag_digest(directory: Path) -> None:
+    replace_text(directory / "metadata.yaml", "throwcollect.digest: ", "throwcollect.digest: 0000")
+
+
+def bag_qos(directory: Path) -> None:
+    replace_text(directory / "metadata.yaml", "durability: transient_local", "durability: volatile")
+
+
+def open_shard_left(directory: Path) -> None:
+    (directory / "quick_00003.mcap.part").write_bytes(b"")
+
+
+def card_gone(directory: Path) -> None:
+    (directory / "README.md").unlink()
+
+
+DEFECTS: dict[Callable[[Path], None], tuple[str, str, str]] = {
+    chunk_contents: (SHARD, "trial 4", "cannot be decompressed|CRC differs"),
+    chunk_crc: (SHARD, "trial 4", "CRC differs"),
+    chunk_end_time: (SHARD, "trial 4", "times differ"),
+    message_index: (SHARD, "trial 5", "message indexes"),
+    stored_digest: (SHARD, "trial 3", "metadata at byte"),
+    header_contact: (SHARD, "trial 3", "metadata at byte"),
+    torn: (SHARD, "", "cut off|beyond the end"),
+    missing_footer: (SHARD, "summary", "a footer is missing"),
+    trailing_bytes: (SHARD, "", "its records have"),
+    statistics: (SHARD, "byte", "statistics does not fit"),
+    chunk_index: (SHARD, "byte", "chunk_index does not fit"),
+    footer_crc: (SHARD, "byte", "footer does not fit"),
+    data_crc: (SHARD, "byte", "CRC of the data section"),
+    profile: (SHARD, "byte", "profile ros2"),
+    channel_qos: (SHARD, "channels", "/ball/odometry"),
+    schema_name: (SHARD, "schemas", "std_msgs/msg/String"),
+    bag_copy: (SHARD, "byte", "copy of the bag's metadata"),
+    shard_gone: (SHARD, "", "cannot be read"),
+    shards_swapped: (SHARD, "trial 0", "does not place here"),
+    measured_landing: ("quick_00000.mcap", "trial 2", r"landing_x_m = 1\.25, the episode gives"),
+    outcome: (SHARD, "trial 4", "outcome = 'timeout', the episode gives 'landed'"),
+    row_digest: (SHARD, "trial 4", "digest = '000"),
+    row_offset: (SHARD, "trial 4", "chunk_offset = 17"),
+    row_lost: (SHARD, "trial 4", "does not place here"),
+    row_invented: ("throws.parquet", "trial 4", "is lost with shard"),
+    swept_value: ("throws.parquet", "trial 6", r"task\.duration_s = 0\.9, the plan"),
+    refused_row: ("throws.parquet", "trial 6", "nothing against it"),
+    row_missing: ("throws.parquet", "", "not the 7 trials of the plan"),
+    plan_of_another: ("plan.parquet", "", "another configuration"),
+    config_broken: ("config.yaml", "", "trials"),
+    bag_count: ("metadata.yaml", "message_count", "the files give"),
+    bag_digest: ("metadata.yaml", "throwcollect.digest", "the episodes give"),
+    bag_qos: ("metadata.yaml", "topics_with_message_count", "the files give"),
+    open_shard_left: ("quick_00003.mcap.part", "", "no row of throws"),
+    card_gone: ("README.md", "", "is missing"),
+}
+
+
+def test_a_sound_dataset_has_no_findings(dataset: Path) -> None:
+    assert verify(dataset) == []
+
+
+@pytest.mark.parametrize("plant", DEFECTS, ids=lambda plant: plant.__name__)
+def test_a_planted_defect_is_found_and_named(dataset: Path, plant: Callable[[Path], None]) -> None:
+    plant(dataset)
+    file, place, problem = DEFECTS[plant]
+    findings = verify(dataset)
+    assert [
+        finding
+        for finding in findings
+        if finding.file == file and place in finding.place and re.search(problem, finding.problem)
+    ], "\n".join(map(str, findings))
+    assert json.loads(json.dumps([finding.as_dict() for finding in findings]))
+
+
+def test_what_is_sound_beside_a_defect_is_not_accused(dataset: Path) -> None:
+    measured_landing(dataset)
+    (finding,) = verify(dataset)
+    assert str(finding).startswith("quick_00000.mcap: trial 2: throws.parquet has landing_x_m = 1.25")
+
+
+def test_a_changed_sample_is_found_even_if_all_checksums_are_made_to_fit(dataset: Path) -> None:
+    """Somebody rewrites one number of a chunk, its CRC and its size: digest, indexes and judgement still say so."""
+    path = dataset / SHARD
+    episode = stored(path, 4)
+    contents = bytearray(episode.episode.chunk.decompress())
+    contents[31 + joint_states().layout.dtype.fields["position"][1]] ^= 0x40
+    data = zstandard.ZstdCompressor(level=1).compress(bytes(contents))
+    chunk = replace(episode.episode.chunk, data=data, crc=zlib.crc32(contents)).record()
+    whole = path.read_bytes()
+    path.write_bytes(whole[: episode.chunk.offset] + chunk + whole[episode.chunk.end :])
+    problems = [str(finding) for finding in verify(dataset)]
+    assert any("metadata at byte" in problem for problem in problems)
+    assert any("throwcollect.digest" in problem for problem in problems)
+
+
+def kicked(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
+    """In the middle of the flight the ball gains a micrometre per second, and nothing touches it."""
+    if header.trial != 2:
+        return samples, header
+    half = (len(samples) + 100) // 2
+    seconds = np.maximum(0, np.arange(len(samples)) - half) / 250
+    position = samples.ball_position + 1e-6 * seconds[:, np.newaxis] * np.array([1.0, 0, 0])
+    return replace(samples, ball_position=position), header
+
+
+def stalled(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
+    """One sample is missing."""
+    if header.trial != 2:
+        return samples, header
+    kept = np.delete(np.arange(len(samples)), 40)
+    return Samples(**{name: column[kept] for name, column in vars(samples).items()}), replace(header, samples=len(kept))
+
+
+def early(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
+    """The header says that the trial began before its first sample."""
+    return samples, replace(header, start_ns=header.start_ns - (header.trial == 2))
+
+
+@pytest.mark.parametrize(
+    ("change", "problem"),
+    [(kicked, "departs from ballistic motion by"), (stalled, "not spaced by 1/250 s"), (early, "times differ: header")],
+)
+def test_an_episode_that_contradicts_physics_or_its_header_is_found(
+    collection: Any, tmp_path: Path, change: Any, problem: str
+) -> None:
+    findings = verify(collection.collect(tmp_path / "dataset", change=change))
+    assert {(finding.file, finding.place) for finding in findings} == {("quick_00000.mcap", "trial 2")}
+    assert any(problem in finding.problem for finding in findings)
+
+
+def test_latched_topics_of_another_robot_are_found(
+    make_collection: Any, collection: Any, tmp_path: Path, dataset: Path
+) -> None:
+    """A shard recorded with another height of the base: only its static transforms tell."""
+    other = make_collection({"robot": {"base_height_m": 1.1}}).collect(tmp_path / "other")
+    (dataset / SHARD).write_bytes((other / SHARD).read_bytes())
+    assert any("/tf_static does not fit" in str(finding) for finding in verify(dataset))
+
+
+def test_a_file_cut_anywhere_is_reported_and_never_raises(dataset: Path) -> None:
+    whole = (dataset / "quick_00002.mcap").read_bytes()
+    for size in (0, 8, 17, 40, 5000, len(whole) // 2, len(whole) - 30, len(whole) - 1):
+        (dataset / "quick_00002.mcap").write_bytes(whole[:size])
+        assert any(finding.file == "quick_00002.mcap" for finding in verify(dataset)), size
+
+
+def test_random_damage_is_always_found_and_never_raises(make_collection: Any, tmp_path: Path) -> None:
+    path = make_collection({"trials": 1}).collect(tmp_path / "dataset") / "quick_00000.mcap"
+    whole = path.read_bytes()
+    random = np.random.default_rng(0)
+    for offset in random.integers(8, len(whole), size=60).tolist():
+        flip(path, offset, bit=1 << int(random.integers(8)))
+        assert any(finding.file == path.name for finding in verify(path.parent)), offset
+        path.write_bytes(whole)
+
+
+def test_huge_announced_sizes_are_refused_without_being_believed(dataset: Path) -> None:
+    path = dataset / SHARD
+    chunk = stored(path, 4).chunk
+    data = bytearray(path.read_bytes())
+    struct.pack_into("<Q", data, chunk.offset + 9 + 16, 1 << 62)
+    path.write_bytes(data)
+    assert any("as announced" in str(finding) for finding in verify(dataset))
+
+
+def test_only_a_finished_dataset_is_verified(collection: Any, tmp_path: Path) -> None:
+    create(tmp_path / "dataset", collection.plan)
+    with pytest.raises(DatasetError, match="is not finished"):
+        verify(tmp_path / "dataset")

@@ -1,0 +1,238 @@
+from __future__ import annotations
+
+import os
+import resource
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pyarrow.parquet as pq
+import pytest
+
+from throwcollect.config.loader import load
+from throwcollect.dataset.verify import verify
+from throwcollect.dataset.writer import DatasetWriter, create
+from throwcollect.episode.message import Episode
+from throwcollect.errors import ConfigError, DatasetError
+
+MAY_DIFFER = "README.md"
+
+
+def files_of(directory: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in directory.iterdir()}
+
+
+@contextmanager
+def file_size_limit(size: int) -> Iterator[None]:
+    """No file may grow beyond a size: the nearest thing to a full disk that needs no root."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+@pytest.mark.parametrize("order", [(6, 5, 4, 3, 2, 1, 0), (3, 0, 6, 1, 4, 2, 5), (2, 5, 1, 4, 0, 3, 6)])
+def test_files_do_not_depend_on_the_order_of_arrival(collection: Any, tmp_path: Path, order: tuple[int, ...]) -> None:
+    expected = files_of(collection.collect(tmp_path / "in_order", lost=[4]))
+    shuffled = files_of(collection.collect(tmp_path / "shuffled", order, lost=[4]))
+    assert expected.keys() == shuffled.keys()
+    assert [name for name in expected if expected[name] != shuffled[name]] in ([], [MAY_DIFFER])
+
+
+def test_nothing_under_run_changes_a_file(make_collection: Any, tmp_path: Path) -> None:
+    one = files_of(make_collection({"run": {"simulations": 1}}).collect(tmp_path / "one"))
+    other = files_of(make_collection({"run": {"simulations": 9, "retries": 0}}).collect(tmp_path / "other"))
+    assert [name for name in one if one[name] != other[name]] in ([], [MAY_DIFFER])
+
+
+def test_a_shard_is_beside_its_name_until_its_last_trial_is_in(collection: Any, tmp_path: Path) -> None:
+    directory = tmp_path / "dataset"
+    writer = DatasetWriter.create(directory, collection.plan)
+    collection.fill(writer, [1, 2])
+    assert sorted(path.name for path in directory.glob("*.mcap*")) == ["quick_00000.mcap.part"]
+    collection.fill(writer, [0])
+    assert sorted(path.name for path in directory.glob("*.mcap*")) == ["quick_00000.mcap"]
+    collection.fill(writer, [5])
+    assert sorted(path.name for path in directory.glob("*.mcap*")) == ["quick_00000.mcap", "quick_00001.mcap.part"]
+    writer.close()
+
+
+def test_an_open_shard_holds_each_episode_as_soon_as_it_is_appended(collection: Any, tmp_path: Path) -> None:
+    """What `kill -9` leaves behind are whole records: every chunk is followed by the metadata that name its trial."""
+    from mcap.records import Chunk, Metadata
+    from mcap.stream_reader import StreamReader
+
+    writer = DatasetWriter.create(tmp_path / "dataset", collection.plan)
+    for arrived, trial in enumerate([2, 0], start=1):
+        collection.fill(writer, [trial])
+        with (tmp_path / "dataset" / "quick_00000.mcap.part").open("rb") as file:
+            records = []
+            size = os.fstat(file.fileno()).st_size
+            for record in StreamReader(file, emit_chunks=True).records:
+                records.append(record)
+                if file.tell() == size:
+                    break
+        assert sum(isinstance(record, Chunk) for record in records) == 1 + arrived
+        last = records[-1]
+        assert isinstance(last, Metadata)
+        assert (last.name, last.metadata["trial"]) == ("throwcollect.episode", str(trial))
+    writer.close()
+
+
+def test_a_lost_trial_has_a_row_but_no_episode(collection: Any, tmp_path: Path) -> None:
+    directory = collection.collect(tmp_path / "dataset", lost=[1])
+    row = pq.read_table(directory / "throws.parquet").to_pylist()[1]
+    assert (row["outcome"], row["reason"]) == ("lost", "two simulations were lost")
+    assert [row[name] for name in ("shard", "chunk_offset", "samples", "digest", "landing_x_m")] == [None] * 5
+    assert verify(directory) == []
+
+
+def test_a_refused_trial_is_not_waited_for(collection: Any, tmp_path: Path) -> None:
+    collection.refuse(0, "too fast")
+    collection.refuse(6, "too far")
+    directory = collection.collect(tmp_path / "dataset", range(1, 6))
+    rows = pq.read_table(directory / "throws.parquet").to_pylist()
+    assert [(row["trial"], row["reason"]) for row in rows if row["outcome"] == "refused"] == [
+        (0, "too fast"),
+        (6, "too far"),
+    ]
+    # Trial 6 is the only one of its shard, so that shard has no file.
+    assert sorted(path.name for path in directory.glob("*.mcap")) == ["quick_00000.mcap", "quick_00001.mcap"]
+    assert verify(directory) == []
+
+
+def test_rows_say_what_the_throw_did_with_units_and_descriptions(collection: Any, dataset: Path) -> None:
+    table = pq.read_table(dataset / "throws.parquet")
+    result = collection.result(collection.episode(2))
+    row = table.to_pylist()[2]
+    assert row["task.duration_s"] == collection.plan.trials[2].values["task.duration_s"]
+    assert (row["landing_x_m"], row["landing_y_m"], row["landing_z_m"]) == result.landing.position
+    assert (row["release_vx_mps"], row["release_vy_mps"], row["release_vz_mps"]) == result.release.velocity
+    assert (row["effort_peak_joint"], row["effort_peak_share"]) == (result.effort_peak.joint, result.effort_peak.share)
+    assert row["arm_right_2_joint_tracking_error_rad"] == result.tracking_error_rad["arm_right_2_joint"]
+    assert all(field.metadata[b"description"].endswith(b".") for field in table.schema)
+
+
+def test_the_configuration_that_is_kept_loads_to_the_same_plan(collection: Any, dataset: Path) -> None:
+    assert load(dataset / "config.yaml") == collection.config
+
+
+def test_a_directory_that_holds_files_is_refused(collection: Any, tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("mine")
+    with pytest.raises(ConfigError, match=r"holds notes\.txt"):
+        create(tmp_path, collection.plan)
+    assert files_of(tmp_path) == {"notes.txt": b"mine"}
+
+
+def test_a_path_below_a_file_is_refused(collection: Any, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(ConfigError, match="cannot be used as directory of a dataset"):
+        create(tmp_path / "file" / "dataset", collection.plan)
+
+
+def test_a_directory_that_cannot_be_written_leaves_nothing_behind(collection: Any, tmp_path: Path) -> None:
+    with (
+        file_size_limit(2000),
+        pytest.raises(DatasetError, match=r"plan\.parquet.*cannot be written|cannot be written"),
+    ):
+        create(tmp_path / "dataset", collection.plan)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_full_disk_is_one_error_and_costs_one_episode(collection: Any, tmp_path: Path) -> None:
+    writer = DatasetWriter.create(tmp_path / "dataset", collection.plan)
+    collection.fill(writer, [0])
+    part = tmp_path / "dataset" / "quick_00000.mcap.part"
+    size = part.stat().st_size
+    with file_size_limit(size + 1000), pytest.raises(DatasetError, match=r"quick_00000\.mcap\.part: cannot be written"):
+        collection.fill(writer, [1])
+    assert part.stat().st_size == size
+    # When there is space again, nothing of the failure is left.
+    collection.fill(writer, range(1, 7))
+    writer.finish(wall_s=1.0)
+    assert verify(tmp_path / "dataset") == []
+
+
+def test_a_disk_that_is_full_from_the_start_leaves_an_empty_shard(collection: Any, tmp_path: Path) -> None:
+    writer = DatasetWriter.create(tmp_path / "dataset", collection.plan)
+    with file_size_limit(5000), pytest.raises(DatasetError, match="cannot be written: File too large"):
+        collection.fill(writer, [0])
+    collection.fill(writer, range(7))
+    writer.finish(wall_s=1.0)
+    assert verify(tmp_path / "dataset") == []
+
+
+def test_a_disk_that_is_full_at_the_end_leaves_the_episodes(collection: Any, tmp_path: Path) -> None:
+    directory = tmp_path / "dataset"
+    writer = DatasetWriter.create(directory, collection.plan)
+    collection.fill(writer, [0, 1])
+    finished = collection.collect(tmp_path / "elsewhere") / "quick_00000.mcap"
+    # The finished file is larger than the open one, by its summary.
+    with (
+        file_size_limit(finished.stat().st_size - 100),
+        pytest.raises(DatasetError, match=r"quick_00000\.mcap: cannot be written"),
+    ):
+        collection.fill(writer, [2])
+    assert sorted(path.name for path in directory.glob("*.mcap*")) == ["quick_00000.mcap.part"]
+    writer.close()
+
+
+def test_an_episode_is_taken_once_and_only_if_it_is_waited_for(collection: Any, tmp_path: Path) -> None:
+    collection.refuse(3, "too fast")
+    writer = DatasetWriter.create(tmp_path / "dataset", collection.plan)
+    collection.fill(writer, [0])
+    for trial in (0, 3):
+        with pytest.raises(DatasetError, match=f"no episode of trial {trial} is waited for"):
+            collection.fill(writer, [trial])
+        with pytest.raises(DatasetError, match=f"no episode of trial {trial} is waited for"):
+            writer.append_lost(trial, "gone")
+    stranger = collection.episode(1)
+    stranger = Episode(replace(stranger.header, trial=99), stranger.chunk)
+    with pytest.raises(DatasetError, match="no episode of trial 99 is waited for"):
+        writer.append(stranger, collection.result(collection.episode(1)))
+    writer.close()
+
+
+def test_a_damaged_episode_is_not_written(collection: Any, tmp_path: Path) -> None:
+    writer = DatasetWriter.create(tmp_path / "dataset", collection.plan)
+    whole = collection.episode(0)
+    damaged = Episode(whole.header, replace(whole.chunk, crc=whole.chunk.crc ^ 1))
+    with pytest.raises(DatasetError, match="CRC differs"):
+        writer.append(damaged, collection.result(whole))
+    assert not list((tmp_path / "dataset").glob("*.part"))
+    writer.append(whole, collection.result(whole))
+    writer.close()
+
+
+def test_a_dataset_with_missing_trials_is_not_finished(collection: Any, tmp_path: Path) -> None:
+    writer = DatasetWriter.create(tmp_path / "dataset", collection.plan)
+    collection.fill(writer, [0, 1, 3, 4, 5, 6])
+    with pytest.raises(DatasetError, match="1 trials are missing, such as 2"):
+        writer.finish(wall_s=1.0)
+    assert not (tmp_path / "dataset" / "metadata.yaml").exists()
+    writer.close()
+
+
+def test_another_process_can_fill_what_was_created(collection: Any, tmp_path: Path) -> None:
+    create(tmp_path / "dataset", collection.plan)
+    writer = DatasetWriter.open(tmp_path / "dataset")
+    assert writer.plan == collection.plan
+    collection.fill(writer, range(7))
+    writer.finish(wall_s=1.0)
+    assert verify(tmp_path / "dataset") == []
+
+
+def test_only_a_fresh_dataset_can_be_opened_for_filling(collection: Any, tmp_path: Path, dataset: Path) -> None:
+    with pytest.raises(DatasetError, match=r"holds no config\.yaml"):
+        DatasetWriter.open(tmp_path)
+    with pytest.raises(DatasetError, match="trials of it have run already"):
+        DatasetWriter.open(dataset)
+    begun = DatasetWriter.create(tmp_path / "begun", collection.plan)
+    collection.fill(begun, [1])
+    begun.close()
+    with pytest.raises(DatasetError, match=r"trials of it have run already: it holds quick_00000\.mcap\.part"):
+        DatasetWriter.open(tmp_path / "begun")

@@ -1,0 +1,181 @@
+from __future__ import annotations
+
+import io
+import struct
+import zlib
+from dataclasses import fields, replace
+from typing import Any
+
+import numpy as np
+import pytest
+import zstandard
+from mcap.data_stream import ReadDataStream
+from mcap.records import Chunk as McapChunk
+from mcap.records import Message, MessageIndex
+
+from throwcollect.config.schema import Config
+from throwcollect.episode.channels import Channels
+from throwcollect.episode.chunk import Chunk, ChunkEncoder, MessageTable
+from throwcollect.episode.record import Samples
+from throwcollect.errors import DatasetError
+from throwcollect.robots.description import full_description
+
+URDF = full_description(Config())
+ALL = ["joint_states", "ball/odometry", "controller_state", "tf", "clock"]
+
+
+@pytest.fixture
+def encoder() -> ChunkEncoder:
+    return ChunkEncoder(Channels(Config(), URDF), level=1)
+
+
+@pytest.fixture
+def full() -> ChunkEncoder:
+    return ChunkEncoder(Channels(Config.model_validate({"record": {"topics": ALL}}), URDF), level=1)
+
+
+@pytest.fixture
+def targets(make_set_points: Any) -> dict[str, Any]:
+    return {name: make_set_points(name, 50) for name in ("arm_right_controller", "torso_controller")}
+
+
+def messages_of(contents: bytes) -> list[tuple[int, Message]]:
+    """Offset and fields of each record, as the mcap library reads them."""
+    found, offset = [], 0
+    while offset < len(contents):
+        opcode, length = struct.unpack_from("<BQ", contents, offset)
+        assert opcode == 0x05
+        found.append((offset, Message.read(ReadDataStream(io.BytesIO(contents[offset + 9 :])), length)))
+        offset += 9 + length
+    return found
+
+
+def test_a_chunk_has_one_message_per_channel_and_sample(full: ChunkEncoder, make_samples: Any, targets: Any) -> None:
+    samples = make_samples(50)
+    messages = [message for _, message in messages_of(full.encode(samples, targets).decompress())]
+    assert [message.channel_id for message in messages] == [3, 4, 5, 6, 8, 11] * 50
+    assert [message.sequence for message in messages[::6]] == list(range(50))
+    assert [message.log_time for message in messages[3::6]] == samples.stamps_ns.tolist()
+    assert all(message.publish_time == message.log_time for message in messages)
+
+
+def test_a_message_made_alone_has_the_bytes_of_the_chunk(full: ChunkEncoder, make_samples: Any, targets: Any) -> None:
+    """What a listener receives live is what the dataset holds."""
+    samples = make_samples(50)
+    table = MessageTable(full.encode(samples, targets).decompress(), 50)
+    topics = {
+        3: "/joint_states",
+        4: "/ball/odometry",
+        5: "/clock",
+        6: "/tf",
+        8: "/arm_right_controller/controller_state",
+        11: "/torso_controller/controller_state",
+    }
+    for channel, topic in topics.items():
+        stored = table.messages(channel)
+        for index in (0, 17, 49):
+            assert full.message(topic, samples, index, targets) == stored[index].tobytes()
+
+
+def test_what_is_not_recorded_cannot_be_made(encoder: ChunkEncoder, full: ChunkEncoder, make_samples: Any) -> None:
+    with pytest.raises(KeyError, match="/clock"):
+        encoder.message("/clock", make_samples(1), 0)
+    with pytest.raises(KeyError, match="arm_right_controller"):
+        full.encode(make_samples(5))
+
+
+@pytest.mark.parametrize("count", [1, 2, 500])
+def test_samples_survive(encoder: ChunkEncoder, make_samples: Any, count: int) -> None:
+    samples = make_samples(count)
+    read = MessageTable(encoder.encode(samples).decompress(), count).samples
+    for field in fields(Samples):
+        assert np.allclose(getattr(samples, field.name), getattr(read, field.name), rtol=0, atol=1e-14)
+    assert np.array_equal(samples.stamps_ns, read.stamps_ns)
+    assert np.array_equal(samples.effort, read.effort)
+
+
+def test_equal_samples_give_equal_chunks(make_samples: Any) -> None:
+    encoders = [ChunkEncoder(Channels(Config(), URDF), level=3) for _ in range(2)]
+    assert encoders[0].encode(make_samples(30)) == encoders[1].encode(make_samples(30))
+
+
+def test_the_record_is_the_one_that_the_mcap_library_reads(encoder: ChunkEncoder, make_samples: Any) -> None:
+    chunk = encoder.encode(make_samples(20))
+    read = McapChunk.read(ReadDataStream(io.BytesIO(chunk.record()[9:])))
+    assert (read.compression, read.data, read.uncompressed_size) == ("zstd", chunk.data, len(chunk.decompress()))
+    assert (read.message_start_time, read.message_end_time) == (10**10, 10**10 + 19 * 4_000_000)
+    assert read.uncompressed_crc == zlib.crc32(chunk.decompress())
+    assert Chunk.parse(chunk.record()) == chunk
+
+
+def test_message_indexes_point_at_the_messages(encoder: ChunkEncoder, make_samples: Any) -> None:
+    contents = encoder.encode(make_samples(20)).decompress()
+    table = MessageTable(contents, 20)
+    for channel in (3, 4):
+        index = MessageIndex.read(ReadDataStream(io.BytesIO(table.message_index(channel)[9:])))
+        assert index.records == [
+            (message.log_time, at) for at, message in messages_of(contents) if message.channel_id == channel
+        ]
+
+
+@pytest.mark.parametrize("at", [0, 5, 40, 45, 49, 52, -1])
+def test_a_record_that_is_not_such_a_chunk_is_refused(encoder: ChunkEncoder, make_samples: Any, at: int) -> None:
+    record = bytearray(encoder.encode(make_samples(20)).record())
+    if at == -1:
+        del record[-1]
+    else:
+        record[at] ^= 0x11
+    with pytest.raises(DatasetError, match="chunk: "):
+        Chunk.parse(bytes(record)).decompress()
+
+
+def test_damage_is_refused_before_it_is_believed(encoder: ChunkEncoder, make_samples: Any) -> None:
+    chunk = encoder.encode(make_samples(20))
+    bomb = zstandard.ZstdCompressor().compress(bytes(50_000_000))
+    for data, message in [
+        (chunk.data[:-1], "cannot be decompressed"),
+        (chunk.data + b"x", "cannot be decompressed"),
+        (b"", "cannot be decompressed"),
+        (bomb, "holds 50000000 bytes"),
+    ]:
+        with pytest.raises(DatasetError, match=message):
+            replace(chunk, data=data).decompress()
+    with pytest.raises(DatasetError, match="CRC differs"):
+        replace(chunk, crc=chunk.crc ^ 1).decompress()
+
+
+def test_records_that_are_no_table_are_refused(encoder: ChunkEncoder, make_samples: Any) -> None:
+    contents = encoder.encode(make_samples(20)).decompress()
+    row = len(contents) // 20
+    changed = bytearray(contents)
+    changed[3 * row + 9] = 9
+    for broken, count, message in [
+        (contents, 0, "are not the records of 0 samples"),
+        (contents, 19, "are not the records of 19 samples"),
+        (contents, 40, "not one message per channel"),
+        (contents, 10, "not one message per channel"),
+        (b"", 1, "are not the records"),
+        (b"\x05" + bytes(30), 1, "not one message per channel"),
+        (contents[:row] + bytes(3), 1, "cut off"),
+        (bytes(changed), 20, "the records of channel 3 are not alike"),
+    ]:
+        with pytest.raises(DatasetError, match=message):
+            MessageTable(broken, count)
+
+
+def test_records_of_other_topics_hold_no_samples(encoder: ChunkEncoder, make_samples: Any) -> None:
+    contents = encoder.encode(make_samples(2)).decompress()
+    size = 9 + struct.unpack_from("<Q", contents, 1)[0]
+    with pytest.raises(DatasetError, match="no messages of /ball/odometry"):
+        _ = MessageTable(contents[:size], 1).samples
+    renamed = contents[: len(contents) // 2].replace(b"head_1_joint", b"head_9_joint")
+    with pytest.raises(DatasetError, match="messages of /joint_states have another layout"):
+        _ = MessageTable(renamed, 1).samples
+
+
+def test_times_are_compared_with_stamps(encoder: ChunkEncoder, make_samples: Any) -> None:
+    samples = make_samples(5)
+    contents = bytearray(encoder.encode(samples).decompress())
+    assert MessageTable(bytes(contents), 5).are_timed_by(samples.stamps_ns)
+    contents[len(contents) // 5 + 11] ^= 1
+    assert not MessageTable(bytes(contents), 5).are_timed_by(samples.stamps_ns)

@@ -1,0 +1,127 @@
+from __future__ import annotations
+
+import hashlib
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from throwcollect.config.schema import Config
+from throwcollect.episode.channels import Channels
+from throwcollect.episode.chunk import Chunk, ChunkEncoder
+from throwcollect.episode.message import Episode, header_from_json, header_to_json, pack, unpack
+from throwcollect.episode.record import EpisodeHeader
+from throwcollect.errors import DatasetError
+from throwcollect.interfaces import deserialize, get_message
+from throwcollect.robots.description import full_description
+
+
+@pytest.fixture(scope="module")
+def encoder() -> ChunkEncoder:
+    return ChunkEncoder(Channels(Config(), full_description(Config())), level=1)
+
+
+@pytest.fixture
+def chunk(encoder: ChunkEncoder, make_samples: Any) -> Chunk:
+    return encoder.encode(make_samples(50))
+
+
+def test_an_episode_arrives_as_it_was_sent(header: EpisodeHeader, chunk: Chunk, make_samples: Any) -> None:
+    episode = unpack(pack(header, chunk))
+    assert (episode.header, episode.chunk) == (header, chunk)
+    assert episode.samples().ball_position.tolist() == make_samples(50).ball_position.tolist()
+
+
+def test_the_message_is_a_stock_one_that_names_its_parts(header: EpisodeHeader, chunk: Chunk) -> None:
+    message = deserialize(pack(header, chunk), get_message("std_msgs/msg/UInt8MultiArray"))
+    sizes = {part.label: part.size for part in message.layout.dim}
+    assert list(sizes) == ["header", "chunk"]
+    data = message.data.tobytes()
+    assert header_from_json(data[: sizes["header"]]) == header
+    assert data[sizes["header"] :] == chunk.record()
+
+
+def test_the_digest_covers_header_and_messages_but_not_their_packing(
+    encoder: ChunkEncoder, header: EpisodeHeader, chunk: Chunk, make_samples: Any
+) -> None:
+    digest = Episode(header, chunk).digest
+    assert digest == hashlib.sha256(header_to_json(header).encode() + b"\0" + chunk.decompress()).hexdigest()
+    packed_more = ChunkEncoder(Channels(Config(), full_description(Config())), level=9).encode(make_samples(50))
+    assert packed_more.data != chunk.data
+    assert Episode(header, packed_more).digest == digest
+    others = [
+        Episode(replace(header, end_reason="rest"), chunk),
+        Episode(replace(header, contacts=header.contacts[:1]), chunk),
+        Episode(replace(header, goals=()), chunk),
+        Episode(header, encoder.encode(make_samples(50, seed=1))),
+    ]
+    assert len({digest, *(other.digest for other in others)}) == 5
+
+
+def test_the_header_is_one_text(header: EpisodeHeader) -> None:
+    text = header_to_json(header)
+    assert text.startswith('{"trial":7,"start_ns":10000000000,"end_reason":"landed","contacts":[{"body":"spoon",')
+    assert text.isascii()
+    assert header_to_json(header_from_json(text)) == text
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ('"trial":7', '"trial":-1'),
+        ('"trial":7', '"trial":7.0'),
+        ('"trial":7', '"trial":"7"'),
+        ('"trial":7,', ""),
+        ('"samples":50', '"samples":0'),
+        ('"end_ns":null', '"end_ns":"never"'),
+        ("}", ""),
+    ],
+)
+def test_a_wrong_header_is_refused(header: EpisodeHeader, old: str, new: str) -> None:
+    text = header_to_json(header)
+    assert old in text
+    with pytest.raises(DatasetError, match="episode header: "):
+        header_from_json(text.replace(old, new, 1))
+
+
+def test_more_samples_than_there_are_is_an_error(header: EpisodeHeader, chunk: Chunk) -> None:
+    with pytest.raises(DatasetError, match="are not the records of 51 samples"):
+        unpack(pack(replace(header, samples=51), chunk)).samples()
+
+
+@pytest.mark.parametrize("length", [0, 3, 60, 100, 300, -1])
+def test_a_message_that_is_cut_off_is_refused(header: EpisodeHeader, chunk: Chunk, length: int) -> None:
+    with pytest.raises(DatasetError, match="episode: "):
+        unpack(pack(header, chunk)[:length])
+
+
+def test_a_message_of_another_layout_is_refused(header: EpisodeHeader, chunk: Chunk) -> None:
+    message = pack(header, chunk)
+    for wrong in (message + b"x", message.replace(b"chunk", b"blobs", 1), b"\1" + message[1:]):
+        with pytest.raises(DatasetError, match="episode: "):
+            unpack(wrong)
+
+
+@pytest.fixture(scope="module")
+def whole(encoder: ChunkEncoder, header: EpisodeHeader, make_samples: Any) -> bytes:
+    return pack(replace(header, samples=3), encoder.encode(make_samples(3)))
+
+
+@settings(max_examples=300)
+@given(data=st.data())
+def test_garbage_is_refused_with_one_kind_of_error(whole: bytes, data: st.DataObject) -> None:
+    """A changed byte or a changed stretch: a DatasetError, or an episode with the same messages."""
+    message = bytearray(whole)
+    if data.draw(st.booleans()):
+        message[data.draw(st.integers(0, len(message) - 1))] ^= data.draw(st.integers(1, 255))
+    else:
+        start = data.draw(st.integers(0, len(message)))
+        message[start : data.draw(st.integers(start, len(message)))] = data.draw(st.binary(max_size=200))
+    try:
+        episode = unpack(bytes(message))
+        episode.samples()
+    except DatasetError:
+        return
+    assert episode.contents == unpack(whole).contents

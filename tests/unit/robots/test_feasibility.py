@@ -1,0 +1,216 @@
+from __future__ import annotations
+
+import numpy as np
+import pinocchio
+import pytest
+
+from throwcollect.config.schema import Config
+from throwcollect.errors import ConfigError
+from throwcollect.robots.clearance import MARGIN_M, Clearance, spoon_mount
+from throwcollect.robots.feasibility import Feasibility
+from throwcollect.robots.interpolation import sample_quintic
+from throwcollect.robots.model import half_sitting, joint_limits, urdf_path
+from throwcollect.robots.spoon import ball_seat
+from throwcollect.robots.talos import JOINTS
+from throwcollect.tasks.trajectory import throw_trajectory
+
+TASK = Config().task
+
+
+def throw(end=None, start=None, duration_s=1.0, gamma=1.2, **sections):
+    return Config(
+        task={
+            "start": {**TASK.start, **(start or {})},
+            "end": {**TASK.end, **(end or {})},
+            "duration_s": duration_s,
+            "trajectory": {"gamma": gamma},
+        },
+        **sections,
+    )
+
+
+LONG = throw({"arm_right_4_joint": -0.2, "arm_right_7_joint": 0.55}, duration_s=0.95)
+
+
+@pytest.fixture(scope="module")
+def feasibility():
+    return Feasibility(Config())
+
+
+@pytest.fixture
+def reason(feasibility):
+    return lambda config: feasibility.check(config, throw_trajectory(config))
+
+
+def shares(feasibility, config):
+    """Largest effort over limit, and speed over limit, of the moving joints."""
+    times = np.linspace(0, config.task.duration_s, 501)
+    trajectory = throw_trajectory(config)
+    columns = [JOINTS.index(joint) for joint in trajectory.joints]
+    posture = np.array([{**half_sitting(), **config.robot.posture, **config.task.start}[joint] for joint in JOINTS])
+    motion = tuple(np.tile(rest, (501, 1)) for rest in (posture, 0 * posture, 0 * posture))
+    for array, sampled in zip(motion, sample_quintic(trajectory, times), strict=True):
+        array[:, columns] = sampled
+    efforts = np.abs(feasibility.efforts(config, motion)) / joint_limits().effort
+    return efforts[:, columns].max(), (np.abs(motion[1]) / joint_limits().velocity).max()
+
+
+def test_default_throw_needs_the_effort_and_speed_that_the_physics_showed(feasibility, reason):
+    assert reason(Config()) is None
+    # Measured in the physics: 0.86 and 0.69.
+    assert shares(feasibility, Config()) == pytest.approx((0.86, 0.69), abs=0.01)
+
+
+def test_long_throw_is_refused_for_the_effort_that_saturated_in_the_physics(feasibility, reason):
+    assert reason(LONG).startswith("arm_right_2_joint needs 23.9")
+    assert reason(LONG).endswith("its limit is 22.32 Nm")
+    assert shares(feasibility, LONG)[1] == pytest.approx(0.79, abs=0.01)
+
+
+def test_recommended_sweep_box_is_feasible(reason):
+    draw = np.random.default_rng(0)
+    for _ in range(200):
+        elbow, wrist, duration_s, gamma = draw.uniform([-0.95, 0.1, 0.9, 0.95], [-0.25, 0.5, 1.3, 1.3])
+        config = throw({"arm_right_4_joint": elbow, "arm_right_7_joint": wrist}, duration_s=duration_s, gamma=gamma)
+        assert reason(config) is None
+
+
+def test_position_beyond_its_limit_is_refused(reason):
+    assert reason(throw({"arm_right_7_joint": 0.75})) == (
+        "arm_right_7_joint is at 0.75 rad at 1.000 s; its upper limit is 0.6981 rad"
+    )
+    assert "its lower limit is -2.88 rad" in reason(throw({"arm_right_2_joint": -2.9}))
+
+
+def test_held_posture_beyond_its_limit_is_refused(reason):
+    assert reason(throw(robot={"posture": {"head_1_joint": 1.0}})).startswith("head_1_joint is at 1 rad at 0.000 s")
+
+
+def test_joint_may_start_at_the_very_end_of_its_range(reason):
+    limit = float(joint_limits().upper[JOINTS.index("arm_right_7_joint")])
+    assert reason(throw({"arm_right_7_joint": limit}, duration_s=1.2)) is None
+
+
+def test_speed_above_its_limit_is_refused(reason):
+    assert reason(throw(duration_s=0.5)) == "arm_right_7_joint moves at 2.413 rad/s at 0.290 s; its limit is 1.76 rad/s"
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"robot": {"effort_scale": 0.8}},
+        {"tool": {"mass_kg": 0.6}},
+        {"ball": {"mass_kg": 0.5}},
+        {"scene": {"gravity_mps2": 15.0}},
+    ],
+)
+def test_masses_gravity_and_effort_scale_of_the_trial_count(reason, change):
+    assert "Nm at" in reason(throw(**change))
+    assert reason(Config()) is None
+
+
+def test_stronger_robot_can_do_the_long_throw(reason):
+    assert reason(LONG.model_copy(update={"robot": Config(robot={"effort_scale": 1.1}).robot})) is None
+
+
+def test_effort_of_held_joints_is_limited_only_where_they_are_simulated(reason):
+    """An arm that carries too much is no matter as long as it is rigid and only the head moves."""
+    task = {"start": {**TASK.start, "head_1_joint": 0.0}, "end": {"head_1_joint": 0.1}}
+    assert reason(Config(task=task, tool={"mass_kg": 2.0})) is None
+    assert reason(Config(task=task, tool={"mass_kg": 2.0}, robot={"locked": "none"})).startswith("arm_right_")
+
+
+def test_static_torque_is_the_weight_times_its_lever(feasibility):
+    """Lifting one more kilogram in the cup by a joint's small turn takes the work that the torque gives."""
+    heavy = Config(ball={"mass_kg": 1.045})
+    posture = np.array([{**half_sitting(), **TASK.start}[joint] for joint in JOINTS])[None]
+    still = np.zeros_like(posture)
+    extra = [feasibility.efforts(config, (posture, still, still))[0] for config in (heavy, Config())]
+    column = JOINTS.index("arm_right_4_joint")
+    model = pinocchio.buildModelFromUrdf(str(urdf_path()))
+    data = model.createData()
+
+    def height(turn):
+        q = pinocchio.neutral(model)
+        for joint, angle in zip(JOINTS, posture[0], strict=True):
+            q[model.idx_qs[model.getJointId(joint)]] = angle
+        q[model.idx_qs[model.getJointId("arm_right_4_joint")]] += turn
+        pinocchio.framesForwardKinematics(model, data, q)
+        gripper = data.oMf[model.getFrameId("gripper_right_base_link")]
+        return gripper.act(spoon_mount(heavy.tool)).act(np.array(ball_seat(heavy.tool, heavy.ball.radius_m)))[2]
+
+    lever = (height(1e-5) - height(-1e-5)) / 2e-5
+    assert (extra[0] - extra[1])[column] == pytest.approx(9.81 * lever, abs=1e-6)
+
+
+def test_damping_and_inertia_show_in_the_torque(feasibility):
+    posture = np.array([{**half_sitting(), **TASK.start}[joint] for joint in JOINTS])[None]
+    still, turning = np.zeros_like(posture), np.zeros_like(posture)
+    column = JOINTS.index("torso_1_joint")
+    turning[0, column] = 2.0
+    rest = feasibility.efforts(Config(), (posture, still, still))[0, column]
+    # Turning steadily about the vertical torso axis takes friction alone.
+    steady = feasibility.efforts(Config(), (posture, turning, still))[0, column]
+    assert steady - rest == pytest.approx(2.0 * joint_limits().damping[column], abs=1e-9)
+    faster = feasibility.efforts(Config(), (posture, still, turning))[0, column]
+    assert faster - rest > 1.0
+
+
+def test_arm_against_the_head_is_refused(reason):
+    config = throw(
+        {"arm_right_2_joint": -2.15, "arm_right_3_joint": 1.95, "arm_right_5_joint": 2.33, "arm_right_6_joint": -1.19},
+        duration_s=6.0,
+        robot={"effort_scale": 2.0},
+    )
+    assert reason(config) == "arm_right_5_link and head_2_link overlap at 1.510 s; they must stay 2 mm apart"
+
+
+def test_spoon_against_the_leg_is_refused_until_it_is_short_enough(reason):
+    start = {joint: angle for joint, angle in half_sitting().items() if joint.startswith("arm_right_")}
+    task = {"start": start, "end": {**start, "arm_right_1_joint": 0.7, "arm_right_6_joint": 1.0}, "duration_s": 6.0}
+    refusal = reason(Config(task=task))
+    assert refusal.startswith("leg_left_3_link and spoon overlap at 5.")
+    assert reason(Config(task=task, tool={"handle_length_m": 0.05})) is None
+    assert reason(Config(task=task)) == refusal
+
+
+def test_handle_may_reach_into_the_hand(reason):
+    assert reason(throw(tool={"mount_offset_m": 0.0})) is None
+
+
+def test_links_that_are_held_into_each_other_are_refused(reason):
+    posture = {"arm_left_1_joint": 0.0, "arm_left_2_joint": 0.0, "arm_left_3_joint": 0.0, "arm_left_4_joint": 0.0}
+    assert "leg_left_3_link" in reason(
+        throw(robot={"posture": posture | {f"leg_left_{n}_joint": 0.0 for n in range(1, 7)}})
+    )
+
+
+def test_unsettled_choice_of_joints_is_an_error(feasibility):
+    config = Config(robot={"locked": ["head_1_joint"]})
+    bad = config.model_copy(update={"robot": config.robot.model_copy(update={"locked": ["arm_right_4_joint"]})})
+    with pytest.raises(ConfigError, match="arm_right_4_joint"):
+        feasibility.check(bad, throw_trajectory(bad))
+
+
+def test_broad_phase_finds_what_all_distances_find():
+    """Every pair's distance, one by one, is the reference for the pruned check."""
+    model = pinocchio.buildModelFromUrdf(str(urdf_path()))
+    clearance = Clearance(model, Config().tool)
+    geometry = clearance.geometry
+    data, shapes = model.createData(), geometry.createData()
+    draw, limits = np.random.default_rng(1), joint_limits()
+    found = 0
+    for _ in range(120):
+        configuration = pinocchio.neutral(model)
+        for joint in ("torso_1_joint", *(f"arm_right_{number}_joint" for number in range(1, 8))):
+            column = JOINTS.index(joint)
+            angle = draw.uniform(limits.lower[column], limits.upper[column])
+            configuration[model.idx_qs[model.getJointId(joint)]] = angle
+        pinocchio.computeDistances(model, data, geometry, shapes, configuration)
+        closest = min(result.min_distance for result in shapes.distanceResults)
+        approach = clearance.first_approach(configuration[None])
+        assert (approach is not None) == (closest <= MARGIN_M)
+        if approach is not None:
+            found += 1
+            assert approach.distance_m == pytest.approx(closest, abs=1e-5)
+    assert found > 10

@@ -1,0 +1,53 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from throwcollect.robots.interpolation import sample_positions, sample_quintic
+from throwcollect.robots.trajectory import JointTrajectory
+
+
+def rest_to_rest(start=1.1, end=2.1, duration=1.0):
+    rest = np.zeros((2, 1))
+    return JointTrajectory(("j",), np.array([0.0, duration]), np.array([[start], [end]]), rest, rest)
+
+
+@pytest.mark.parametrize(
+    ("time", "value"), [(0.01, 1.100010), (0.25, 1.203516), (0.5, 1.6), (0.75, 1.996484), (1.0, 2.1)]
+)
+def test_rest_to_rest_is_the_curve_that_controllers_follow(time, value):
+    assert sample_quintic(rest_to_rest(), np.array([time]))[0][0, 0] == pytest.approx(value, abs=5e-7)
+
+
+@settings(max_examples=60)
+@given(st.lists(st.floats(-3, 3), min_size=6, max_size=6), st.lists(st.floats(0.01, 1), min_size=2, max_size=6))
+def test_polynomials_of_degree_five_are_reproduced(coefficients, spans):
+    path = np.polynomial.Polynomial(coefficients)
+    knots = np.concatenate([[0.0], np.cumsum(spans)])
+    trajectory = JointTrajectory(
+        ("j",), knots, path(knots)[:, None], path.deriv(1)(knots)[:, None], path.deriv(2)(knots)[:, None]
+    )
+    times = np.linspace(0, knots[-1], 50)
+    scale = 1 + np.abs([path.deriv(order)(times) for order in (0, 1, 2)]).max() * 1e4
+    for order, sampled in enumerate(sample_quintic(trajectory, times)):
+        assert np.abs(sampled[:, 0] - path.deriv(order)(times)).max() < 1e-11 * scale
+
+
+def test_ends_are_held_outside_the_trajectory():
+    positions, velocities, _ = sample_quintic(rest_to_rest(), np.array([-0.5, 1.0, 1.5]))
+    assert positions[:, 0] == pytest.approx([1.1, 2.1, 2.1], abs=1e-14)
+    assert not velocities.any()
+
+
+def test_single_point_is_no_curve():
+    point = JointTrajectory(("j",), np.zeros(1), *(np.zeros((1, 1)),) * 3)
+    with pytest.raises(ValueError, match="at least two points, got 1"):
+        sample_quintic(point, np.zeros(1))
+
+
+def test_positions_alone_are_those_of_the_whole_sample():
+    trajectory = rest_to_rest(duration=0.7)
+    times = np.linspace(-0.1, 0.9, 33)
+    assert (sample_positions(trajectory, times) == sample_quintic(trajectory, times)[0]).all()

@@ -1,0 +1,78 @@
+import hashlib
+import json
+
+import numpy as np
+import pytest
+
+from throwcollect.config.schema import Config, Range, RunConfig, SweepConfig
+from throwcollect.config.values import leaves, with_values
+from throwcollect.sweep.digest import config_digest, trial_digests
+from throwcollect.sweep.points import Points
+
+WITHOUT_EFFECT = {"name", "trials", "sim.real_time_factor", "record.zstd_level", "record.trials_per_shard"}
+POINTS = Points(("ball.mass_kg", "task.duration_s"), np.array([[0.1, 1.0], [0.2, 1.0]]))
+
+
+def digests(config: Config, points: Points = POINTS, seeds: tuple[int, ...] = (5, 6)) -> list[str]:
+    return list(trial_digests(config, points, seeds))
+
+
+def test_digests_are_sha_256_over_the_effective_keys_in_order():
+    kept = dict(leaves(with_values(Config(), {"ball.mass_kg": 0.1, "task.duration_s": 1.0}))) | {"seed": 5}
+    for key in list(kept):
+        if key.startswith(("sweep", "run.")) or key in WITHOUT_EFFECT:
+            del kept[key]
+    text = "\n".join(["throwcollect trial 1", *(f"{key}={json.dumps(kept[key])}" for key in sorted(kept))])
+    assert digests(Config())[0] == hashlib.sha256(text.encode()).hexdigest()
+
+
+def test_it_does_not_matter_whether_a_value_was_swept_or_fixed():
+    fixed = with_values(Config(), {"ball.mass_kg": 0.2, "task.duration_s": 1.0})
+    no_points = Points((), np.empty((1, 0)))
+    assert digests(fixed, no_points, (6,)) == digests(Config())[1:]
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"name": "other"},
+        {"seed": 9},
+        {"trials": 9},
+        {"sweep": SweepConfig(parameters={"scene.gravity_mps2": Range(min=9, max=10)})},
+        {"run": RunConfig(simulations=7)},
+        {"sim": Config().sim.model_copy(update={"real_time_factor": 1.0})},
+        {"record": Config().record.model_copy(update={"zstd_level": 9, "trials_per_shard": 9})},
+    ],
+)
+def test_what_does_not_change_samples_does_not_change_digests(changes):
+    assert digests(Config().model_copy(update=changes)) == digests(Config())
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"robot": Config().robot.model_copy(update={"posture": {"head_1_joint": 0.1}})},
+        {"robot": Config().robot.model_copy(update={"locked": ["head_1_joint"]})},
+        {"tool": Config().tool.model_copy(update={"cup_walls": 8})},
+        {"scene": Config().scene.model_copy(update={"gravity_mps2": 9.8})},
+        {"sim": Config().sim.model_copy(update={"physics_hz": 1000})},
+        {"task": Config().task.model_copy(update={"points_hz": 40.0})},
+        {"record": Config().record.model_copy(update={"rate_hz": 500})},
+    ],
+)
+def test_what_changes_samples_changes_all_digests(changes):
+    assert not set(digests(Config().model_copy(update=changes))) & set(digests(Config()))
+
+
+def test_values_and_seed_of_a_trial_change_its_digest_alone():
+    first, second = digests(Config())
+    other = Points(POINTS.keys, np.array([[0.1, 1.0], [0.2, np.nextafter(1.0, 2.0)]]))
+    assert digests(Config(), other)[0] == first
+    assert digests(Config(), other)[1] != second
+    assert digests(Config(), seeds=(5, 7))[0] == first
+    assert digests(Config(), seeds=(5, 7))[1] != second
+
+
+def test_the_digest_of_a_configuration_is_over_everything_but_how_it_is_run():
+    assert config_digest(Config(run=RunConfig(simulations=9))) == config_digest(Config())
+    assert config_digest(Config(name="other")) != config_digest(Config())

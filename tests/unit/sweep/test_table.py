@@ -1,0 +1,124 @@
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from throwcollect.config.schema import Config
+from throwcollect.errors import ConfigError
+from throwcollect.sweep.table import read_points
+
+HEADER = "ball.mass_kg,task.duration_s\n"
+
+
+@pytest.fixture
+def csv(tmp_path):
+    def csv(content: str | bytes):
+        path = tmp_path / "list.csv"
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+        return path
+
+    return csv
+
+
+@pytest.fixture
+def parquet(tmp_path):
+    def parquet(columns: dict):
+        path = tmp_path / "list.parquet"
+        pq.write_table(pa.table(columns), path)
+        return path
+
+    return parquet
+
+
+def problems(path) -> list[str]:
+    with pytest.raises(ConfigError, match=r"\S") as caught:
+        read_points(path, Config())
+    return [str(problem).replace(f"{path.parent}/", "") for problem in caught.value.problems]
+
+
+def test_rows_are_trials_and_columns_are_keys(csv):
+    points = read_points(csv("\ufeffball.mass_kg, task.duration_s\r\n0.1, 1\r\n\r\n2e-1,1.5\r\n"), Config())
+    assert points.keys == ("ball.mass_kg", "task.duration_s")
+    assert points.values.tolist() == [[0.1, 1.0], [0.2, 1.5]]
+
+
+def test_parquet_holds_the_same(parquet):
+    path = parquet({"ball.mass_kg": pa.array([0.1, 0.2]), "task.duration_s": pa.array([1, 2], pa.int16())})
+    points = read_points(path, Config())
+    assert points.keys == ("ball.mass_kg", "task.duration_s")
+    assert points.values.tolist() == [[0.1, 1.0], [0.2, 2.0]]
+
+
+@pytest.mark.parametrize(
+    ("content", "messages"),
+    [
+        ("", ["list.csv: sweep.file: the file is empty"]),
+        (HEADER, ["list.csv: sweep.file: the file has no rows"]),
+        (b"ball.mass_kg\n\xff\n", ["list.csv: sweep.file: should be UTF-8 text"]),
+        ("ball.mas_kg\n1\n", ["list.csv:1: ball.mas_kg: unknown key; did you mean 'ball.mass_kg'?"]),
+        (
+            "seed,ball.mass_kg,ball.mass_kg\n",
+            [
+                "list.csv:1: seed: cannot vary from trial to trial",
+                "list.csv:1: ball.mass_kg: the column is here twice",
+            ],
+        ),
+        (
+            HEADER + "0.1,1\nheavy,1\n0.1,nan\n0.1,\n",
+            [
+                "list.csv:3: ball.mass_kg: should be a number, got 'heavy'",
+                "list.csv:4: task.duration_s: should be a number, got 'nan'",
+                "list.csv:5: task.duration_s: should be a number, got ''",
+            ],
+        ),
+        (
+            HEADER + "0.1\n0.1,1,1\n",
+            [
+                "list.csv:2: should have 2 values, got 1",
+                "list.csv:3: should have 2 values, got 3",
+            ],
+        ),
+        (
+            HEADER + "0.1,1\n\n3,1\n0.1,0\n-1,1\n",
+            [
+                "list.csv:4: ball.mass_kg: should be a number above 0 and up to 2 kg, got 3.0",
+                "list.csv:5: task.duration_s: should be a number from 0.1 to 10 s, got 0.0",
+                "list.csv:6: ball.mass_kg: should be a number above 0 and up to 2 kg, got -1.0",
+            ],
+        ),
+    ],
+)
+def test_wrong_tables_are_named_with_their_lines(csv, content, messages):
+    assert problems(csv(content)) == messages
+
+
+def test_a_long_table_of_nonsense_is_not_listed_in_full(csv):
+    assert len(problems(csv(HEADER + "1,x\n" + "x,y\n" * 1000))) == 20
+    assert len(problems(csv(HEADER + "9,9\n" * 1000))) == 20
+
+
+@pytest.mark.parametrize(
+    ("columns", "messages"),
+    [
+        ({"ball.mass_kg": ["0.1"]}, ["list.parquet: ball.mass_kg: should be a column of numbers, got string"]),
+        ({"ball.mass_kg": [0.1, None]}, ["list.parquet: ball.mass_kg: should have a number in each row, got 1 nulls"]),
+        ({"ball.mass_kg": pa.array([], pa.float64())}, ["list.parquet: sweep.file: the file has no rows"]),
+        ({"ball.mas_kg": [0.1]}, ["list.parquet: ball.mas_kg: unknown key; did you mean 'ball.mass_kg'?"]),
+        (
+            {"ball.mass_kg": [0.1, float("nan"), 9.0]},
+            [
+                "list.parquet: ball.mass_kg: row 2: should be a number above 0 and up to 2 kg, got nan",
+                "list.parquet: ball.mass_kg: row 3: should be a number above 0 and up to 2 kg, got 9.0",
+            ],
+        ),
+    ],
+)
+def test_wrong_parquet_is_named_with_its_columns(parquet, columns, messages):
+    assert problems(parquet(columns)) == messages
+
+
+def test_files_that_are_no_table(tmp_path):
+    assert problems(tmp_path / "missing.csv") == ["missing.csv: sweep.file: no such file"]
+    assert problems(tmp_path / "list.json") == ["sweep.file: should end in .csv or .parquet, got 'list.json'"]
+    broken = tmp_path / "broken.parquet"
+    broken.write_bytes(b"PAR1 but not much more")
+    assert problems(broken)[0].startswith("broken.parquet: sweep.file: cannot be read as Parquet: ")

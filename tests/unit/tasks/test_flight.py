@@ -1,0 +1,94 @@
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from throwcollect.config.schema import Config
+from throwcollect.episode.record import Contact
+from throwcollect.tasks.flight import ballistic_positions, flight_residual
+
+from .episodes import RELEASE_S, episode
+
+DRAG = Config(ball={"drag_coefficient": 0.47})
+RELEASED = 160  # first sample at or after the release
+
+
+def discrete_throw(config):
+    """An episode whose flight is stepped in numpy, independently of the code under test."""
+    samples, header = episode(config)
+    dt = 1 / config.sim.physics_hz
+    scene, ball = config.scene, config.ball
+    factor = scene.air_density_kgpm3 * ball.drag_coefficient * math.pi * ball.radius_m**2 / 2 / ball.mass_kg
+    x, v = samples.ball_position[RELEASED].copy(), samples.ball_linear_velocity[RELEASED].copy()
+    for row in range(RELEASED + 1, len(samples.stamps_ns)):
+        for _ in range(config.sim.physics_hz // config.record.rate_hz):
+            v = v + (np.array([0, 0, -scene.gravity_mps2]) - factor * np.linalg.norm(v) * v) * dt
+            x = x + v * dt
+        samples.ball_position[row], samples.ball_linear_velocity[row] = x, v
+    return samples, header
+
+
+@pytest.mark.parametrize("config", [Config(), DRAG, Config(scene={"gravity_mps2": 1.62})])
+def test_flight_as_the_physics_computes_it_has_no_residual(config):
+    assert math.ceil(RELEASE_S * 250) == RELEASED
+    samples, header = discrete_throw(config)
+    assert flight_residual(samples, header, config=config) < 1e-12
+
+
+def test_wrong_gravity_and_forgotten_drag_show():
+    samples, header = discrete_throw(DRAG)
+    assert 1e-3 < flight_residual(samples, header, config=Config()) < 0.1
+    samples, header = discrete_throw(Config())
+    assert flight_residual(samples, header, config=Config(scene={"gravity_mps2": 9.80665})) > 1e-4
+
+
+def test_a_displaced_sample_shows_by_its_distance():
+    samples, header = discrete_throw(Config())
+    samples.ball_position[250] += [0, 3e-6, 4e-6]
+    assert flight_residual(samples, header, config=Config()) == pytest.approx(5e-6, rel=1e-6)
+
+
+def test_flight_ends_with_the_first_contact():
+    samples, header = discrete_throw(Config())
+    samples.ball_position[251:] += 0.1
+    contact = Contact("ground", int(samples.stamps_ns[251]), None)
+    assert flight_residual(samples, header, config=Config()) > 0.1
+    touched = replace(header, contacts=(*header.contacts, contact))
+    assert flight_residual(samples, touched, config=Config()) < 1e-12
+
+
+def test_motion_is_compared_from_the_recatch_gap_on():
+    samples, header = discrete_throw(Config())
+    free = math.ceil((RELEASE_S + Config().task.recatch_gap_s) * 250)
+    samples.ball_position[:free] += 0.1
+    assert flight_residual(samples, header, config=Config()) < 1e-12
+    samples.ball_position[free] += 0.1
+    assert flight_residual(samples, header, config=Config()) > 0.05
+
+
+def test_there_is_no_residual_without_a_flight():
+    samples, header = episode(contacts=(("spoon", 0.0, None),))
+    assert flight_residual(samples, header, config=Config()) is None
+    samples, header = episode(contacts=(("spoon", 0.0, 1.4),))
+    assert flight_residual(samples, header, config=Config()) is None
+
+
+def test_ballistic_motion_converges_to_the_parabola_with_the_physics_rate():
+    start, velocity = np.array([0.0, 0.0, 2.0]), np.array([2.0, 0.0, 0.5])
+    exact = start + velocity * 0.5 + np.array([0, 0, -9.81]) * 0.5**2 / 2
+    errors = []
+    for hz in (250, 500, 1000):
+        config = Config(sim={"physics_hz": hz}, record={"rate_hz": 250})
+        errors.append(np.linalg.norm(ballistic_positions(start, velocity, steps=hz // 2, config=config)[-1] - exact))
+    assert errors[0] / errors[1] == pytest.approx(2, rel=1e-6)
+    assert errors[1] / errors[2] == pytest.approx(2, rel=1e-6)
+
+
+def test_drag_slows_the_ball_towards_its_terminal_speed():
+    config = Config(ball={"drag_coefficient": 0.47})
+    path = ballistic_positions(np.zeros(3), np.zeros(3), steps=20_000, config=config)
+    terminal = math.sqrt(2 * 0.045 * 9.81 / (1.2 * 0.47 * math.pi * 0.025**2))
+    assert (path[-2] - path[-1])[2] * 500 == pytest.approx(terminal, rel=1e-6)

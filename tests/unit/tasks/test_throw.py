@@ -1,0 +1,288 @@
+from __future__ import annotations
+
+import math
+from dataclasses import astuple, replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from throwcollect.config.schema import Config
+from throwcollect.episode.record import Contact, GoalOutcome
+from throwcollect.robots.model import joint_limits
+from throwcollect.robots.talos import JOINTS
+from throwcollect.tasks.flight import ballistic_positions
+from throwcollect.tasks.throw import Outcome, judge
+from throwcollect.tasks.trajectory import throw_trajectory
+
+from .episodes import GRAVITY, ORIGIN, RELEASE_S, VELOCITY, episode, landing_time, parabola
+
+HELD = ("spoon", 0.0, RELEASE_S)
+ELBOW = JOINTS.index("arm_right_4_joint")
+GRIPPER = JOINTS.index("gripper_left_joint")
+RADIUS = Config().ball.radius_m
+
+
+def judged(samples, header, config=None):
+    config = config or Config()
+    return judge(samples, header, config=config, trajectory=throw_trajectory(config), limits=joint_limits())
+
+
+def test_landed_throw_has_all_its_numbers():
+    result = judged(*episode())
+    assert (result.outcome, result.reason) == (Outcome.LANDED, None)
+    assert result.release.time_s == pytest.approx(RELEASE_S, abs=1e-9)
+    end = landing_time(RADIUS)
+    position, velocity = parabola(np.array([end]))
+    assert result.landing.time_s == pytest.approx(end, abs=1e-9)
+    assert result.landing.position == pytest.approx(position[0], abs=1e-9)
+    assert result.landing.velocity == pytest.approx(velocity[0], abs=1e-8)
+    assert result.flight_time_s == pytest.approx(end - RELEASE_S, abs=1e-9)
+    assert result.hit_angle_rad == pytest.approx(math.atan2(-velocity[0][2], np.hypot(*velocity[0][:2])), abs=1e-9)
+    assert result.apex.time_s == pytest.approx(RELEASE_S + VELOCITY[2] / GRAVITY, abs=1e-6)
+    assert result.apex.position[2] == pytest.approx(ORIGIN[2] + VELOCITY[2] ** 2 / (2 * GRAVITY), abs=1e-6)
+    assert result.recontacts == 0
+    assert result.effort_saturated_share == 0
+    assert max(result.tracking_error_rad.values()) < 1e-12
+    assert result.velocity_peak.joint == "arm_right_7_joint"
+    assert result.velocity_peak.share == pytest.approx(0.686, abs=2e-3)
+
+
+def test_ball_at_release_lies_between_its_neighbouring_samples():
+    # Constant acceleration before the release as after it, so that the cubic is exact on the whole interval.
+    samples, header = episode()
+    times = (samples.stamps_ns - header.start_ns) / 1e9 - RELEASE_S
+    g = np.array([0, 0, -GRAVITY])
+    samples = replace(
+        samples,
+        ball_position=ORIGIN + VELOCITY * times[:, None] + g * times[:, None] ** 2 / 2,
+        ball_linear_velocity=VELOCITY + g * times[:, None],
+    )
+    result = judged(samples, header)
+    assert result.release.position == pytest.approx(ORIGIN, abs=1e-12)
+    assert result.release.velocity == pytest.approx(VELOCITY, abs=1e-12)
+    assert result.release_speed_mps == pytest.approx(np.linalg.norm(VELOCITY), abs=1e-12)
+    assert result.release_elevation_rad == pytest.approx(math.atan2(0.34, math.hypot(2.18, 0.16)), abs=1e-12)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    height=st.floats(0, 1.5), rate=st.sampled_from([50, 250, 500]), vx=st.floats(-3, 3), vz=st.floats(-2, 3),
+)  # fmt: skip
+def test_landing_between_samples_is_exact_for_a_parabola(height, rate, vx, vz):
+    base = Config()
+    config = base.model_copy(update={"scene": base.scene.model_copy(update={"landing_height_m": height})})
+    velocity = np.array([vx, 0.1, vz])
+    samples, header = episode(duration_s=2.0, rate_hz=rate, velocity=velocity)
+    # Start the ball on its parabola early, so that the release falls into a smooth interval.
+    times = ((samples.stamps_ns - header.start_ns) / 1e9 - RELEASE_S)[:, None]
+    g = np.array([0, 0, -GRAVITY])
+    samples = replace(
+        samples,
+        ball_position=ORIGIN + velocity * times + g * times**2 / 2,
+        ball_linear_velocity=velocity + g * times,
+    )
+    end = landing_time(height + RADIUS, velocity=velocity)
+    result = judged(samples, header, config)
+    assert result.landing.time_s == pytest.approx(end, abs=1e-9)
+    assert result.landing.position[2] == pytest.approx(height + RADIUS, abs=1e-9)
+    assert result.landing.position[0] == pytest.approx(ORIGIN[0] + vx * (end - RELEASE_S), abs=1e-8)
+    assert result.apex.position[2] >= result.release.position[2] - 1e-12
+    assert result.apex.time_s <= result.landing.time_s
+
+
+def test_ball_that_stays_in_the_spoon_is_not_released():
+    result = judged(*episode(contacts=(("spoon", 0.0, None),), end_reason="timeout"))
+    assert result.outcome is Outcome.NOT_RELEASED
+    assert result.reason == "the ball stayed in the spoon"
+    assert (result.release, result.apex, result.landing, result.recontacts) == (None, None, None, None)
+    assert result.velocity_peak is not None
+
+
+def test_ball_that_was_never_in_the_spoon_is_not_released():
+    result = judged(*episode(contacts=()))
+    assert (result.outcome, result.reason) == (Outcome.NOT_RELEASED, "the ball was never in the spoon")
+
+
+@pytest.mark.parametrize(("gap", "released_at"), [(0.0199, 0.65), (0.02, 0.6)])
+def test_hop_shorter_than_the_gap_is_no_release(gap, released_at):
+    result = judged(*episode(contacts=(("spoon", 0.0, 0.6), ("spoon", 0.6 + gap, 0.65))))
+    assert result.release.time_s == pytest.approx(released_at, abs=1e-9)
+
+
+def test_ball_back_in_the_spoon_is_recaught_at_its_first_release():
+    result = judged(*episode(contacts=(HELD, ("spoon", 0.7, 0.72), ("spoon", 0.8, 0.81))))
+    assert result.outcome is Outcome.RECAUGHT
+    assert result.reason == "the spoon touched the ball again at 0.700 s"
+    assert result.release.time_s == pytest.approx(RELEASE_S)
+    assert result.recontacts == 2
+    assert result.landing is not None
+
+
+def test_ball_against_a_link_hits_the_robot():
+    result = judged(*episode(contacts=(HELD, ("head_2_link", 0.7, 0.71), ("spoon", 0.8, 0.81))))
+    assert (result.outcome, result.reason) == (Outcome.SELF_HIT, "the ball touched head_2_link at 0.700 s")
+    assert result.recontacts == 2
+
+
+def test_link_that_is_still_touched_after_the_release_is_hit():
+    assert judged(*episode(contacts=(("arm_right_7_link", 0.6, 0.64), HELD))).outcome is Outcome.SELF_HIT
+    assert judged(*episode(contacts=(("arm_right_7_link", 0.6, RELEASE_S), HELD))).outcome is Outcome.LANDED
+
+
+def test_what_the_ball_touches_after_landing_does_not_count():
+    contacts = (HELD, ("ground", landing_time(RADIUS), 1.38), ("leg_left_6_link", 1.39, None))
+    assert judged(*episode(contacts=contacts)).outcome is Outcome.LANDED
+
+
+def test_ball_that_does_not_come_down_in_time_is_a_timeout():
+    result = judged(*episode(duration_s=1.2, end_reason="timeout"))
+    assert result.outcome is Outcome.TIMEOUT
+    assert result.reason == "the ball did not reach the landing plane; the trial ended as timeout"
+    assert (result.landing, result.flight_time_s, result.hit_angle_rad) == (None, None, None)
+    assert result.apex is not None
+
+
+def test_ball_on_the_ground_below_the_plane_has_not_hit_the_robot():
+    origin = np.array([0.0, 0.0, 1.2])
+    config = Config(scene={"landing_height_m": 1.5})
+    samples, header = episode(config, origin=origin, contacts=(HELD, ("ground", 1.1, None)), end_reason="rest")
+    assert judged(samples, header, config).outcome is Outcome.TIMEOUT
+
+
+@pytest.mark.parametrize("drag", [0.0, 0.47])
+def test_impact_on_the_ground_does_not_bend_the_landing_just_above_it(drag):
+    """The ball crosses a plane 5 mm above the ground and is stopped by the ground before the next sample."""
+    config = Config(scene={"landing_height_m": 0.005}, ball={"drag_coefficient": drag})
+    free, header = episode(config)
+    end = int(np.argmax(free.ball_position[:, 2] < 0.005 + RADIUS))
+    step = 1 / config.sim.physics_hz
+    path = ballistic_positions(free.ball_position[end - 1], free.ball_linear_velocity[end - 1], steps=2, config=config)
+    free.ball_position[end], free.ball_linear_velocity[end] = path[2], (path[2] - path[1]) / step
+    undisturbed = judged(free, header, config)
+    free.ball_position[end, 2], free.ball_linear_velocity[end] = RADIUS, 0.0
+    start_ns = int(free.stamps_ns[end]) - round(step * 1e9)
+    impact = Contact("ground", start_ns, None)
+    stopped = judged(free, replace(header, contacts=(*header.contacts, impact)), config)
+    assert stopped.outcome is Outcome.LANDED
+    assert stopped.landing.position == pytest.approx(undisturbed.landing.position, abs=1e-12)
+    assert stopped.landing.velocity == pytest.approx(undisturbed.landing.velocity, abs=1e-9)
+    assert judged(free, header, config).landing.time_s != pytest.approx(undisturbed.landing.time_s, abs=1e-5)
+
+
+def test_crossing_upwards_is_no_landing():
+    origin = np.array([0.0, 0.0, 0.9])
+    config = Config(scene={"landing_height_m": 1.0})
+    velocity = np.array([1.0, 0.0, 4.0])
+    result = judged(*episode(config, duration_s=2.0, origin=origin, velocity=velocity), config)
+    assert result.landing.time_s == pytest.approx(landing_time(1.0 + RADIUS, origin, velocity), abs=1e-9)
+    assert result.landing.velocity[2] < 0
+
+
+def test_saturated_effort_violates_a_limit_but_keeps_the_landing():
+    samples, header = episode()
+    samples.effort[100:110, ELBOW] = -joint_limits().effort[ELBOW]
+    result = judged(samples, header)
+    assert result.outcome is Outcome.LIMIT_VIOLATED
+    assert "arm_right_4_joint reached 1.000 of its effort limit" in result.reason
+    assert result.landing is not None
+    assert result.effort_saturated_share == pytest.approx(10 / 351)
+
+
+def test_effort_limits_scale_with_the_robot():
+    samples, header = episode()
+    samples.effort[100, ELBOW] = joint_limits().effort[ELBOW]
+    result = judged(samples, header, Config(robot={"effort_scale": 2.0}))
+    assert result.outcome is Outcome.LANDED
+    assert (result.effort_peak.joint, result.effort_peak.share) == ("arm_right_4_joint", pytest.approx(0.5))
+
+
+def test_speed_above_the_limit_of_any_joint_violates_it():
+    samples, header = episode()
+    samples.velocity[5, GRIPPER] = -1.2
+    result = judged(samples, header)
+    assert result.outcome is Outcome.LIMIT_VIOLATED
+    assert result.reason == "gripper_left_joint moved at 1.200 of its velocity limit"
+
+
+def test_moving_joint_beyond_its_range_violates_it():
+    samples, header = episode()
+    samples.position[5, ELBOW] = 0.05
+    result = judged(samples, header)
+    assert result.outcome is Outcome.LIMIT_VIOLATED
+    assert result.reason.startswith("arm_right_4_joint left its range")
+    assert result.tracking_error_rad["arm_right_4_joint"] == pytest.approx(0.05 + 1.9, abs=1e-3)
+
+
+def test_held_joint_may_rest_beyond_the_end_of_its_range():
+    samples, header = episode()
+    samples.position[:, GRIPPER] = 1e-3
+    assert judged(samples, header).outcome is Outcome.LANDED
+
+
+@pytest.mark.parametrize(
+    ("status", "outcome"), [(4, "landed"), (2, "landed"), (5, "tracking_failed"), (6, "tracking_failed")]
+)
+def test_goal_that_was_not_carried_out_is_a_tracking_failure(status, outcome):
+    goal = GoalOutcome("arm_right_controller", status, -4, "path tolerance of arm_right_4_joint")
+    result = judged(*episode(goals=(goal,)))
+    assert result.outcome.value == outcome
+    if result.outcome is Outcome.TRACKING_FAILED:
+        assert result.reason.endswith("its goal: path tolerance of arm_right_4_joint")
+        assert result.landing is not None
+
+
+def test_tracking_error_is_that_of_each_moving_joint():
+    samples, header = episode()
+    samples.position[200, ELBOW] += 0.0125
+    errors = judged(samples, header).tracking_error_rad
+    assert errors["arm_right_4_joint"] == pytest.approx(0.0125)
+    assert errors["arm_right_2_joint"] < 1e-12
+    assert set(errors) == set(Config().task.end)
+
+
+def test_outcomes_come_in_their_documented_order():
+    samples, header = episode(contacts=(HELD, ("head_2_link", 0.7, 0.71)), duration_s=1.2, end_reason="rest")
+    samples.effort[100, ELBOW] = 1e3
+    assert judged(samples, header).outcome is Outcome.SELF_HIT
+    header = replace(header, contacts=header.contacts[:1])
+    assert judged(samples, header).outcome is Outcome.TIMEOUT
+    assert judged(samples, replace(header, contacts=())).outcome is Outcome.NOT_RELEASED
+    goal = GoalOutcome("torso_controller", 6, -5, "")
+    result = judged(samples, replace(header, contacts=(), goals=(goal,)))
+    assert result.outcome is Outcome.TRACKING_FAILED
+    assert result.reason == "torso_controller aborted its goal with error code -5"
+
+
+@pytest.mark.parametrize("field", ["position", "velocity", "effort", "ball_position", "ball_linear_velocity"])
+def test_diverged_simulation_is_a_tracking_failure_without_numbers(field):
+    samples, header = episode()
+    getattr(samples, field)[300, 0] = np.nan
+    result = judged(samples, header)
+    assert result.outcome is Outcome.TRACKING_FAILED
+    assert result.landing is None
+    assert result.velocity_peak is None
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.lists(
+        st.tuples(
+            st.sampled_from(["spoon", "head_2_link", "ground"]),
+            st.floats(0, 1.4),
+            st.one_of(st.none(), st.floats(0.001, 0.5)),
+        ),
+        max_size=5,
+    )
+)
+def test_any_contacts_give_an_outcome_without_nan(contacts):
+    spans = [(body, start, None if length is None else min(start + length, 1.4)) for body, start, length in contacts]
+    result = judged(*episode(contacts=tuple(spans)))
+    assert (result.reason is None) == (result.outcome is Outcome.LANDED)
+    assert (result.release is None) == (result.outcome is Outcome.NOT_RELEASED)
+    if result.release is not None:
+        assert result.apex.position[2] >= result.release.position[2]
+    for state in (result.release, result.apex, result.landing):
+        if state is not None:
+            assert all(math.isfinite(number) for number in np.hstack(astuple(state)))

@@ -1,0 +1,34 @@
+from __future__ import annotations
+
+import pytest
+
+from throwcollect.config.schema import Config
+from throwcollect.errors import ConfigError
+from throwcollect.robots.talos import JOINTS
+from throwcollect.tasks.trajectory import throw_trajectory
+
+
+def test_joints_are_the_moving_ones_in_the_order_of_the_robot():
+    points = throw_trajectory(Config())
+    assert set(points.joints) == set(Config().task.end)
+    assert list(points.joints) == [joint for joint in JOINTS if joint in points.joints]
+    assert points.positions.shape == points.velocities.shape == points.accelerations.shape == (51, 5)
+
+
+def test_each_column_goes_from_the_start_to_the_end_of_its_joint():
+    task = Config().task
+    points = throw_trajectory(Config())
+    assert points.positions[0].tolist() == [task.start[joint] for joint in points.joints]
+    assert points.positions[-1].tolist() == [task.end[joint] for joint in points.joints]
+
+
+def test_family_is_that_of_the_task():
+    config = Config(task={"trajectory": {"family": "dmp"}, "duration_s": 2.0})
+    points = throw_trajectory(config)
+    assert points.positions[-1].tolist() == [config.task.end[joint] for joint in points.joints]
+    assert points.accelerations[0].any()
+
+
+def test_motion_that_cannot_be_computed_is_refused():
+    with pytest.raises(ConfigError, match="the acceleration is unbounded"):
+        throw_trajectory(Config(task={"trajectory": {"gamma": 0.5}}))
