@@ -64,10 +64,6 @@ class Shape:
                 return Shape(_resolved(node), node.get("unit") or _unit(str(part)) or inherited)
         return Shape({})
 
-    def alternative(self, name: str) -> Shape:
-        """The alternative of a union that a model describes."""
-        return next(shape for shape in self.alternatives if shape.node.get("title") == name)
-
     def __str__(self) -> str:
         return " or ".join(dict.fromkeys(_in_words(shape) for shape in self.alternatives))
 

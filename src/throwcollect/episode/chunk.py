@@ -307,7 +307,7 @@ class MessageTable:
         if channel not in self.columns:
             raise DatasetError(f"chunk: no messages of {topic.name}")
         rows = self.messages(channel)
-        if not topic.layout.describes(rows):
+        if not topic.layout.describes(rows[:1]):
             raise DatasetError(
                 f"chunk: the messages of {topic.name} have another layout than {topic.type_name} written here"
             )

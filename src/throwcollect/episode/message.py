@@ -6,9 +6,7 @@ Its layout names two parts of its data: ``header``, an `EpisodeHeader` in JSON, 
 from __future__ import annotations
 
 import hashlib
-import json
 import struct
-from dataclasses import asdict
 from functools import cache, cached_property
 
 import numpy as np
@@ -76,8 +74,8 @@ class Episode:
 
 
 def header_to_json(header: EpisodeHeader) -> str:
-    """The header in JSON: keys in the order of their declaration, no blanks, ASCII; equal headers give equal text."""
-    return json.dumps(asdict(header), separators=(",", ":"))
+    """The header in JSON: keys in the order of their declaration, no blanks; equal headers give equal text."""
+    return _HEADER.dump_json(header).decode()
 
 
 def header_from_json(text: bytes | str) -> EpisodeHeader:

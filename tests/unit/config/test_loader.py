@@ -417,7 +417,7 @@ configs = st.builds(
         ThrowConfig,
         end=st.dictionaries(st.sampled_from(["torso_1_joint", "arm_right_4_joint"]), angles, min_size=2),
         trajectory=st.one_of(
-            st.builds(MinimumJerk, gamma=st.floats(0.5, 3)),
+            st.builds(MinimumJerk, gamma=st.floats(1, 2)),
             st.builds(
                 DynamicMovementPrimitive,
                 family=st.just("dmp"),

@@ -1,0 +1,101 @@
+"""Runs whole collections as a user does: the command in a process of its own."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import psutil
+
+CONFIG = """\
+name: small
+trials: {trials}
+seed: 7
+sweep:
+  parameters:
+    task.end.arm_right_4_joint: {{min: -0.7, max: -0.4}}
+    task.duration_s: {{min: 1.0, max: 1.2}}
+    ball.mass_kg: {{min: 0.03, max: 0.06}}
+"""
+
+
+def command(*arguments: str | Path) -> list[str]:
+    return [sys.executable, "-m", "throwcollect", *map(str, arguments)]
+
+
+def call(*arguments: str | Path, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(command(*arguments), capture_output=True, text=True, timeout=120, cwd=cwd, check=False)
+
+
+def write_config(directory: Path, *, trials: int, text: str = CONFIG) -> Path:
+    path = directory / "small.yaml"
+    path.write_text(text.format(trials=trials))
+    return path
+
+
+@dataclass
+class Running:
+    """A running `throwcollect up`."""
+
+    process: subprocess.Popen[str]
+    directory: Path
+
+    def node(self, *words: str) -> psutil.Process:
+        """The child whose command line ends with these words."""
+        for child in psutil.Process(self.process.pid).children():
+            if child.cmdline()[-len(words) :] == list(words):
+                return child
+        raise LookupError(words)
+
+    def written(self) -> int:
+        """Number of bytes of the shards so far."""
+        return sum(path.stat().st_size for path in self.directory.glob("*.mcap*"))
+
+    def wait_until(self, condition: Callable[[], bool], *, seconds: float = 60) -> None:
+        deadline = time.monotonic() + seconds
+        while not condition():
+            if self.process.poll() is not None or time.monotonic() > deadline:
+                raise AssertionError(f"did not happen; the command says: {self.process.communicate()}")
+            time.sleep(0.01)
+
+    def finish(self) -> tuple[int, str, str]:
+        out, err = self.process.communicate(timeout=120)
+        return self.process.returncode, out, err
+
+
+def start(config: Path, directory: Path, simulations: int, *options: str) -> Running:
+    process = subprocess.Popen(
+        command("up", "-n", str(simulations), config, "--output", directory, *options),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    return Running(process, directory)
+
+
+def collect(config: Path, directory: Path, simulations: int) -> dict[str, object]:
+    """A whole collection; returns its summary."""
+    code, out, err = start(config, directory, simulations, "--json").finish()
+    assert code == 0, err
+    summary: dict[str, object] = json.loads(out)
+    return summary
+
+
+def fingerprints(directory: Path) -> dict[str, str]:
+    """SHA-256 of every file that must be the same for the same YAML file."""
+    return {
+        path.name: hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in sorted(directory.iterdir())
+        if path.is_file() and path.name != "README.md"
+    }
+
+
+def interrupt(running: Running) -> None:
+    running.process.send_signal(signal.SIGINT)

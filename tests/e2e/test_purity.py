@@ -1,0 +1,75 @@
+"""The dataset is a pure function of the YAML file."""
+
+import signal
+from pathlib import Path
+
+import pytest
+
+from tests.e2e.collection import call, collect, fingerprints, start, write_config
+from throwcollect.dataset.verify import verify
+
+pytestmark = pytest.mark.e2e
+TRIALS = 24
+
+
+@pytest.fixture(scope="module")
+def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_config(tmp_path_factory.mktemp("config"), trials=TRIALS)
+
+
+@pytest.fixture(scope="module")
+def reference(config: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An undisturbed collection with one simulation."""
+    directory = tmp_path_factory.mktemp("reference") / "data"
+    summary = collect(config, directory, 1)
+    assert summary["episodes"] == TRIALS
+    return directory
+
+
+def test_a_collection_is_whole(reference: Path) -> None:
+    assert verify(reference) == []
+    assert {"metadata.yaml", "plan.parquet", "throws.parquet", "config.yaml", "small_00000.mcap"} == set(
+        fingerprints(reference)
+    )
+
+
+@pytest.mark.parametrize("simulations", [1, 2, 4])
+def test_every_file_is_the_same_for_any_number_of_simulations(
+    simulations: int, config: Path, reference: Path, tmp_path: Path
+) -> None:
+    collect(config, tmp_path / "data", simulations)
+    assert fingerprints(tmp_path / "data") == fingerprints(reference)
+
+
+def test_every_file_is_the_same_when_trials_end_in_another_order(
+    config: Path, reference: Path, tmp_path: Path
+) -> None:
+    running = start(config, tmp_path / "data", 2)
+    running.wait_until(lambda: running.written() > 100_000)
+    # Frozen in the middle of a trial, it hands it in long after those that follow.
+    frozen = running.node("--name", "sim_0")
+    frozen.suspend()
+    before = running.written()
+    running.wait_until(lambda: running.written() > before + 300_000)
+    frozen.resume()
+    code, _, err = running.finish()
+    assert code == 0, err
+    assert fingerprints(tmp_path / "data") == fingerprints(reference)
+
+
+def test_every_file_is_the_same_when_a_simulation_is_killed(config: Path, reference: Path, tmp_path: Path) -> None:
+    running = start(config, tmp_path / "data", 2)
+    running.wait_until(lambda: running.written() > 100_000)
+    running.node("--name", "sim_1").send_signal(signal.SIGKILL)
+    code, _, err = running.finish()
+    assert code == 0, err
+    assert "sim_1 was lost (ended by SIGKILL)" in err
+    assert fingerprints(tmp_path / "data") == fingerprints(reference)
+
+
+def test_another_seed_gives_another_digest(config: Path, reference: Path, tmp_path: Path) -> None:
+    other = write_config(tmp_path, trials=2)
+    other.write_text(other.read_text().replace("seed: 7", "seed: 8"))
+    collect(other, tmp_path / "data", 1)
+    digests = [call("dataset", "digest", directory).stdout for directory in (reference, tmp_path / "data")]
+    assert digests[0] != digests[1]
