@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Mapping
 from types import TracebackType
-from typing import Any, Protocol
+from typing import Protocol
+
+from throwcollect.coordinator.progress import Progress
 
 _LINE_EVERY_S = 2.0
 
@@ -20,7 +21,7 @@ class Display(Protocol):
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None: ...
 
-    def update(self, progress: Mapping[str, Any]) -> None:
+    def update(self, progress: Progress) -> None:
         """Show a progress report of the coordinator."""
 
     def say(self, line: str) -> None:
@@ -38,14 +39,14 @@ def display(*, quiet: bool) -> Display:
     return _Lines(quiet=quiet)
 
 
-def counts(progress: Mapping[str, Any]) -> str:
+def counts(progress: Progress) -> str:
     """Landed and failed throws, simulations and speed, in one line without markup."""
-    parts = [f"{progress['landed']} landed", f"{progress['failed']} failed"]
-    if progress["lost"]:
-        parts.append(f"{progress['lost']} lost")
-    alive = progress["simulations"]
+    parts = [f"{progress.landed} landed", f"{progress.failed} failed"]
+    if progress.lost:
+        parts.append(f"{progress.lost} lost")
+    alive = progress.simulations
     parts.append(f"{alive} simulation{'' if alive == 1 else 's'}")
-    parts.append(f"{progress['throws_per_s']:.1f} throws/s")
+    parts.append(f"{progress.throws_per_s:.1f} throws/s")
     return ", ".join(parts)
 
 
@@ -62,12 +63,12 @@ class _Lines:
     ) -> None:
         pass
 
-    def update(self, progress: Mapping[str, Any]) -> None:
+    def update(self, progress: Progress) -> None:
         now = time.monotonic()
-        if self._quiet or (now < self._next and progress["ended"] < progress["total"]):
+        if self._quiet or (now < self._next and progress.ended < progress.total):
             return
         self._next = now + _LINE_EVERY_S
-        self.say(f"{progress['ended']}/{progress['total']} throws: {counts(progress)}")
+        self.say(f"{progress.ended}/{progress.total} throws: {counts(progress)}")
 
     def say(self, line: str) -> None:
         print(line, file=sys.stderr, flush=True)
@@ -76,15 +77,15 @@ class _Lines:
 class _Bar:
     def __init__(self) -> None:
         from rich.console import Console
-        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+        from rich import progress
 
-        self._progress = Progress(
-            TextColumn("throws"),
-            BarColumn(bar_width=24),
-            MofNCompleteColumn(),
-            TextColumn("{task.description}"),
-            TextColumn("ETA"),
-            TimeRemainingColumn(),
+        self._progress = progress.Progress(
+            progress.TextColumn("throws"),
+            progress.BarColumn(bar_width=24),
+            progress.MofNCompleteColumn(),
+            progress.TextColumn("{task.description}"),
+            progress.TextColumn("ETA"),
+            progress.TimeRemainingColumn(),
             console=Console(stderr=True),
         )
         self._task = self._progress.add_task("waiting for simulations", total=None)
@@ -98,9 +99,9 @@ class _Bar:
     ) -> None:
         self._progress.stop()
 
-    def update(self, progress: Mapping[str, Any]) -> None:
+    def update(self, progress: Progress) -> None:
         self._progress.update(
-            self._task, total=progress["total"], completed=progress["ended"], description=counts(progress)
+            self._task, total=progress.total, completed=progress.ended, description=counts(progress)
         )
 
     def say(self, line: str) -> None:

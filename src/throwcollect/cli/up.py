@@ -15,16 +15,14 @@ from typing import Any
 
 import typer
 
-from throwcollect import ros
 from throwcollect.cli.dataset import describe
 from throwcollect.cli.terminal import Display, display
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
-from throwcollect.coordinator.node import PROGRESS_QOS, PROGRESS_TOPIC
 from throwcollect.coordinator.prepare import prepare
+from throwcollect.coordinator.progress import ProgressListener
 from throwcollect.dataset.inspect import info
 from throwcollect.errors import Interrupted, WorkerError
-from throwcollect.interfaces import get_message
 from throwcollect.runtime.supervisor import Supervisor
 
 _POLL_S = 0.05
@@ -74,9 +72,8 @@ def _follow(supervisor: Supervisor, config: Config, shown: Display) -> None:
     try:
         supervisor.start()
         os.environ.update(supervisor.environment)
-        progress = _ProgressListener(shown)
-        try:
-            code = None
+        code = None
+        with ProgressListener(shown.update) as progress:
             while code is None and not interrupted:
                 progress.spin(_POLL_S)
                 code, lost = supervisor.poll()
@@ -86,8 +83,6 @@ def _follow(supervisor: Supervisor, config: Config, shown: Display) -> None:
                 shown.say("interrupted: finishing the running trials")
                 code = supervisor.drain()
             progress.spin(_POLL_S)
-        finally:
-            progress.close()
     finally:
         for number, handler in previous.items():
             signal.signal(number, handler)
@@ -97,29 +92,6 @@ def _follow(supervisor: Supervisor, config: Config, shown: Display) -> None:
         raise WorkerError(
             f"the coordinator ended with exit code {code}", evidence=supervisor.coordinator_log() or None
         )
-
-
-class _ProgressListener:
-    """Shows what the coordinator publishes."""
-
-    def __init__(self, shown: Display) -> None:
-        ros.init()
-        self._node = ros.Node("up")
-        self._executor = ros.SingleThreadedExecutor()
-        self._executor.add_node(self._node)
-        self._node.create_subscription(
-            get_message("std_msgs/msg/String"),
-            PROGRESS_TOPIC,
-            lambda message: shown.update(json.loads(message.data)),
-            PROGRESS_QOS,
-        )
-
-    def spin(self, seconds: float) -> None:
-        self._executor.spin_once(timeout_sec=seconds)
-
-    def close(self) -> None:
-        self._node.destroy_node()
-        ros.shutdown()
 
 
 def _print_summary(summary: dict[str, Any], directory: Path, *, as_json: bool) -> None:

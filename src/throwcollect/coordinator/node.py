@@ -2,36 +2,28 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections import Counter, deque
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 from throwcollect.config.schema import Config
 from throwcollect.config.values import is_physics
 from throwcollect.coordinator.goals import FollowJointTrajectory, TrialGoals, trial_goals
 from throwcollect.coordinator.leases import Leases
+from throwcollect.coordinator.progress import PROGRESS_QOS, PROGRESS_TOPIC, Progress, String
 from throwcollect.coordinator.simulation_client import EPISODE_TOPIC, SimulationClient
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.episode.message import Episode, unpack
 from throwcollect.errors import DatasetError
-from throwcollect.interfaces import get_message
 from throwcollect.robots.description import start_posture
 from throwcollect.robots.model import joint_limits
 from throwcollect.robots.talos import CONTROLLERS, controller_of
 from throwcollect.robots.trajectory import JointTrajectory
-from throwcollect.ros import Node, QoSProfile
-from throwcollect.ros.qos import DurabilityPolicy
+from throwcollect.ros import Node
 from throwcollect.sweep.plan import Plan, Trial
 from throwcollect.tasks.throw import Outcome, judge
 from throwcollect.tasks.trajectory import throw_trajectory
-
-String: Any = get_message("std_msgs/msg/String")
-
-PROGRESS_TOPIC = "/coordinator/progress"
-PROGRESS_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 _DISCOVERY_PERIOD_S = 0.1
 _REPORT_PERIOD_S = 0.2
@@ -115,26 +107,21 @@ class Coordinator(Node):
         self._outcomes[result.outcome.value] += 1
 
     def report(self) -> None:
-        """Publish the progress, as JSON in a std_msgs/String."""
+        """Publish the progress."""
         now = time.monotonic()
         ended = self._leases.ended
         self._ends.append((now, ended))
         while self._ends[0][0] < now - _RATE_WINDOW_S:
             self._ends.popleft()
         since, before = self._ends[0]
-        landed = self._outcomes[Outcome.LANDED.value]
-        lost = self._outcomes[Outcome.LOST.value]
-        progress = {
-            "total": self._leases.total,
-            "ended": ended,
-            "landed": landed,
-            "failed": self._outcomes.total() - landed - lost,
-            "lost": lost,
-            "outcomes": dict(self._outcomes),
-            "simulations": len(self._simulations),
-            "throws_per_s": (ended - before) / (now - since) if now > since else 0.0,
-        }
-        self._progress.publish(String(data=json.dumps(progress)))
+        progress = Progress(
+            total=self._leases.total,
+            ended=ended,
+            outcomes=dict(self._outcomes),
+            simulations=len(self._simulations),
+            throws_per_s=(ended - before) / (now - since) if now > since else 0.0,
+        )
+        self._progress.publish(progress.message())
 
     def _discover(self) -> None:
         offered = {

@@ -84,7 +84,7 @@ def serve(listen: str = DEFAULT_LISTEN) -> None:
         ConfigError: If the endpoint is malformed.
         ThrowcollectError: If the router cannot listen on it.
     """
-    # Not `sigwait`: libraries start threads when they are imported, and one of them would take the signal and die of it.
+    # Not `sigwait`: libraries start threads when they are imported, and one of those would take the signal and die.
     stop: SimpleQueue[int] = SimpleQueue()
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda received, _frame: stop.put(received))

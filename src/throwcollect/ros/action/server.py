@@ -225,7 +225,7 @@ class ActionServer:
         callback = execute_callback or self._execute_callback
         if callback is None:
             return
-        self._executor().create_task(self._execute(handle, callback))
+        self._executor().create_task(self._execute, handle, callback)
 
     def set_result(self, handle: ServerGoalHandle, result: Message) -> None:
         """Set a goal's result and answer those who wait for it; the first result counts.
@@ -294,7 +294,7 @@ class ActionServer:
             self._publish_status()
             await _outcome(self._handle_accepted_callback(handle))
 
-        self._executor().create_task(begin())
+        self._executor().create_task(begin)
 
     async def _on_cancel(self, request: Message, response: Message) -> Message:
         self._forget_old()

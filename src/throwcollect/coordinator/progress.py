@@ -1,0 +1,86 @@
+"""What the coordinator tells about its progress, and how to listen to it from another process."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from types import TracebackType
+from typing import Any
+
+from throwcollect import ros
+from throwcollect.interfaces import get_message
+from throwcollect.ros.qos import DurabilityPolicy
+
+String: Any = get_message("std_msgs/msg/String")
+
+PROGRESS_TOPIC = "/coordinator/progress"
+PROGRESS_QOS = ros.QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+@dataclass(frozen=True)
+class Progress:
+    """The state of a collection, whole in every message, so that anybody may join late.
+
+    Attributes:
+        total: Number of trials to run.
+        ended: Number of trials that have ended, whether they are written yet or not.
+        outcomes: Number of written trials of each outcome.
+        simulations: Number of simulations in the ROS graph.
+        throws_per_s: Trials that ended per second of the last ten seconds.
+    """
+
+    total: int
+    ended: int
+    outcomes: dict[str, int]
+    simulations: int
+    throws_per_s: float
+
+    @property
+    def landed(self) -> int:
+        """Number of throws that landed without blemish."""
+        return self.outcomes.get("landed", 0)
+
+    @property
+    def lost(self) -> int:
+        """Number of trials that were given up."""
+        return self.outcomes.get("lost", 0)
+
+    @property
+    def failed(self) -> int:
+        """Number of throws with any other outcome."""
+        return sum(self.outcomes.values()) - self.landed - self.lost
+
+    def message(self) -> Any:
+        """The message that carries it: a std_msgs/String of JSON."""
+        return String(data=json.dumps(asdict(self)))
+
+
+class ProgressListener:
+    """A node of its own that hears the coordinator's progress; use it as a context manager.
+
+    Args:
+        on_progress: Called with every report, within `spin`.
+    """
+
+    def __init__(self, on_progress: Callable[[Progress], None]) -> None:
+        ros.init()
+        self._node = ros.Node("progress_listener")
+        self._executor = ros.SingleThreadedExecutor()
+        self._executor.add_node(self._node)
+        self._node.create_subscription(
+            String, PROGRESS_TOPIC, lambda message: on_progress(Progress(**json.loads(message.data))), PROGRESS_QOS
+        )
+
+    def __enter__(self) -> ProgressListener:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._node.destroy_node()
+        ros.shutdown()
+
+    def spin(self, seconds: float) -> None:
+        """Wait for a report, at most so long [s]."""
+        self._executor.spin_once(timeout_sec=seconds)

@@ -1,0 +1,191 @@
+import threading
+import time
+
+import pytest
+
+from throwcollect import ros
+from throwcollect.interfaces import get_message
+from throwcollect.ros import ExternalShutdownException, Future, SingleThreadedExecutor
+
+String = get_message("std_msgs/msg/String")
+
+
+@pytest.fixture
+def node(rig):
+    return rig.node("node")
+
+
+@pytest.fixture
+def executor(node):
+    return node.executor
+
+
+def test_spinning_once_without_work_returns_after_the_timeout(executor):
+    executor.spin_once(timeout_sec=0)
+    start = time.monotonic()
+    executor.spin_once(timeout_sec=0)
+    executor.spin_once(timeout_sec=0.05)
+    assert 0.05 <= time.monotonic() - start < 1.0
+
+
+def test_a_waiting_executor_wakes_when_a_message_arrives(rig, node, executor):
+    heard = []
+    node.create_subscription(String, "t", heard.append, 10)
+    publisher = node.create_publisher(String, "t", 10)
+    threading.Timer(0.05, lambda: publisher.publish(String())).start()
+    while not heard:
+        executor.spin_once(timeout_sec=10)
+
+
+def test_spinning_once_calls_one_callback(node, executor):
+    calls = []
+    executor.create_task(calls.append, 1)
+    executor.create_task(calls.append, 2)
+    while not calls:
+        executor.spin_once(timeout_sec=1)
+    assert calls == [1]
+    executor.spin_once(timeout_sec=1)
+    assert calls == [1, 2]
+
+
+def test_timers_and_messages_take_turns(rig, node, executor):
+    calls = []
+    node.create_timer(0.0, lambda: calls.append("timer"))
+    for _ in range(3):
+        executor.create_task(calls.append, "task")
+    assert rig.spin(lambda: calls.count("task") == 3)
+    assert "timer" in calls[calls.index("task") :][:2]
+
+
+def test_a_timer_fires_while_nothing_else_happens(rig, node):
+    calls = []
+    timer = node.create_timer(0.01, lambda: calls.append(1))
+    assert rig.spin(lambda: len(calls) == 3)
+    node.destroy_timer(timer)
+    rig.rest(0.05)
+    assert len(calls) == 3
+
+
+def test_a_task_awaits_futures_and_has_a_result(rig, node, executor):
+    future = Future()
+
+    async def double():
+        return 2 * await future
+
+    task = executor.create_task(double)
+    rig.rest(0.02)
+    assert not task.done()
+    future.set_result(21)
+    assert rig.result(task) == 42
+
+
+def test_a_future_may_be_completed_by_another_thread(node, executor):
+    future = Future()
+    threading.Timer(0.05, lambda: future.set_result("x")).start()
+    executor.spin_until_future_complete(future, timeout_sec=10)
+    assert future.result() == "x"
+
+
+def test_waiting_for_a_future_ends_at_the_timeout(node, executor):
+    future = Future()
+    start = time.monotonic()
+    executor.spin_until_future_complete(future, timeout_sec=0.05)
+    assert not future.done()
+    assert 0.05 <= time.monotonic() - start < 1.0
+
+
+def test_an_exception_in_a_task_reaches_those_who_await_it_and_who_spins(node, executor):
+    async def fail():
+        raise LookupError("task failed")
+
+    task = executor.create_task(fail())
+    with pytest.raises(LookupError, match="task failed"):
+        executor.spin_until_future_complete(task, 1)
+    assert isinstance(task.exception(), LookupError)
+    with pytest.raises(LookupError, match="task failed"):
+        task.result()
+
+
+def test_a_cancelled_task_goes_no_further(rig, node, executor):
+    future, reached = Future(), []
+
+    async def wait():
+        await future
+        reached.append(1)
+
+    task = executor.create_task(wait)
+    rig.rest(0.02)
+    task.cancel()
+    future.set_result(None)
+    rig.rest(0.02)
+    assert task.cancelled()
+    assert reached == []
+
+
+def test_done_callbacks_are_called_once_and_can_be_taken_back():
+    future, calls = Future(), []
+    future.add_done_callback(calls.append)
+    other = calls.clear
+    future.add_done_callback(other)
+    assert future.remove_done_callback(other)
+    assert not future.remove_done_callback(other)
+    future.set_result(1)
+    future.add_done_callback(calls.append)
+    assert calls == [future, future]
+
+
+def test_work_of_a_node_follows_it_to_another_executor(rig, node, executor):
+    heard = []
+    node.create_subscription(String, "t", heard.append, 10)
+    publisher = node.create_publisher(String, "t", 10)
+    publisher.publish(String(data="a"))
+    time.sleep(0.05)
+    executor.remove_node(node)
+    publisher.publish(String(data="b"))
+    time.sleep(0.05)
+    executor.spin_once(timeout_sec=0.01)
+    assert heard == []
+    other = SingleThreadedExecutor(context=node.context)
+    assert other.add_node(node)
+    assert not other.add_node(node)
+    for _ in range(5):
+        other.spin_once(timeout_sec=0.02)
+    assert [message.data for message in heard] == ["a", "b"]
+
+
+def test_shutting_the_context_down_ends_spinning(node, executor):
+    threading.Timer(0.05, node.context.request_shutdown).start()
+    with pytest.raises(ExternalShutdownException, match="shut down"):
+        executor.spin()
+    with pytest.raises(ExternalShutdownException, match="shut down"):
+        executor.spin_once(timeout_sec=0)
+
+
+def test_shutting_the_executor_down_ends_spinning(node, executor):
+    threading.Timer(0.05, executor.shutdown).start()
+    executor.spin()
+    assert executor.get_nodes() == []
+    assert node.executor is None
+
+
+def test_module_functions_spin_a_node_with_the_shared_executor(environment):
+    ros.init()
+    try:
+        node = ros.create_node("node")
+        calls = []
+        timer = node.create_timer(0.001, lambda: calls.append(1))
+        while not calls:
+            ros.spin_once(node, timeout_sec=1)
+        assert node.executor is None
+        timer.cancel()
+        future = Future()
+        timer = node.create_timer(0.001, lambda: future.set_result(1))
+        ros.spin_until_future_complete(node, future, timeout_sec=5)
+        assert future.done()
+        timer.cancel()
+        threading.Timer(0.05, ros.get_default_context().request_shutdown).start()
+        with pytest.raises(ExternalShutdownException, match="shut down"):
+            ros.spin(node)
+    finally:
+        ros.shutdown()
+    assert not ros.ok()
