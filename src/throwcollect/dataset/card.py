@@ -8,9 +8,10 @@ from __future__ import annotations
 import platform
 import socket
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime, timezone
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -54,10 +55,19 @@ class Provenance:
             host=socket.gethostname(),
             platform=platform.platform(),
             python=platform.python_version(),
-            libraries={"throwcollect": throwcollect.__version__, **{name: version(name) for name in _LIBRARIES}},
+            libraries={"throwcollect": throwcollect.__version__, **_versions()},
             simulations=simulations,
             wall_s=wall_s,
         )
+
+
+def _versions() -> dict[str, str]:
+    found = {}
+    for name in _LIBRARIES:
+        # Not every machine that collects also simulates.
+        with suppress(PackageNotFoundError):
+            found[name] = version(name)
+    return found
 
 
 def count_outcomes(throws: pa.Table) -> dict[str, int]:
@@ -120,11 +130,8 @@ def data_card(config: Config, throws: pa.Table, provenance: Provenance) -> str:
 
 
 def _ranges(config: Config, throws: pa.Table) -> list[str]:
-    swept = [name for name in throws.column_names if "." in name]
-    if not swept:
-        return []
     rows = []
-    for name in swept:
+    for name in (name for name in throws.column_names if "." in name):
         limits = pc.min_max(throws[name]).as_py()
         rows.append(f"| `{name}` | {limits['min']:g} | {limits['max']:g} |")
     return [

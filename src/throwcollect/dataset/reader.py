@@ -15,10 +15,9 @@ from ruamel.yaml.error import YAMLError
 
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
+from throwcollect.dataset.directory import CONFIG, METADATA, PLAN, THROWS
 from throwcollect.dataset.mcap_reader import opened
-from throwcollect.dataset.throws import FILE_NAME as THROWS
 from throwcollect.dataset.throws import ThrowsTable
-from throwcollect.dataset.writer import CONFIG, METADATA, PLAN
 from throwcollect.episode.message import Episode
 from throwcollect.errors import DatasetError
 from throwcollect.sweep.plan import Plan

@@ -20,16 +20,6 @@ from throwcollect.episode.channels import Channels
 from throwcollect.episode.message import Episode
 
 
-def shard_name(collection: str, number: int) -> str:
-    """File name of a shard.
-
-    Args:
-        collection: Name of the collection.
-        number: Number of the shard, counted from 0.
-    """
-    return f"{collection}_{number:05d}.mcap"
-
-
 @dataclass(frozen=True)
 class FinishedShard:
     """A shard in trial order under its final name.

@@ -12,7 +12,6 @@ import pyarrow.parquet as pq
 
 from throwcollect.tasks.throw import BallState, Outcome, Peak, ThrowResult
 
-FILE_NAME = "throws.parquet"
 REFUSED = "refused"
 """Outcome of a trial that the plan refused; all others are those of `Outcome`."""
 

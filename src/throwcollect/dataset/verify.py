@@ -9,14 +9,12 @@ from typing import Any
 from throwcollect.config.loader import load
 from throwcollect.dataset.bag import bag_information
 from throwcollect.dataset.digest import combined_digest
+from throwcollect.dataset.directory import CARD, CONFIG, FORMAT, METADATA, PLAN, THROWS, shard_name
 from throwcollect.dataset.findings import Finding
 from throwcollect.dataset.reader import read_bag_metadata, read_throws
-from throwcollect.dataset.shard import shard_name
-from throwcollect.dataset.throws import FILE_NAME as THROWS
 from throwcollect.dataset.throws import REFUSED
 from throwcollect.dataset.verify_episode import EpisodeCheck
 from throwcollect.dataset.verify_shard import ShardCheck
-from throwcollect.dataset.writer import CARD, CONFIG, FORMAT, METADATA, PLAN
 from throwcollect.errors import ThrowcollectError
 from throwcollect.sweep.plan import Plan
 from throwcollect.tasks.throw import Outcome

@@ -116,6 +116,8 @@ def _stamp_problems(episode: Episode, samples: Samples, config: Config) -> Itera
     if (header.start_ns, episode.chunk.start_ns, episode.chunk.end_ns) != (stamps[0], stamps[0], stamps[-1]):
         said = f"header {header.start_ns} ns, chunk {episode.chunk.start_ns} to {episode.chunk.end_ns} ns"
         yield f"times differ: {said}, stamps {stamps[0]} to {stamps[-1]} ns"
+    if stamps[0] != config.trial_start_ns(header.trial):
+        yield f"starts at {stamps[0]} ns, the trial's slot of time at {config.trial_start_ns(header.trial)} ns"
     steps = np.diff(stamps)
     if len(steps) and np.abs(steps - _NS_PER_S / config.record.rate_hz).max() > 1:
         yield f"stamps are not spaced by 1/{config.record.rate_hz} s: {steps.min()} to {steps.max()} ns"

@@ -18,9 +18,9 @@ from throwcollect.config.schema import Config, RunConfig
 from throwcollect.dataset.bag import FileSummary, bag_information, to_yaml
 from throwcollect.dataset.card import Provenance, data_card
 from throwcollect.dataset.digest import combined_digest
+from throwcollect.dataset.directory import CARD, CONFIG, FORMAT, METADATA, PLAN, THROWS, shard_name
 from throwcollect.dataset.files import write_file
-from throwcollect.dataset.shard import OpenShard, shard_name
-from throwcollect.dataset.throws import FILE_NAME as THROWS
+from throwcollect.dataset.shard import OpenShard
 from throwcollect.dataset.throws import Place, Row, ThrowsTable, encode_table
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.message import Episode
@@ -28,13 +28,6 @@ from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.robots.description import full_description
 from throwcollect.sweep.plan import Plan
 from throwcollect.tasks.throw import Outcome, ThrowResult
-
-CONFIG = "config.yaml"
-PLAN = "plan.parquet"
-METADATA = "metadata.yaml"
-CARD = "README.md"
-FORMAT = "1"
-"""Version of the layout that ``docs/dataset.md`` describes."""
 
 
 def create(directory: Path, plan: Plan) -> None:

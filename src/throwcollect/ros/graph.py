@@ -18,6 +18,7 @@ from throwcollect.ros.keys import PREFIX, EntityKind, Token, parse_token
 _MOST_UNREAD = 10_000
 """Changes after which they are read even though nobody asks."""
 _POLL_S = 0.1
+_HISTORY_TIMEOUT_S = 10.0
 
 
 class Graph:
@@ -36,9 +37,9 @@ class Graph:
         key = f"{PREFIX}/{domain}/**"
         handler = zenoh.handlers.Callback(self._on_change, indirect=False)
         self._subscriber = session.liveliness().declare_subscriber(key, handler, history=True)
-        # Answered by the router after the history that the subscriber asked for, so that the graph is complete now.
-        for _ in session.liveliness().get(key):
-            pass
+        # Nobody has an answer, but the router says so after the history that the subscriber asked for: now the graph is
+        # complete. Not a liveliness query, which never ends while there is a subscriber to the same tokens (Zenoh 1.10).
+        list(session.get(f"{PREFIX}/{domain}/{session.zid()}", timeout=_HISTORY_TIMEOUT_S))
 
     def _on_change(self, sample: zenoh.Sample) -> None:
         with self._changed:

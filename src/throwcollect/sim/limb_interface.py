@@ -56,15 +56,26 @@ class LimbInterface:
         if (future := self._results.get(result.goal_id)) is not None:
             future.set_result(result)
 
+    @property
+    def watched(self) -> bool:
+        """Whether somebody listens to the controller's state, or to feedback that there is."""
+        return self._wants_state or self._wants_feedback
+
+    @property
+    def _wants_state(self) -> bool:
+        return bool(self._states.get_subscription_count())
+
+    @property
+    def _wants_feedback(self) -> bool:
+        return bool(self._handles) and self._node.count_subscribers(self._feedback_topic) > 0
+
     def publish_state(self) -> None:
         """Publish the controller's state, and the feedback of its goal, to whoever listens."""
-        wants_state = self._states.get_subscription_count() > 0
-        wants_feedback = bool(self._handles) and self._node.count_subscribers(self._feedback_topic) > 0
-        if not (wants_state or wants_feedback):
+        if not self.watched:
             return
         state = self._simulation.controller_state(self._controller)
         desired, actual, error = map(_point_message, (state.desired, state.actual, state.error))
-        if wants_state:
+        if self._wants_state:
             message = JointTrajectoryControllerState(
                 joint_names=list(state.joint_names),
                 reference=desired,
@@ -75,7 +86,7 @@ class LimbInterface:
             )
             message.header.stamp.sec, message.header.stamp.nanosec = divmod(state.stamp_ns, _NS)
             self._states.publish(message)
-        if wants_feedback:
+        if self._wants_feedback:
             feedback = FollowJointTrajectory.Feedback(
                 joint_names=list(state.joint_names), desired=desired, actual=actual, error=error
             )

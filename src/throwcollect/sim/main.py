@@ -44,7 +44,7 @@ def run(config: Path, *, name: str) -> None:
     try:
         while not stopped and not node.quitting:
             if simulation.running:
-                simulation.advance()
+                simulation.advance(watched=node.watched)
                 executor.spin_once(timeout_sec=0.0)
             else:
                 executor.spin_once(timeout_sec=_IDLE_S)

@@ -2,14 +2,30 @@
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 
+import numpy as np
 import pybullet
+from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
 from throwcollect.robots.model import joint_limits
 from throwcollect.robots.talos import JOINTS
+
+
+class Aim(NamedTuple):
+    """What the motors are told for one step, one number a moving joint; a tuple, as there is one for every step.
+
+    Attributes:
+        before: Position wanted at the beginning of the step [rad].
+        velocity: Velocity that leads from there to the target [rad/s].
+        target: Position wanted at its end [rad].
+    """
+
+    before: list[float]
+    velocity: list[float]
+    target: list[float]
 
 
 class Motors:
@@ -45,30 +61,47 @@ class Motors:
         self._velocity_gains = [config.robot.velocity_gain] * len(joints)
         delay = config.sim.command_delay_s * self._hz
         self._fraction = delay % 1
-        self._recent = deque([start], maxlen=int(delay) + 2)
-        self._recent.extend([start] * (int(delay) + 1))
-        self.target: Sequence[float] = start
-        """Position wanted at the end of the last step [rad], after the delay."""
+        # The commands that will still act: as many as the delay is long, and one more to interpolate from.
+        self._acting = np.tile(np.array(start, dtype=float), (int(delay) + 1, 1))
+        self._targets = self._acting[:1]
+        self._planned = self._acting
 
-    def follow(self, command: Sequence[float]) -> None:
-        """Aim the motors for the next step.
+    @property
+    def target(self) -> list[float]:
+        """Position wanted at the end of the last step [rad], after the delay."""
+        target: list[float] = self._targets[0].tolist()
+        return target
+
+    def plan(self, commands: NDArray[np.float64]) -> Iterable[Aim]:
+        """Work out how to aim for each of the next steps; `advance` then says how many of them were taken.
 
         Args:
-            command: Position wanted at its end [rad], one number a moving joint, before the delay.
+            commands: Position wanted at the end of each step [rad], before the delay, shape ``(n_steps, n_moving)``.
         """
-        self._recent.append(command)
-        before = self.target
-        self.target = self._recent[1]
+        count = len(commands)
+        self._planned = np.concatenate((self._acting, commands))
+        targets = self._planned[1 : count + 1]
         if self._fraction:
-            late, now = self._fraction, 1 - self._fraction
-            self.target = [now * b + late * a for a, b in zip(self._recent[0], self._recent[1], strict=True)]
-        hz = self._hz
+            targets = (1 - self._fraction) * targets + self._fraction * self._planned[:count]
+        self._targets = np.concatenate((self._targets[:1], targets))
+        velocities = np.diff(self._targets, axis=0) * self._hz
+        lists = self._targets.tolist()
+        # Lists, as Bullet reads them twice as fast as arrays.
+        return map(Aim, lists[:-1], velocities.tolist(), lists[1:])
+
+    def advance(self, steps: int) -> None:
+        """Go on by so many of the steps that were planned."""
+        self._acting = self._planned[steps : steps + len(self._acting)]
+        self._targets = self._targets[steps : steps + 1]
+
+    def aim(self, aim: Aim) -> None:
+        """Aim the motors for the next step."""
         pybullet.setJointMotorControlArray(
             self._robot,
             self._joints,
             pybullet.POSITION_CONTROL,
-            targetPositions=before,
-            targetVelocities=[(b - a) * hz for a, b in zip(before, self.target, strict=True)],
+            targetPositions=aim.before,
+            targetVelocities=aim.velocity,
             forces=self._forces,
             positionGains=self._position_gains,
             velocityGains=self._velocity_gains,

@@ -10,6 +10,7 @@ from throwcollect.episode.channels import Channels
 from throwcollect.episode.chunk import ChunkEncoder, encode_message
 from throwcollect.episode.message import pack
 from throwcollect.episode.record import Samples
+from throwcollect.episode.topics import Topic
 from throwcollect.errors import ConfigError
 from throwcollect.interfaces import get_message
 from throwcollect.robots.description import full_description
@@ -62,6 +63,11 @@ class SimulationNode(Node):
         """Whether a client has asked the simulation to quit."""
         return self._simulation.state == State.QUITTING
 
+    @property
+    def watched(self) -> bool:
+        """Whether somebody listens to samples, states or feedback."""
+        return bool(self._listened()) or any(interface.watched for interface in self._interfaces.values())
+
     def follow_up(self) -> None:
         """Tell the world what has happened since the last call: time, samples, feedback, results, the episode."""
         simulation = self._simulation
@@ -76,13 +82,16 @@ class SimulationNode(Node):
             self._episodes.publish(pack(header, self._encoder.encode(samples, states)))
 
     def _publish_samples(self) -> None:
-        listened = [(topic, publisher) for topic, publisher in self._live if publisher.get_subscription_count()]
+        listened = self._listened()
         if not listened:
             return
         samples: Samples = self._simulation.fresh_samples()
         for index in range(len(samples)):
             for topic, publisher in listened:
                 publisher.publish(encode_message(topic, samples, index, {}))
+
+    def _listened(self) -> list[tuple[Topic, Publisher]]:
+        return [(topic, publisher) for topic, publisher in self._live if publisher.get_subscription_count()]
 
     def _publish_latched(self, channels: Channels) -> None:
         self._latched = []

@@ -23,8 +23,11 @@ from throwcollect.sim.recording import BallState
 from throwcollect.sim.world import World
 
 _NO_TRIAL = -1
-_SLICE_S = 0.05
-"""Simulated time between two looks at the inputs; also the period of action feedback."""
+_SLICE_S = 0.25
+"""Simulated time between two looks at the inputs: about 10 ms of real time."""
+
+_WATCHED_SLICE_S = 0.05
+"""The same while somebody watches: the period of action feedback, as upstream."""
 
 _EXECUTING = 2
 """action_msgs/msg/GoalStatus.STATUS_EXECUTING."""
@@ -71,7 +74,6 @@ class Simulation:
         self.state = State.PLAYING
         self.world = World(config)
         self._period_ns = round(10**9 / config.sim.physics_hz)
-        self._slice_steps = max(1, round(_SLICE_S * config.sim.physics_hz))
         self._stride = config.sim.physics_hz // config.record.rate_hz
         self.limbs = {
             name: Limb(name, joints, moving=self.world.moving, period_ns=self._period_ns)
@@ -154,10 +156,15 @@ class Simulation:
         self._running |= refusal is None
         return refusal
 
-    def advance(self) -> None:
-        """Run for a slice of time, or until the run ends; slept through where a real-time factor asks for it."""
+    def advance(self, *, watched: bool) -> None:
+        """Run for a slice of time, or until the run ends; slept through where a real-time factor asks for it.
+
+        Args:
+            watched: Whether somebody wants to see it happen: slices are short then.
+        """
         began, stamp = time.monotonic(), self.now_ns
-        self.step(self._slice_steps)
+        short = watched or self.real_time_factor is not None
+        self.step(round((_WATCHED_SLICE_S if short else _SLICE_S) * self.config.sim.physics_hz))
         if self._in_trial and self.world.end_reason is not None:
             self._running = False
         elif not self._in_trial and not any(limb.moves for limb in self.limbs.values()):
@@ -248,7 +255,7 @@ class Simulation:
             self._look(moving)
             commands = self._command[np.newaxis].copy()
         self._command = commands[-1].copy()
-        self.world.run(commands.tolist(), stop_at_end=self._in_trial)
+        self.world.run(commands, stop_at_end=self._in_trial)
         self._collect_results()
         return len(commands)
 

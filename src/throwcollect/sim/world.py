@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import pybullet
+from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
 from throwcollect.episode.record import Contact, Samples
@@ -122,21 +123,22 @@ class World:
         """Why the trial ended: ``landed``, ``rest`` or ``timeout``; None while it goes on."""
         return self._end_reason
 
-    def run(self, commands: Iterable[Sequence[float]], *, stop_at_end: bool = True) -> int:
+    def run(self, commands: NDArray[np.float64], *, stop_at_end: bool = True) -> int:
         """Take one physics step for each command, or fewer if the trial ends.
 
         Args:
-            commands: For each step, the position of each moving joint wanted at its end [rad], as plain floats.
+            commands: For each step, the position of each moving joint wanted at its end [rad], shape
+                ``(n_steps, n_moving)``.
             stop_at_end: Whether to take no more steps once the trial has ended.
 
         Returns:
             Number of steps taken.
         """
+        if stop_at_end and self._end_reason is not None:
+            return 0
         first = self._steps
-        for command in commands:
-            if stop_at_end and self._end_reason is not None:
-                break
-            self._motors.follow(command)
+        for aim in self._motors.plan(commands):
+            self._motors.aim(aim)
             if self._drag:
                 self._apply_drag()
             pybullet.stepSimulation(physicsClientId=self._client)
@@ -144,7 +146,10 @@ class World:
             self._contacts.update(self._pressing(), self._steps)
             if self._steps % self._stride == 0:
                 self._rows.append(self._read())
-                self._end_reason = self._end_reason or self._judge()
+                self._end_reason = self._end_reason or self._judge(aim.target)
+                if stop_at_end and self._end_reason is not None:
+                    break
+        self._motors.advance(self._steps - first)
         return self._steps - first
 
     def samples(self, first: int = 0, last: int | None = None) -> Samples:
@@ -231,8 +236,9 @@ class World:
         )
         motors = self._make_motors(trial)
         # At least one step, as contact forces and motor torques are those of the last one.
-        for _ in range(max(1, round(trial.sim.settle_s * trial.sim.physics_hz))):
-            motors.follow(self._start)
+        settling = np.tile(self._start, (max(1, round(trial.sim.settle_s * trial.sim.physics_hz)), 1))
+        for aim in motors.plan(settling):
+            motors.aim(aim)
             pybullet.stepSimulation(physicsClientId=client)
         self._settled = self._read()
         self._settled_pressing = self._pressing()
@@ -262,14 +268,14 @@ class World:
     def _stamp_ns(self, step: int) -> int:
         return self._start_ns + step * _NS_PER_S // self._hz
 
-    def _judge(self) -> str | None:
+    def _judge(self, target: Sequence[float]) -> str | None:
         """Whether the trial ends with the sample just recorded, and why."""
         before, now = self._rows[-2:]
         has_contact = bool(self._contacts.bodies)
         if now.pose[0][2] < self._landing_height <= before.pose[0][2] and "spoon" not in self._contacts.bodies:
             return "landed"
-        stands_still = self._motors.target == self._sampled_target
-        self._sampled_target = self._motors.target
+        stands_still = target == self._sampled_target
+        self._sampled_target = target
         self._has_moved |= not stands_still
         if not (has_contact and stands_still and self._has_moved and math.hypot(*now.twist[0]) < _REST_SPEED):
             self._resting_since = self._steps

@@ -34,7 +34,6 @@ SETTINGS: dict[str, Any] = {
 }
 RELEASE_S = 0.4
 HOLDING = (0.5, -0.2, 1.3)
-SLOT_NS = 10_000_000_000
 
 Change = Callable[[Samples, EpisodeHeader], tuple[Samples, EpisodeHeader]]
 
@@ -43,7 +42,7 @@ def throw(config: Config, trial: int) -> tuple[Samples, EpisodeHeader]:
     """A throw that lands, as samples and header."""
     random = np.random.default_rng(trial)
     rate, hz = config.record.rate_hz, config.sim.physics_hz
-    start_ns = (trial + 1) * SLOT_NS
+    start_ns = config.trial_start_ns(trial)
     speed = np.array([2.5, 0.1, 2.0]) + 0.2 * random.normal(size=3)
     held = round(RELEASE_S * rate)
     path = ballistic_positions(np.array(HOLDING), speed, steps=3 * hz, config=config)[:: hz // rate]

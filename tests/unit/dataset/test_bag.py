@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import io
+import struct
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from mcap.opcode import Opcode
 from mcap.reader import make_reader
 from rosbags.highlevel import AnyReader
 from rosbags.interfaces import QosDurability, QosReliability
@@ -64,7 +67,7 @@ def test_every_message_decodes_to_what_was_recorded(full: Path, make_collection:
     assert [stamp for stamp, _ in states] == samples.stamps_ns.tolist()
     assert all(state.name == list(JOINTS) for _, state in states)
     assert np.array_equal(np.array([state.position for _, state in states]), samples.position)
-    assert others["/clock"].clock.sec == 41
+    assert others["/clock"].clock.sec == 65
     assert "<robot" in others["/robot_description"].data
     frames = {(each.header.frame_id, each.child_frame_id) for each in others["/tf"].transforms}
     fixed = {(each.header.frame_id, each.child_frame_id) for each in others["/tf_static"].transforms}
@@ -93,9 +96,25 @@ def test_latched_topics_are_repeated_at_the_start_of_each_file(full: Path) -> No
 def test_seeking_by_time_and_topic_needs_one_chunk(full: Path) -> None:
     with (full / "quick_00000.mcap").open("rb") as file:
         reader = make_reader(file, validate_crcs=True)
-        found = list(reader.iter_messages(["/ball/odometry"], starting_at=20_000_000_000, ending_before=20_100_000_000))
-    assert [message.log_time for _, _, message in found] == list(range(20_000_000_000, 20_100_000_000, 4_000_000))
+        found = list(reader.iter_messages(["/ball/odometry"], starting_at=32_000_000_000, ending_before=32_100_000_000))
+    assert [message.log_time for _, _, message in found] == list(range(32_000_000_000, 32_100_000_000, 4_000_000))
     assert [message.sequence for _, _, message in found] == list(range(25))
+
+
+def test_chunk_indexes_point_at_the_message_indexes(full: Path) -> None:
+    for path in full.glob("*.mcap"):
+        data = path.read_bytes()
+        summary = make_reader(io.BytesIO(data)).get_summary()
+        assert summary is not None
+        for chunk in summary.chunk_indexes:
+            assert data[chunk.chunk_start_offset] == Opcode.CHUNK
+            end = chunk.chunk_start_offset + chunk.chunk_length
+            assert min(chunk.message_index_offsets.values()) == end
+            for channel, offset in chunk.message_index_offsets.items():
+                opcode, length, found = struct.unpack_from("<BQH", data, offset)
+                assert (opcode, found) == (Opcode.MESSAGE_INDEX, channel)
+                end = max(end, offset + 9 + length)
+            assert end == chunk.chunk_start_offset + chunk.chunk_length + chunk.message_index_length
 
 
 def test_files_follow_the_conventions_of_rosbag2s_mcap_plugin(full: Path) -> None:

@@ -88,7 +88,7 @@ def stored_digest(directory: Path) -> None:
 def header_contact(directory: Path) -> None:
     facts = stored(directory / SHARD, 3).facts
     # The contact ends 1 ns later: valid, but not what was hashed.
-    flip(directory / SHARD, facts.offset + facts.data.index(b'"end_ns":40400000000') + len('"end_ns":40400000000') - 1)
+    flip(directory / SHARD, facts.offset + facts.data.index(b'"end_ns":64400000000') + len('"end_ns":64400000000') - 1)
 
 
 def torn(directory: Path) -> None:
@@ -312,6 +312,17 @@ def stalled(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHe
     return Samples(**{name: column[kept] for name, column in vars(samples).items()}), replace(header, samples=len(kept))
 
 
+def late(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
+    """The trial ran in another slot of time; its contacts with it."""
+    if header.trial != 2:
+        return samples, header
+    contacts = tuple(
+        replace(each, start_ns=each.start_ns + 1, end_ns=each.end_ns and each.end_ns + 1) for each in header.contacts
+    )
+    header = replace(header, start_ns=header.start_ns + 1, contacts=contacts)
+    return replace(samples, stamps_ns=samples.stamps_ns + 1), header
+
+
 def early(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
     """The header says that the trial began before its first sample."""
     return samples, replace(header, start_ns=header.start_ns - (header.trial == 2))
@@ -319,7 +330,12 @@ def early(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHead
 
 @pytest.mark.parametrize(
     ("change", "problem"),
-    [(kicked, "departs from ballistic motion by"), (stalled, "not spaced by 1/250 s"), (early, "times differ: header")],
+    [
+        (kicked, "departs from ballistic motion by"),
+        (stalled, "not spaced by 1/250 s"),
+        (early, "times differ: header"),
+        (late, "the trial's slot of time"),
+    ],
 )
 def test_an_episode_that_contradicts_physics_or_its_header_is_found(
     collection: Any, tmp_path: Path, change: Any, problem: str

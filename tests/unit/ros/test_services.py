@@ -78,8 +78,9 @@ def test_a_service_may_call_another_service_in_a_coroutine(rig, pair):
 
 
 def test_the_wire_is_that_of_rmw_zenoh(rig, pair):
-    server, node, _ = pair
+    server, node, client = pair
     server.create_service(SetBool, "~/set", answer)
+    assert client.wait_for_service(5)
     key = data_key(node.context.get_domain_id(), "/server/set", SetBool.TYPE, type_hash(SetBool.TYPE))
     attachment = Attachment(7, 5, bytes(range(16))).pack()
     replies = []

@@ -175,6 +175,7 @@ def test_garbage_on_a_topic_is_logged_once_and_does_not_stop_the_node(rig, capsy
     heard = []
     node.create_subscription(JointState, "t", heard.append, 1000)
     publisher = rig.node("talker").create_publisher(JointState, "t", 1000)
+    assert rig.spin(lambda: publisher.get_subscription_count() == 1)
     session = rig.context().session
     key = data_key(node.context.get_domain_id(), "/t", JointState.TYPE, type_hash(JointState.TYPE))
     good, attachment = serialize(JointState(position=[1.0])), Attachment(1, 0, bytes(16)).pack()
@@ -185,7 +186,6 @@ def test_garbage_on_a_topic_is_logged_once_and_does_not_stop_the_node(rig, capsy
         session.put(key, body, attachment=attachment)
         session.put(key, good, attachment=body)
     session.put(key, good)
-    assert rig.spin(lambda: publisher.get_subscription_count() == 1)
     assert rig.spin(
         lambda: publisher.publish(JointState(position=[2.0])) or (heard and heard[-1].position.tolist() == [2.0])
     )

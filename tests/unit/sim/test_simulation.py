@@ -49,7 +49,7 @@ def run(simulation: Simulation) -> None:
     for _ in range(1000):
         if not simulation.running:
             return
-        simulation.advance()
+        simulation.advance(watched=True)
     pytest.fail("the run does not end")
 
 
@@ -133,7 +133,7 @@ def test_without_a_trial_the_run_ends_when_limbs_and_ball_are_at_rest(simulation
 
 def test_a_reset_aborts_goals_and_goes_back_to_the_start(simulation: Simulation) -> None:
     trial(simulation)
-    simulation.advance()
+    simulation.advance(watched=True)
     simulation.reset()
     assert [(result.status, result.error_string) for _, result in simulation.pop_results()] == [
         (GoalStatus.ABORTED, "simulation was reset")
@@ -145,7 +145,7 @@ def test_a_reset_aborts_goals_and_goes_back_to_the_start(simulation: Simulation)
 def test_a_cancelled_goal_stops_where_it_is(simulation: Simulation) -> None:
     assert simulation.submit(ARM, 1, swing()) is None
     for _ in range(10):
-        simulation.advance()
+        simulation.advance(watched=True)
     assert simulation.cancel(ARM, 1)
     run(simulation)
     positions = simulation.world.joint_positions()
@@ -188,6 +188,6 @@ def test_a_real_time_factor_holds_the_clock_back(simulation: Simulation) -> None
     trial(simulation)
     simulation.real_time_factor = 1.0
     began = time.monotonic()
-    simulation.advance()
+    simulation.advance(watched=True)
     simulation.real_time_factor = None
     assert time.monotonic() - began >= 0.05

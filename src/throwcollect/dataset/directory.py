@@ -1,0 +1,22 @@
+"""Names of the files in the directory of a dataset."""
+
+from __future__ import annotations
+
+CONFIG = "config.yaml"
+PLAN = "plan.parquet"
+THROWS = "throws.parquet"
+METADATA = "metadata.yaml"
+CARD = "README.md"
+
+FORMAT = "1"
+"""Version of the layout that ``docs/dataset.md`` describes."""
+
+
+def shard_name(collection: str, number: int) -> str:
+    """File name of a shard.
+
+    Args:
+        collection: Name of the collection.
+        number: Number of the shard, counted from 0.
+    """
+    return f"{collection}_{number:05d}.mcap"
