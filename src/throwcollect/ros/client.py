@@ -140,7 +140,7 @@ class Client(Receiver):
         except ValueError as error:
             self._endpoint.complain(error)
             return
-        if attachment.gid != self._endpoint.gid or attachment.sequence not in self._pending:
+        if attachment.sequence not in self._pending:
             self._endpoint.complain("unexpected response; there may be more than one server of this name")
             return
         future, convert = self._pending.pop(attachment.sequence)

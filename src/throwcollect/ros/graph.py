@@ -37,8 +37,8 @@ class Graph:
         key = f"{PREFIX}/{domain}/**"
         handler = zenoh.handlers.Callback(self._on_change, indirect=False)
         self._subscriber = session.liveliness().declare_subscriber(key, handler, history=True)
-        # Nobody has an answer, but the router says so after the history that the subscriber asked for: now the graph is
-        # complete. Not a liveliness query, which never ends while there is a subscriber to the same tokens (Zenoh 1.10).
+        # Nobody has an answer, but the router says so after the history that the subscriber asked for: now the graph
+        # is complete. Not a liveliness query, which never ends while there is a subscriber to its tokens (Zenoh 1.10).
         list(session.get(f"{PREFIX}/{domain}/{session.zid()}", timeout=_HISTORY_TIMEOUT_S))
 
     def _on_change(self, sample: zenoh.Sample) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Set
 
 from throwcollect.episode.record import Contact
 
@@ -19,7 +19,6 @@ class ContactLog:
 
     def __init__(self, names: Mapping[Surface, str]) -> None:
         self._names = names
-        self._pressing: frozenset[Surface] = frozenset()
         self._open: dict[str, int] = {}
         self._closed: list[tuple[int, str, int]] = []
 
@@ -28,16 +27,13 @@ class ContactLog:
         """Names of the bodies that press on the ball now."""
         return self._open.keys()
 
-    def update(self, pressing: frozenset[Surface], step: int) -> None:
-        """Take note of what pressed on the ball in one step; costs next to nothing while that stays the same.
+    def update(self, pressing: Set[Surface], step: int) -> None:
+        """Take note of what presses on the ball since a step.
 
         Args:
             pressing: All surfaces that pressed on the ball.
             step: Number of the step; later than that of the call before.
         """
-        if pressing == self._pressing:
-            return
-        self._pressing = pressing
         bodies = {self._names[surface] for surface in pressing}
         for body in self._open.keys() - bodies:
             self._closed.append((self._open.pop(body), body, step))

@@ -7,7 +7,7 @@ from collections.abc import Hashable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.control import ControllerParameters, JointState, JointTrajectoryController, Trajectory, TrajectoryGoal
+from throwcollect.control import ControllerParameters, GoalResult, JointState, JointTrajectoryController, Trajectory, TrajectoryGoal
 from throwcollect.episode.record import ControllerSamples
 
 _LOCKED_TOLERANCE_RAD = 1e-6
@@ -27,7 +27,8 @@ class Limb:
 
     def __init__(self, name: str, joints: Sequence[str], *, moving: Sequence[str], period_ns: int) -> None:
         self.name = name
-        self.controller = JointTrajectoryController(name, ControllerParameters.talos(joints), period_ns=period_ns)
+        self._controller = JointTrajectoryController(name, ControllerParameters.talos(joints), period_ns=period_ns)
+        self._start_ns: int | None = None
         self._joints = tuple(joints)
         self._own = [index for index, joint in enumerate(joints) if joint in moving]
         self._worlds = [moving.index(joints[index]) for index in self._own]
@@ -36,9 +37,16 @@ class Limb:
         self._points: list[NDArray[np.float64]] = []
 
     @property
+    def controller(self) -> JointTrajectoryController:
+        """The controller, in the state of the last reset or later."""
+        if self._start_ns is not None:
+            self._wake()
+        return self._controller
+
+    @property
     def moves(self) -> bool:
         """Whether the commands may still change, so that the limb must be driven."""
-        return not self.controller.at_rest
+        return self._start_ns is None and not self._controller.at_rest
 
     def reset(self, time_ns: int, posture: Mapping[str, float]) -> None:
         """Hold a posture; a goal that is being executed is aborted.
@@ -48,14 +56,15 @@ class Limb:
             posture: Angle of each joint [rad].
         """
         self._posture = np.array([posture[joint] for joint in self._joints])
-        measured = JointState(self._posture.copy())
-        if self.controller.active:
-            self.controller.reset(time_ns, measured)
-        else:
-            self.controller.activate(time_ns, measured)
-        # Begins the hold, so that an idle limb need not be driven.
-        self.controller.update(time_ns, 0, measured)
+        # Put off until somebody asks for the controller, as most limbs are idle in most trials.
+        self._start_ns = time_ns
         self._elapsed_ns, self._points = [], []
+        if self._controller.goal_id is not None:
+            self._wake()
+
+    def pop_results(self) -> tuple[GoalResult, ...]:
+        """Results of the goals that have ended since the last call, oldest first."""
+        return self._controller.pop_results()
 
     def submit(self, goal_id: Hashable, goal: TrajectoryGoal, now_ns: int) -> str | None:
         """Give the controller a goal.
@@ -130,3 +139,15 @@ class Limb:
                         f"{wanted:.6g} rad"
                     )
         return None
+
+    def _wake(self) -> None:
+        start_ns, self._start_ns = self._start_ns, None
+        if start_ns is None:
+            return
+        measured = JointState(self._posture.copy())
+        if self._controller.active:
+            self._controller.reset(start_ns, measured)
+        else:
+            self._controller.activate(start_ns, measured)
+        # Begins the hold, so that an idle limb need not be driven.
+        self._controller.update(start_ns, 0, measured)

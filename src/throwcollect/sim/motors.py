@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple
 
 import numpy as np
 import pybullet
@@ -14,18 +13,9 @@ from throwcollect.robots.model import joint_limits
 from throwcollect.robots.talos import JOINTS
 
 
-class Aim(NamedTuple):
-    """What the motors are told for one step, one number a moving joint; a tuple, as there is one for every step.
-
-    Attributes:
-        before: Position wanted at the beginning of the step [rad].
-        velocity: Velocity that leads from there to the target [rad/s].
-        target: Position wanted at its end [rad].
-    """
-
-    before: list[float]
-    velocity: list[float]
-    target: list[float]
+Aim = tuple[list[float], list[float], list[float]]
+"""What matters to the motors in one step, one number a moving joint: the position wanted at its beginning [rad], the
+velocity that leads from there to the target [rad/s], and the target, the position wanted at its end [rad]."""
 
 
 class Motors:
@@ -87,21 +77,26 @@ class Motors:
         velocities = np.diff(self._targets, axis=0) * self._hz
         lists = self._targets.tolist()
         # Lists, as Bullet reads them twice as fast as arrays.
-        return map(Aim, lists[:-1], velocities.tolist(), lists[1:])
+        return zip(lists[:-1], velocities.tolist(), lists[1:], strict=True)
 
     def advance(self, steps: int) -> None:
         """Go on by so many of the steps that were planned."""
         self._acting = self._planned[steps : steps + len(self._acting)]
         self._targets = self._targets[steps : steps + 1]
 
-    def aim(self, aim: Aim) -> None:
-        """Aim the motors for the next step."""
+    def aim(self, position: list[float], velocity: list[float]) -> None:
+        """Aim the motors for the next step.
+
+        Args:
+            position: Position wanted at the beginning of the step, one number a moving joint [rad].
+            velocity: Velocity that leads from there to the target [rad/s].
+        """
         pybullet.setJointMotorControlArray(
             self._robot,
             self._joints,
             pybullet.POSITION_CONTROL,
-            targetPositions=aim.before,
-            targetVelocities=aim.velocity,
+            targetPositions=position,
+            targetVelocities=velocity,
             forces=self._forces,
             positionGains=self._position_gains,
             velocityGains=self._velocity_gains,

@@ -270,7 +270,7 @@ class Simulation:
 
     def _collect_results(self) -> None:
         for name, limb in self.limbs.items():
-            for result in limb.controller.pop_results():
+            for result in limb.pop_results():
                 self._results.append((name, result))
                 if name in self._goals:
                     self._goals[name] = GoalOutcome(name, result.status, result.error_code, result.error_string)

@@ -111,7 +111,8 @@ class World:
         self._drag = ball.drag_coefficient * trial.scene.air_density_kgpm3 * math.pi * ball.radius_m**2 / 2
         self._motors = self._make_motors(trial)
         self._contacts = ContactLog(self._scenery.names)
-        self._contacts.update(self._settled_pressing, 0)
+        self._pressing = self._settled_pressing
+        self._contacts.update(self._pressing, 0)
         self._record_start()
         self._sampled_target = self._motors.target
         self._has_moved = False
@@ -136,17 +137,24 @@ class World:
         """
         if stop_at_end and self._end_reason is not None:
             return 0
-        first = self._steps
-        for aim in self._motors.plan(commands):
-            self._motors.aim(aim)
+        # Local names, tuples and one loop: what stands here is paid for in every step.
+        client, ball, rows = self._client, self._ball, self._rows
+        aim, take_step, points_on = self._motors.aim, pybullet.stepSimulation, pybullet.getContactPoints
+        first, stride = self._steps, self._stride
+        for before, velocity, target in self._motors.plan(commands):
+            aim(before, velocity)
             if self._drag:
                 self._apply_drag()
-            pybullet.stepSimulation(physicsClientId=self._client)
+            take_step(physicsClientId=client)
             self._steps += 1
-            self._contacts.update(self._pressing(), self._steps)
-            if self._steps % self._stride == 0:
-                self._rows.append(self._read())
-                self._end_reason = self._end_reason or self._judge(aim.target)
+            # Bullet also lists points that are merely close; those have no normal force (field 9).
+            pressing = {point[2:5:2] for point in points_on(ball, physicsClientId=client) if point[9] > 0}
+            if pressing != self._pressing:
+                self._pressing = pressing
+                self._contacts.update(pressing, self._steps)
+            if self._steps % stride == 0:
+                rows.append(self._read())
+                self._end_reason = self._end_reason or self._judge(target)
                 if stop_at_end and self._end_reason is not None:
                     break
         self._motors.advance(self._steps - first)
@@ -237,11 +245,12 @@ class World:
         motors = self._make_motors(trial)
         # At least one step, as contact forces and motor torques are those of the last one.
         settling = np.tile(self._start, (max(1, round(trial.sim.settle_s * trial.sim.physics_hz)), 1))
-        for aim in motors.plan(settling):
-            motors.aim(aim)
+        for position, velocity, _ in motors.plan(settling):
+            motors.aim(position, velocity)
             pybullet.stepSimulation(physicsClientId=client)
         self._settled = self._read()
-        self._settled_pressing = self._pressing()
+        points = pybullet.getContactPoints(self._ball, physicsClientId=client)
+        self._settled_pressing: set[Surface] = {point[2:5:2] for point in points if point[9] > 0}
 
     def _place(self, row: Row) -> None:
         """Put robot and ball into a state, leaving nothing behind of what went on before.
@@ -270,14 +279,13 @@ class World:
 
     def _judge(self, target: Sequence[float]) -> str | None:
         """Whether the trial ends with the sample just recorded, and why."""
-        before, now = self._rows[-2:]
-        has_contact = bool(self._contacts.bodies)
-        if now.pose[0][2] < self._landing_height <= before.pose[0][2] and "spoon" not in self._contacts.bodies:
+        (_, (before, _), _), (_, (now, _), (velocity, _)) = self._rows[-2:]
+        if now[2] < self._landing_height <= before[2] and "spoon" not in self._contacts.bodies:
             return "landed"
         stands_still = target == self._sampled_target
         self._sampled_target = target
         self._has_moved |= not stands_still
-        if not (has_contact and stands_still and self._has_moved and math.hypot(*now.twist[0]) < _REST_SPEED):
+        if not (stands_still and self._pressing and self._has_moved and math.hypot(*velocity) < _REST_SPEED):
             self._resting_since = self._steps
         elif self._steps - self._resting_since >= _REST_S * self._hz:
             return "rest"
@@ -292,11 +300,6 @@ class World:
             self._ball, BASE, force, position, pybullet.WORLD_FRAME, physicsClientId=self._client
         )
 
-    def _pressing(self) -> frozenset[Surface]:
-        # Bullet also lists points that are merely close; those have no normal force (field 9).
-        points = pybullet.getContactPoints(self._ball, physicsClientId=self._client)
-        return frozenset([(point[2], point[4]) for point in points if point[9] > 0])
-
     def _joint_states(self) -> Sequence[tuple[Any, ...]]:
         states: Sequence[tuple[Any, ...]] = pybullet.getJointStates(
             self._scenery.robot, self._scenery.joints, physicsClientId=self._client
@@ -304,8 +307,9 @@ class World:
         return states
 
     def _read(self) -> Row:
+        client, ball = self._client, self._ball
         return Row(
-            joints=self._joint_states(),
-            pose=pybullet.getBasePositionAndOrientation(self._ball, physicsClientId=self._client),
-            twist=pybullet.getBaseVelocity(self._ball, physicsClientId=self._client),
+            self._joint_states(),
+            pybullet.getBasePositionAndOrientation(ball, physicsClientId=client),
+            pybullet.getBaseVelocity(ball, physicsClientId=client),
         )

@@ -1,5 +1,8 @@
 """The ROS graph, through a real router."""
 
+import os
+import time
+
 import zenoh
 
 from throwcollect.interfaces import get_message, get_service
@@ -32,6 +35,13 @@ def test_nodes_see_what_others_have_as_soon_as_they_exist(rig):
     node.destroy_node()
     assert rig.spin(lambda: seen.get_node_names() == ["b"])
     assert seen.count_publishers("/ns/topic") == 0
+
+
+def test_the_graph_is_complete_when_a_node_begins(rig):
+    session, domain = rig.context().session, int(os.environ["ROS_DOMAIN_ID"])
+    tokens = [session.liveliness().declare_token(f"@ros2_lv/{domain}/1a/{i}/{i}/NN/%/%/n{i}") for i in range(500)]
+    time.sleep(0.3)
+    assert len(rig.node("observer").get_node_names()) == len(tokens) + 1
 
 
 def test_endpoints_match_by_name_and_type(rig):

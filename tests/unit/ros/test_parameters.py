@@ -142,6 +142,14 @@ def test_callbacks_are_asked_before_and_told_after(node):
     assert node.set_parameters([Parameter("a", value=5)])[0].successful
 
 
+def test_the_last_callback_that_was_added_is_asked_first(node):
+    node.declare_parameter("a", 1)
+    for reason in ("first", "last"):
+        result = SetParametersResult(successful=False, reason=reason)
+        node.add_on_set_parameters_callback(lambda _parameters, result=result: result)
+    assert node.set_parameters([Parameter("a", value=2)])[0].reason == "last"
+
+
 def test_names_are_listed_by_prefix_and_depth(node):
     node.declare_parameters("", [("x", 1), ("a.b", 1), ("a.c.d", 1)])
     assert node.list_parameters([], 0).names == ["use_sim_time", "x", "a.b", "a.c.d"]

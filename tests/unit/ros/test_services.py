@@ -128,10 +128,19 @@ def test_an_error_in_a_callback_ends_spinning_and_the_request(rig, pair):
 
     server.create_service(SetBool, "~/set", fail)
     client.wait_for_service(5)
-    future = client.call_async(SetBool.Request())
-    with pytest.raises(LookupError, match="callback failed"):
-        rig.spin(future.done)
-    assert not future.done()
+    key = data_key(server.context.get_domain_id(), "/server/set", SetBool.TYPE, type_hash(SetBool.TYPE))
+    replies = []
+    rig.context().session.get(
+        key,
+        zenoh.handlers.Callback(replies.append, drop=lambda: replies.append(None), indirect=False),
+        payload=serialize(SetBool.Request()),
+        attachment=Attachment(1, 0, bytes(16)).pack(),
+    )
+    with pytest.raises(LookupError, match="callback failed") as caught:
+        rig.rest(5)
+    # Even while the traceback keeps everything alive.
+    assert rig.spin(lambda: replies == [None])
+    assert caught.value.args == ("callback failed",)
 
 
 def test_a_callback_that_returns_no_response_is_a_mistake(rig, pair):

@@ -82,6 +82,7 @@ def test_who_joins_late_gets_the_last_messages_of_a_transient_local_topic(rig, r
     publisher = talker.create_publisher(String, "t", qos)
     for text in "abc":
         publisher.publish(String(data=text))
+    rig.rest()  # What is still on its way would be heard as well.
     heard = []
     listener.create_subscription(String, "t", lambda m: heard.append(m.data), qos)
     assert rig.spin(lambda: len(heard) == 2)
@@ -121,6 +122,14 @@ def test_an_advanced_subscriber_as_genuine_nodes_have_it_loses_nothing(rig, dura
     assert rig.spin(lambda: sequences[-1] - sequences[0] > 1999)
     assert np.all(np.diff(sequences) == 1)
     subscriber.undeclare()
+
+
+def test_the_history_of_a_topic_is_announced_as_advanced_publishers_do(rig):
+    node = rig.node("talker")
+    node.create_publisher(String, "t", LATCHED)
+    key = data_key(node.context.get_domain_id(), "/t", String.TYPE, type_hash(String.TYPE))
+    session = rig.context().session
+    assert len(list(session.liveliness().get(f"{key}/@adv/pub/{node.context.session.zid()}/*/_"))) == 1
 
 
 def test_the_oldest_messages_make_room_when_nobody_spins(rig):

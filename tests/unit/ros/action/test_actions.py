@@ -219,6 +219,18 @@ def test_a_handle_may_end_a_goal_without_an_execute_callback(rig):
         handles[0].abort()
 
 
+def test_the_first_result_of_a_goal_counts(rig):
+    def execute(handle):
+        handle.succeed(FJT.Result(error_string="first"))
+        return FJT.Result(error_string="second")
+
+    ActionServer(rig.node("server"), FJT, "/act", execute)
+    client = ActionClient(rig.node("client"), FJT, "/act")
+    assert client.wait_for_server(5)
+    handle = rig.result(client.send_goal_async(goal("a")))
+    assert [rig.result(handle.get_result_async()).result.error_string for _ in range(2)] == ["first", "first"]
+
+
 def test_wrong_types_are_refused(rig, controller, client):
     _, ours = send(rig, controller, client, "a")
     with pytest.raises(TypeError, match=r"expected .*FollowJointTrajectory.Goal, got .*Result"):
