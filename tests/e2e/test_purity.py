@@ -41,9 +41,7 @@ def test_every_file_is_the_same_for_any_number_of_simulations(
     assert fingerprints(tmp_path / "data") == fingerprints(reference)
 
 
-def test_every_file_is_the_same_when_trials_end_in_another_order(
-    config: Path, reference: Path, tmp_path: Path
-) -> None:
+def test_every_file_is_the_same_when_trials_end_in_another_order(config: Path, reference: Path, tmp_path: Path) -> None:
     running = start(config, tmp_path / "data", 2)
     running.wait_until(lambda: running.written() > 100_000)
     # Frozen in the middle of a trial, it hands it in long after those that follow.

@@ -61,8 +61,9 @@ def describe(found: Mapping[str, Any]) -> str:
     lines = {
         "trials": f"{found['trials']}: {outcomes}",
         "landing": _landing(found.get("landing")),
-        "episodes": f"{found['episodes']} with {found['samples']} samples, {found['duration_s']:.0f} s of simulated time",
-        "files": f"{found['shards']} MCAP, {found['recordings_bytes'] / 1e6:.1f} MB; all {found['size_bytes'] / 1e6:.1f} MB",
+        "episodes": f"{found['episodes']}, {found['samples']} samples, {found['duration_s']:.0f} s of simulated time",
+        "files": f"{found['shards']} MCAP of {found['recordings_bytes'] / 1e6:.1f} MB, "
+        f"{found['size_bytes'] / 1e6:.1f} MB in all",
         "topics": ", ".join(f"{topic} ({count})" for topic, count in found["topics"].items()),
         "digest": found["digest"],
     }

@@ -12,6 +12,7 @@ import typer
 from throwcollect.config.loader import load, resolved_yaml
 from throwcollect.config.reference import json_schema
 
+
 def show_schema() -> None:
     """Print the JSON Schema of the configuration."""
     typer.echo(jsonlib.dumps(json_schema(), indent=2))

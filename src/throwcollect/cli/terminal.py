@@ -76,8 +76,8 @@ class _Lines:
 
 class _Bar:
     def __init__(self) -> None:
-        from rich.console import Console
         from rich import progress
+        from rich.console import Console
 
         self._progress = progress.Progress(
             progress.TextColumn("throws"),
@@ -100,9 +100,7 @@ class _Bar:
         self._progress.stop()
 
     def update(self, progress: Progress) -> None:
-        self._progress.update(
-            self._task, total=progress.total, completed=progress.ended, description=counts(progress)
-        )
+        self._progress.update(self._task, total=progress.total, completed=progress.ended, description=counts(progress))
 
     def say(self, line: str) -> None:
         self._progress.console.print(line, markup=False, highlight=False)

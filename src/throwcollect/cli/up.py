@@ -18,7 +18,6 @@ import typer
 from throwcollect.cli.dataset import describe
 from throwcollect.cli.terminal import Display, display
 from throwcollect.config.loader import load
-from throwcollect.config.schema import Config
 from throwcollect.coordinator.prepare import prepare
 from throwcollect.coordinator.progress import ProgressListener
 from throwcollect.dataset.inspect import info
@@ -56,15 +55,15 @@ def collect(
         note = f", {refused} refused by calculation (see `throwcollect plan`)" if refused else ""
         shown.say(f"plan: {len(plan.trials)} trials{note}; dataset: {directory}")
         with Supervisor(directory, config.run, simulations=count) as supervisor:
-            _follow(supervisor, config, shown)
+            _follow(supervisor, shown)
     summary = {**info(directory).as_dict(), "wall_s": time.monotonic() - started}
     _print_summary(summary, directory, as_json=json)
 
 
-def _follow(supervisor: Supervisor, config: Config, shown: Display) -> None:
+def _follow(supervisor: Supervisor, shown: Display) -> None:
     interrupted = False
 
-    def interrupt(number: int, frame: FrameType | None) -> None:
+    def interrupt(_number: int, _frame: FrameType | None) -> None:
         nonlocal interrupted
         interrupted = True
 
@@ -89,9 +88,7 @@ def _follow(supervisor: Supervisor, config: Config, shown: Display) -> None:
     if interrupted:
         raise Interrupted("interrupted; finished throws are on disk, the dataset is not complete")
     if code != 0:
-        raise WorkerError(
-            f"the coordinator ended with exit code {code}", evidence=supervisor.coordinator_log() or None
-        )
+        raise WorkerError(f"the coordinator ended with exit code {code}", evidence=supervisor.coordinator_log() or None)
 
 
 def _print_summary(summary: dict[str, Any], directory: Path, *, as_json: bool) -> None:

@@ -31,7 +31,7 @@ def run(directory: Path) -> None:
     ros.init()
     node = Coordinator(writer.plan, writer)
 
-    def drain(number: int, frame: FrameType | None) -> None:
+    def drain(_number: int, _frame: FrameType | None) -> None:
         node.drain()
 
     signal.signal(signal.SIGINT, drain)

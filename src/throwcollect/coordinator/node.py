@@ -65,9 +65,7 @@ class Coordinator(Node):
         self._draining = False
         self._last_simulation_seen = time.monotonic()
         joints = self._config.task.end
-        self._controllers = tuple(
-            name for name in CONTROLLERS if name in {controller_of(joint) for joint in joints}
-        )
+        self._controllers = tuple(name for name in CONTROLLERS if name in {controller_of(joint) for joint in joints})
         self._progress = self.create_publisher(String, PROGRESS_TOPIC, PROGRESS_QOS)
         self.create_timer(_DISCOVERY_PERIOD_S, self._discover)
         self.create_timer(_REPORT_PERIOD_S, self.report)
@@ -194,4 +192,3 @@ class Coordinator(Node):
             self._setups.pop(number)
             self._writer.append_lost(number, "; ".join(reasons))
             self._outcomes[Outcome.LOST.value] += 1
-

@@ -22,9 +22,7 @@ def checked_plan(config: Config, *, directory: Path) -> Plan:
         ConfigError: If the sweep cannot be drawn, or no trial is left.
     """
     feasibility = Feasibility(config)
-    return make_plan(
-        config, check=lambda trial: feasibility.check(trial, throw_trajectory(trial)), directory=directory
-    )
+    return make_plan(config, check=lambda trial: feasibility.check(trial, throw_trajectory(trial)), directory=directory)
 
 
 def prepare(config: Config, directory: Path, *, sweep_directory: Path) -> Plan:

@@ -7,14 +7,14 @@ from typing import Any
 
 from throwcollect.coordinator.goals import TrialGoals
 from throwcollect.interfaces import get_message, get_service
-from throwcollect.ros import Node, Parameter, QoSProfile
+from throwcollect.ros import Future, Node, Parameter, QoSProfile
 from throwcollect.ros.action import ActionClient
 from throwcollect.ros.qos import HistoryPolicy, ReliabilityPolicy
 
 ResetSimulation: Any = get_service("simulation_interfaces/srv/ResetSimulation")
 SetParametersAtomically: Any = get_service("rcl_interfaces/srv/SetParametersAtomically")
 UInt8MultiArray: Any = get_message("std_msgs/msg/UInt8MultiArray")
-FOLLOW_JOINT_TRAJECTORY = "control_msgs/action/FollowJointTrajectory"
+_OK = get_message("simulation_interfaces/msg/Result").RESULT_OK
 
 EPISODE_TOPIC = "episode"
 EPISODE_QOS = QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy.RELIABLE)
@@ -49,9 +49,7 @@ class SimulationClient:
         self._on_refusal = on_refusal
         self._generation = 0
         name = namespace.strip("/")
-        self._parameters = node.create_client(
-            SetParametersAtomically, f"{namespace}/{name}/set_parameters_atomically"
-        )
+        self._parameters = node.create_client(SetParametersAtomically, f"{namespace}/{name}/set_parameters_atomically")
         self._reset = node.create_client(ResetSimulation, f"{namespace}/reset_simulation")
         self._actions = {
             controller: ActionClient(node, action_type, f"{namespace}/{controller}/follow_joint_trajectory")
@@ -86,29 +84,22 @@ class SimulationClient:
             goals: Joint trajectory goals.
         """
         self._generation += 1
-        generation = self._generation
         parameters = [
             Parameter("trial.number", value=trial),
             Parameter("trial.controllers", value=list(goals.controllers)),
             *(Parameter(key, value=float(value)) for key, value in physics.items()),
         ]
         request = SetParametersAtomically.Request(parameters=[item.to_parameter_msg() for item in parameters])
-        self._parameters.call_async(request).add_done_callback(
-            lambda future: self._check(
-                generation, future.result().result.successful, f"parameters: {future.result().result.reason}"
-            )
+        self._expect(
+            self._parameters.call_async(request),
+            lambda response: None if response.result.successful else f"parameters: {response.result.reason}",
         )
-        self._reset.call_async(ResetSimulation.Request(scope=ResetSimulation.Request.SCOPE_ALL)).add_done_callback(
-            lambda future: self._check(
-                generation, future.result().result.result == 1, f"reset: {future.result().result.error_message}"
-            )
+        self._expect(
+            self._reset.call_async(ResetSimulation.Request(scope=ResetSimulation.Request.SCOPE_ALL)),
+            lambda response: None if response.result.result == _OK else f"reset: {response.result.error_message}",
         )
         for controller, goal in zip(goals.controllers, goals.goals, strict=True):
-            self._actions[controller].send_goal_async(goal).add_done_callback(
-                lambda future, controller=controller: self._check(
-                    generation, future.result().accepted, f"{controller} refused the goal; its log says why"
-                )
-            )
+            self._expect(self._actions[controller].send_goal_async(goal), _refusal_of(controller))
 
     def abandon(self) -> None:
         """Forget the running trial: late answers to it are ignored."""
@@ -124,6 +115,17 @@ class SimulationClient:
         self._node.destroy_client(self._reset)
         self._node.destroy_client(self._parameters)
 
-    def _check(self, generation: int, successful: bool, reason: str) -> None:
-        if generation == self._generation and not successful:
-            self._on_refusal(self.namespace, reason)
+    def _expect(self, answer: Future, refusal: Callable[[Any], str | None]) -> None:
+        """Report a refusal, unless the trial that it concerns is over by then."""
+        generation = self._generation
+
+        def check(future: Future) -> None:
+            reason = refusal(future.result())
+            if generation == self._generation and reason is not None:
+                self._on_refusal(self.namespace, reason)
+
+        answer.add_done_callback(check)
+
+
+def _refusal_of(controller: str) -> Callable[[Any], str | None]:
+    return lambda handle: None if handle.accepted else f"{controller} refused the goal; its log says why"

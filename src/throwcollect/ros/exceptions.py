@@ -5,23 +5,23 @@ from __future__ import annotations
 from throwcollect.errors import ThrowcollectError
 
 
-class NotInitializedException(ThrowcollectError):  # noqa: N818 - rclpy's name
+class NotInitializedException(ThrowcollectError):
     """A node was made, or a context used, before `init` or after `shutdown`."""
 
 
-class ExternalShutdownException(ThrowcollectError):  # noqa: N818
+class ExternalShutdownException(ThrowcollectError):
     """The context was shut down while an executor was spinning."""
 
 
-class InvalidHandle(ThrowcollectError):  # noqa: N818
+class InvalidHandle(ThrowcollectError):
     """A publisher, client or the like was used after it, or the session, was closed."""
 
 
-class NameValidationException(ThrowcollectError):  # noqa: N818
+class NameValidationException(ThrowcollectError):
     """Name of a node, namespace, topic, service or parameter that ROS does not allow."""
 
 
-class ParameterException(ThrowcollectError):  # noqa: N818
+class ParameterException(ThrowcollectError):
     """Root of the errors about parameters."""
 
 

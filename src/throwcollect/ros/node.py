@@ -121,7 +121,7 @@ class Node(NodeParameters, NodeGraph):
         """Absolute name."""
         return join(self._namespace, self._name)
 
-    def get_clock(self) -> Clock:
+    def get_clock(self) -> ROSClock:
         """Clock of the node: ROS time."""
         return self._clock
 

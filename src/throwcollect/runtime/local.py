@@ -83,7 +83,7 @@ class LocalRuntime:
                     stderr=subprocess.STDOUT,
                     env=self._environment,
                     start_new_session=True,
-                    preexec_fn=_die_with_parent,
+                    preexec_fn=_die_with_parent,  # noqa: PLW1509 - it calls nothing that takes a lock
                 )
         except OSError as error:
             raise WorkerError(f"{name}: cannot be started: {error}") from error

@@ -7,7 +7,14 @@ from collections.abc import Hashable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.control import ControllerParameters, GoalResult, JointState, JointTrajectoryController, Trajectory, TrajectoryGoal
+from throwcollect.control import (
+    ControllerParameters,
+    GoalResult,
+    JointState,
+    JointTrajectoryController,
+    Trajectory,
+    TrajectoryGoal,
+)
 from throwcollect.episode.record import ControllerSamples
 
 _LOCKED_TOLERANCE_RAD = 1e-6

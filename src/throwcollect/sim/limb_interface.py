@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from typing import Any
 
 from throwcollect.control import GoalResult, GoalStatus, JointTolerance, Trajectory, TrajectoryGoal, TrajectoryPoint
@@ -36,7 +37,7 @@ class LimbInterface:
         self._count = 0
         self._keys: dict[bytes, int] = {}
         self._handles: dict[int, Any] = {}
-        self._results: dict[int, Future] = {}
+        self._results: dict[Hashable, Future] = {}
         self._server = ActionServer(
             node,
             FollowJointTrajectory,

@@ -34,7 +34,7 @@ def run(config: Path, *, name: str) -> None:
     executor.add_node(node)
     stopped = False
 
-    def stop(number: int, frame: FrameType | None) -> None:
+    def stop(_number: int, _frame: FrameType | None) -> None:
         nonlocal stopped
         stopped = True
         executor.wake()

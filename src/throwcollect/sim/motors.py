@@ -12,7 +12,6 @@ from throwcollect.config.schema import Config
 from throwcollect.robots.model import joint_limits
 from throwcollect.robots.talos import JOINTS
 
-
 Aim = tuple[list[float], list[float], list[float]]
 """What matters to the motors in one step, one number a moving joint: the position wanted at its beginning [rad], the
 velocity that leads from there to the target [rad/s], and the target, the position wanted at its end [rad]."""

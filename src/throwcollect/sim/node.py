@@ -15,6 +15,7 @@ from throwcollect.errors import ConfigError
 from throwcollect.interfaces import get_message
 from throwcollect.robots.description import full_description
 from throwcollect.ros import Node, QoSProfile, Time
+from throwcollect.ros.publisher import Publisher
 from throwcollect.ros.qos import DurabilityPolicy, HistoryPolicy
 from throwcollect.sim.limb_interface import LimbInterface
 from throwcollect.sim.simulation import Simulation, State, TrialSetup

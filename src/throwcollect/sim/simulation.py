@@ -1,7 +1,7 @@
 """One simulation without its ROS interface: the world, the limbs' controllers, the clock, and the present run.
 
-A *run* begins when goals have been accepted and ends with the trial, or, when no trial was set up, when all limbs are at
-rest again. The clock stands still outside of runs, so that no step is wasted.
+A *run* begins when goals have been accepted and ends with the trial, or, when no trial was set up, when all limbs are
+at rest again. The clock stands still outside of runs, so that no step is wasted.
 """
 
 from __future__ import annotations

@@ -58,7 +58,7 @@ class SimulationControl:
         ):
             node.create_service(service, name, callback)
 
-    def _get_features(self, request: Any, response: Any) -> Any:
+    def _get_features(self, _request: Any, response: Any) -> Any:
         response.features.features = [getattr(Features, name) for name in _FEATURES]
         response.features.custom_info = (
             f"throwcollect {throwcollect.__version__}; one step is one physics step of "
@@ -66,7 +66,7 @@ class SimulationControl:
         )
         return response
 
-    def _get_state(self, request: Any, response: Any) -> Any:
+    def _get_state(self, _request: Any, response: Any) -> Any:
         response.state.state = int(self._simulation.state)
         response.result.result = Result.RESULT_OK
         return response
@@ -88,7 +88,9 @@ class SimulationControl:
     def _reset(self, request: Any, response: Any) -> Any:
         if request.scope not in (ResetSimulation.Request.SCOPE_DEFAULT, ResetSimulation.Request.SCOPE_ALL):
             return _refuse(
-                response, Result.RESULT_FEATURE_UNSUPPORTED, f"scope {request.scope}: only DEFAULT and ALL are supported"
+                response,
+                Result.RESULT_FEATURE_UNSUPPORTED,
+                f"scope {request.scope}: only DEFAULT and ALL are supported",
             )
         self._simulation.reset()
         response.result.result = Result.RESULT_OK

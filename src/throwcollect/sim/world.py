@@ -47,7 +47,11 @@ class World:
 
     _ball: int
     _settled: Row
-    _settled_pressing: frozenset[Surface]
+    _settled_pressing: set[Surface]
+    _pressing: set[Surface]
+    _sampled_target: Sequence[float]
+    _rows: list[Row]
+    _forgotten: int
 
     def __init__(self, config: Config) -> None:
         self._client = connect()
@@ -250,7 +254,7 @@ class World:
             pybullet.stepSimulation(physicsClientId=client)
         self._settled = self._read()
         points = pybullet.getContactPoints(self._ball, physicsClientId=client)
-        self._settled_pressing: set[Surface] = {point[2:5:2] for point in points if point[9] > 0}
+        self._settled_pressing = {point[2:5:2] for point in points if point[9] > 0}
 
     def _place(self, row: Row) -> None:
         """Put robot and ball into a state, leaving nothing behind of what went on before.

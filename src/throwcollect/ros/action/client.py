@@ -15,6 +15,7 @@ from throwcollect.ros.task import Future
 
 if TYPE_CHECKING:
     from throwcollect.ros.node import Node
+    from throwcollect.ros.subscription import Subscription
 
 _UUID = get_message("unique_identifier_msgs/msg/UUID")
 _GoalStatusArray = get_message("action_msgs/msg/GoalStatusArray")
@@ -31,7 +32,17 @@ class ClientGoalHandle:
         self.goal_id = goal_id
         self.accepted: bool = response.accepted
         self.stamp: Message = response.stamp
-        self.status: int = GoalStatus.STATUS_UNKNOWN
+        self._status: int = GoalStatus.STATUS_UNKNOWN
+
+    @property
+    def status(self) -> int:
+        """State of the goal, as far as the server has told; asking for it is what makes the client listen."""
+        self._client.listen_to_status()
+        return self._status
+
+    def update(self, status: int) -> None:
+        """Take over the state that the server tells."""
+        self._status = status
 
     def get_result_async(self) -> Future:
         """Ask for the result.
@@ -53,6 +64,9 @@ class ClientGoalHandle:
 class ActionClient:
     """Sends goals.
 
+    A client subscribes to feedback when it is first given a callback for it, and to the status when a goal's status is
+    first asked for: servers then spare messages that nobody looks at.
+
     Args:
         node: Node that the client belongs to.
         action_type: Class of the action.
@@ -68,14 +82,12 @@ class ActionClient:
         self._goal_client = node.create_client(protocol.SendGoalService, f"{prefix}/send_goal")
         self._cancel_client = node.create_client(_CancelGoal, f"{prefix}/cancel_goal")
         self._result_client = node.create_client(protocol.GetResultService, f"{prefix}/get_result")
-        feedback, status = f"{prefix}/feedback", f"{prefix}/status"
-        self._subscriptions = [
-            node.create_subscription(protocol.FeedbackMessage, feedback, self._on_feedback, QoSProfile(depth=10)),
-            node.create_subscription(_GoalStatusArray, status, self._on_status, qos_profile_action_status_default),
-        ]
+        self._feedback_topic, self._status_topic = f"{prefix}/feedback", f"{prefix}/status"
+        self._feedback: Subscription | None = None
+        self._status: Subscription | None = None
         self._topics = [
-            (node.resolve_topic_name(feedback), dds_type(protocol.FeedbackMessage.TYPE)),
-            (node.resolve_topic_name(status), dds_type(_GoalStatusArray.TYPE)),
+            (node.resolve_topic_name(self._feedback_topic), dds_type(protocol.FeedbackMessage.TYPE)),
+            (node.resolve_topic_name(self._status_topic), dds_type(_GoalStatusArray.TYPE)),
         ]
 
     def server_is_ready(self) -> bool:
@@ -121,6 +133,7 @@ class ActionClient:
         key = bytes(goal_id.uuid)
         if feedback_callback is not None:
             self._feedback_callbacks[key] = feedback_callback
+            self._listen_to_feedback()
 
         def handle(response: Message) -> ClientGoalHandle:
             goal_handle = ClientGoalHandle(self, goal_id, response)
@@ -151,8 +164,23 @@ class ActionClient:
         """Withdraw the client; what is pending stays so."""
         for client in (self._goal_client, self._cancel_client, self._result_client):
             self._node.destroy_client(client)
-        for subscription in self._subscriptions:
-            self._node.destroy_subscription(subscription)
+        for subscription in (self._feedback, self._status):
+            if subscription is not None:
+                self._node.destroy_subscription(subscription)
+
+    def listen_to_status(self) -> None:
+        """Hear of the states of goals from now on, the present ones included."""
+        if self._status is None:
+            self._status = self._node.create_subscription(
+                _GoalStatusArray, self._status_topic, self._on_status, qos_profile_action_status_default
+            )
+
+    def _listen_to_feedback(self) -> None:
+        if self._feedback is None:
+            feedback = self._action_type.Impl.FeedbackMessage
+            self._feedback = self._node.create_subscription(
+                feedback, self._feedback_topic, self._on_feedback, QoSProfile(depth=10)
+            )
 
     def _on_feedback(self, message: Message) -> Any:
         callback = self._feedback_callbacks.get(bytes(message.goal_id.uuid))
@@ -162,4 +190,4 @@ class ActionClient:
         for status in message.status_list:
             goal_handle = self._handles.get(bytes(status.goal_info.goal_id.uuid))
             if goal_handle is not None:
-                goal_handle.status = status.status
+                goal_handle.update(status.status)

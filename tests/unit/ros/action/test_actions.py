@@ -245,4 +245,14 @@ def test_actions_are_found_in_the_graph(rig, controller, client):
     assert get_action_names_and_types(node) == expected
     assert get_action_server_names_and_types_by_node(node, "server", "/") == expected
     assert get_action_server_names_and_types_by_node(node, "client", "/") == []
-    assert get_action_client_names_and_types_by_node(node, "client", "/") == expected
+    client.send_goal_async(goal("a"), feedback_callback=print)
+    assert rig.spin(lambda: get_action_client_names_and_types_by_node(node, "client", "/") == expected)
+
+
+def test_a_client_listens_to_what_it_uses_only(rig, controller, client):
+    node = rig.node("observer")
+    feedback, status = ("/arm/follow_joint_trajectory/_action/" + topic for topic in ("feedback", "status"))
+    _, theirs = rig.result(client.send_goal_async(goal("a"))), rig.result(client.send_goal_async(goal("b")))
+    assert (node.count_subscribers(feedback), node.count_subscribers(status)) == (0, 0)
+    assert rig.spin(lambda: theirs.status != GoalStatus.STATUS_UNKNOWN)
+    assert (node.count_subscribers(feedback), node.count_subscribers(status)) == (0, 1)
