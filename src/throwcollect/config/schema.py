@@ -199,7 +199,7 @@ class ThrowConfig(Section):
     """Duration of the motion (tau of a DMP)."""
     trajectory: Trajectory = MinimumJerk()
     """How the joints go from start to end."""
-    points_hz: Annotated[float, Field(ge=5, le=1000)] = 50.0
+    points_hz: Annotated[float, Field(ge=5, le=1000)] = 25.0
     """Points per second of the joint trajectories that are sent to the controllers (quintic between them)."""
     recatch_gap_s: Annotated[float, Field(ge=0, le=1)] = 0.02
     """The ball counts as released when it has been out of the spoon for this long."""

@@ -45,6 +45,10 @@ class Leases:
         """Whether every trial was completed or given up."""
         return self._ended == self._total
 
+    def upcoming(self, count: int) -> list[int]:
+        """The trials that will be handed out next, at most so many."""
+        return heapq.nsmallest(count, self._waiting)
+
     def held_by(self, simulation: str) -> int | None:
         """Trial that a simulation holds, or None."""
         return self._holders.get(simulation)

@@ -41,7 +41,9 @@ def run(directory: Path) -> None:
     started = time.monotonic()
     try:
         while not node.finished:
-            executor.spin_once(timeout_sec=0.0 if node.backlog else _IDLE_S)
+            # Simulations come first: what can wait is done when no message is there.
+            waiting = node.backlog or node.prepare_one()
+            executor.spin_once(timeout_sec=0.0 if waiting else _IDLE_S)
             if node.backlog:
                 node.write_one()
         node.report()

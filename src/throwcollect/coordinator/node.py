@@ -104,6 +104,18 @@ class Coordinator(Node):
         self._writer.append(episode, result)
         self._outcomes[result.outcome.value] += 1
 
+    def prepare_one(self) -> bool:
+        """Work out the next trial that will be leased and is not worked out yet, so that no simulation waits for it.
+
+        Returns:
+            Whether there was one.
+        """
+        for trial in self._leases.upcoming(len(self._simulations)):
+            if trial not in self._setups:
+                self._setups[trial] = self._setup(trial)
+                return True
+        return False
+
     def report(self) -> None:
         """Publish the progress."""
         now = time.monotonic()

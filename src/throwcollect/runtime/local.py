@@ -11,6 +11,7 @@ import time
 from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from throwcollect.errors import WorkerError
@@ -43,8 +44,11 @@ class NodeExit:
         return f"exit code {self.code}"
 
 
-def _die_with_parent() -> None:
+def _enter(core: int | None) -> None:
+    """What a child does before it becomes the node: it asks to die with its parent, and takes its core."""
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
+    if core is not None:
+        os.sched_setaffinity(0, {core})
 
 
 class LocalRuntime:
@@ -63,12 +67,13 @@ class LocalRuntime:
         self._environment = {**os.environ, **environment}
         self._processes: dict[str, subprocess.Popen[bytes]] = {}
 
-    def start(self, name: str, arguments: Sequence[str]) -> None:
+    def start(self, name: str, arguments: Sequence[str], *, core: int | None = None) -> None:
         """Start a node.
 
         Args:
             name: Its name; names the log file too.
             arguments: Arguments of the `throwcollect` command.
+            core: Processor core that it is bound to; None for any.
 
         Raises:
             WorkerError: If the process cannot be started or its log cannot be written.
@@ -83,7 +88,7 @@ class LocalRuntime:
                     stderr=subprocess.STDOUT,
                     env=self._environment,
                     start_new_session=True,
-                    preexec_fn=_die_with_parent,  # noqa: PLW1509 - it calls nothing that takes a lock
+                    preexec_fn=partial(_enter, core),  # noqa: PLW1509 - it calls nothing that takes a lock
                 )
         except OSError as error:
             raise WorkerError(f"{name}: cannot be started: {error}") from error

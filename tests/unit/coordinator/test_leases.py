@@ -65,3 +65,12 @@ def test_every_trial_ends_exactly_once(actions: list[tuple[str, str]], retries: 
         for simulation in "abcd":
             act(simulation, "complete")
     assert sorted(ended) == list(range(6))
+
+
+def test_upcoming_trials_are_those_that_are_handed_out_next() -> None:
+    leases = Leases(range(5), retries=1)
+    leases.lease("a")
+    leases.lease("b")
+    leases.fail("a", "killed")
+    assert leases.upcoming(3) == [0, 2, 3]
+    assert [leases.lease("a"), leases.lease("c")] == [0, 2]

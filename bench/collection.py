@@ -1,0 +1,111 @@
+"""`throwcollect up` in steady state: throws per second, and where processor time and memory go."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import psutil
+
+from throwcollect.coordinator.progress import Progress, ProgressListener
+from throwcollect.dataset.writer import create
+from throwcollect.runtime.supervisor import Supervisor
+from throwcollect.sweep.plan import Plan
+
+ROLES = ("sim", "router", "coordinator")
+_POLL_S = 0.01
+
+
+@dataclass(frozen=True)
+class Collection:
+    """What one collection cost.
+
+    Attributes:
+        throws_per_s: In steady state: between a tenth and nine tenths of the trials.
+        cpu_ms_per_throw: Processor time of each role in that span, for one throw [ms].
+        memory_mb: Largest resident memory of a process of each role [MB].
+        bytes_per_throw: Size of the recordings on disk, for one throw.
+        first_throw_s: From the start of the nodes to the end of the first throws [s].
+    """
+
+    throws_per_s: float
+    cpu_ms_per_throw: dict[str, float]
+    memory_mb: dict[str, float]
+    bytes_per_throw: float
+    first_throw_s: float
+
+
+@dataclass(frozen=True)
+class _Mark:
+    time_s: float
+    ended: int
+    cpu_s: dict[str, float]
+
+
+class _Watch:
+    """Follows one collection from the outside."""
+
+    def __init__(self, supervisor: Supervisor, listener: ProgressListener, reports: list[Progress]) -> None:
+        self._supervisor = supervisor
+        self._listener = listener
+        self._reports = reports
+        names = supervisor.runtime.running()
+        self._nodes = {name: psutil.Process(supervisor.runtime.pid(name)) for name in names}
+
+    def until(self, ended: int) -> _Mark:
+        while not self._reports or self._reports[-1].ended < ended:
+            self._listener.spin(_POLL_S)
+            if self._supervisor.poll()[0] is not None:
+                raise RuntimeError(f"the collection ended early: {self._supervisor.coordinator_log()}")
+        return _Mark(time.monotonic(), self._reports[-1].ended, self._sum(lambda node: sum(node.cpu_times()[:2])))
+
+    def memory_mb(self) -> dict[str, float]:
+        return {
+            role: max(node.memory_info().rss / 1e6 for name, node in self._nodes.items() if name.startswith(role))
+            for role in ROLES
+        }
+
+    def finish(self) -> None:
+        while self._supervisor.poll()[0] is None:
+            self._listener.spin(_POLL_S)
+
+    def _sum(self, measure) -> dict[str, float]:
+        return {
+            role: sum(measure(node) for name, node in self._nodes.items() if name.startswith(role)) for role in ROLES
+        }
+
+
+def measure(plan: Plan, simulations: int) -> Collection:
+    """Collect all trials of a plan, as the command does, and watch the processes.
+
+    Args:
+        plan: The trials.
+        simulations: Number of simulations.
+    """
+    trials = sum(trial.refused is None for trial in plan.trials)
+    with tempfile.TemporaryDirectory(prefix="throwcollect-bench-") as scratch:
+        directory = Path(scratch) / "data"
+        create(directory, plan)
+        reports: list[Progress] = []
+        began = time.monotonic()
+        with Supervisor(directory, plan.config.run, simulations=simulations) as supervisor:
+            supervisor.start()
+            os.environ.update(supervisor.environment)
+            with ProgressListener(reports.append) as listener:
+                watch = _Watch(supervisor, listener, reports)
+                first = watch.until(1)
+                start, stop = watch.until(trials // 10), watch.until(trials * 9 // 10)
+                memory = watch.memory_mb()
+                watch.finish()
+        size = sum(path.stat().st_size for path in directory.glob("*.mcap"))
+    counted = stop.ended - start.ended
+    return Collection(
+        throws_per_s=counted / (stop.time_s - start.time_s),
+        cpu_ms_per_throw={role: (stop.cpu_s[role] - start.cpu_s[role]) / counted * 1e3 for role in ROLES},
+        memory_mb=memory,
+        bytes_per_throw=size / trials,
+        first_throw_s=first.time_s - began,
+    )
