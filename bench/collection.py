@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import tempfile
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,6 +25,7 @@ class Collection:
     Attributes:
         throws_per_s: In steady state: between a tenth and nine tenths of the trials.
         cpu_ms_per_throw: Processor time of each role in that span, for one throw [ms].
+        disk_ms_per_throw: What of the coordinator's was spent in the kernel, for files and network [ms].
         memory_mb: Largest resident memory of a process of each role [MB].
         bytes_per_throw: Size of the recordings on disk, for one throw.
         first_throw_s: From the start of the nodes to the end of the first throws [s].
@@ -33,6 +33,7 @@ class Collection:
 
     throws_per_s: float
     cpu_ms_per_throw: dict[str, float]
+    disk_ms_per_throw: float
     memory_mb: dict[str, float]
     bytes_per_throw: float
     first_throw_s: float
@@ -43,6 +44,7 @@ class _Mark:
     time_s: float
     ended: int
     cpu_s: dict[str, float]
+    kernel_s: dict[str, float]
 
 
 class _Watch:
@@ -60,7 +62,12 @@ class _Watch:
             self._listener.spin(_POLL_S)
             if self._supervisor.poll()[0] is not None:
                 raise RuntimeError(f"the collection ended early: {self._supervisor.coordinator_log()}")
-        return _Mark(time.monotonic(), self._reports[-1].ended, self._sum(lambda node: sum(node.cpu_times()[:2])))
+        return _Mark(
+            time.monotonic(),
+            self._reports[-1].ended,
+            self._sum(lambda node: sum(node.cpu_times()[:2])),
+            self._sum(lambda node: node.cpu_times().system),
+        )
 
     def memory_mb(self) -> dict[str, float]:
         return {
@@ -78,33 +85,33 @@ class _Watch:
         }
 
 
-def measure(plan: Plan, simulations: int) -> Collection:
+def measure(plan: Plan, simulations: int, directory: Path) -> Collection:
     """Collect all trials of a plan, as the command does, and watch the processes.
 
     Args:
         plan: The trials.
         simulations: Number of simulations.
+        directory: Where the dataset is left.
     """
     trials = sum(trial.refused is None for trial in plan.trials)
-    with tempfile.TemporaryDirectory(prefix="throwcollect-bench-") as scratch:
-        directory = Path(scratch) / "data"
-        create(directory, plan)
-        reports: list[Progress] = []
-        began = time.monotonic()
-        with Supervisor(directory, plan.config.run, simulations=simulations) as supervisor:
-            supervisor.start()
-            os.environ.update(supervisor.environment)
-            with ProgressListener(reports.append) as listener:
-                watch = _Watch(supervisor, listener, reports)
-                first = watch.until(1)
-                start, stop = watch.until(trials // 10), watch.until(trials * 9 // 10)
-                memory = watch.memory_mb()
-                watch.finish()
-        size = sum(path.stat().st_size for path in directory.glob("*.mcap"))
+    create(directory, plan)
+    reports: list[Progress] = []
+    began = time.monotonic()
+    with Supervisor(directory, plan.config.run, simulations=simulations) as supervisor:
+        supervisor.start()
+        os.environ.update(supervisor.environment)
+        with ProgressListener(reports.append) as listener:
+            watch = _Watch(supervisor, listener, reports)
+            first = watch.until(1)
+            start, stop = watch.until(trials // 10), watch.until(trials * 9 // 10)
+            memory = watch.memory_mb()
+            watch.finish()
+    size = sum(path.stat().st_size for path in directory.glob("*.mcap"))
     counted = stop.ended - start.ended
     return Collection(
         throws_per_s=counted / (stop.time_s - start.time_s),
         cpu_ms_per_throw={role: (stop.cpu_s[role] - start.cpu_s[role]) / counted * 1e3 for role in ROLES},
+        disk_ms_per_throw=(stop.kernel_s["coordinator"] - start.kernel_s["coordinator"]) / counted * 1e3,
         memory_mb=memory,
         bytes_per_throw=size / trials,
         first_throw_s=first.time_s - began,

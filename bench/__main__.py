@@ -1,0 +1,78 @@
+"""`python -m bench`: the tables of docs/benchmarks.md, measured on this machine, and `build/bench.json`."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import statistics
+import tempfile
+from dataclasses import asdict
+from pathlib import Path
+
+from bench import collection, intake, raw
+from throwcollect.config.loader import load
+from throwcollect.sweep.plan import make_plan
+
+CONFIG = Path(__file__).parents[1] / "configs" / "quickstart.yaml"
+RESULT = Path("build/bench.json")
+
+
+def main() -> None:
+    """Measure the raw loop and the collection in turns, as the machine's speed drifts, and print medians."""
+    parser = argparse.ArgumentParser(prog="python -m bench", description=__doc__)
+    parser.add_argument("--rounds", type=int, default=3, help="measurements of each kind [%(default)s]")
+    parser.add_argument("--trials", type=int, default=400, help="throws of each collection [%(default)s]")
+    arguments = parser.parse_args()
+    cores = len(os.sched_getaffinity(0))
+    plan = make_plan(load(CONFIG, [f"trials={arguments.trials}"]))
+    report: dict[str, object] = {"cores": cores, "trials": arguments.trials, "rounds": arguments.rounds}
+    with tempfile.TemporaryDirectory(prefix="throwcollect-bench-") as scratch:
+        for simulations in sorted({1, cores}):
+            rounds = []
+            for index in range(arguments.rounds):
+                limit = raw.measure(plan, simulations, arguments.trials // 4)
+                found = collection.measure(plan, simulations, Path(scratch) / f"{simulations}-{index}")
+                rounds.append({"raw_throws_per_s": limit, "ratio": found.throws_per_s / limit, **asdict(found)})
+            report[f"n={simulations}"] = rounds
+            _print_table(simulations, rounds)
+        episodes = [intake.measure(Path(scratch) / "1-0") for _ in range(arguments.rounds)]
+    report["intake_episodes_per_s"] = episodes
+    print(f"\ncoordinator takes in {statistics.median(episodes):.0f} episodes/s (unpack, judge, append; one thread)")
+    RESULT.parent.mkdir(exist_ok=True)
+    RESULT.write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")
+    print(f"all numbers: {RESULT}")
+
+
+def _print_table(simulations: int, rounds: list[dict]) -> None:
+    def median(*keys: str) -> float:
+        values = rounds
+        for key in keys:
+            values = [value[key] for value in values]
+        return statistics.median(values)
+
+    plural = "s" if simulations > 1 else ""
+    print(f"\n## {simulations} simulation{plural}, medians of {len(rounds)}\n")
+    print("| what | |\n|---|---|")
+    print(f"| raw pybullet loop, {simulations} at once | {median('raw_throws_per_s'):.1f} throws/s |")
+    print(f"| `throwcollect up -n {simulations}` | {median('throws_per_s'):.1f} throws/s |")
+    print(f"| ratio | {median('ratio'):.2f} |")
+    spent = {role: median("cpu_ms_per_throw", role) for role in collection.ROLES}
+    physics = simulations * 1e3 / median("raw_throws_per_s")
+    parts = {
+        "physics, as in the raw loop": physics,
+        "controllers, ROS and encoding in the simulation": spent["sim"] - physics,
+        "router": spent["router"],
+        "coordinator: judging, ROS": spent["coordinator"] - median("disk_ms_per_throw"),
+        "coordinator: kernel, disk and network": median("disk_ms_per_throw"),
+    }
+    for part, milliseconds in parts.items():
+        print(f"| {part} | {milliseconds:.1f} ms a throw ({milliseconds / sum(parts.values()):.0%}) |")
+    for role in collection.ROLES:
+        print(f"| memory of a {role} | {median('memory_mb', role):.0f} MB |")
+    print(f"| recordings | {median('bytes_per_throw') / 1e3:.0f} kB a throw |")
+    print(f"| start of the nodes to the first throw | {median('first_throw_s'):.1f} s |", flush=True)
+
+
+if __name__ == "__main__":
+    main()

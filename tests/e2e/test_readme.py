@@ -1,0 +1,53 @@
+"""What the README shows is true."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from tests.e2e.collection import collect
+from throwcollect.config.loader import load
+
+pytestmark = pytest.mark.e2e
+ROOT = Path(__file__).parents[2]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"```{language}\n(.*?)```", README, flags=re.DOTALL)
+
+
+def test_the_yaml_and_the_python_work(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (yaml,), (python,) = blocks("yaml"), blocks("python")
+    config = tmp_path / "throws.yaml"
+    config.write_text(yaml, encoding="utf-8")
+    assert load(config).trials == 2000
+    few = tmp_path / "few.yaml"
+    few.write_text(yaml.replace("trials: 2000", "trials: 2"), encoding="utf-8")
+    collect(few, tmp_path / "data", 1)
+    named = re.sub(r'Path\("datasets/[^"]*"\)', f"Path({str(tmp_path / 'data')!r})", python)
+    assert named != python
+    exec(named, {})  # noqa: S102
+    printed = capsys.readouterr().out
+    assert "landing_x_m" in printed
+    assert re.search(r"^1 \(\d+, 32\) \[", printed, flags=re.MULTILINE)
+
+
+def test_the_directory_is_as_drawn(tmp_path: Path) -> None:
+    drawn = set(re.findall(r"^[├└]── ([\w.]+)", README, flags=re.MULTILINE))
+    (yaml,) = blocks("yaml")
+    config = tmp_path / "quickstart.yaml"
+    config.write_text(yaml.replace("trials: 2000", "trials: 1").replace("name: throws", "name: quickstart"))
+    collect(config, tmp_path / "data", 1)
+    assert {path.name for path in (tmp_path / "data").iterdir()} == drawn
+
+
+def test_its_commands_exist() -> None:
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    for target in re.findall(r"^make (\w+)", README, flags=re.MULTILINE):
+        assert re.search(rf"^{target}:", makefile, flags=re.MULTILINE), target
+
+
+def test_its_links_lead_somewhere() -> None:
+    for link in re.findall(r"\]\(([^)#]+)\)", README):
+        assert (ROOT / link).exists(), link
