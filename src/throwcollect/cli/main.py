@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import errno
 import os
+import signal
 import sys
 import traceback
-from enum import Enum
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated
 
 import typer
+from typer.exceptions import TyperException
 
 import throwcollect
-from throwcollect.errors import ThrowcollectError
+from throwcollect.errors import Interrupted, ThrowcollectError
 
 app = typer.Typer(
     name="throwcollect",
@@ -25,28 +28,28 @@ dataset_app = typer.Typer(help="Look into datasets.", no_args_is_help=True)
 app.add_typer(dataset_app, name="dataset")
 
 
-class RuntimeName(str, Enum):
-    """Where nodes run."""
-
-    auto = "auto"
-    local = "local"
-
-
 ConfigArgument = Annotated[
-    Path, typer.Argument(metavar="CONFIG", help="YAML file of the collection.", show_default=True)
+    # Whether it can be read is found where it is read, and said there.
+    Path,
+    typer.Argument(metavar="CONFIG", help="YAML file of the collection.", show_default=True, readable=False),
 ]
 SetOption = Annotated[
     list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Replace a key of the file; may be repeated.")
 ]
-TrialsOption = Annotated[int | None, typer.Option("--trials", metavar="K", min=1, help="Number of trials.")]
+TrialsOption = Annotated[str | None, typer.Option("--trials", metavar="K", help="Number of trials.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON.")]
-DatasetArgument = Annotated[Path, typer.Argument(metavar="DIR", help="Directory of the dataset.")]
+DatasetArgument = Annotated[Path, typer.Argument(metavar="DIR", help="Directory of the dataset.", readable=False)]
 
 DEFAULT_CONFIG = Path("throwcollect.yaml")
 
 
-def _overrides(settings: list[str] | None, trials: int | None) -> list[str]:
-    return [*(settings or []), *([f"trials={trials}"] if trials else [])]
+_OUTPUT_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
+
+
+def _overrides(settings: list[str] | None, **options: str | None) -> list[str]:
+    """Options for single keys are overrides like any other, and so are their mistakes."""
+    named = (f"{key.replace('__', '.')}={value}" for key, value in options.items() if value is not None)
+    return [*(settings or []), *named]
 
 
 def _print_version(wanted: bool) -> None:
@@ -67,9 +70,13 @@ def _options(
 @app.command()
 def up(
     config: ConfigArgument = DEFAULT_CONFIG,
-    simulations: Annotated[int | None, typer.Option("-n", metavar="N", min=1, help="Number of simulations.")] = None,
+    simulations: Annotated[
+        str | None, typer.Option("-n", metavar="N", help="Number of simulations: run.simulations.")
+    ] = None,
     settings: SetOption = None,
-    runtime: Annotated[RuntimeName | None, typer.Option("--runtime", help="Where the nodes run.")] = None,
+    runtime: Annotated[
+        str | None, typer.Option("--runtime", metavar="auto|local", help="Where the nodes run: run.runtime.")
+    ] = None,
     output: Annotated[
         Path | None, typer.Option("--output", metavar="DIR", help="Directory of the dataset; must be new or empty.")
     ] = None,
@@ -79,14 +86,8 @@ def up(
     """Collect a dataset: start the simulations, run all trials, write the files."""
     from throwcollect.cli.up import collect
 
-    collect(
-        config,
-        overrides=_overrides(settings, trials),
-        simulations=simulations,
-        runtime=runtime.value if runtime else None,
-        output=output,
-        json=json,
-    )
+    overrides = _overrides(settings, trials=trials, run__simulations=simulations, run__runtime=runtime)
+    collect(config, overrides=overrides, output=output, json=json)
 
 
 @app.command()
@@ -102,7 +103,7 @@ def config(
     if schema:
         show_schema()
     else:
-        show_config(path, _overrides(settings, None), json=json)
+        show_config(path, _overrides(settings), json=json)
 
 
 @app.command()
@@ -115,7 +116,7 @@ def plan(
     """Print the trials without running them."""
     from throwcollect.cli.show import show_plan
 
-    show_plan(path, _overrides(settings, trials), json=json)
+    show_plan(path, _overrides(settings, trials=trials), json=json)
 
 
 @app.command()
@@ -183,25 +184,45 @@ def coordinator(directory: DatasetArgument) -> None:
 
 def main() -> None:
     """Entry point: run a command, print errors as messages, exit with their codes."""
+    # What cleans up after Ctrl-C does so after SIGTERM, too.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
-        app()
-        code = 0
-    except KeyboardInterrupt:
-        code = 130
-    except BrokenPipeError:
-        # Whoever reads our output has left; writing more, at exit, would fail again.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        code = 0
-    except ThrowcollectError as error:
-        typer.echo(f"throwcollect: {error}", err=True)
-        code = error.exit_code
+        code = app(prog_name="throwcollect", standalone_mode=False) or 0
+        if code == Interrupted.exit_code:
+            raise Interrupted("interrupted")
+        print(end="", flush=True)
+    except (BrokenPipeError, SystemExit) as end:
+        # Whoever reads our output has seen enough; Typer makes an exit of that.
+        code = 0 if BrokenPipeError in (type(end), type(end.__context__)) else 1
     except Exception as error:  # noqa: BLE001 - the one place where the unexpected becomes a message
         if os.environ.get("THROWCOLLECT_DEBUG"):
             traceback.print_exc()
-        typer.echo(
-            f"throwcollect: internal error: {type(error).__name__}: {error}\n"
-            "  try: THROWCOLLECT_DEBUG=1 shows where; please report it",
-            err=True,
-        )
-        code = 1
+        message, code = _told(error)
+        if message:
+            with suppress(OSError):
+                typer.echo(f"throwcollect: {message}", err=True)
+    _drop_what_cannot_be_written()
     sys.exit(code)
+
+
+def _told(error: Exception) -> tuple[str, int]:
+    """Message and exit code of an error."""
+    if isinstance(error, ThrowcollectError):
+        return str(error), error.exit_code
+    if isinstance(error, TyperException):
+        message = error.format_message()
+        command = getattr(getattr(error, "ctx", None), "command_path", "throwcollect")
+        # Without any argument, the help has been printed already.
+        return (f"{message}\n  try: {command} --help" if message else ""), error.exit_code
+    if isinstance(error, OSError) and error.errno in _OUTPUT_ERRORS and error.filename is None:
+        return f"the output cannot be written: {error.strerror}", 1
+    where = "  try: THROWCOLLECT_DEBUG=1 shows where; please report it"
+    return f"internal error: {type(error).__name__}: {error}\n{where}", 1
+
+
+def _drop_what_cannot_be_written() -> None:
+    """What standard output still holds would be written at exit, and fail there again."""
+    try:
+        print(end="", flush=True)
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)

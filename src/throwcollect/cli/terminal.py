@@ -11,6 +11,9 @@ from throwcollect.coordinator.progress import Progress
 
 _LINE_EVERY_S = 2.0
 
+_TEXT_COLUMNS = 72
+"""Width of everything beside the bar."""
+
 
 class Display(Protocol):
     """Shows the progress of a run; a context manager."""
@@ -27,12 +30,15 @@ class Display(Protocol):
     def say(self, line: str) -> None:
         """Show a line that stays."""
 
+    def warn(self, line: str) -> None:
+        """Show a line that stays, also where all else is silent."""
+
 
 def display(*, quiet: bool) -> Display:
     """The display that fits where standard error goes.
 
     Args:
-        quiet: Show nothing but lines that are said.
+        quiet: Show nothing but warnings.
     """
     if sys.stderr.isatty() and not quiet:
         return _Bar()
@@ -65,12 +71,16 @@ class _Lines:
 
     def update(self, progress: Progress) -> None:
         now = time.monotonic()
-        if self._quiet or (now < self._next and progress.ended < progress.total):
+        if now < self._next and progress.ended < progress.total:
             return
         self._next = now + _LINE_EVERY_S
         self.say(f"{progress.ended}/{progress.total} throws: {counts(progress)}")
 
     def say(self, line: str) -> None:
+        if not self._quiet:
+            self.warn(line)
+
+    def warn(self, line: str) -> None:
         print(line, file=sys.stderr, flush=True)
 
 
@@ -79,14 +89,14 @@ class _Bar:
         from rich import progress
         from rich.console import Console
 
+        console = Console(stderr=True)
         self._progress = progress.Progress(
-            progress.TextColumn("throws"),
-            progress.BarColumn(bar_width=24),
+            progress.BarColumn(bar_width=min(max(console.width - _TEXT_COLUMNS, 4), 40)),
             progress.MofNCompleteColumn(),
             progress.TextColumn("{task.description}"),
             progress.TextColumn("ETA"),
-            progress.TimeRemainingColumn(),
-            console=Console(stderr=True),
+            progress.TimeRemainingColumn(compact=True),
+            console=console,
         )
         self._task = self._progress.add_task("waiting for simulations", total=None)
 
@@ -103,4 +113,7 @@ class _Bar:
         self._progress.update(self._task, total=progress.total, completed=progress.ended, description=counts(progress))
 
     def say(self, line: str) -> None:
-        self._progress.console.print(line, markup=False, highlight=False)
+        self.warn(line)
+
+    def warn(self, line: str) -> None:
+        self._progress.console.print(line, markup=False, highlight=False, soft_wrap=True)

@@ -183,7 +183,7 @@ def interpolated(
             np.concatenate((waypoints.content[:1], waypoints.content)),
         )
     durations_ns = np.append(np.diff(waypoints.times_ns), 1)
-    if splines:
+    if splines and len(durations_ns) > 1:
         return _splines(waypoints, durations_ns)
     rows = np.minimum(np.arange(len(durations_ns)) + 1, len(durations_ns) - 1)
     if leads_in:

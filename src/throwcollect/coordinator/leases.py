@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import heapq
+from collections import deque
 from collections.abc import Iterable
+from itertools import islice
 
 
 class Leases:
@@ -18,11 +20,12 @@ class Leases:
     """
 
     def __init__(self, trials: Iterable[int], *, retries: int) -> None:
-        self._waiting = sorted(set(trials))
+        self._fresh = deque(sorted(set(trials)))
+        self._returned: list[int] = []
         self._retries = retries
         self._holders: dict[str, int] = {}
         self._failures: dict[int, list[str]] = {}
-        self._total = len(self._waiting)
+        self._total = len(self._fresh)
         self._ended = 0
 
     @property
@@ -47,7 +50,7 @@ class Leases:
 
     def upcoming(self, count: int) -> list[int]:
         """The trials that will be handed out next, at most so many."""
-        return heapq.nsmallest(count, self._waiting)
+        return [*sorted(self._returned), *islice(self._fresh, count)][:count]
 
     def held_by(self, simulation: str) -> int | None:
         """Trial that a simulation holds, or None."""
@@ -67,9 +70,9 @@ class Leases:
         """
         if simulation in self._holders:
             raise ValueError(f"{simulation} still holds trial {self._holders[simulation]}")
-        if not self._waiting:
+        if not (self._returned or self._fresh):
             return None
-        trial = heapq.heappop(self._waiting)
+        trial = heapq.heappop(self._returned) if self._returned else self._fresh.popleft()
         self._holders[simulation] = trial
         return trial
 
@@ -103,5 +106,5 @@ class Leases:
         if len(reasons) > self._retries:
             self._ended += 1
             return trial, reasons
-        heapq.heappush(self._waiting, trial)
+        heapq.heappush(self._returned, trial)
         return None

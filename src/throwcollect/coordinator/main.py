@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import signal
 import time
 from pathlib import Path
@@ -38,6 +39,8 @@ def run(directory: Path) -> None:
     signal.signal(signal.SIGTERM, drain)
     executor = ros.SingleThreadedExecutor()
     executor.add_node(node)
+    # What is here now stays until the end; the garbage collector need not go through it again and again.
+    gc.freeze()
     started = time.monotonic()
     try:
         while not node.finished:

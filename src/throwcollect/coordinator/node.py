@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections import Counter, deque
 from collections.abc import Mapping
@@ -58,12 +59,15 @@ class Coordinator(Node):
         self._leases = Leases(self._trials, retries=self._config.run.retries)
         self._limits = joint_limits()
         self._simulations: dict[str, SimulationClient] = {}
+        self._discovered_changes = -1
         self._setups: dict[int, _Setup] = {}
         self._backlog: deque[tuple[Episode, _Setup]] = deque()
         self._outcomes: Counter[str] = Counter()
         self._ends: deque[tuple[float, int]] = deque([(time.monotonic(), 0)])
         self._draining = False
-        self._last_simulation_seen = time.monotonic()
+        # A simulation that is held back for onlookers needs its time, and is not lost.
+        slowed_s = self._config.sim.max_trial_s / (self._config.sim.real_time_factor or math.inf)
+        self._patience_s = self._config.run.trial_timeout_s + slowed_s
         joints = self._config.task.end
         self._controllers = tuple(name for name in CONTROLLERS if name in {controller_of(joint) for joint in joints})
         self._progress = self.create_publisher(String, PROGRESS_TOPIC, PROGRESS_QOS)
@@ -130,10 +134,23 @@ class Coordinator(Node):
             outcomes=dict(self._outcomes),
             simulations=len(self._simulations),
             throws_per_s=(ended - before) / (now - since) if now > since else 0.0,
+            hung=[name.strip("/") for name, simulation in self._simulations.items() if simulation.hung],
         )
         self._progress.publish(progress.message())
 
     def _discover(self) -> None:
+        changes = self.context.graph.changes
+        if changes != self._discovered_changes:
+            self._discovered_changes = changes
+            self._find_simulations()
+        now = time.monotonic()
+        for namespace, simulation in list(self._simulations.items()):
+            if now > simulation.deadline:
+                simulation.hung = True
+                self._take_back(namespace, f"no episode within {self._patience_s:g} s")
+            self._lease(namespace)
+
+    def _find_simulations(self) -> None:
         offered = {
             topic.removesuffix(f"/{EPISODE_TOPIC}")
             for topic, types in self.get_topic_names_and_types()
@@ -152,15 +169,10 @@ class Coordinator(Node):
         for namespace in self._simulations.keys() - offered:
             self._take_back(namespace, "left the ROS graph")
             self._simulations.pop(namespace).destroy()
-        now = time.monotonic()
-        for namespace, simulation in list(self._simulations.items()):
-            if now > simulation.deadline:
-                self._take_back(namespace, f"no episode within {self._config.run.trial_timeout_s:g} s")
-            self._lease(namespace)
 
     def _lease(self, namespace: str) -> None:
         simulation = self._simulations.get(namespace)
-        if simulation is None or self._draining or self._leases.held_by(namespace) is not None:
+        if simulation is None or simulation.hung or self._draining or self._leases.held_by(namespace) is not None:
             return
         if not simulation.ready():
             return
@@ -169,7 +181,7 @@ class Coordinator(Node):
             return
         setup = self._setups.get(trial) or self._setup(trial)
         self._setups[trial] = setup
-        simulation.deadline = time.monotonic() + self._config.run.trial_timeout_s
+        simulation.deadline = time.monotonic() + self._patience_s
         simulation.begin(trial, setup.physics, setup.goals)
 
     def _setup(self, number: int) -> _Setup:
@@ -186,6 +198,7 @@ class Coordinator(Node):
             self.get_logger().warning(f"{namespace}: unreadable episode: {error}")
             return
         trial = episode.header.trial
+        self._simulations[namespace].hung = False
         if not self._leases.complete(namespace, trial):
             self.get_logger().warning(f"{namespace}: trial {trial} came too late and was dropped")
             return

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from throwcollect.config.schema import Config
 from throwcollect.dataset.writer import create
+from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.robots.feasibility import Feasibility
 from throwcollect.sweep.plan import Plan, make_plan
 from throwcollect.tasks.trajectory import throw_trajectory
@@ -37,5 +38,9 @@ def prepare(config: Config, directory: Path, *, sweep_directory: Path) -> Plan:
         ConfigError: If the sweep or the directory cannot be used; nothing is left behind then.
     """
     plan = checked_plan(config, directory=sweep_directory)
-    create(directory, plan)
+    try:
+        create(directory, plan)
+    except DatasetError as error:
+        # Nothing has been started yet, so what is wrong is the choice of the directory.
+        raise ConfigError(error.message, hint=error.hint) from error
     return plan

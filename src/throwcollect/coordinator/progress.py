@@ -28,6 +28,7 @@ class Progress:
         outcomes: Number of written trials of each outcome.
         simulations: Number of simulations in the ROS graph.
         throws_per_s: Trials that ended per second of the last ten seconds.
+        hung: Names of the simulations that took too long for a trial and have not been heard of since.
     """
 
     total: int
@@ -35,6 +36,7 @@ class Progress:
     outcomes: dict[str, int]
     simulations: int
     throws_per_s: float
+    hung: list[str]
 
     @property
     def landed(self) -> int:

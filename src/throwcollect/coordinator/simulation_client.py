@@ -45,6 +45,8 @@ class SimulationClient:
         self.namespace = namespace
         self.deadline = float("inf")
         """Monotonic time [s] at which the running trial counts as lost."""
+        self.hung = False
+        """Whether a trial was lost that way and nothing has come from the simulation since."""
         self._node = node
         self._on_refusal = on_refusal
         self._generation = 0

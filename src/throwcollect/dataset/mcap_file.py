@@ -75,7 +75,7 @@ def episode_index(chunk: Chunk, indexes: Mapping[int, bytes]) -> records.ChunkIn
         chunk: The chunk.
         indexes: Message Index records that follow it, by channel.
     """
-    length = len(chunk.record())
+    length = chunk.record_size
     offsets, offset = {}, length
     for channel, index in indexes.items():
         offsets[channel] = offset

@@ -7,7 +7,7 @@ is finished, as that file is written last. While a dataset is filled, each open 
 
 from __future__ import annotations
 
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -53,16 +53,19 @@ def create(directory: Path, plan: Plan) -> None:
             expected="a directory that is new or empty",
             hint="choose another one with --output",
         )
-    try:
+    with ExitStack() as undo:
+        undo.callback(_clear, directory, remove=made)
         write_file(directory / CONFIG, resolved_yaml(plan.config).encode())
         plan.write(directory / PLAN)
-    except DatasetError:
-        with suppress(OSError):
-            for path in directory.iterdir():
-                path.unlink()
-            if made:
-                directory.rmdir()
-        raise
+        undo.pop_all()
+
+
+def _clear(directory: Path, *, remove: bool) -> None:
+    with suppress(OSError):
+        for path in directory.iterdir():
+            path.unlink()
+        if remove:
+            directory.rmdir()
 
 
 class _Finished(NamedTuple):

@@ -30,6 +30,8 @@ from throwcollect.errors import DatasetError
 _COMPRESSION = b"zstd"
 _CHUNK_HEADER = struct.Struct("<BQQQQII4sQ")
 """Opcode, length, start and end time, uncompressed size and CRC, length and name of the compression, data's length."""
+_PREFIX_BYTES = 9
+"""Opcode and length, which a record's length leaves out."""
 _MESSAGE_HEADER = struct.Struct("<BQHIQQ")
 """Opcode, length, channel, sequence, log time, publish time."""
 _MESSAGE_INDEX_HEADER = struct.Struct("<BQHI")
@@ -66,16 +68,23 @@ class Chunk:
 
     def record(self) -> bytes:
         """The MCAP Chunk record, with its opcode and length."""
-        return encode_records(
-            records.Chunk(
-                compression=_COMPRESSION.decode(),
-                data=self.data,
-                message_start_time=self.start_ns,
-                message_end_time=self.end_ns,
-                uncompressed_crc=self.crc,
-                uncompressed_size=self.uncompressed_size,
-            )
+        header = _CHUNK_HEADER.pack(
+            Opcode.CHUNK,
+            self.record_size - _PREFIX_BYTES,
+            self.start_ns,
+            self.end_ns,
+            self.uncompressed_size,
+            self.crc,
+            len(_COMPRESSION),
+            _COMPRESSION,
+            len(self.data),
         )
+        return header + self.data
+
+    @property
+    def record_size(self) -> int:
+        """Size of what `record` gives [bytes]."""
+        return _CHUNK_HEADER.size + len(self.data)
 
     @classmethod
     def parse(cls, record: bytes) -> Chunk:
@@ -90,7 +99,7 @@ class Chunk:
         if opcode != Opcode.CHUNK or (name_length, name) != (len(_COMPRESSION), _COMPRESSION):
             raise DatasetError("chunk: not the record of a chunk compressed with zstd")
         data = record[_CHUNK_HEADER.size :]
-        if stored != len(data) or length != len(record) - 9:
+        if stored != len(data) or length != len(record) - _PREFIX_BYTES:
             raise DatasetError(f"chunk: announces {stored} bytes of data; got {len(data)}")
         return cls(data, size, crc, start, end)
 

@@ -122,6 +122,9 @@ def as_numbers(value: Any, field: Field, where: str) -> NDArray[Any]:
         ValueError: If a number does not fit the type, or there are too many or too few.
     """
     dtype = DTYPES[field.type]
+    is_free = field.length is None and field.bound is None
+    if is_free and isinstance(value, np.ndarray) and value.dtype == dtype and value.ndim == 1 and value.flags.carray:
+        return value
     is_octets = isinstance(value, (bytes, bytearray))
     array = np.frombuffer(value, np.uint8).copy() if is_octets else np.asarray(value)
     if array.dtype != dtype:

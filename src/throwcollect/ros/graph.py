@@ -34,6 +34,8 @@ class Graph:
         self._unread: deque[tuple[bool, str]] = deque()
         self._tokens: dict[str, Token] = {}
         self._counts: Counter[tuple[EntityKind, str, str]] = Counter()
+        self.changes = 0
+        """Number of changes so far: while it stays the same, so does everything else here."""
         key = f"{PREFIX}/{domain}/**"
         handler = zenoh.handlers.Callback(self._on_change, indirect=False)
         self._subscriber = session.liveliness().declare_subscriber(key, handler, history=True)
@@ -44,6 +46,7 @@ class Graph:
     def _on_change(self, sample: zenoh.Sample) -> None:
         with self._changed:
             self._unread.append((sample.kind == zenoh.SampleKind.PUT, str(sample.key_expr)))
+            self.changes += 1
             if len(self._unread) > _MOST_UNREAD:
                 self._read()
             self._changed.notify_all()

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Literal
 
 from throwcollect.errors import ConfigError
-from throwcollect.robots.model import urdf_path
+from throwcollect.robots.model import half_sitting, joint_limits, urdf_path
 
 _GIB = 1024**3
 _SIMULATION_MEMORY_GIB = 0.3
@@ -72,10 +72,13 @@ def _pybullet() -> Check:
 
 def _robot() -> Check:
     try:
-        path = urdf_path()
-        return Check("robot", "ok", f"Talos of example-robot-data {version('example-robot-data')}, {path}")
-    except (ConfigError, PackageNotFoundError) as error:
-        return Check("robot", "problem", str(error).replace("\n", "; "))
+        joint_limits()
+        half_sitting()
+        return Check("robot", "ok", f"Talos of example-robot-data {version('example-robot-data')}, {urdf_path()}")
+    except PackageNotFoundError as error:
+        return Check("robot", "problem", str(error))
+    except ConfigError as error:
+        return Check("robot", "problem", "; try: ".join(filter(None, [error.message, error.hint])))
 
 
 class _UnixConnection(http.client.HTTPConnection):

@@ -19,6 +19,8 @@ from throwcollect.errors import WorkerError
 _PR_SET_PDEATHSIG = 1
 """prctl(2): the signal a process gets when its parent dies."""
 
+_LIBC = ctypes.CDLL(None)
+
 _LOG_TAIL_LINES = 40
 
 
@@ -46,7 +48,8 @@ class NodeExit:
 
 def _enter(core: int | None) -> None:
     """What a child does before it becomes the node: it asks to die with its parent, and takes its core."""
-    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
+    # By force: without router and simulations there is nothing that a coordinator could wait for.
+    _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     if core is not None:
         os.sched_setaffinity(0, {core})
 
@@ -119,6 +122,14 @@ class LocalRuntime:
                 return "".join(deque(log, _LOG_TAIL_LINES)).strip()
         except OSError:
             return ""
+
+    def said(self, name: str, line: str) -> bool:
+        """Whether a node of this name has ever printed a line."""
+        try:
+            with (self._logs / f"{name}.log").open(encoding="utf-8", errors="replace") as log:
+                return f"{line}\n" in log
+        except OSError:
+            return False
 
     def signal(self, name: str, number: signal.Signals) -> None:
         """Send a signal to a node; one that has ended is left alone."""

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import os
 import signal
 import socket
 import time
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from types import TracebackType
 
@@ -13,6 +15,7 @@ from throwcollect.config.schema import RunConfig
 from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.runtime.local import LocalRuntime, NodeExit
 
+_HOST = "127.0.0.1"
 _ROUTER = "router"
 _COORDINATOR = "coordinator"
 _FIRST_BACKOFF_S = 0.2
@@ -21,17 +24,24 @@ _DRAIN_S = 15.0
 """Time that a coordinator gets to finish its running trials after it was told to stop."""
 
 
-def _free_port(wanted: int) -> int:
-    with socket.socket() as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind(("127.0.0.1", wanted))
-        except OSError as error:
-            raise ConfigError(
-                f"run.router_port: port {wanted} of 127.0.0.1 cannot be used: {error.strerror}",
-                hint="--set run.router_port=0 takes a free one",
-            ) from error
-        return int(probe.getsockname()[1])
+_RESTARTS_BEFORE_READY = 1
+"""A node that has never worked will hardly do so at the tenth attempt."""
+_CONNECT_S = 0.1
+
+
+def _reserved_port(wanted: int) -> socket.socket:
+    """A socket that keeps a port until it is closed."""
+    probe = socket.socket()
+    probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        probe.bind((_HOST, wanted))
+    except OSError as error:
+        probe.close()
+        raise ConfigError(
+            f"run.router_port: port {wanted} of {_HOST} cannot be used: {error.strerror}",
+            hint="--set run.router_port=0 takes a free one",
+        ) from error
+    return probe
 
 
 class Supervisor:
@@ -54,10 +64,15 @@ class Supervisor:
         cores = sorted(os.sched_getaffinity(0))
         bound = simulations >= len(cores)
         self._cores = {name: cores[k % len(cores)] if bound else None for k, name in enumerate(self._simulations)}
-        self._restarts = dict.fromkeys(self._simulations, 0)
+        self._restarts = dict.fromkeys((_ROUTER, *self._simulations), 0)
         self._due: dict[str, float] = {}
-        self._given_up: list[NodeExit] = []
-        self.endpoint = f"tcp/127.0.0.1:{_free_port(run.router_port)}"
+        self._given_up: dict[str, NodeExit] = {}
+        self._ready: set[str] = set()
+        self._start_deadline = math.inf
+        self._hung: frozenset[str] = frozenset()
+        self._reserved = _reserved_port(run.router_port)
+        self._address: tuple[str, int] = self._reserved.getsockname()
+        self.endpoint = f"tcp/{_HOST}:{self._address[1]}"
         self.environment = {
             "ZENOH_CONFIG_OVERRIDE": f'mode="client";connect/endpoints=["{self.endpoint}"]',
             "ROS_DOMAIN_ID": str(run.domain_id),
@@ -73,6 +88,7 @@ class Supervisor:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        self._reserved.close()
         names = [name for name in self.runtime.running() if name != _ROUTER]
         self.runtime.stop(names)
         self.runtime.stop([_ROUTER])
@@ -83,73 +99,116 @@ class Supervisor:
         Raises:
             WorkerError: If a process cannot be started.
         """
-        self.runtime.start(_ROUTER, ["router", "--listen", self.endpoint])
-        for name in self._simulations:
-            self._start_simulation(name)
+        self._reserved.close()
+        self._start_deadline = time.monotonic() + self._run.start_timeout_s
+        for name in (_ROUTER, *self._simulations):
+            self._start(name)
         self.runtime.start(_COORDINATOR, ["coordinator", str(self._directory)])
 
-    def poll(self) -> tuple[int | None, list[NodeExit]]:
+    def router_answers(self) -> bool:
+        """Whether nodes can connect to the router by now."""
+        try:
+            socket.create_connection(self._address, _CONNECT_S).close()
+        except OSError:
+            return False
+        return True
+
+    def poll(self) -> tuple[NodeExit | None, list[str]]:
         """Look after the nodes: restart what died.
 
         Returns:
-            Exit code of the coordinator, None while it runs; and the nodes that were lost since the last call.
+            How the coordinator ended, None while it runs; and what happened to other nodes since the last call.
 
         Raises:
-            WorkerError: If the router was lost for good, or no simulation can be kept alive, with the evidence.
+            WorkerError: If no simulation was ready in time, or the router or all simulations are lost for good; with
+                the evidence.
         """
-        code = None
-        lost = []
+        end = None
+        news = []
+        self._ready |= {name for name in self._simulations if name not in self._ready and self._was_ready(name)}
         for node in self.runtime.exits():
             if node.name == _COORDINATOR:
-                code = node.code
-                continue
-            lost.append(node)
-            if node.name == _ROUTER:
-                self.runtime.start(_ROUTER, ["router", "--listen", self.endpoint])
+                end = node
             else:
-                self._schedule_restart(node)
+                fate = "is started again" if self._schedule_restart(node) else "is given up"
+                news.append(f"{node.name} was lost ({node.reason}) and {fate}")
         now = time.monotonic()
         for name in [name for name, due in self._due.items() if due <= now]:
             del self._due[name]
-            self._start_simulation(name)
-        if code is None and len(self._given_up) == len(self._simulations):
-            last = self._given_up[-1]
-            raise WorkerError(
-                f"no simulation can be kept alive; the last, {last.name}, was restarted "
-                f"{self._restarts[last.name]} times: {last.reason}",
-                evidence=last.log or None,
-                hint=f"look into {self._directory / 'logs'}",
-            )
-        return code, lost
+            self._start(name)
+        if end is None:
+            self._check_hope()
+        return end, news
 
-    def drain(self) -> int:
+    def replace(self, hung: Iterable[str]) -> None:
+        """End simulations by force that do not answer any more, so that they are started again.
+
+        Args:
+            hung: Names of all of which that is known; each is ended once until it is missing here again.
+        """
+        known, self._hung = self._hung, frozenset(hung)
+        for name in self._hung - known:
+            self.runtime.signal(name, signal.SIGKILL)
+
+    def drain(self, *, hurry: Callable[[], bool] = lambda: False) -> NodeExit | None:
         """Let the coordinator finish its running trials and close its files.
 
+        Args:
+            hurry: Asked again and again whether to end at once.
+
         Returns:
-            Its exit code.
+            How it ended; None when it had to be ended by force.
         """
         self.runtime.signal(_COORDINATOR, signal.SIGINT)
         deadline = time.monotonic() + _DRAIN_S
-        while time.monotonic() < deadline:
-            code, _ = self.poll()
-            if code is not None:
-                return code
+        while time.monotonic() < deadline and not hurry():
+            for node in self.runtime.exits():
+                if node.name == _COORDINATOR:
+                    return node
             time.sleep(0.02)
-        self.runtime.stop([_COORDINATOR])
-        return -signal.SIGTERM
+        self.runtime.stop([_COORDINATOR], grace_s=0.0)
+        return None
 
     def coordinator_log(self) -> str:
         """Last lines that the coordinator printed."""
         return self.runtime.log_tail(_COORDINATOR)
 
-    def _start_simulation(self, name: str) -> None:
-        arguments = ["sim", str(self._directory / "config.yaml"), "--name", name]
-        self.runtime.start(name, arguments, core=self._cores[name])
+    def _start(self, name: str) -> None:
+        if name == _ROUTER:
+            self.runtime.start(name, ["router", "--listen", self.endpoint])
+        else:
+            arguments = ["sim", str(self._directory / "config.yaml"), "--name", name]
+            self.runtime.start(name, arguments, core=self._cores[name])
 
-    def _schedule_restart(self, node: NodeExit) -> None:
+    def _was_ready(self, name: str) -> bool:
+        return self.runtime.said(name, f"{name} is ready")
+
+    def _schedule_restart(self, node: NodeExit) -> bool:
+        """Whether a node that ended will be started again."""
         count = self._restarts[node.name]
-        if count >= self._run.restarts:
-            self._given_up.append(node)
-            return
+        worked = node.name == _ROUTER or node.name in self._ready
+        if count >= (self._run.restarts if worked else min(_RESTARTS_BEFORE_READY, self._run.restarts)):
+            self._given_up[node.name] = node
+            return False
         self._restarts[node.name] = count + 1
         self._due[node.name] = time.monotonic() + min(_FIRST_BACKOFF_S * 2**count, _LONGEST_BACKOFF_S)
+        return True
+
+    def _check_hope(self) -> None:
+        hint = f"look into {self._directory / 'logs'}"
+        router = self._given_up.get(_ROUTER)
+        if router is not None or len(self._given_up) == len(self._simulations):
+            last = router or list(self._given_up.values())[-1]
+            restarts = self._restarts[last.name]
+            what = "the router" if router else f"no simulation can be kept alive; the last, {last.name},"
+            raise WorkerError(
+                f"{what} ended again after {restarts} restart{'' if restarts == 1 else 's'}: {last.reason}",
+                evidence=last.log or None,
+                hint=hint,
+            )
+        if not self._ready and time.monotonic() > self._start_deadline:
+            raise WorkerError(
+                f"no simulation was ready within {self._run.start_timeout_s:g} s (run.start_timeout_s)",
+                evidence=self.runtime.log_tail(self._simulations[0]) or None,
+                hint=hint,
+            )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Hashable
 from typing import Any
 
@@ -35,8 +36,10 @@ class LimbInterface:
         self._simulation = simulation
         self._controller = controller
         self._count = 0
+        self._told_ns = 0
+        self._considered: deque[int] = deque()
         self._keys: dict[bytes, int] = {}
-        self._handles: dict[int, Any] = {}
+        self._handles: dict[Hashable, Any] = {}
         self._results: dict[Hashable, Future] = {}
         self._server = ActionServer(
             node,
@@ -56,6 +59,13 @@ class LimbInterface:
         """Answer whoever waits for the result of a goal."""
         if (future := self._results.get(result.goal_id)) is not None:
             future.set_result(result)
+            # No feedback after the end, which may lie within the slice of time that has just passed.
+            self._handles.pop(result.goal_id, None)
+
+    @property
+    def heard(self) -> bool:
+        """Whether somebody listens to the controller's state or to its feedback."""
+        return self._wants_state or self._node.count_subscribers(self._feedback_topic) > 0
 
     @property
     def watched(self) -> bool:
@@ -68,7 +78,7 @@ class LimbInterface:
 
     @property
     def _wants_feedback(self) -> bool:
-        return bool(self._handles) and self._node.count_subscribers(self._feedback_topic) > 0
+        return bool(self._results) and self._node.count_subscribers(self._feedback_topic) > 0
 
     def publish_state(self) -> None:
         """Publish the controller's state, and the feedback of its goal, to whoever listens."""
@@ -87,7 +97,8 @@ class LimbInterface:
             )
             message.header.stamp.sec, message.header.stamp.nanosec = divmod(state.stamp_ns, _NS)
             self._states.publish(message)
-        if self._wants_feedback:
+        if self._wants_feedback and self._simulation.now_ns != self._told_ns:
+            self._told_ns = self._simulation.now_ns
             feedback = FollowJointTrajectory.Feedback(
                 joint_names=list(state.joint_names), desired=desired, actual=actual, error=error
             )
@@ -96,18 +107,23 @@ class LimbInterface:
                 handle.publish_feedback(feedback)
 
     def _consider(self, request: Any) -> GoalResponse:
-        # The controller takes the goal here, as it alone can tell whether it is acceptable; the handle follows at once.
+        # The controller takes the goal here, as it alone can tell whether it is acceptable. Its handle follows in the
+        # same order, but perhaps after the next goal, or after its own end.
         refusal = self._simulation.submit(self._controller, self._count + 1, _goal(request))
         if refusal is not None:
             self._node.get_logger().error(refusal)
             return GoalResponse.REJECT
         self._count += 1
+        # There is nothing to tell of a goal before time has passed.
+        self._told_ns = self._simulation.now_ns
+        self._considered.append(self._count)
+        self._results[self._count] = Future()
         return GoalResponse.ACCEPT
 
     def _accept(self, handle: Any) -> None:
-        self._keys[_uuid(handle)] = self._count
-        self._handles[self._count] = handle
-        self._results[self._count] = Future()
+        key = self._considered.popleft()
+        self._keys[_uuid(handle)] = key
+        self._handles[key] = handle
         handle.execute()
 
     def _cancel(self, handle: Any) -> CancelResponse:
@@ -119,7 +135,8 @@ class LimbInterface:
     async def _execute(self, handle: Any) -> Any:
         key = self._keys[_uuid(handle)]
         result: GoalResult = await self._results[key]
-        del self._keys[_uuid(handle)], self._results[key], self._handles[key]
+        del self._keys[_uuid(handle)], self._results[key]
+        self._handles.pop(key, None)
         if result.status == GoalStatus.SUCCEEDED:
             handle.succeed()
         elif result.status == GoalStatus.CANCELED:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import signal
 from pathlib import Path
 from types import FrameType
@@ -12,6 +13,10 @@ from throwcollect.sim.node import SimulationNode
 from throwcollect.sim.simulation import Simulation
 
 _IDLE_S = 1.0
+
+
+def _nothing() -> None:
+    """Work that makes an executor return from waiting."""
 
 
 def run(config: Path, *, name: str) -> None:
@@ -37,10 +42,13 @@ def run(config: Path, *, name: str) -> None:
     def stop(_number: int, _frame: FrameType | None) -> None:
         nonlocal stopped
         stopped = True
-        executor.wake()
+        executor.create_task(_nothing)
 
     signal.signal(signal.SIGINT, stop)
     signal.signal(signal.SIGTERM, stop)
+    # What is here now stays until the end; the garbage collector need not go through it again and again.
+    gc.freeze()
+    print(f"{name} is ready", flush=True)
     try:
         while not stopped and not node.quitting:
             if simulation.running:

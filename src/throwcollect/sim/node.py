@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from throwcollect.config.schema import Config
@@ -30,6 +31,8 @@ _WHOLE = QoSProfile(history=HistoryPolicy.KEEP_ALL)
 """Every episode reaches every subscriber, however slow it is."""
 
 _NO_LIMIT = 0.0
+_MOST_TRIALS = 10_000_000
+"""As many as a configuration may ask for; all of them start at times that fit into a stamp."""
 
 
 class SimulationNode(Node):
@@ -55,6 +58,9 @@ class SimulationNode(Node):
             for topic in Channels(_everything(config), description).recorded.values()
         ]
         self._interfaces = {name: LimbInterface(self, simulation, name) for name in simulation.limbs}
+        self._listened: list[tuple[Topic, Publisher]] = []
+        self._heard: list[LimbInterface] = []
+        self._noticed_changes = -1
         SimulationControl(self, simulation)
         # Last, as coordinators take its presence for that of the whole simulation.
         self._episodes = self.create_publisher(UInt8MultiArray, "episode", _WHOLE)
@@ -67,7 +73,8 @@ class SimulationNode(Node):
     @property
     def watched(self) -> bool:
         """Whether somebody listens to samples, states or feedback."""
-        return bool(self._listened()) or any(interface.watched for interface in self._interfaces.values())
+        self._notice_listeners()
+        return bool(self._listened) or any(interface.watched for interface in self._heard)
 
     def follow_up(self) -> None:
         """Tell the world what has happened since the last call: time, samples, feedback, results, the episode."""
@@ -75,24 +82,30 @@ class SimulationNode(Node):
         self.get_clock().set_ros_time_override(Time(nanoseconds=simulation.now_ns))
         for controller, result in simulation.pop_results():
             self._interfaces[controller].finish(result)
+        self._notice_listeners()
         self._publish_samples()
-        for interface in self._interfaces.values():
+        for interface in self._heard:
             interface.publish_state()
         if (episode := simulation.episode()) is not None:
             header, samples, states = episode
             self._episodes.publish(pack(header, self._encoder.encode(samples, states)))
 
     def _publish_samples(self) -> None:
-        listened = self._listened()
-        if not listened:
+        if not self._listened:
             return
         samples: Samples = self._simulation.fresh_samples()
         for index in range(len(samples)):
-            for topic, publisher in listened:
+            for topic, publisher in self._listened:
                 publisher.publish(encode_message(topic, samples, index, {}))
 
-    def _listened(self) -> list[tuple[Topic, Publisher]]:
-        return [(topic, publisher) for topic, publisher in self._live if publisher.get_subscription_count()]
+    def _notice_listeners(self) -> None:
+        """Find out who listens, if the graph has changed since the last time."""
+        changes = self.context.graph.changes
+        if changes == self._noticed_changes:
+            return
+        self._noticed_changes = changes
+        self._listened = [(topic, publisher) for topic, publisher in self._live if publisher.get_subscription_count()]
+        self._heard = [interface for interface in self._interfaces.values() if interface.heard]
 
     def _publish_latched(self, channels: Channels) -> None:
         self._latched = []
@@ -117,6 +130,9 @@ class SimulationNode(Node):
         values = {parameter.name: parameter.value for parameter in parameters}
         number = int(values.get("trial.number", setup.number))
         controllers = tuple(filter(None, values.get("trial.controllers", setup.controllers)))
+        if number >= _MOST_TRIALS:
+            reason = f"trial.number: should be below {_MOST_TRIALS}, got {number}"
+            return SetParametersResult(successful=False, reason=reason)
         if unknown := [name for name in controllers if name not in self._simulation.limbs]:
             return SetParametersResult(successful=False, reason=f"no controller {unknown[0]!r}")
         try:
@@ -124,8 +140,9 @@ class SimulationNode(Node):
         except ConfigError as error:
             return SetParametersResult(successful=False, reason=str(error))
         factor = values.get("sim.real_time_factor", _NO_LIMIT)
-        if factor < 0:
-            return SetParametersResult(successful=False, reason="sim.real_time_factor must not be negative")
+        if not 0 <= factor < math.inf:
+            reason = f"sim.real_time_factor: should be a finite number, 0 for no limit, got {factor}"
+            return SetParametersResult(successful=False, reason=reason)
         if "sim.real_time_factor" in values:
             self._simulation.real_time_factor = factor or None
         self._simulation.setup = TrialSetup(number, controllers, config)

@@ -23,8 +23,8 @@ from throwcollect.sim.recording import BallState
 from throwcollect.sim.world import World
 
 _NO_TRIAL = -1
-_SLICE_S = 0.25
-"""Simulated time between two looks at the inputs: about 10 ms of real time."""
+_SLICE_S = 0.5
+"""Simulated time between two looks at the inputs: about 20 ms of real time."""
 
 _WATCHED_SLICE_S = 0.05
 """The same while somebody watches: the period of action feedback, as upstream."""
@@ -101,13 +101,22 @@ class Simulation:
         return ("ball", self.config.robot.name)
 
     def set_state(self, state: State) -> None:
-        """Play, pause, stop or quit; stopping resets everything."""
+        """Play, pause, stop or quit; stopping resets everything.
+
+        Raises:
+            ConfigError: If there is no start state to go back to; the state is set all the same.
+        """
         self.state = state
         if state == State.STOPPED:
             self.reset()
 
     def reset(self) -> None:
-        """Put world, controllers and clock into the start state of the trial that is set up; goals are aborted."""
+        """Put world, controllers and clock into the start state of the trial that is set up; goals are aborted.
+
+        Raises:
+            ConfigError: If there is no such state; the clock stands still until another reset succeeds.
+        """
+        self._running = False
         setup = self.setup
         start_ns = 0 if setup.number < 0 else setup.config.trial_start_ns(setup.number)
         self.world.reset(setup.config, start_ns=start_ns)
@@ -117,7 +126,6 @@ class Simulation:
         self._collect_results()
         self._command = np.array([posture[joint] for joint in self.world.moving])
         self._goals = {}
-        self._running = False
         self._in_trial = setup.number >= 0
         self._published = 0
 
@@ -163,8 +171,11 @@ class Simulation:
             watched: Whether somebody wants to see it happen: slices are short then.
         """
         began, stamp = time.monotonic(), self.now_ns
-        short = watched or self.real_time_factor is not None
-        self.step(round((_WATCHED_SLICE_S if short else _SLICE_S) * self.config.sim.physics_hz))
+        # In slow motion slices are shorter still, so that the node answers while it waits.
+        slice_s = _WATCHED_SLICE_S * min(1.0, self.real_time_factor or 1.0)
+        if not watched and self.real_time_factor is None:
+            slice_s = _SLICE_S
+        self.step(max(1, round(slice_s * self.config.sim.physics_hz)))
         if self._in_trial and self.world.end_reason is not None:
             self._running = False
         elif not self._in_trial and not any(limb.moves for limb in self.limbs.values()):

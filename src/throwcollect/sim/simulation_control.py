@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import throwcollect
+from throwcollect.errors import ConfigError
 from throwcollect.interfaces import get_message, get_service
 from throwcollect.ros import Node
 from throwcollect.sim.recording import BallState
@@ -32,7 +34,9 @@ _FEATURES = (
     "STEP_SIMULATION_MULTIPLE",
 )
 _SETTABLE_STATES = (State.STOPPED, State.PLAYING, State.PAUSED, State.QUITTING)
-_MOST_STEPS = 10_000_000
+_MOST_STEPS = 100_000
+"""In one call, during which nothing else is answered: some seconds."""
+
 _UNIT_QUATERNION_TOLERANCE = 1e-3
 _LARGEST_COORDINATE_M = 1e3
 
@@ -81,7 +85,10 @@ class SimulationControl:
                 SetSimulationState.Response.ALREADY_IN_TARGET_STATE,
                 f"the simulation is {State(wanted).name} already",
             )
-        self._simulation.set_state(State(wanted))
+        try:
+            self._simulation.set_state(State(wanted))
+        except ConfigError as error:
+            return _refuse(response, SetSimulationState.Response.STATE_TRANSITION_ERROR, str(error))
         response.result.result = Result.RESULT_OK
         return response
 
@@ -92,14 +99,17 @@ class SimulationControl:
                 Result.RESULT_FEATURE_UNSUPPORTED,
                 f"scope {request.scope}: only DEFAULT and ALL are supported",
             )
-        self._simulation.reset()
+        try:
+            self._simulation.reset()
+        except ConfigError as error:
+            return _refuse(response, Result.RESULT_OPERATION_FAILED, str(error))
         response.result.result = Result.RESULT_OK
         return response
 
     def _step(self, request: Any, response: Any) -> Any:
         if self._simulation.state != State.PAUSED:
             return _refuse(
-                response, Result.RESULT_OPERATION_FAILED, "steps are taken while the simulation is paused only"
+                response, Result.RESULT_INCORRECT_STATE, "steps are taken while the simulation is paused only"
             )
         if request.steps > _MOST_STEPS:
             return _refuse(
@@ -150,6 +160,9 @@ class SimulationControl:
                 f"position {entity.position} m, quaternion of norm {norm:g}; wanted within "
                 f"{_LARGEST_COORDINATE_M:g} m and norm 1",
             )
+        twist = (*entity.linear_velocity, *entity.angular_velocity)
+        if not all(map(math.isfinite, twist)):
+            return _refuse(response, Result.RESULT_OPERATION_FAILED, f"twist {twist}; wanted finite numbers")
         if not self._simulation.set_entity_state(request.entity, entity):
             return _refuse(response, Result.RESULT_OPERATION_FAILED, f"{request.entity} is fixed to the world")
         response.result.result = Result.RESULT_OK

@@ -17,11 +17,20 @@ from throwcollect.robots.spoon import ball_seat
 from throwcollect.sim.bullet import BASE, connect, load_ball, load_scenery, renew_pairs, set_physics
 from throwcollect.sim.contacts import ContactLog, Surface
 from throwcollect.sim.motors import Motors
-from throwcollect.sim.recording import BallState, Row, to_samples
+from throwcollect.sim.recording import (
+    BALL_HEIGHT,
+    BALL_LINEAR_VELOCITY,
+    BallState,
+    Row,
+    Sample,
+    to_sample,
+    to_samples,
+)
 
 _NS_PER_S = 1_000_000_000
 _REST_S = 0.5
 _REST_SPEED = 0.01
+_ANY_BODY, _ANY_LINK = -1, -2
 
 
 class World:
@@ -50,7 +59,7 @@ class World:
     _settled_pressing: set[Surface]
     _pressing: set[Surface]
     _sampled_target: Sequence[float]
-    _rows: list[Row]
+    _rows: list[Sample]
     _forgotten: int
 
     def __init__(self, config: Config) -> None:
@@ -141,28 +150,32 @@ class World:
         """
         if stop_at_end and self._end_reason is not None:
             return 0
-        # Local names, tuples and one loop: what stands here is paid for in every step.
+        # Local names, arguments by position and one loop: what stands here is paid for in every step.
         client, ball, rows = self._client, self._ball, self._rows
         aim, take_step, points_on = self._motors.aim, pybullet.stepSimulation, pybullet.getContactPoints
-        first, stride = self._steps, self._stride
+        first = step = self._steps
+        stride = self._stride
         for before, velocity, target in self._motors.plan(commands):
             aim(before, velocity)
             if self._drag:
                 self._apply_drag()
-            take_step(physicsClientId=client)
-            self._steps += 1
+            take_step(client)
+            step += 1
             # Bullet also lists points that are merely close; those have no normal force (field 9).
-            pressing = {point[2:5:2] for point in points_on(ball, physicsClientId=client) if point[9] > 0}
+            points = points_on(ball, _ANY_BODY, _ANY_LINK, _ANY_LINK, client)
+            pressing = {(point[2], point[4]) for point in points if point[9] > 0}
             if pressing != self._pressing:
                 self._pressing = pressing
-                self._contacts.update(pressing, self._steps)
-            if self._steps % stride == 0:
-                rows.append(self._read())
+                self._contacts.update(pressing, step)
+            if step % stride == 0:
+                self._steps = step
+                rows.append(to_sample(self._read()))
                 self._end_reason = self._end_reason or self._judge(target)
                 if stop_at_end and self._end_reason is not None:
                     break
-        self._motors.advance(self._steps - first)
-        return self._steps - first
+        self._steps = step
+        self._motors.advance(step - first)
+        return step - first
 
     def samples(self, first: int = 0, last: int | None = None) -> Samples:
         """Recorded samples as arrays.
@@ -172,7 +185,8 @@ class World:
             last: Number after the last sample; None for all.
         """
         numbers = range(self.recorded)[max(first, self._forgotten) : last]
-        stamps = np.array([self._stamp_ns(number * self._stride) for number in numbers], dtype=np.int64)
+        steps = np.arange(numbers.start, numbers.stop, dtype=np.int64) * self._stride
+        stamps = self._start_ns + steps * _NS_PER_S // self._hz
         rows = self._rows[numbers.start - self._forgotten : numbers.stop - self._forgotten]
         return to_samples(rows, stamps, self._moving, self._locked)
 
@@ -271,7 +285,7 @@ class World:
     def _record_start(self) -> None:
         # Contact forces and motor torques of the settled state: Bullet has none before the first step.
         now = self._read()
-        self._rows = [now._replace(joints=self._settled.joints)]
+        self._rows = [to_sample(now._replace(joints=self._settled.joints))]
         self._forgotten = 0
 
     def _make_motors(self, trial: Config) -> Motors:
@@ -283,13 +297,14 @@ class World:
 
     def _judge(self, target: Sequence[float]) -> str | None:
         """Whether the trial ends with the sample just recorded, and why."""
-        (_, (before, _), _), (_, (now, _), (velocity, _)) = self._rows[-2:]
-        if now[2] < self._landing_height <= before[2] and "spoon" not in self._contacts.bodies:
+        before, now = self._rows[-2:]
+        if now[BALL_HEIGHT] < self._landing_height <= before[BALL_HEIGHT] and "spoon" not in self._contacts.bodies:
             return "landed"
         stands_still = target == self._sampled_target
         self._sampled_target = target
         self._has_moved |= not stands_still
-        if not (stands_still and self._pressing and self._has_moved and math.hypot(*velocity) < _REST_SPEED):
+        lies = stands_still and self._pressing and self._has_moved
+        if not (lies and math.hypot(*now[BALL_LINEAR_VELOCITY]) < _REST_SPEED):
             self._resting_since = self._steps
         elif self._steps - self._resting_since >= _REST_S * self._hz:
             return "rest"
@@ -306,7 +321,7 @@ class World:
 
     def _joint_states(self) -> Sequence[tuple[Any, ...]]:
         states: Sequence[tuple[Any, ...]] = pybullet.getJointStates(
-            self._scenery.robot, self._scenery.joints, physicsClientId=self._client
+            self._scenery.robot, self._scenery.joints, self._client
         )
         return states
 
@@ -314,6 +329,6 @@ class World:
         client, ball = self._client, self._ball
         return Row(
             self._joint_states(),
-            pybullet.getBasePositionAndOrientation(ball, physicsClientId=client),
-            pybullet.getBaseVelocity(ball, physicsClientId=client),
+            pybullet.getBasePositionAndOrientation(ball, client),
+            pybullet.getBaseVelocity(ball, client),
         )

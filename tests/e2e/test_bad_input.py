@@ -1,0 +1,371 @@
+"""What a clumsy user meets: one clear message, the right exit code, nothing left behind, never a traceback."""
+
+import contextlib
+import ctypes
+import json
+import os
+import pty
+import resource
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+from tests.e2e.collection import call, command, write_config
+from throwcollect.cli.main import main
+from throwcollect.robots.model import share_directory
+
+pytestmark = pytest.mark.e2e
+
+PR_CAPBSET_DROP, CAP_DAC_OVERRIDE, CAP_DAC_READ_SEARCH = 24, 1, 2
+
+TALOS = "example-robot-data/robots/talos_data"
+LIST = ["--set", "sweep.sampler=list", "--set", "sweep.parameters={}", "--set"]
+
+
+class Said(NamedTuple):
+    code: object
+    out: str
+    err: str
+
+
+@pytest.fixture
+def say(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> Iterator[Callable[..., Said]]:
+    """The command, called in this process, as most mistakes are found before any other is started."""
+    monkeypatch.chdir(tmp_path)
+    before = signal.getsignal(signal.SIGTERM)
+
+    def run(*arguments: str) -> Said:
+        monkeypatch.setattr(sys, "argv", ["throwcollect", *arguments])
+        try:
+            main()
+        except SystemExit as end:
+            return Said(end.code, *capfd.readouterr())
+        raise AssertionError("the command did not exit")
+
+    yield run
+    signal.signal(signal.SIGTERM, before)
+
+
+@pytest.fixture
+def small(tmp_path: Path) -> Path:
+    return write_config(tmp_path, trials=2)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["foo"], "No such command 'foo'.\n  try: throwcollect --help"),
+        (["up", "--foo"], "No such option: --foo\n  try: throwcollect up --help"),
+        (["up", "--set"], "Option '--set' requires an argument.\n  try: throwcollect --help"),
+        (["up", "a.yaml", "b.yaml"], "Got unexpected extra argument(s) (b.yaml)\n  try: throwcollect up --help"),
+        (["up", "-n", "0", "small.yaml"], "run.simulations: should be a whole number from 1 to 256, got 0"),
+        (["up", "-n", "300", "small.yaml"], "run.simulations: should be a whole number from 1 to 256, got 300"),
+        (["up", "-n", "two", "small.yaml"], "run.simulations: should be a whole number from 1 to 256, got 'two'"),
+        (["up", "--trials", "0", "small.yaml"], "trials: should be a whole number from 1 to 10000000 or null, got 0"),
+        (["up", "--runtime", "dockr", "small.yaml"], "run.runtime: should be 'auto' or 'local', got 'dockr'"),
+        (["up", "--set", "trials", "small.yaml"], "an override should be KEY=VALUE, got 'trials'"),
+        (["up", "--set", "=3", "small.yaml"], "an override should be KEY=VALUE, got '=3'"),
+        (["up", "--set", "trails=3", "small.yaml"], "trails: unknown key; did you mean 'trials'?"),
+        (["up"], "throwcollect.yaml: no such file"),
+        (["up", "none.yaml"], "none.yaml: no such file"),
+        (["up", "."], ".: should be a YAML file, got a directory"),
+        (["plan", "binary.yaml"], "binary.yaml:1: should be UTF-8 text, got the byte 0xff"),
+        (["config", "broken.yaml"], "broken.yaml:2: not valid YAML: expected ',' or ']', but got '<stream end>'"),
+        (["plan", "empty.yaml"], "empty.yaml: the file is empty"),
+        (["plan", "list.yaml"], "list.yaml:1: the file should hold keys and values"),
+        (["plan", "bare.yaml"], "sweep.parameters: nothing is swept"),
+        (["plan", *LIST, "sweep.file=no.csv", "bare.yaml"], "no.csv: sweep.file: no such file"),
+        (
+            ["plan", *LIST, "sweep.file=torn.parquet", "bare.yaml"],
+            "torn.parquet: sweep.file: cannot be read as Parquet",
+        ),
+        (["plan", *LIST, "sweep.file=bad.csv", "bare.yaml"], "bad.csv:3: ball.mass_kg: should be a number, got 'x'"),
+    ],
+)
+def test_a_wrong_request_is_one_message(
+    arguments: list[str], message: str, say: Callable[..., Said], small: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "binary.yaml").write_bytes(b"\xff\x00")
+    (tmp_path / "broken.yaml").write_text("a: [1\n")
+    (tmp_path / "empty.yaml").write_text("")
+    (tmp_path / "list.yaml").write_text("- 1\n")
+    (tmp_path / "bare.yaml").write_text("trials: 2\n")
+    (tmp_path / "torn.parquet").write_bytes(b"PAR1")
+    (tmp_path / "bad.csv").write_text("ball.mass_kg\n0.04\nx\n")
+    before = sorted(tmp_path.iterdir())
+    said = say(*arguments)
+    assert said.code == 2
+    assert said.out == ""
+    assert said.err.startswith(f"throwcollect: {message}")
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def test_all_problems_of_a_file_come_at_once(say: Callable[..., Said], tmp_path: Path) -> None:
+    (tmp_path / "many.yaml").write_text(
+        "trails: 9\nball: {mass_kg: heavy}\ntask: {end: {arm_right_4_joint: 90}}\nsim: {physics_hz: 5}\n"
+    )
+    said = say("up", "many.yaml", "--output", "data")
+    assert said.code == 2
+    assert said.err.splitlines() == [
+        "throwcollect: many.yaml:1: trails: unknown key; did you mean 'trials'?",
+        "many.yaml:2: ball.mass_kg: should be a number above 0 and up to 2 kg, got 'heavy'",
+        "many.yaml:3: task.end.arm_right_4_joint: should be a number from -6.3 to 6.3 rad, got 90; "
+        "angles are in radians: 90 degrees are 1.5708",
+        "many.yaml:4: sim.physics_hz: should be a whole number from 100 to 10000 Hz, got 5",
+    ]
+    assert not (tmp_path / "data").exists()
+
+
+@pytest.mark.parametrize(
+    ("directory", "message"),
+    [
+        ("used", "used: holds notes.txt\n  expected: a directory that is new or empty"),
+        ("file", "file: cannot be used as directory of a dataset: File exists"),
+        ("file/data", "file/data: cannot be used as directory of a dataset: Not a directory"),
+    ],
+)
+def test_a_taken_output_directory_is_left_alone(
+    directory: str, message: str, say: Callable[..., Said], small: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "used").mkdir()
+    (tmp_path / "used" / "notes.txt").write_text("mine")
+    (tmp_path / "file").write_text("mine")
+    said = say("up", "small.yaml", "--output", directory)
+    assert (said.code, said.out) == (2, "")
+    assert said.err.startswith(f"throwcollect: {message}")
+    assert sorted(path.name for path in tmp_path.rglob("*")) == ["file", "notes.txt", "small.yaml", "used"]
+
+
+def test_a_busy_port_is_found_before_anything_is_written(say: Callable[..., Said], small: Path, tmp_path: Path) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        said = say("up", "small.yaml", "--set", f"run.router_port={port}", "--output", "data")
+    assert said.code == 2
+    assert said.err == (
+        f"throwcollect: run.router_port: port {port} of 127.0.0.1 cannot be used: Address already in use\n"
+        "  try: --set run.router_port=0 takes a free one\n"
+    )
+    assert not (tmp_path / "data").exists()
+
+
+def test_a_sweep_that_the_robot_cannot_do_is_refused(say: Callable[..., Said], small: Path, tmp_path: Path) -> None:
+    said = say("up", "small.yaml", "--set", "sweep.parameters.task.duration_s={min: 0.2, max: 0.2}", "--output", "data")
+    assert said.code == 2
+    assert "throwcollect: sweep: all 2 trials are refused: 2 × arm_right_7_joint moves at 6.034 rad/s" in said.err
+    assert not (tmp_path / "data").exists()
+
+
+def obey_permissions() -> None:
+    """Take the right to ignore permissions from a process that root starts; others do not have it anyway."""
+    libc = ctypes.CDLL(None)
+    for capability in (CAP_DAC_OVERRIDE, CAP_DAC_READ_SEARCH):
+        libc.prctl(PR_CAPBSET_DROP, capability, 0, 0, 0)
+
+
+@pytest.mark.parametrize("directory", ["locked", "locked/data"])
+def test_no_permission_to_write(directory: str, small: Path, tmp_path: Path) -> None:
+    (tmp_path / "locked").mkdir(mode=0o555)
+    said = subprocess.run(
+        command("up", small, "--output", tmp_path / directory),
+        capture_output=True,
+        text=True,
+        timeout=60,
+        preexec_fn=obey_permissions,
+        check=False,
+    )
+    assert (said.returncode, said.stdout) == (2, "")
+    assert said.stderr.startswith(f"throwcollect: {tmp_path / directory}")
+    assert "Permission denied" in said.stderr
+    assert list((tmp_path / "locked").iterdir()) == []
+
+
+def test_no_permission_to_read(small: Path) -> None:
+    small.chmod(0o000)
+    said = subprocess.run(
+        command("plan", small), capture_output=True, text=True, timeout=60, preexec_fn=obey_permissions, check=False
+    )
+    assert (said.returncode, said.stdout) == (2, "")
+    assert said.stderr == f"throwcollect: {small}: no permission to read the file\n"
+
+
+@pytest.mark.parametrize(
+    ("urdf", "message"),
+    [
+        (None, "talos_data: the robot's description is missing"),
+        ("<robot name='talos'><link", "talos_reduced.urdf: cannot be read as robot description"),
+    ],
+)
+def test_a_robot_that_cannot_be_read(urdf: str | None, message: str, small: Path, tmp_path: Path) -> None:
+    fake = tmp_path / "fake"
+    metadata = fake / "example_robot_data-6.0.0.dist-info" / "METADATA"
+    metadata.parent.mkdir(parents=True)
+    metadata.write_text("Metadata-Version: 2.1\nName: example-robot-data\nVersion: 6.0.0\n")
+    if urdf is not None:
+        robot = fake / "cmeel.prefix" / "share" / TALOS
+        (robot / "robots").mkdir(parents=True)
+        (robot / "robots" / "talos_reduced.urdf").write_text(urdf)
+        (robot / "srdf").symlink_to(share_directory() / TALOS / "srdf")
+    environment = {**os.environ, "PYTHONPATH": str(fake)}
+    run = partial(subprocess.run, capture_output=True, text=True, timeout=60, env=environment, check=False)
+    said = run(command("up", small, "--output", tmp_path / "data"))
+    assert said.returncode == 2
+    assert message in said.stderr
+    assert "Traceback" not in said.stderr
+    assert not (tmp_path / "data").exists()
+    doctor = run(command("doctor"))
+    assert doctor.returncode == 1
+    assert any(line.startswith("problem robot") and message in line for line in doctor.stdout.splitlines())
+
+
+def limited(size: int) -> Callable[[], None]:
+    return lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, object]]:
+    """A dataset, and the summary that was printed."""
+    directory = tmp_path_factory.mktemp("whole")
+    config = write_config(directory, trials=2)
+    said = call("up", "-n", "1", config, "--output", directory / "data", "--json")
+    assert (said.returncode, said.stderr) == (0, "")
+    return directory / "data", json.loads(said.stdout)
+
+
+@pytest.mark.parametrize("moment", ["plan", "collection", "finish"])
+def test_a_full_disk(moment: str, small: Path, tmp_path: Path, dataset: tuple[Path, dict[str, object]]) -> None:
+    shard = (dataset[0] / "small_00000.mcap").stat().st_size
+    # The finished shard is larger than that in order of arrival by its summary, which is some kilobytes.
+    limit, file = {
+        "plan": (1000, "config.yaml"),
+        "collection": (shard // 2, "small_00000.mcap.part"),
+        "finish": (shard - 100, "small_00000.mcap"),
+    }[moment]
+    said = subprocess.run(
+        command("up", "-n", "1", small, "--output", tmp_path / "data"),
+        capture_output=True,
+        text=True,
+        timeout=60,
+        preexec_fn=limited(limit),
+        check=False,
+    )
+    assert said.stdout == ""
+    assert f"{tmp_path / 'data' / file}: cannot be written: File too large\n" in said.stderr
+    assert "Traceback" not in said.stderr
+    assert said.returncode == (2 if moment == "plan" else 4)
+    left = {path.name for path in (tmp_path / "data").glob("*.mcap*")}
+    assert left == (set() if moment == "plan" else {"small_00000.mcap.part"})
+    assert (tmp_path / "data").exists() == (moment != "plan")
+
+
+def test_directories_that_are_no_whole_dataset(
+    say: Callable[..., Said], tmp_path: Path, dataset: tuple[Path, dict[str, object]]
+) -> None:
+    whole = dataset[0]
+    (tmp_path / "empty").mkdir()
+    begun = tmp_path / "begun"
+    begun.mkdir()
+    for name in ("config.yaml", "plan.parquet"):
+        (begun / name).write_bytes((whole / name).read_bytes())
+    torn = tmp_path / "torn"
+    torn.mkdir()
+    for path in whole.iterdir():
+        if path.is_file() and path.name != "throws.parquet":
+            (torn / path.name).write_bytes(path.read_bytes())
+    for verb in ("info", "verify", "digest"):
+        for name, message in {
+            "none": "none: holds no dataset",
+            "empty": "empty: holds no dataset",
+            "begun": "begun: the dataset is not finished: it has no metadata.yaml",
+            "torn": "throws.parquet: is missing",
+        }.items():
+            said = say("dataset", verb, name)
+            assert (verb, name, said.code) == (verb, name, 4)
+            assert message in said.out + said.err
+            assert said.err.startswith("throwcollect: ")
+
+
+def test_answers_for_programs_are_one_document_and_silence(
+    say: Callable[..., Said], small: Path, dataset: tuple[Path, dict[str, object]]
+) -> None:
+    for arguments in (
+        ["config", "small.yaml"],
+        ["plan", "small.yaml"],
+        ["doctor"],
+        ["dataset", "info", str(dataset[0])],
+    ):
+        said = say(*arguments, "--json")
+        assert (arguments, said.code, said.err) == (arguments, 0, "")
+        assert json.loads(said.out)
+    told = json.loads(say("dataset", "info", str(dataset[0]), "--json").out)
+    assert told.items() <= dataset[1].items()
+
+
+@pytest.mark.parametrize("arguments", [["plan", "small.yaml"], ["config", "small.yaml"], ["--help"]])
+def test_a_reader_that_leaves_is_no_error(arguments: list[str], small: Path) -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    said = subprocess.run(
+        command(*arguments),
+        stdout=writing,
+        stderr=subprocess.PIPE,
+        text=True,
+        timeout=60,
+        cwd=small.parent,
+        check=False,
+    )
+    os.close(writing)
+    assert said.returncode == 0
+    assert said.stderr.removesuffix("2 trials, 0 refused\n") == ""
+
+
+def test_output_that_cannot_be_written_is_an_error(small: Path) -> None:
+    with Path("/dev/full").open("w") as full:
+        said = subprocess.run(
+            command("config", small), stdout=full, stderr=subprocess.PIPE, text=True, timeout=60, check=False
+        )
+    assert said.returncode == 1
+    assert said.stderr == "throwcollect: the output cannot be written: No space left on device\n"
+
+
+def test_every_command_has_help(say: Callable[..., Said]) -> None:
+    commands = ["up", "config", "plan", "doctor", "dataset", "router", "sim", "coordinator"]
+    for arguments in (
+        [],
+        *([name] for name in commands),
+        *(["dataset", verb] for verb in ("info", "verify", "digest")),
+    ):
+        said = say(*arguments, "--help")
+        assert (arguments, said.code, said.err) == (arguments, 0, "")
+        assert "Usage: throwcollect" in said.out
+        assert "\x1b" not in said.out
+    assert say("--version").out.startswith("throwcollect 0.")
+
+
+def test_progress_is_a_bar_on_a_terminal(small: Path, tmp_path: Path) -> None:
+    master, slave = pty.openpty()
+    running = subprocess.Popen(
+        command("up", "-n", "1", small, "--output", tmp_path / "bar"),
+        stdout=subprocess.DEVNULL,
+        stderr=slave,
+        env={**os.environ, "TERM": "xterm", "COLUMNS": "80", "NO_COLOR": "1"},
+    )
+    os.close(slave)
+    shown = b""
+    with contextlib.suppress(OSError):  # the terminal's end is an error on Linux
+        while piece := os.read(master, 65536):
+            shown += piece
+    os.close(master)
+    assert running.wait(60) == 0
+    text = shown.decode()
+    assert "\x1b[?25l" in text
+    assert "2/2 2 landed, 0 failed, 1 simulation," in text
+    assert "throws/s ETA 00:00" in text

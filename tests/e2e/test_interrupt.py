@@ -1,0 +1,225 @@
+"""Interruptions and losses: nothing half-done, nobody left behind, and the evidence told."""
+
+import io
+import json
+import os
+import signal
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+import psutil
+import pytest
+from mcap.exceptions import McapError
+from mcap.records import Chunk, Metadata
+from mcap.stream_reader import StreamReader
+
+from tests.e2e.collection import Running, call, collect, fingerprints, start, write_config
+
+pytestmark = pytest.mark.e2e
+TRIALS = 16
+
+
+@pytest.fixture(scope="module")
+def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_config(tmp_path_factory.mktemp("config"), trials=TRIALS)
+
+
+@pytest.fixture(scope="module")
+def reference(config: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    directory = tmp_path_factory.mktemp("reference") / "data"
+    collect(config, directory, 2)
+    return directory
+
+
+@pytest.fixture
+def started(tmp_path: Path) -> Iterator[list[Running]]:
+    """Collections that are ended with the test, however that ends."""
+    running: list[Running] = []
+    yield running
+    for each in running:
+        if each.process.poll() is None:
+            each.process.kill()
+            each.process.communicate()
+
+
+def begin(started: list[Running], config: Path, directory: Path, *options: str) -> tuple[Running, list[psutil.Process]]:
+    """A collection with two simulations, and its nodes as soon as all four run."""
+    running = start(config, directory, 2, *options)
+    started.append(running)
+    launcher = psutil.Process(running.process.pid)
+    running.wait_until(lambda: len(launcher.children()) == 4)
+    return running, launcher.children()
+
+
+def in_the_middle(running: Running, share: float = 0.3, *, whole: Path) -> None:
+    size = (whole / "small_00000.mcap").stat().st_size
+    running.wait_until(lambda: running.written() > share * size)
+
+
+def assert_gone(nodes: list[psutil.Process]) -> None:
+    _, alive = psutil.wait_procs(nodes, timeout=10)
+    assert alive == []
+
+
+def episodes(part: Path) -> Counter[str]:
+    """Trials of the whole episodes of a shard, as MCAP's own reader finds them."""
+    found: Counter[str] = Counter()
+    data = io.BytesIO(part.read_bytes())
+    chunks = 0
+    try:
+        for record in StreamReader(data, emit_chunks=True, validate_crcs=True).records:
+            chunks += isinstance(record, Chunk)
+            if isinstance(record, Metadata) and record.name == "throwcollect.episode":
+                found[record.metadata["trial"]] += 1
+    except (McapError, EOFError):
+        # The footer is missing; up to there, all records were read.
+        assert data.tell() == len(data.getvalue())
+    assert chunks == len(found) + 1
+    return found
+
+
+def test_ctrl_c_before_any_simulation_is_ready(config: Path, tmp_path: Path, started: list[Running]) -> None:
+    running, nodes = begin(started, config, tmp_path / "data")
+    running.process.send_signal(signal.SIGINT)
+    code, out, err = running.finish()
+    assert (code, out) == (130, "")
+    assert f"throwcollect: interrupted; finished throws are in {tmp_path / 'data'}" in err
+    assert "Traceback" not in err
+    assert_gone(nodes)
+
+
+@pytest.mark.parametrize(("number", "share"), [(signal.SIGINT, 0.3), (signal.SIGTERM, 0.7)])
+def test_an_interruption_finishes_what_runs(
+    number: signal.Signals, share: float, config: Path, reference: Path, tmp_path: Path, started: list[Running]
+) -> None:
+    running, nodes = begin(started, config, tmp_path / "data")
+    in_the_middle(running, share, whole=reference)
+    before = running.written()
+    running.process.send_signal(number)
+    code, out, err = running.finish()
+    assert (code, out) == (130, "")
+    assert "interrupted: finishing the running trials; once more ends at once" in err
+    assert_gone(nodes)
+    assert running.written() >= before
+    found = episodes(tmp_path / "data" / "small_00000.mcap.part")
+    assert 0 < len(found) < TRIALS
+    assert set(found.values()) == {1}
+    assert "the dataset is not finished" in call("dataset", "info", tmp_path / "data").stderr
+
+
+def test_a_second_ctrl_c_does_not_wait_for_trials(
+    config: Path, reference: Path, tmp_path: Path, started: list[Running]
+) -> None:
+    running, nodes = begin(started, config, tmp_path / "data")
+    in_the_middle(running, whole=reference)
+    hanging = running.node("--name", "sim_0")
+    hanging.suspend()
+    coordinator = running.node("coordinator", str(tmp_path / "data"))
+    running.process.send_signal(signal.SIGINT)
+    # The trial of the hanging simulation does not end, so this is where it would wait.
+    with pytest.raises(psutil.TimeoutExpired, match="timeout after 2 seconds"):
+        coordinator.wait(2)
+    running.process.send_signal(signal.SIGINT)
+    code, _, _ = running.finish()
+    assert code == 130
+    assert_gone(nodes)
+    # It did not get so far as to say that it had drained.
+    assert "interrupted" not in (tmp_path / "data" / "logs" / "coordinator.log").read_text()
+    assert len(episodes(tmp_path / "data" / "small_00000.mcap.part")) > 0
+
+
+def test_a_killed_launcher_takes_its_nodes_along(
+    config: Path, reference: Path, tmp_path: Path, started: list[Running]
+) -> None:
+    running, nodes = begin(started, config, tmp_path / "data")
+    in_the_middle(running, whole=reference)
+    running.process.send_signal(signal.SIGKILL)
+    running.finish()
+    assert_gone(nodes)
+
+
+def test_a_killed_coordinator_ends_the_run(
+    config: Path, reference: Path, tmp_path: Path, started: list[Running]
+) -> None:
+    running, nodes = begin(started, config, tmp_path / "data", "--set", "run.trial_timeout_s=1")
+    in_the_middle(running, whole=reference)
+    coordinator = running.node("coordinator", str(tmp_path / "data"))
+    for name in ("sim_0", "sim_1"):
+        running.node("--name", name).suspend()
+    log = tmp_path / "data" / "logs" / "coordinator.log"
+    running.wait_until(lambda: "no episode within 1 s" in log.read_text())
+    coordinator.kill()
+    code, out, err = running.finish()
+    assert (code, out) == (3, "")
+    assert "throwcollect: the coordinator stopped: ended by SIGKILL\n  evidence: " in err
+    assert "is given to another simulation: no episode within 1 s" in err
+    assert_gone(nodes)
+
+
+def test_a_killed_router_costs_nothing(config: Path, reference: Path, tmp_path: Path, started: list[Running]) -> None:
+    running, nodes = begin(started, config, tmp_path / "data", "--set", "run.trial_timeout_s=5")
+    in_the_middle(running, whole=reference)
+    next(node for node in nodes if "router" in node.cmdline()).kill()
+    code, out, err = running.finish()
+    assert code == 0, err
+    # Where nobody looks, progress is plain lines.
+    assert "\x1b" not in out + err
+    assert f"{TRIALS}/{TRIALS} throws: {TRIALS} landed, 0 failed, 2 simulations," in err
+    assert "router was lost (ended by SIGKILL) and is started again" in err
+    assert fingerprints(tmp_path / "data") == fingerprints(reference)
+
+
+def test_the_trial_of_a_hanging_simulation_goes_to_another(
+    config: Path, reference: Path, tmp_path: Path, started: list[Running]
+) -> None:
+    running, nodes = begin(started, config, tmp_path / "data", "--set", "run.trial_timeout_s=2")
+    in_the_middle(running, whole=reference)
+    running.node("--name", "sim_0").suspend()
+    code, _, err = running.finish()
+    assert code == 0, err
+    assert "no episode within 2 s" in (tmp_path / "data" / "logs" / "coordinator.log").read_text()
+    assert fingerprints(tmp_path / "data") == fingerprints(reference)
+    assert_gone(nodes)
+
+
+def test_a_trial_without_retries_left_is_recorded_as_lost(
+    config: Path, reference: Path, tmp_path: Path, started: list[Running]
+) -> None:
+    running, _ = begin(started, config, tmp_path / "data", "--set", "run.retries=0", "--json")
+    in_the_middle(running, whole=reference)
+    running.node("--name", "sim_0").kill()
+    code, out, err = running.finish()
+    assert code == 0, err
+    summary = json.loads(out)
+    assert summary["outcomes"]["lost"] == 1
+    assert summary["episodes"] == TRIALS - 1
+    assert "sim_0 was lost (ended by SIGKILL)" in err
+    rows = throws(tmp_path / "data")
+    assert [row["reason"] for row in rows if row["outcome"] == "lost"] == ["/sim_0: left the ROS graph"]
+
+
+def throws(directory: Path) -> list[dict[str, object]]:
+    import pyarrow.parquet as pq
+
+    rows: list[dict[str, object]] = pq.read_table(directory / "throws.parquet").to_pylist()
+    return rows
+
+
+@pytest.mark.parametrize(
+    ("physics", "option", "message"),
+    [
+        ("raise ImportError('broken pybullet')", "run.restarts=10", "ended again after 1 restart: exit code 1"),
+        ("import time; time.sleep(600)", "run.start_timeout_s=2", "no simulation was ready within 2 s"),
+    ],
+)
+def test_simulations_that_never_start_end_the_run(
+    physics: str, option: str, message: str, config: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "pybullet.py").write_text(physics)
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")]))
+    said = call("up", "-n", "2", config, "--output", tmp_path / "data", "--set", option)
+    assert said.returncode == 3
+    assert message in said.stderr
+    assert ("broken pybullet" in said.stderr) == ("broken" in physics)
+    assert "Traceback" not in said.stderr

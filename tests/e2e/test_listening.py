@@ -1,0 +1,127 @@
+"""Who listens during a collection hears what the dataset will hold, and changes nothing."""
+
+import socket
+from collections import Counter, defaultdict
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from mcap.reader import make_reader
+
+from tests.e2e.collection import collect, fingerprints, start, write_config
+from tests.integration.robot import connected
+from throwcollect.dataset.reader import Dataset
+from throwcollect.interfaces import get_message
+from throwcollect.ros import Context, Node, QoSProfile, SingleThreadedExecutor
+from throwcollect.ros.qos import HistoryPolicy
+
+pytestmark = pytest.mark.e2e
+TRIALS = 16
+SIMULATIONS = ("sim_0", "sim_1")
+KINDS = {"/joint_states": "sensor_msgs/msg/JointState", "/ball/odometry": "nav_msgs/msg/Odometry"}
+WHOLE = QoSProfile(history=HistoryPolicy.KEEP_ALL)
+_STAMP = slice(4, 12)
+"""Where the header's stamp is in a message of either type."""
+
+Messages = dict[str, list[bytes]]
+
+
+class Listener:
+    """Keeps the bytes of samples by simulation and topic."""
+
+    def __init__(self, context: Context) -> None:
+        self.heard: dict[str, Messages] = {name: {topic: [] for topic in KINDS} for name in SIMULATIONS}
+        self._node = Node("listener", context=context)
+        self._executor = SingleThreadedExecutor(context=context)
+        self._executor.add_node(self._node)
+        for name, messages in self.heard.items():
+            for topic, kind in KINDS.items():
+                append = messages[topic].append
+                self._node.create_subscription(get_message(kind), f"/{name}{topic}", append, WHOLE, raw=True)
+
+    def listen(self) -> None:
+        """Take what has come so far."""
+        for _ in range(1000):
+            self._executor.spin_once(timeout_sec=0.0)
+
+
+@contextmanager
+def listener(port: int) -> Iterator[Listener]:
+    with connected(f"tcp/127.0.0.1:{port}") as context:
+        yield Listener(context)
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def is_open(port: int) -> bool:
+    with socket.socket() as probe:
+        return probe.connect_ex(("127.0.0.1", port)) == 0
+
+
+def during_trials(messages: Messages) -> Messages:
+    """Without those of time 0: where a simulation stands before its first trial."""
+    return {topic: [data for data in found if any(data[_STAMP])] for topic, found in messages.items()}
+
+
+def recorded(directory: Path) -> dict[str, dict[bytes, int]]:
+    """Trial of every message in the dataset, by topic; read by MCAP's own library."""
+    starts = {episode.header.start_ns: episode.header.trial for episode in Dataset.open(directory)}
+    messages: dict[str, dict[bytes, int]] = {topic: {} for topic in KINDS}
+    for path in directory.glob("*.mcap"):
+        with path.open("rb") as file:
+            for _, channel, message in make_reader(file).iter_messages(topics=list(KINDS)):
+                start_ns = max(start for start in starts if start <= message.log_time)
+                messages[channel.topic][message.data] = starts[start_ns]
+    return messages
+
+
+@pytest.fixture(scope="module")
+def listened(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Messages]]:
+    """A collection that was listened to from before its first trial, and what was heard of it."""
+    directory = tmp_path_factory.mktemp("listened")
+    port = free_port()
+    config = write_config(directory, trials=TRIALS)
+    running = start(config, directory / "data", 2, "--set", f"run.router_port={port}")
+    running.wait_until(lambda: is_open(port))
+    with listener(port) as ears:
+        while running.process.poll() is None:
+            ears.listen()
+    code, _, err = running.finish()
+    assert code == 0, err
+    return directory / "data", {name: during_trials(messages) for name, messages in ears.heard.items()}
+
+
+def test_every_message_heard_is_in_the_dataset_byte_for_byte(listened: tuple[Path, dict[str, Messages]]) -> None:
+    directory, heard = listened
+    messages = recorded(directory)
+    for topic in KINDS:
+        everything = [data for name in SIMULATIONS for data in heard[name][topic]]
+        strange = [data for data in everything if data not in messages[topic]]
+        assert len(everything) > TRIALS
+        assert len(everything) == len(set(everything))
+        assert not strange, f"{topic}: {len(strange)} of {len(everything)} messages are not in the dataset"
+
+
+def test_whole_trials_are_heard(listened: tuple[Path, dict[str, Messages]]) -> None:
+    directory, heard = listened
+    messages = recorded(directory)
+    complete = []
+    for topic in KINDS:
+        wanted = Counter(messages[topic].values())
+        got: dict[int, set[bytes]] = defaultdict(set)
+        for name in SIMULATIONS:
+            for data in heard[name][topic]:
+                got[messages[topic][data]].add(data)
+        complete.append({trial for trial, count in wanted.items() if len(got[trial]) == count})
+    assert len(complete[0] & complete[1]) >= 3
+
+
+def test_a_listener_does_not_change_the_dataset(listened: tuple[Path, dict[str, Messages]], tmp_path: Path) -> None:
+    directory, _ = listened
+    collect(write_config(tmp_path, trials=TRIALS), tmp_path / "data", 2)
+    assert fingerprints(tmp_path / "data") == fingerprints(directory)

@@ -1,0 +1,53 @@
+"""A router in this process and one simulation in another, for all tests of a session."""
+
+from collections.abc import Iterator
+
+import pytest
+
+from tests.integration.robot import PLAYING, Robot, connected, start_simulation
+from throwcollect.ros import Context
+from throwcollect.ros.parameter import parameter_value_to_python
+from throwcollect.ros.router import router
+
+NAME = "sim_0"
+
+
+@pytest.fixture(scope="session")
+def endpoint() -> Iterator[str]:
+    with router("tcp/127.0.0.1:0") as endpoint:
+        yield endpoint
+
+
+@pytest.fixture(scope="session")
+def session(endpoint: str) -> Iterator[Context]:
+    with connected(endpoint) as context:
+        yield context
+
+
+@pytest.fixture(scope="session")
+def shared(endpoint: str, session: Context, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Robot]:
+    process = start_simulation(tmp_path_factory.mktemp("sim"), endpoint, NAME)
+    robot = Robot(session, NAME)
+    robot.wait_until_ready(process)
+    yield robot
+    process.terminate()
+    output, _ = process.communicate(timeout=20)
+    assert process.returncode == 0, output
+
+
+@pytest.fixture(scope="session")
+def defaults(shared: Robot) -> dict[str, object]:
+    """Values of all parameters when the simulation has just started."""
+    names = shared.parameters("list_parameters").result.names
+    values = shared.parameters("get_parameters", names=names).values
+    return {name: parameter_value_to_python(value) for name, value in zip(names, values, strict=True)}
+
+
+@pytest.fixture
+def robot(shared: Robot, defaults: dict[str, object]) -> Robot:
+    """The simulation as it was when it had just started."""
+    assert shared.set(defaults).successful
+    if shared.state() != PLAYING:
+        shared.put_into(PLAYING)
+    shared.reset()
+    return shared

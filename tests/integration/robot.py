@@ -1,0 +1,214 @@
+"""One simulation in a process of its own, and a client of it that knows nothing but its ROS interface."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from throwcollect.config.schema import Config
+from throwcollect.interfaces import Message, get_action, get_message, get_service
+from throwcollect.robots.description import start_posture
+from throwcollect.robots.talos import CONTROLLERS
+from throwcollect.ros import Context, Future, Node, Parameter, QoSProfile, SingleThreadedExecutor
+from throwcollect.ros.action import ActionClient
+from throwcollect.ros.qos import HistoryPolicy
+from throwcollect.ros.session import CONFIG_FILE_VARIABLE, OVERRIDE_VARIABLE
+
+CONFIG = Config.model_validate({"name": "integration", "tool": {"cup_floor_radius_m": 0.006}})
+"""Almost the defaults: the smallest balls fall through this spoon."""
+POSTURE = start_posture(CONFIG)
+ARM, TORSO, HEAD = "arm_right_controller", "torso_controller", "head_controller"
+ELBOW = "arm_right_4_joint"
+STEP_NS = 10**9 // CONFIG.sim.physics_hz
+SAMPLE_NS = 10**9 // CONFIG.record.rate_hz
+PATIENCE_S = 20.0
+
+ALL = QoSProfile(history=HistoryPolicy.KEEP_ALL)
+"""Nothing is lost on the client's side, however late it looks."""
+
+FollowJointTrajectory: Any = get_action("control_msgs/action/FollowJointTrajectory")
+JointTrajectory: Any = get_message("trajectory_msgs/msg/JointTrajectory")
+JointTrajectoryPoint: Any = get_message("trajectory_msgs/msg/JointTrajectoryPoint")
+JointTolerance: Any = get_message("control_msgs/msg/JointTolerance")
+Duration: Any = get_message("builtin_interfaces/msg/Duration")
+Result: Any = get_message("simulation_interfaces/msg/Result")
+SimulationState: Any = get_message("simulation_interfaces/msg/SimulationState")
+STOPPED, PLAYING, PAUSED, QUITTING = range(4)
+
+
+def environment(endpoint: str) -> dict[str, str]:
+    """Variables that lead a node to a router."""
+    return {OVERRIDE_VARIABLE: f"connect/endpoints={json.dumps([endpoint])}", "ROS_DOMAIN_ID": "0"}
+
+
+def start_simulation(directory: Path, endpoint: str, name: str) -> subprocess.Popen[str]:
+    config = directory / "integration.json"
+    config.write_text(CONFIG.model_dump_json())
+    return subprocess.Popen(
+        [sys.executable, "-m", "throwcollect", "sim", str(config), "--name", name],
+        env={**os.environ, **environment(endpoint)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+
+
+@contextmanager
+def connected(endpoint: str) -> Iterator[Context]:
+    """A session of the test's own."""
+    context = Context()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.delenv(CONFIG_FILE_VARIABLE, raising=False)
+        for variable, value in environment(endpoint).items():
+            patch.setenv(variable, value)
+        context.init()
+    try:
+        yield context
+    finally:
+        context.try_shutdown()
+
+
+def stamp_ns(stamp: Any) -> int:
+    return int(stamp.sec) * 10**9 + int(stamp.nanosec)
+
+
+def duration(seconds: float) -> Any:
+    sec, nanosec = divmod(round(seconds * 1e9), 10**9)
+    return Duration(sec=sec, nanosec=nanosec)
+
+
+def trajectory(controller: str, seconds: float = 1.0, **ends: float) -> Any:
+    """From the start posture to other angles of some joints [rad], and to rest there."""
+    joints = CONTROLLERS[controller]
+    still = [0.0] * len(joints)
+    postures = [[POSTURE[joint] for joint in joints], [ends.get(joint, POSTURE[joint]) for joint in joints]]
+    points = [
+        JointTrajectoryPoint(positions=posture, velocities=still, accelerations=still, time_from_start=duration(time_s))
+        for time_s, posture in zip((0.0, seconds), postures, strict=True)
+    ]
+    return JointTrajectory(joint_names=list(joints), points=points)
+
+
+def goal(controller: str = ARM, seconds: float = 1.0, **ends: float) -> Any:
+    return FollowJointTrajectory.Goal(trajectory=trajectory(controller, seconds, **ends))
+
+
+def swing(seconds: float = 1.0) -> Any:
+    """A goal of the right arm that throws the ball."""
+    return goal(ARM, seconds, arm_right_4_joint=-0.5, arm_right_7_joint=0.5)
+
+
+class Robot:
+    """A client of one simulation, spinning whenever it waits."""
+
+    def __init__(self, context: Context, name: str) -> None:
+        self.name = name
+        self.node = Node(f"client_of_{name}", context=context)
+        self._executor = SingleThreadedExecutor(context=context)
+        self._executor.add_node(self.node)
+        self._clients: dict[str, Any] = {}
+        self._actions: dict[str, ActionClient] = {}
+
+    def topic(self, name: str) -> str:
+        return f"/{self.name}/{name}"
+
+    def wait_until(self, condition: Callable[[], bool], what: str = "") -> None:
+        deadline = time.monotonic() + PATIENCE_S
+        while not condition():
+            assert time.monotonic() < deadline, f"did not happen: {what}"
+            self._executor.spin_once(timeout_sec=0.01)
+
+    def wait_until_ready(self, process: subprocess.Popen[str]) -> None:
+        def ready() -> bool:
+            assert process.poll() is None, process.communicate()[0]
+            return self.node.count_publishers(self.topic("episode")) == 1
+
+        self.wait_until(ready, f"{self.name} is ready")
+
+    def result(self, future: Future) -> Any:
+        self.wait_until(future.done, "an answer")
+        return future.result()
+
+    def ask(self, kind: str, service: str, **fields: Any) -> Future:
+        service_type: Any = get_service(kind)
+        if service not in self._clients:
+            self._clients[service] = self.node.create_client(service_type, self.topic(service))
+            assert self._clients[service].wait_for_service(PATIENCE_S), service
+        return self._clients[service].call_async(service_type.Request(**fields))
+
+    def call(self, service: str, **fields: Any) -> Any:
+        """Call one of the simulation_interfaces services."""
+        kind = "".join(word.capitalize() for word in service.split("_"))
+        return self.result(self.ask(f"simulation_interfaces/srv/{kind}", service, **fields))
+
+    def parameters(self, service: str, **fields: Any) -> Any:
+        """Call one of the node's services for parameters."""
+        kind = "".join(word.capitalize() for word in service.split("_"))
+        return self.result(self.ask(f"rcl_interfaces/srv/{kind}", f"{self.name}/{service}", **fields))
+
+    def set(self, values: Mapping[str, Any]) -> Any:
+        """Set parameters all at once; returns rcl_interfaces/msg/SetParametersResult."""
+        messages = [Parameter(name, value=value).to_parameter_msg() for name, value in values.items()]
+        return self.parameters("set_parameters_atomically", parameters=messages).result
+
+    def reset(self) -> None:
+        assert self.call("reset_simulation").result.result == Result.RESULT_OK
+
+    def put_into(self, state: int) -> Any:
+        return self.call("set_simulation_state", state=SimulationState(state=state)).result
+
+    def state(self) -> int:
+        return int(self.call("get_simulation_state").state.state)
+
+    def step(self, steps: int) -> Any:
+        return self.call("step_simulation", steps=steps).result
+
+    def now_ns(self) -> int:
+        """Simulated time."""
+        return stamp_ns(self.call("get_entity_state", entity="ball").state.header.stamp)
+
+    def joint(self, name: str) -> float:
+        """Measured angle of a joint, by the state of its controller."""
+        controller = next(key for key, joints in CONTROLLERS.items() if name in joints)
+        kind = "control_msgs/msg/JointTrajectoryControllerState"
+        with self.listening(kind, f"{controller}/controller_state") as heard:
+            # A request makes an idle simulation look around, and tell its state.
+            self.wait_until(lambda: self.state() in (PLAYING, PAUSED) and bool(heard), "a controller state")
+        return float(heard[-1].feedback.positions[CONTROLLERS[controller].index(name)])
+
+    @contextmanager
+    def listening(self, kind: str | type[Message], topic: str, qos: QoSProfile = ALL) -> Iterator[list[Any]]:
+        """Messages of a topic heard so far; the simulation knows of the listener."""
+        heard: list[Any] = []
+        name = topic if topic.startswith("/") else self.topic(topic)
+        message_type = get_message(kind) if isinstance(kind, str) else kind
+        subscription = self.node.create_subscription(message_type, name, heard.append, qos)
+        # The answer comes after the simulation has been told, as both take the same way.
+        self.state()
+        yield heard
+        self.node.destroy_subscription(subscription)
+
+    def action(self, controller: str = ARM) -> ActionClient:
+        if controller not in self._actions:
+            name = self.topic(f"{controller}/follow_joint_trajectory")
+            self._actions[controller] = ActionClient(self.node, FollowJointTrajectory, name)
+            assert self._actions[controller].wait_for_server(PATIENCE_S), name
+        return self._actions[controller]
+
+    def send(self, wish: Any, controller: str = ARM) -> Any:
+        """Send a goal; returns its handle, accepted or not."""
+        return self.result(self.action(controller).send_goal_async(wish))
+
+    def outcome(self, handle: Any) -> tuple[int, int, str]:
+        """Status, error code and text at the end of a goal."""
+        response = self.result(handle.get_result_async())
+        return int(response.status), int(response.result.error_code), str(response.result.error_string)

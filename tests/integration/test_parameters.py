@@ -1,0 +1,103 @@
+"""Trial and physics as ROS parameters."""
+
+from typing import Any
+
+import pytest
+
+from tests.integration.robot import ARM, CONFIG, ELBOW, PAUSED, POSTURE, STEP_NS, TORSO, Robot, goal, swing
+from throwcollect.config.values import is_physics, sweepable_keys
+from throwcollect.episode.message import unpack
+from throwcollect.interfaces import serialize
+from throwcollect.ros import Parameter
+
+OWN = ["trial.number", "trial.controllers", "sim.real_time_factor"]
+INTEGER, DOUBLE, STRINGS = 2, 3, 9
+
+
+def test_trial_clock_and_swept_physics_are_parameters(robot: Robot) -> None:
+    physics = [key for key in sweepable_keys(CONFIG) if is_physics(key)]
+    assert "ball.mass_kg" in physics
+    assert "task.start.arm_right_4_joint" in physics
+    assert sorted(robot.parameters("list_parameters").result.names) == sorted(["use_sim_time", *OWN, *physics])
+
+
+def test_parameters_are_described_with_their_types_and_have_the_values_of_the_configuration(robot: Robot) -> None:
+    names = [*OWN, "ball.mass_kg"]
+    described = robot.parameters("describe_parameters", names=names).descriptors
+    assert [(each.name, each.type) for each in described] == list(
+        zip(names, [INTEGER, STRINGS, DOUBLE, DOUBLE], strict=True)
+    )
+    values = robot.parameters("get_parameters", names=["trial.number", "ball.mass_kg"]).values
+    assert values[0].integer_value == -1
+    assert values[1].double_value == CONFIG.ball.mass_kg
+
+
+@pytest.mark.parametrize(
+    ("values", "reason"),
+    [
+        ({"ball.mass_kg": 1}, "Wrong parameter type of ball.mass_kg, expected DOUBLE, got INTEGER"),
+        ({"trial.number": 1.0}, "Wrong parameter type of trial.number, expected INTEGER, got DOUBLE"),
+        ({"ball.mass_kg": -1.0}, "ball.mass_kg: should be a number above 0 and up to 2 kg, got -1.0"),
+        ({"ball.mass_kg": float("nan")}, "ball.mass_kg"),
+        ({"trial.controllers": [ARM, "arm_controller"]}, "no controller 'arm_controller'"),
+        ({"sim.real_time_factor": -1.0}, "sim.real_time_factor"),
+        ({"sim.real_time_factor": float("nan")}, "sim.real_time_factor"),
+        ({"trial.number": 10**15}, "trial.number"),
+    ],
+)
+def test_a_wrong_value_is_refused_with_the_reason(values: dict[str, Any], reason: str, robot: Robot) -> None:
+    result = robot.set(values)
+    assert not result.successful
+    assert reason in result.reason
+
+
+def test_a_wrong_value_keeps_the_others_of_its_request_from_being_set(robot: Robot) -> None:
+    assert not robot.set({"ball.mass_kg": 0.06, "ball.radius_m": 5.0}).successful
+    (value,) = robot.parameters("get_parameters", names=["ball.mass_kg"]).values
+    assert value.double_value == CONFIG.ball.mass_kg
+
+
+def test_one_by_one_each_parameter_has_its_own_result(robot: Robot) -> None:
+    wanted = [Parameter("ball.mass_kg", value=0.06), Parameter("ball.radius_m", value=5.0)]
+    results = robot.parameters("set_parameters", parameters=[each.to_parameter_msg() for each in wanted]).results
+    assert [each.successful for each in results] == [True, False]
+
+
+def test_physics_takes_effect_with_the_next_reset(robot: Robot) -> None:
+    start = {"task.start.arm_right_4_joint": -1.7, "scene.gravity_mps2": 1.6}
+    assert robot.set(start).successful
+    assert robot.joint(ELBOW) == pytest.approx(POSTURE[ELBOW], abs=1e-4)
+    robot.reset()
+    assert robot.joint(ELBOW) == pytest.approx(-1.7, abs=1e-4)
+
+
+def test_a_trial_waits_for_all_its_controllers_and_then_hands_in_its_episode(robot: Robot) -> None:
+    assert robot.set({"trial.number": 5, "trial.controllers": [ARM, TORSO], "ball.mass_kg": 0.05}).successful
+    robot.reset()
+    start_ns = CONFIG.trial_start_ns(5)
+    assert robot.now_ns() == start_ns
+    with robot.listening("std_msgs/msg/UInt8MultiArray", "episode") as heard:
+        first = robot.send(swing())
+        assert robot.now_ns() == start_ns
+        second = robot.send(goal(TORSO), TORSO)
+        robot.wait_until(lambda: bool(heard), "an episode")
+    assert [robot.outcome(handle)[1] for handle in (first, second)] == [0, 0]
+    (message,) = heard
+    parts = [each.label for each in message.layout.dim]
+    assert parts == ["header", "chunk"]
+    header = unpack(serialize(message)).header
+    assert (header.trial, header.start_ns, header.end_reason) == (5, start_ns, "landed")
+    assert [(each.controller, each.status) for each in header.goals] == [(ARM, 4), (TORSO, 4)]
+
+
+def test_a_real_time_factor_can_be_set_and_taken_back(robot: Robot) -> None:
+    assert robot.set({"sim.real_time_factor": 5.0}).successful
+    assert robot.outcome(robot.send(swing(0.3)))[1] == 0
+    assert robot.set({"sim.real_time_factor": 0.0}).successful
+
+
+def test_setting_parameters_does_not_move_the_clock(robot: Robot) -> None:
+    robot.put_into(PAUSED)
+    robot.step(3)
+    assert robot.set({"trial.number": 2}).successful
+    assert robot.now_ns() == 3 * STEP_NS

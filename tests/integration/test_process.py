@@ -1,0 +1,58 @@
+"""How the process of a simulation begins and ends."""
+
+import signal
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.integration.robot import QUITTING, Result, Robot, start_simulation, swing
+from throwcollect.ros import Context
+
+NAME = "sim_1"
+
+
+@pytest.fixture
+def running(endpoint: str, session: Context, tmp_path: Path) -> Iterator[tuple[subprocess.Popen[str], Robot]]:
+    process = start_simulation(tmp_path, endpoint, NAME)
+    robot = Robot(session, NAME)
+    robot.wait_until_ready(process)
+    yield process, robot
+    robot.node.destroy_node()
+    process.kill()
+    process.communicate()
+
+
+def assert_ends_well(process: subprocess.Popen[str]) -> None:
+    output, _ = process.communicate(timeout=10)
+    assert process.returncode == 0, output
+    assert "Traceback" not in output
+    assert "rror" not in output
+
+
+def test_quitting_ends_the_process_after_an_answer(running: tuple[subprocess.Popen[str], Robot]) -> None:
+    process, robot = running
+    assert robot.put_into(QUITTING).result == Result.RESULT_OK
+    assert_ends_well(process)
+    robot.wait_until(
+        lambda: (NAME, f"/{NAME}") not in robot.node.get_node_names_and_namespaces(), "it leaves the graph"
+    )
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_ends_the_process_in_the_middle_of_a_run(
+    number: signal.Signals, running: tuple[subprocess.Popen[str], Robot]
+) -> None:
+    process, robot = running
+    # Slow enough to last longer than the patience of the test.
+    assert robot.set({"sim.real_time_factor": 0.5}).successful
+    assert robot.send(swing(60.0)).accepted
+    process.send_signal(number)
+    assert_ends_well(process)
+
+
+def test_a_signal_ends_an_idle_process(running: tuple[subprocess.Popen[str], Robot]) -> None:
+    process, _ = running
+    process.send_signal(signal.SIGTERM)
+    assert_ends_well(process)

@@ -1,0 +1,103 @@
+"""Topics that come with every sample, while somebody listens."""
+
+from typing import Any
+
+import pytest
+
+from tests.integration.robot import (
+    ARM,
+    CONFIG,
+    ELBOW,
+    PAUSED,
+    POSTURE,
+    SAMPLE_NS,
+    STEP_NS,
+    Robot,
+    goal,
+    stamp_ns,
+    swing,
+)
+from throwcollect.robots.talos import CONTROLLERS, JOINTS
+
+KINDS = {
+    "joint_states": "sensor_msgs/msg/JointState",
+    "ball/odometry": "nav_msgs/msg/Odometry",
+    "tf": "tf2_msgs/msg/TFMessage",
+    "clock": "rosgraph_msgs/msg/Clock",
+}
+
+
+def time_of(message: Any) -> int:
+    if hasattr(message, "transforms"):
+        return stamp_ns(message.transforms[0].header.stamp)
+    return stamp_ns(message.clock if hasattr(message, "clock") else message.header.stamp)
+
+
+@pytest.mark.parametrize("topic", KINDS)
+def test_a_listener_hears_every_sample_of_a_stretch_of_time(topic: str, robot: Robot) -> None:
+    robot.put_into(PAUSED)
+    with robot.listening(KINDS[topic], topic) as heard:
+        robot.step(50)
+        robot.wait_until(lambda: bool(heard) and time_of(heard[-1]) == 50 * STEP_NS, "the last sample")
+    times = [time_of(message) for message in heard]
+    assert times == list(range(times[0], 50 * STEP_NS + 1, SAMPLE_NS))
+    assert times[0] in (0, SAMPLE_NS)
+
+
+def test_nobody_is_told_anything_twice_while_time_stands_still(robot: Robot) -> None:
+    robot.put_into(PAUSED)
+    with robot.listening(KINDS["clock"], "clock") as heard:
+        robot.step(20)
+        robot.wait_until(lambda: bool(heard) and time_of(heard[-1]) == 20 * STEP_NS, "the last sample")
+        for _ in range(5):
+            robot.state()
+    assert len({time_of(message) for message in heard}) == len(heard)
+
+
+def test_joint_states_hold_all_joints_and_follow_a_motion(robot: Robot) -> None:
+    with robot.listening(KINDS["joint_states"], "joint_states") as heard:
+        robot.outcome(robot.send(goal(ARM, 0.5, arm_right_4_joint=-1.0)))
+        robot.wait_until(lambda: bool(heard) and time_of(heard[-1]) >= 500_000_000, "samples of the whole motion")
+    first, last = heard[0], heard[-1]
+    assert tuple(first.name) == JOINTS
+    assert len(first.position) == len(first.velocity) == len(first.effort) == 32
+    column = JOINTS.index(ELBOW)
+    assert first.position[column] == pytest.approx(POSTURE[ELBOW], abs=1e-3)
+    assert last.position[column] == pytest.approx(-1.0, abs=0.005)
+    assert max(message.velocity[column] for message in heard) > 1.0
+
+
+def test_the_ball_is_heard_to_fly_and_to_land(robot: Robot) -> None:
+    assert robot.set({"trial.number": 0, "trial.controllers": [ARM]}).successful
+    robot.reset()
+    start_ns = CONFIG.trial_start_ns(0)
+    with (
+        robot.listening(KINDS["ball/odometry"], "ball/odometry") as heard,
+        robot.listening("std_msgs/msg/UInt8MultiArray", "episode") as episodes,
+    ):
+        robot.send(swing())
+        robot.wait_until(lambda: bool(episodes), "the episode")
+    # Samples are sent before the episode that they are part of, but may be overtaken by it on the way.
+    robot.state()
+    heights = [message.pose.pose.position.z for message in heard]
+    assert max(heights) > heights[0] + 0.1
+    assert heights[-1] <= CONFIG.ball.radius_m
+    assert heard[0].header.frame_id == "world"
+    assert heard[0].child_frame_id == "ball"
+    assert time_of(heard[-1]) > start_ns + 10**9
+
+
+def test_the_state_of_a_controller_comes_every_50_ms_while_somebody_listens(robot: Robot) -> None:
+    kind = "control_msgs/msg/JointTrajectoryControllerState"
+    with robot.listening(kind, f"{ARM}/controller_state") as heard:
+        robot.outcome(robot.send(goal(ARM, 0.5, arm_right_4_joint=-1.0)))
+        robot.wait_until(lambda: bool(heard) and time_of(heard[-1]) >= 490_000_000, "the last state")
+    times = sorted({time_of(message) for message in heard if time_of(message) > 0})
+    assert times[:9] == [50_000_000 * number - STEP_NS for number in range(1, 10)]
+    last = heard[-1]
+    assert tuple(last.joint_names) == CONTROLLERS[ARM]
+    column = CONTROLLERS[ARM].index(ELBOW)
+    assert last.reference.positions[column] == pytest.approx(-1.0, abs=1e-3)
+    assert last.feedback.positions[column] == pytest.approx(-1.0, abs=0.01)
+    assert last.output.positions[column] == pytest.approx(-1.0, abs=1e-3)
+    assert last.speed_scaling_factor == 1.0

@@ -1,0 +1,251 @@
+"""Joint trajectories, by action and by topic."""
+
+import math
+import uuid
+from typing import Any
+
+import pytest
+
+from tests.integration.robot import (
+    ARM,
+    ELBOW,
+    HEAD,
+    PAUSED,
+    PLAYING,
+    POSTURE,
+    STEP_NS,
+    TORSO,
+    FollowJointTrajectory,
+    JointTolerance,
+    JointTrajectory,
+    Robot,
+    duration,
+    goal,
+    stamp_ns,
+    swing,
+    trajectory,
+)
+from throwcollect.interfaces import get_message, get_service
+from throwcollect.robots.talos import CONTROLLERS
+
+SUCCEEDED, CANCELED, ABORTED = 4, 5, 6
+REACHED = (SUCCEEDED, 0, "Goal successfully reached!")
+PREEMPTED = (ABORTED, -1, "Current goal preempted by new incoming action.")
+START = [POSTURE[joint] for joint in CONTROLLERS[ARM]]
+UUID: Any = get_message("unique_identifier_msgs/msg/UUID")
+CancelGoal: Any = get_service("action_msgs/srv/CancelGoal").Response
+
+
+def changed(wish: Any, **fields: Any) -> Any:
+    for name, value in fields.items():
+        setattr(wish.trajectory, name, value)
+    return wish
+
+
+def partial() -> Any:
+    wish = goal(ARM)
+    wish.trajectory.joint_names = wish.trajectory.joint_names[:-1]
+    for point in wish.trajectory.points:
+        point.positions, point.velocities, point.accelerations = point.positions[:-1], [], []
+    return wish
+
+
+def with_last_point(**fields: Any) -> Any:
+    wish = goal(ARM)
+    for name, value in fields.items():
+        setattr(wish.trajectory.points[-1], name, value)
+    return wish
+
+
+def test_a_goal_is_reached_and_says_so(robot: Robot) -> None:
+    handle = robot.send(goal(ARM, 1.0, arm_right_4_joint=-0.9))
+    assert handle.accepted
+    assert robot.outcome(handle) == REACHED
+    assert robot.joint(ELBOW) == pytest.approx(-0.9, abs=0.005)
+    robot.wait_until(lambda: handle.status == SUCCEEDED, "the status of the goal")
+
+
+def test_the_goals_of_all_eight_limbs_are_carried_out_at_once(robot: Robot) -> None:
+    robot.put_into(PAUSED)
+    handles = [robot.send(goal(controller, 0.5), controller) for controller in CONTROLLERS]
+    robot.put_into(PLAYING)
+    assert [robot.outcome(handle) for handle in handles] == [REACHED] * 8
+
+
+@pytest.mark.parametrize("seconds", [0.52, 1.0])
+def test_feedback_comes_at_20_hz_of_simulated_time_from_the_start_on(seconds: float, robot: Robot) -> None:
+    topic = f"{ARM}/follow_joint_trajectory/_action/feedback"
+    with robot.listening(FollowJointTrajectory.Impl.FeedbackMessage, topic) as heard:
+        handle = robot.send(goal(ARM, seconds, arm_right_4_joint=-1.7))
+        assert robot.outcome(handle) == REACHED
+        assert {bytes(message.goal_id.uuid) for message in heard} == {bytes(handle.goal_id.uuid)}
+    stamps = [stamp_ns(message.feedback.header.stamp) for message in heard]
+    # The controller's last look at its joints is one period before the slice of time ends.
+    assert stamps == [50_000_000 * number - STEP_NS for number in range(1, math.ceil(seconds / 0.05))]
+    middle = heard[len(heard) // 2].feedback
+    assert tuple(middle.joint_names) == CONTROLLERS[ARM]
+    column = CONTROLLERS[ARM].index(ELBOW)
+    assert middle.desired.positions[column] - middle.actual.positions[column] == middle.error.positions[column]
+    assert POSTURE[ELBOW] < middle.actual.positions[column] < -1.7
+    elapsed = [stamp_ns(message.feedback.desired.time_from_start) for message in heard]
+    assert elapsed == sorted(elapsed)
+
+
+def test_a_feedback_callback_is_called(robot: Robot) -> None:
+    heard: list[Any] = []
+    assert robot.set({"sim.real_time_factor": 4.0}).successful
+    handle = robot.result(robot.action().send_goal_async(goal(ARM, 1.0), heard.append))
+    assert robot.outcome(handle) == REACHED
+    assert heard
+    assert bytes(heard[0].goal_id.uuid) == bytes(handle.goal_id.uuid)
+
+
+def test_there_is_no_feedback_while_time_stands_still(robot: Robot) -> None:
+    robot.put_into(PAUSED)
+    topic = f"{ARM}/follow_joint_trajectory/_action/feedback"
+    with robot.listening(FollowJointTrajectory.Impl.FeedbackMessage, topic) as heard:
+        robot.send(swing())
+        for steps in (10, 20):
+            robot.step(steps)
+            for _ in range(3):
+                robot.state()
+    assert [stamp_ns(message.feedback.header.stamp) for message in heard] == [9 * STEP_NS, 29 * STEP_NS]
+
+
+@pytest.mark.parametrize(
+    ("wish", "reason"),
+    [
+        (changed(goal(ARM), joint_names=list(CONTROLLERS["arm_left_controller"])), "Incoming joint arm_left_1_joint"),
+        (partial(), "Joints on incoming trajectory don't match the controller joints"),
+        (changed(goal(ARM), points=[]), "Empty trajectory received"),
+        (changed(goal(ARM), joint_names=[], points=[]), "Joints on incoming trajectory don't match"),
+        (with_last_point(positions=START[:-1]), "Mismatch between joint_names size (7) and positions (6) at point #1"),
+        (goal(ARM, arm_right_4_joint=float("nan")), f"Position of joint {ELBOW} at point #1 is not finite"),
+        (with_last_point(velocities=[0.1] * 7), "Velocity of last trajectory point of joint arm_right_1_joint"),
+        (with_last_point(effort=[1.0] * 7), "effort"),
+        (with_last_point(time_from_start=duration(0.0)), "not strictly increasing"),
+        (goal(ARM, arm_right_5_joint=0.4), "arm_right_5_joint is locked at 0 rad (robot.locked)"),
+    ],
+)
+def test_a_goal_that_cannot_be_carried_out_is_rejected_and_the_log_says_why(
+    wish: Any, reason: str, robot: Robot
+) -> None:
+    with robot.listening("rcl_interfaces/msg/Log", "/rosout") as log:
+        assert not robot.send(wish).accepted
+        robot.wait_until(lambda: any(reason in message.msg for message in log), f"{reason!r} in {log}")
+    assert robot.now_ns() == 0
+
+
+def test_a_locked_limb_is_refused_by_name_and_its_neighbours_still_move(robot: Robot) -> None:
+    assert not robot.send(goal(HEAD, head_1_joint=0.3), HEAD).accepted
+    assert robot.outcome(robot.send(goal(HEAD, 0.2), HEAD)) == REACHED
+    assert robot.outcome(robot.send(goal(TORSO, 1.0, torso_1_joint=0.2), TORSO)) == REACHED
+    assert robot.joint("torso_1_joint") == pytest.approx(0.2, abs=0.005)
+
+
+def test_an_arm_too_weak_to_arrive_breaks_the_tolerance_of_the_goal(robot: Robot) -> None:
+    assert robot.set({"robot.effort_scale": 0.01}).successful
+    robot.reset()
+    status, code, text = robot.outcome(robot.send(swing()))
+    assert (status, code) == (ABORTED, FollowJointTrajectory.Result.GOAL_TOLERANCE_VIOLATED)
+    assert code == -5
+    # 0.6 s are those of PAL's configuration; it is over in the first period after them.
+    assert text.startswith("Aborted due to goal_time_tolerance exceeding by 0.602000 seconds: ")
+    assert f"joint {ELBOW} has position error" in text
+
+
+def test_an_arm_that_cannot_follow_breaks_the_tolerance_of_the_path(robot: Robot) -> None:
+    assert robot.set({"robot.effort_scale": 0.01}).successful
+    robot.reset()
+    wish = swing()
+    wish.path_tolerance = [JointTolerance(name=ELBOW, position=0.1)]
+    status, code, text = robot.outcome(robot.send(wish))
+    assert (status, code) == (ABORTED, FollowJointTrajectory.Result.PATH_TOLERANCE_VIOLATED)
+    assert code == -4
+    assert text.startswith(f"Aborted due to path tolerance violation: joint {ELBOW} has position error 0.1")
+    assert text.endswith("tolerance 0.100000 rad")
+
+
+def test_a_cancelled_goal_ends_as_cancelled_and_the_arm_stops_where_it_is(robot: Robot) -> None:
+    robot.put_into(PAUSED)
+    handle = robot.send(swing())
+    robot.step(250)
+    response = robot.result(handle.cancel_goal_async())
+    assert response.return_code == CancelGoal.ERROR_NONE
+    assert [bytes(info.goal_id.uuid) for info in response.goals_canceling] == [bytes(handle.goal_id.uuid)]
+    assert robot.outcome(handle) == (CANCELED, 0, "")
+    stopped = robot.joint(ELBOW)
+    assert stopped == pytest.approx(-1.2, abs=0.05)
+    robot.step(500)
+    assert robot.joint(ELBOW) == pytest.approx(stopped, abs=0.005)
+
+
+def test_a_goal_is_cancelled_while_the_clock_runs(robot: Robot) -> None:
+    assert robot.set({"sim.real_time_factor": 1.0}).successful
+    handle = robot.send(swing(8.0))
+    before = robot.now_ns()
+    robot.wait_until(lambda: robot.now_ns() > before, "time goes on")
+    robot.result(handle.cancel_goal_async())
+    assert robot.outcome(handle) == (CANCELED, 0, "")
+    assert robot.joint(ELBOW) < -1.0
+
+
+def test_goals_that_are_over_or_unknown_are_not_cancelled(robot: Robot) -> None:
+    handle = robot.send(goal(ARM, 0.2))
+    robot.outcome(handle)
+    assert robot.result(handle.cancel_goal_async()).return_code == CancelGoal.ERROR_GOAL_TERMINATED
+    handle.goal_id = UUID(uuid=uuid.uuid4().bytes)
+    assert robot.result(handle.cancel_goal_async()).return_code == CancelGoal.ERROR_UNKNOWN_GOAL_ID
+
+
+def test_a_new_goal_aborts_the_one_before(robot: Robot) -> None:
+    robot.put_into(PAUSED)
+    first = robot.send(swing())
+    robot.step(100)
+    second = robot.send(goal(ARM, 1.0, arm_right_4_joint=-1.5))
+    assert robot.outcome(first) == PREEMPTED
+    robot.put_into(PLAYING)
+    assert robot.outcome(second) == REACHED
+    assert robot.joint(ELBOW) == pytest.approx(-1.5, abs=0.005)
+
+
+def test_of_goals_sent_at_once_the_last_one_counts_and_each_gets_its_own_result(robot: Robot) -> None:
+    futures = [robot.action().send_goal_async(goal(ARM, 0.5, arm_right_4_joint=end)) for end in (-0.6, -1.0, -1.4)]
+    handles = [robot.result(future) for future in futures]
+    assert [robot.outcome(handle) for handle in handles] == [PREEMPTED, PREEMPTED, REACHED]
+    assert robot.joint(ELBOW) == pytest.approx(-1.4, abs=0.005)
+
+
+def test_a_goal_of_another_limb_aborts_nothing(robot: Robot) -> None:
+    robot.put_into(PAUSED)
+    handles = [robot.send(swing()), robot.send(goal(TORSO, 0.5), TORSO)]
+    robot.put_into(PLAYING)
+    assert [robot.outcome(handle) for handle in handles] == [REACHED, REACHED]
+
+
+def test_a_reset_aborts_a_goal_even_right_after_it(robot: Robot) -> None:
+    future = robot.action().send_goal_async(swing())
+    reset = robot.ask("simulation_interfaces/srv/ResetSimulation", "reset_simulation")
+    handle = robot.result(future)
+    robot.result(reset)
+    assert robot.outcome(handle) == (ABORTED, -1, "simulation was reset")
+    assert robot.now_ns() == 0
+
+
+def test_the_trajectory_topic_moves_the_arm(robot: Robot) -> None:
+    publisher = robot.node.create_publisher(JointTrajectory, robot.topic(f"{ARM}/joint_trajectory"), 10)
+    robot.wait_until(lambda: publisher.get_subscription_count() == 1, "the controller listens")
+    publisher.publish(trajectory(ARM, 0.5, arm_right_4_joint=-0.7))
+    robot.wait_until(lambda: robot.now_ns() >= 500_000_000, "the motion is over")
+    assert robot.joint(ELBOW) == pytest.approx(-0.7, abs=0.005)
+    robot.node.destroy_publisher(publisher)
+
+
+def test_a_trajectory_on_the_topic_that_cannot_be_followed_is_logged(robot: Robot) -> None:
+    publisher = robot.node.create_publisher(JointTrajectory, robot.topic(f"{ARM}/joint_trajectory"), 10)
+    robot.wait_until(lambda: publisher.get_subscription_count() == 1, "the controller listens")
+    with robot.listening("rcl_interfaces/msg/Log", "/rosout") as log:
+        publisher.publish(trajectory(ARM, 0.5, arm_right_6_joint=0.3))
+        robot.wait_until(lambda: any("arm_right_6_joint is locked" in message.msg for message in log), "a log message")
+    assert robot.now_ns() == 0
+    robot.node.destroy_publisher(publisher)

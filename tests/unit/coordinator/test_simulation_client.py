@@ -1,0 +1,141 @@
+"""What the coordinator makes of a simulation's answers, over a real router."""
+
+import json
+import time
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from throwcollect import ros
+from throwcollect.config.schema import Config
+from throwcollect.coordinator.goals import FollowJointTrajectory, trial_goals
+from throwcollect.coordinator.progress import Progress
+from throwcollect.coordinator.simulation_client import SimulationClient
+from throwcollect.interfaces import get_service
+from throwcollect.robots.description import start_posture
+from throwcollect.ros.action import ActionServer, GoalResponse
+from throwcollect.ros.router import router
+from throwcollect.tasks.trajectory import throw_trajectory
+
+ResetSimulation = get_service("simulation_interfaces/srv/ResetSimulation")
+CONFIG = Config()
+GOALS = trial_goals(throw_trajectory(CONFIG), start_posture(CONFIG))
+
+
+class Bench:
+    """A coordinator's client, and a node that stands in for the simulation."""
+
+    def __init__(self) -> None:
+        self.refusals: list[tuple[str, str]] = []
+        self.requests: list[str] = []
+        self.accepts = True
+        self.executor = ros.SingleThreadedExecutor()
+        self.simulation = ros.Node("sim_0", namespace="/sim_0")
+        self.simulation.declare_parameter("trial.number", -1)
+        self.simulation.declare_parameter("trial.controllers", [""])
+        self.simulation.declare_parameter("ball.mass_kg", 0.045)
+        self.simulation.create_service(ResetSimulation, "reset_simulation", self._reset)
+        self.servers = [
+            ActionServer(
+                self.simulation,
+                FollowJointTrajectory,
+                f"{controller}/follow_joint_trajectory",
+                self._execute,
+                goal_callback=self._consider,
+            )
+            for controller in GOALS.controllers
+        ]
+        self.node = ros.Node("coordinator")
+        self.client = SimulationClient(
+            self.node,
+            "/sim_0",
+            controllers=GOALS.controllers,
+            action_type=FollowJointTrajectory,
+            on_episode=lambda namespace, message: None,
+            on_refusal=lambda namespace, reason: self.refusals.append((namespace, reason)),
+        )
+        self.executor.add_node(self.node)
+        self.executor.add_node(self.simulation)
+        assert self.spin(self.client.ready)
+
+    def _reset(self, _request, response):
+        self.requests.append("reset")
+        response.result.result = 1
+        return response
+
+    def _consider(self, _goal):
+        self.requests.append("goal")
+        return GoalResponse.ACCEPT if self.accepts else GoalResponse.REJECT
+
+    def _execute(self, handle):
+        handle.succeed()
+        return FollowJointTrajectory.Result()
+
+    def settle(self) -> None:
+        """Let every answer that is under way arrive: those of a further call come after them."""
+        done = self.client._reset.call_async(ResetSimulation.Request())
+        assert self.spin(done.done)
+
+    def spin(self, condition: Callable[[], bool]) -> bool:
+        deadline = time.monotonic() + 10
+        while not condition() and time.monotonic() < deadline:
+            self.executor.spin_once(timeout_sec=0.05)
+        return condition()
+
+
+@pytest.fixture
+def bench(monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
+    with router("tcp/127.0.0.1:0") as endpoint:
+        monkeypatch.setenv("ZENOH_CONFIG_OVERRIDE", f'mode="client";connect/endpoints=["{endpoint}"]')
+        ros.init()
+        try:
+            yield Bench()
+        finally:
+            ros.shutdown()
+
+
+def test_a_trial_is_parameters_then_reset_then_goals(bench: Bench) -> None:
+    bench.client.begin(5, {"ball.mass_kg": 0.05}, GOALS)
+    assert bench.spin(lambda: len(bench.requests) == 3)
+    assert bench.requests == ["reset", "goal", "goal"]
+    assert bench.simulation.get_parameter("trial.number").value == 5
+    assert tuple(bench.simulation.get_parameter("trial.controllers").value) == GOALS.controllers
+    assert bench.simulation.get_parameter("ball.mass_kg").value == 0.05
+    assert bench.refusals == []
+
+
+def test_refused_goals_are_reported(bench: Bench) -> None:
+    bench.accepts = False
+    bench.client.begin(0, {}, GOALS)
+    assert bench.spin(lambda: len(bench.refusals) == 2)
+    assert bench.refusals[0] == ("/sim_0", "arm_right_controller refused the goal; its log says why")
+
+
+def test_refused_parameters_are_reported_with_the_reason(bench: Bench) -> None:
+    bench.client.begin(0, {"ball.colour": 1.0}, GOALS)
+    assert bench.spin(lambda: bool(bench.refusals))
+    assert bench.refusals[0][1].startswith("parameters: ")
+
+
+def test_a_late_refusal_does_not_touch_the_next_trial(bench: Bench) -> None:
+    bench.accepts = False
+    bench.client.begin(0, {}, GOALS)
+    bench.client.begin(1, {}, GOALS)
+    assert bench.spin(lambda: bench.requests.count("goal") == 4)
+    bench.settle()
+    assert len(bench.refusals) == 2
+
+
+def test_an_abandoned_trial_is_not_heard_of_again(bench: Bench) -> None:
+    bench.accepts = False
+    bench.client.begin(0, {}, GOALS)
+    bench.client.abandon()
+    assert bench.spin(lambda: bench.requests.count("goal") == 2)
+    bench.settle()
+    assert bench.refusals == []
+
+
+def test_progress_survives_its_message() -> None:
+    progress = Progress(10, 4, {"landed": 2, "recaught": 1, "lost": 1}, 2, 7.5, hung=["sim_1"])
+    assert Progress(**json.loads(progress.message().data)) == progress
+    assert (progress.landed, progress.failed, progress.lost) == (2, 1, 1)
