@@ -332,7 +332,7 @@ class RunConfig(Section):
     domain_id: Annotated[int, Field(ge=0, le=232)] = 0
     """ROS domain."""
     trial_timeout_s: PositiveFloat = 60.0
-    """Real time that a simulation may take for one trial before it counts as lost; `sim.real_time_factor` adds to it."""
+    """Real time that a simulation may take for one trial before it counts as lost, besides what slow motion takes."""
     start_timeout_s: PositiveFloat = 60.0
     """Real time within which the first simulation must be ready."""
     retries: Annotated[int, Field(ge=0, le=100)] = 3

@@ -19,7 +19,6 @@ from throwcollect.control.tolerances import default_tolerances, goal_tolerances
 from throwcollect.control.validation import refusal
 
 _LOGGER = logging.getLogger(__name__)
-_READ_ONLY = ("joints", "command_interfaces", "state_interfaces", "interpolation_method")
 
 
 class JointTrajectoryController:
@@ -64,9 +63,7 @@ class JointTrajectoryController:
 
     @parameters.setter
     def parameters(self, parameters: ControllerParameters) -> None:
-        for key in _READ_ONLY:
-            if getattr(parameters, key) != getattr(self._parameters, key):
-                raise ValueError(f"{self.name}: parameter {key} is read-only")
+        self._parameters.check_change(parameters, self.name)
         self._parameters = parameters
         self._defaults = default_tolerances(parameters.constraints, parameters.joints)
 

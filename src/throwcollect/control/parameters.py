@@ -9,6 +9,8 @@ from typing import Literal
 
 from throwcollect.errors import ConfigError, Problem
 
+_READ_ONLY = ("joints", "command_interfaces", "state_interfaces", "interpolation_method")
+
 
 @dataclass(frozen=True)
 class JointConstraints:
@@ -92,6 +94,20 @@ class ControllerParameters:
                 joints={joint: JointConstraints(goal=0.02) for joint in joints},
             ),
         )
+
+    def check_change(self, new: ControllerParameters, controller: str) -> None:
+        """Make sure that a running controller may be set to other parameters.
+
+        Args:
+            new: The parameters to be.
+            controller: Its name, for the error.
+
+        Raises:
+            ValueError: If a parameter differs that is fixed when the controller is made.
+        """
+        for key in _READ_ONLY:
+            if getattr(new, key) != getattr(self, key):
+                raise ValueError(f"{controller}: parameter {key} is read-only")
 
     def _wrong_choices(self) -> list[tuple[str, str]]:
         wrong = []

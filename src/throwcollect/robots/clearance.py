@@ -9,6 +9,7 @@ import pinocchio
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import ToolConfig
+from throwcollect.errors import ConfigError
 from throwcollect.robots.model import share_directory, urdf_path
 from throwcollect.robots.spoon import boxes
 
@@ -56,14 +57,20 @@ class Clearance:
     Args:
         model: Talos with all joints.
         tool: Dimensions of the spoon.
+
+    Raises:
+        ConfigError: If the robot's meshes cannot be read.
     """
 
     def __init__(self, model: pinocchio.Model, tool: ToolConfig) -> None:
         self._model = model
         self._data = model.createData()
-        geometry = pinocchio.buildGeomFromUrdf(
-            model, str(urdf_path()), pinocchio.GeometryType.COLLISION, package_dirs=[str(share_directory())]
-        )
+        try:
+            geometry = pinocchio.buildGeomFromUrdf(
+                model, str(urdf_path()), pinocchio.GeometryType.COLLISION, package_dirs=[str(share_directory())]
+            )
+        except (ValueError, RuntimeError) as error:
+            raise ConfigError(f"{urdf_path()}: its meshes cannot be read: {error}") from error
         for shape in geometry.geometryObjects:
             if isinstance(shape.geometry, pinocchio.coal.BVHModelBase):
                 shape.geometry.buildConvexHull(True, "Qt")

@@ -33,7 +33,8 @@ def read_points(path: Path, config: Config) -> Points:
     if path.suffix not in readers:
         raise ConfigError([Problem(f"should end in .csv or .parquet, got '{path.name}'", "sweep.file")])
     if not path.is_file():
-        raise ConfigError([Problem("no such file", "sweep.file", path)])
+        problem = "is a directory, not a file" if path.is_dir() else "no such file"
+        raise ConfigError([Problem(problem, "sweep.file", path)])
     points, lines = readers[path.suffix](path, config)
     if not len(points.values):
         raise ConfigError([Problem("the file has no rows", "sweep.file", path)])

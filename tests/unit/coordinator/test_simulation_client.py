@@ -51,7 +51,7 @@ class Bench:
             "/sim_0",
             controllers=GOALS.controllers,
             action_type=FollowJointTrajectory,
-            on_episode=lambda namespace, message: None,
+            on_episode=lambda *_: None,
             on_refusal=lambda namespace, reason: self.refusals.append((namespace, reason)),
         )
         self.executor.add_node(self.node)

@@ -1,0 +1,115 @@
+"""The fixture of the acceptance cases: a controller of three joints, a plant, and a clock."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from throwcollect.control import (
+    ControllerParameters,
+    GoalResult,
+    JointConstraints,
+    JointState,
+    JointTolerance,
+    JointTrajectoryController,
+    Trajectory,
+    TrajectoryGoal,
+    TrajectoryPoint,
+)
+from throwcollect.control.parameters import Constraints
+
+JOINTS = ("j1", "j2", "j3")
+START = (1.1, 2.1, 3.1)
+PERIOD_NS = 10_000_000
+SHIPPED = ControllerParameters(JOINTS, state_interfaces=("position", "velocity"))
+
+
+def constrained(goal: float = 0.0, goal_time: float = 0.0, trajectory: float = 0.0) -> ControllerParameters:
+    limits = {joint: JointConstraints(trajectory=trajectory, goal=goal) for joint in JOINTS}
+    constraints = Constraints(goal_time=goal_time, joints=limits)
+    return ControllerParameters(JOINTS, state_interfaces=("position", "velocity"), constraints=constraints)
+
+
+TALOS = constrained(goal=0.02, goal_time=0.6)
+
+
+def seconds(value: float) -> int:
+    return round(value * 1e9)
+
+
+def point(time_s: float, positions: Sequence[float], velocities=(), accelerations=(), effort=()) -> TrajectoryPoint:
+    return TrajectoryPoint(seconds(time_s), positions, velocities, accelerations, effort)
+
+
+def to(time_s: float, j1: float, degree: int = 1) -> TrajectoryPoint:
+    """A point for joint 1, at rest as far as the degree goes; the other joints stay."""
+    still = (0.0, 0.0, 0.0)
+    return point(time_s, (j1, *START[1:]), still if degree > 1 else (), still if degree > 3 else ())
+
+
+def goal(*points: TrajectoryPoint, names=JOINTS, stamp_s: float | None = None, **tolerances) -> TrajectoryGoal:
+    stamp_ns = None if stamp_s is None else seconds(stamp_s)
+    for key in ("path_tolerance", "goal_tolerance"):
+        if key in tolerances:
+            tolerances[key] = [JointTolerance(*tolerances[key])]
+    return TrajectoryGoal(Trajectory(names, points, stamp_ns), **tolerances)
+
+
+@dataclass
+class Plant:
+    """Joints that follow their command: ideally, not at all, with an offset, or with a first-order lag.
+
+    The bulk test runs two side by side, so a plant is a pure function of its commands.
+    """
+
+    kind: str = "ideal"
+    position: np.ndarray = field(default_factory=lambda: np.array(START))
+    velocity: float = 0.0
+    lag_s: float = 0.1
+
+    def apply(self, command: np.ndarray) -> None:
+        if self.kind == "ideal":
+            self.position = np.array(command)
+        elif self.kind == "offset":
+            self.position = command - 0.3
+        elif self.kind == "lag":
+            share = 1 - math.exp(-PERIOD_NS / 1e9 / self.lag_s)
+            self.position = self.position + share * (command - self.position)
+
+    def measured(self) -> JointState:
+        return JointState(self.position, np.full(len(self.position), self.velocity))
+
+
+class Bench:
+    """A controller that is driven step by step; `k` counts the updates since the last goal."""
+
+    def __init__(self, parameters: ControllerParameters = SHIPPED, plant: Plant | None = None, now_s=1000.0) -> None:
+        self.plant = plant or Plant()
+        self.controller = JointTrajectoryController("c", parameters, period_ns=PERIOD_NS)
+        self.now_ns = seconds(now_s)
+        self.controller.activate(self.now_ns, self.plant.measured(), self.plant.position)
+        self.k = 0
+        self.commands: dict[int, np.ndarray] = {}
+        self.results: list[tuple[int, GoalResult]] = []
+
+    def send(self, request: TrajectoryGoal, goal_id="A") -> str | None:
+        refusal = self.controller.submit(goal_id, request, self.now_ns)
+        self.collect()
+        if refusal is None:
+            self.k = 0
+        return refusal
+
+    def collect(self) -> None:
+        self.results += [(self.k, result) for result in self.controller.pop_results()]
+
+    def step(self, updates: int = 1) -> None:
+        for _ in range(updates):
+            self.k += 1
+            self.now_ns += PERIOD_NS
+            command = self.controller.update(self.now_ns, PERIOD_NS, self.plant.measured())
+            self.commands[self.k] = np.array(command)
+            self.plant.apply(command)
+            self.collect()
