@@ -37,8 +37,10 @@ def shared(endpoint: str, session: Context, tmp_path_factory: pytest.TempPathFac
 
 @pytest.fixture(scope="session")
 def defaults(shared: Robot) -> dict[str, object]:
-    """Values of all parameters when the simulation has just started."""
+    """Values of all parameters that can be set when the simulation has just started."""
     names = shared.parameters("list_parameters").result.names
+    described = shared.parameters("describe_parameters", names=names).descriptors
+    names = [each.name for each in described if not each.read_only]
     values = shared.parameters("get_parameters", names=names).values
     return {name: parameter_value_to_python(value) for name, value in zip(names, values, strict=True)}
 

@@ -80,9 +80,8 @@ class JointTrajectoryController:
     @property
     def at_rest(self) -> bool:
         """Whether, unless it is told something new, every further command equals the last and nothing is decided."""
-        if self._goal_id is not None or self._incoming is not None:
-            return False
-        return self._holding or (self._followed().past_end and self.next_decision() == sys.maxsize)
+        idle = self._goal_id is None and self._incoming is None
+        return idle and (self._holding or (self._followed().past_end and self.next_decision() == sys.maxsize))
 
     @property
     def command(self) -> NDArray[np.float64]:
@@ -332,8 +331,7 @@ class JointTrajectoryController:
             return TrajectoryState(False, np.empty(0))
         motion = self._motion
         if motion is None or time_ns < motion.first_ns:
-            measured = self._known_state()
-            return TrajectoryState(False, measured.positions, measured.velocities)
+            return TrajectoryState(False, self._known_state().positions, self._known_state().velocities)
         time_from_start_ns = time_ns - motion.start_ns
         return TrajectoryState(time_from_start_ns < motion.curve.end_ns, *motion.curve.state(time_from_start_ns))
 
@@ -371,8 +369,7 @@ class JointTrajectoryController:
 
     def _restart(self, time_ns: int, measured: JointState) -> None:
         self.observe(measured)
-        self._time_ns = time_ns
-        self._motion = None
+        self._time_ns, self._motion = time_ns, None
         self._command = self._known_state().positions
         self._hold(Waypoints.single(self._command))
 

@@ -15,7 +15,7 @@ from throwcollect.episode.topics import Topic
 from throwcollect.errors import ConfigError
 from throwcollect.interfaces import get_message
 from throwcollect.robots.description import full_description
-from throwcollect.ros import Node, QoSProfile, Time
+from throwcollect.ros import Node, ParameterDescriptor, QoSProfile, Time
 from throwcollect.ros.publisher import Publisher
 from throwcollect.ros.qos import DurabilityPolicy, HistoryPolicy
 from throwcollect.sim.limb_interface import LimbInterface
@@ -31,6 +31,9 @@ _WHOLE = QoSProfile(history=HistoryPolicy.KEEP_ALL)
 """Every episode reaches every subscriber, however slow it is."""
 
 _NO_LIMIT = 0.0
+_SHOWN = ("robot.", "tool.", "sim.", "task.", "record.")
+"""Sections of the configuration that can be read as parameters, besides the physics, which can be set."""
+
 _MOST_TRIALS = 10_000_000
 """As many as a configuration may ask for; all of them start at times that fit into a stamp."""
 
@@ -122,6 +125,10 @@ class SimulationNode(Node):
         self.declare_parameter("sim.real_time_factor", config.sim.real_time_factor or _NO_LIMIT)
         for key in self._physics:
             self.declare_parameter(key, float(values[key]))
+        fixed = ParameterDescriptor(read_only=True, description="of the configuration")
+        for key, value in values.items():
+            if isinstance(value, str | int | float) and key.startswith(_SHOWN) and not self.has_parameter(key):
+                self.declare_parameter(key, value, fixed)
         self.add_on_set_parameters_callback(self._set_up)
 
     def _set_up(self, parameters: Any) -> Any:
