@@ -60,8 +60,8 @@ class _Watch:
     def until(self, ended: int) -> _Mark:
         while not self._reports or self._reports[-1].ended < ended:
             self._listener.spin(_POLL_S)
-            if self._supervisor.poll()[0] is not None:
-                raise RuntimeError(f"the collection ended early: {self._supervisor.coordinator_log()}")
+            if (end := self._supervisor.poll()[0]) is not None:
+                raise RuntimeError(f"the collection ended early: {end.reason}: {end.log}")
         return _Mark(
             time.monotonic(),
             self._reports[-1].ended,
@@ -99,6 +99,8 @@ def measure(plan: Plan, simulations: int, directory: Path) -> Collection:
     began = time.monotonic()
     with Supervisor(directory, plan.config.run, simulations=simulations) as supervisor:
         supervisor.start()
+        while not supervisor.router_answers():
+            time.sleep(_POLL_S)
         os.environ.update(supervisor.environment)
         with ProgressListener(reports.append) as listener:
             watch = _Watch(supervisor, listener, reports)

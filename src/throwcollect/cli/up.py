@@ -25,6 +25,9 @@ from throwcollect.errors import DatasetError, Interrupted, WorkerError
 from throwcollect.runtime.local import NodeExit
 from throwcollect.runtime.supervisor import Supervisor
 
+_MANY_TRIALS = 1000
+"""From here on the plan takes long enough to be announced."""
+
 _POLL_S = 0.05
 
 
@@ -42,9 +45,11 @@ def collect(path: Path, *, overrides: Sequence[str], output: Path | None, json: 
     directory = output or Path("datasets") / f"{config.name}-{datetime.now():%Y%m%d-%H%M%S}"
     with display(quiet=json) as shown:
         supervisor = Supervisor(directory, config.run, simulations=config.run.simulations)
-        plan = prepare(config, directory, sweep_directory=path.parent)
         if config.run.runtime == "auto":
             shown.say("runtime: local processes (auto)")
+        if (config.trials or 0) >= _MANY_TRIALS:
+            shown.say(f"plan: checking {config.trials} trials against limits and collisions, about 5 ms each")
+        plan = prepare(config, directory, sweep_directory=path.parent)
         refused = sum(trial.refused is not None for trial in plan.trials)
         note = f", {refused} refused by calculation (see `throwcollect plan`)" if refused else ""
         shown.say(f"plan: {len(plan.trials)} trials{note}; dataset: {directory}")

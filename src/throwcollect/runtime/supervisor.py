@@ -169,10 +169,6 @@ class Supervisor:
         self.runtime.stop([_COORDINATOR], grace_s=0.0)
         return None
 
-    def coordinator_log(self) -> str:
-        """Last lines that the coordinator printed."""
-        return self.runtime.log_tail(_COORDINATOR)
-
     def _start(self, name: str) -> None:
         if name == _ROUTER:
             self.runtime.start(name, ["router", "--listen", self.endpoint])
