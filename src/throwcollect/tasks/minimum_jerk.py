@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import MinimumJerk
-from throwcollect.errors import ConfigError, Problem
 from throwcollect.robots.trajectory import JointTrajectory
 
 
@@ -18,7 +17,7 @@ def minimum_jerk_trajectory(
     """Points on ``q(t) = q0 + (q1 - q0) s((t/T)^gamma)``, ``s(x) = 10x³ - 15x⁴ + 6x⁵``, with exact derivatives.
 
     Near the start the motion grows as ``t^(3 gamma)``, so its acceleration as ``t^(3 gamma - 2)``: it rises from zero
-    when gamma is above 2/3, jumps to ``20 (q1 - q0) / T²`` when gamma is 2/3, and is unbounded below that.
+    when gamma is above 2/3, and would be unbounded below, which the configuration does not allow.
 
     Args:
         start: Angle [rad] of at least each joint of `end`.
@@ -29,21 +28,8 @@ def minimum_jerk_trajectory(
 
     Returns:
         The trajectory; its last point is at rest, exactly at `end`.
-
-    Raises:
-        ConfigError: If gamma is below 2/3.
     """
     exponent = 3 * family.gamma - 2
-    if exponent < 0:
-        raise ConfigError(
-            [
-                Problem(
-                    f"got {family.gamma:g}; below 2/3 the acceleration is unbounded at the start of the motion",
-                    key="task.trajectory.gamma",
-                )
-            ],
-            hint="set task.trajectory.gamma to 0.67 or more",
-        )
     times = point_times(duration_s, points_hz=points_hz)
     gamma = family.gamma
     u = times / duration_s

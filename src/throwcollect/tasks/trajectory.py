@@ -20,8 +20,7 @@ def throw_trajectory(config: Config) -> JointTrajectory:
         `task.start`, the last one at rest and exactly at `task.end`.
 
     Raises:
-        ConfigError: If the trajectory family has no usable motion for these parameters: an acceleration that is
-            unbounded, or a DMP that does not settle.
+        ConfigError: If the trajectory family has no usable motion for these parameters: a DMP that does not settle.
     """
     task = config.task
     end = {joint: task.end[joint] for joint in JOINTS if joint in task.end}
