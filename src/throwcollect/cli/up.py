@@ -45,11 +45,11 @@ def collect(path: Path, *, overrides: Sequence[str], output: Path | None, json: 
     directory = output or Path("datasets") / f"{config.name}-{datetime.now():%Y%m%d-%H%M%S}"
     with display(quiet=json) as shown:
         supervisor = Supervisor(directory, config.run, simulations=config.run.simulations)
-        if config.run.runtime == "auto":
-            shown.say("runtime: local processes (auto)")
         if (config.trials or 0) >= _MANY_TRIALS:
             shown.say(f"plan: checking {config.trials} trials against limits and collisions, about 5 ms each")
         plan = prepare(config, directory, sweep_directory=path.parent)
+        if config.run.runtime == "auto":
+            shown.say("runtime: local processes (auto)")
         refused = sum(trial.refused is not None for trial in plan.trials)
         note = f", {refused} refused by calculation (see `throwcollect plan`)" if refused else ""
         shown.say(f"plan: {len(plan.trials)} trials{note}; dataset: {directory}")
