@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
 import time
 from multiprocessing.synchronize import Barrier
 
@@ -63,7 +64,11 @@ def throw(world: World, state: int, commands: Commands, config: Config, forces: 
     return step + 1
 
 
-def _loop(plan: Plan, numbers: list[int], barrier: Barrier, seconds: multiprocessing.Queue[float]) -> None:
+def _loop(
+    plan: Plan, numbers: list[int], barrier: Barrier, seconds: multiprocessing.Queue[float], core: int | None
+) -> None:
+    if core is not None:
+        os.sched_setaffinity(0, {core})
     world = World(plan.config)
     limits = joint_limits().effort * plan.config.robot.effort_scale
     forces = [float(limits[JOINTS.index(joint)]) for joint in world.moving]
@@ -91,9 +96,12 @@ def measure(plan: Plan, processes: int, trials: int) -> float:
     barrier = context.Barrier(processes)
     seconds: multiprocessing.Queue[float] = context.Queue()
     workers = []
+    # Bound to cores where the collection's simulations are, so that the limit has the same advantage.
+    cores = sorted(os.sched_getaffinity(0))
     for index in range(processes):
+        core = cores[index % len(cores)] if processes >= len(cores) else None
         numbers = [feasible[(index * trials + k) % len(feasible)] for k in range(trials)]
-        workers.append(context.Process(target=_loop, args=(plan, numbers, barrier, seconds)))
+        workers.append(context.Process(target=_loop, args=(plan, numbers, barrier, seconds, core)))
     for worker in workers:
         worker.start()
     durations = [seconds.get() for _ in workers]

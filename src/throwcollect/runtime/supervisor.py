@@ -60,7 +60,7 @@ class Supervisor:
         self._directory = directory
         self._run = run
         self._simulations = tuple(f"sim_{index}" for index in range(simulations))
-        # Where simulations fill all cores, moving them around costs them their caches: about a tenth of the speed.
+        # Where simulations fill all cores, moving them around was measured to cost about a tenth of the speed.
         cores = sorted(os.sched_getaffinity(0))
         bound = simulations >= len(cores)
         self._cores = {name: cores[k % len(cores)] if bound else None for k, name in enumerate(self._simulations)}
