@@ -22,7 +22,7 @@ def measure(directory: Path) -> float:
         directory: A finished dataset, whose episodes are collected once more.
     """
     dataset = Dataset.open(directory)
-    messages = [pack(episode.header, episode.chunk) for episode in dataset]
+    messages = [pack(episode) for episode in dataset]
     random.Random(0).shuffle(messages)
     plan, limits = dataset.plan, joint_limits()
     configs = [plan.config_of(trial) for trial in plan.trials]

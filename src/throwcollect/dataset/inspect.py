@@ -114,6 +114,10 @@ def digest(directory: Path) -> str:
     digests = []
     for episode in dataset:
         trial = episode.header.trial
+        try:
+            episode.check_records()
+        except DatasetError as error:
+            raise DatasetError(f"{directory}: trial {trial}: {error}") from error
         if episode.digest != said[trial]:
             raise DatasetError(f"{directory}: trial {trial}: digest {episode.digest}", expected=f"{said[trial]}")
         digests.append(episode.digest)

@@ -17,7 +17,7 @@ from throwcollect.dataset.bag import FileSummary, bag_information, to_yaml
 from throwcollect.dataset.mcap_contents import FileContents, declarations
 from throwcollect.episode.channels import Channel, Channels
 from throwcollect.episode.chunk import Chunk, encode_records
-from throwcollect.episode.message import Episode, header_to_json
+from throwcollect.episode.message import Episode
 
 MAGIC = b"\x89MCAP0\r\n"
 EPISODE = "throwcollect.episode"
@@ -57,7 +57,8 @@ def episode_run(episode: Episode) -> EpisodeRun:
     facts = {
         "trial": str(episode.header.trial),
         "digest": episode.digest,
-        "header": header_to_json(episode.header),
+        "records_sha256": episode.records_sha256,
+        "header": episode.header_json,
     }
     metadata = encode_records(records.Metadata(name=EPISODE, metadata=facts))
     return _run(episode.chunk, indexes, metadata, episode.header.samples)

@@ -19,7 +19,7 @@ from mcap.opcode import Opcode
 
 from throwcollect.dataset.mcap_file import EPISODE, MAGIC
 from throwcollect.episode.chunk import Chunk
-from throwcollect.episode.message import Episode, header_from_json
+from throwcollect.episode.message import Episode, make_episode
 from throwcollect.errors import DatasetError
 
 _RECORD_HEADER = struct.Struct("<BQ")
@@ -151,8 +151,10 @@ class McapContents:
         if record.opcode != Opcode.METADATA or (facts := record.parse(records.Metadata)).name != EPISODE:
             raise DatasetError(f"byte {record.offset}: a {record.kind} where the metadata of an episode should be")
         try:
-            header = header_from_json(facts.metadata.get("header", ""))
-            episode = Episode(header, Chunk.parse(chunk.data))
+            said = facts.metadata
+            episode = make_episode(
+                said.get("header", ""), said.get("records_sha256", "").encode(), Chunk.parse(chunk.data)
+            )
         except DatasetError as error:
             raise DatasetError(f"byte {offset}: {error}") from error
         return StoredEpisode(episode, chunk, tuple(indexes), record)

@@ -59,6 +59,10 @@ class EpisodeCheck:
         except DatasetError as error:
             yield str(error)
             return
+        try:
+            episode.check_records()
+        except DatasetError as error:
+            yield str(error)
         yield from _record_problems(stored, run)
         yield from _message_problems(episode, channels)
         config = self._plan.config_of(self._plan.trials[episode.header.trial])

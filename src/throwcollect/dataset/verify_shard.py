@@ -159,10 +159,7 @@ class ShardCheck:
         if trial in self._rows and self.channels is not None:
             for problem in self._problems(stored, self._rows[trial], self.channels):
                 self._report(f"trial {trial}", problem)
-        try:
-            self.digests[trial] = stored.episode.digest
-        except ThrowcollectError:
-            self.digests[trial] = ""
+        self.digests[trial] = stored.episode.digest
 
     def _check_end(self, contents: McapContents, offset: int, held: FileContents) -> None:
         bag = contents.record(offset)

@@ -1,11 +1,13 @@
 """The one message that carries an episode from a simulation to whoever collects: std_msgs/UInt8MultiArray.
 
-Its layout names two parts of its data: ``header``, an `EpisodeHeader` in JSON, and ``chunk``, an MCAP Chunk record.
+Its layout names three parts of its data: ``header``, an `EpisodeHeader` in JSON; ``sha256``, that of the uncompressed
+message records in hexadecimal; and ``chunk``, an MCAP Chunk record.
 """
 
 from __future__ import annotations
 
 import hashlib
+import re
 import struct
 from functools import cache, cached_property
 
@@ -18,7 +20,8 @@ from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.errors import DatasetError
 from throwcollect.interfaces import get_message
 
-_PARTS = ("header", "chunk")
+_PARTS = ("header", "sha256", "chunk")
+_SHA256 = re.compile(rb"[0-9a-f]{64}")
 _HEADER = TypeAdapter(EpisodeHeader)
 _COUNT = struct.Struct("<I")
 
@@ -29,11 +32,18 @@ class Episode:
     Attributes:
         header: What is known besides the samples.
         chunk: The recorded messages, compressed.
+        records_sha256: SHA-256 of the uncompressed message records in hexadecimal, as the simulation computed it.
     """
 
-    def __init__(self, header: EpisodeHeader, chunk: Chunk) -> None:
+    def __init__(self, header: EpisodeHeader, chunk: Chunk, records_sha256: str) -> None:
         self.header = header
         self.chunk = chunk
+        self.records_sha256 = records_sha256
+
+    @cached_property
+    def header_json(self) -> str:
+        """The header as `header_to_json` writes it."""
+        return header_to_json(self.header)
 
     @cached_property
     def contents(self) -> bytes:
@@ -63,14 +73,18 @@ class Episode:
 
     @cached_property
     def digest(self) -> str:
-        """SHA-256 over the header's JSON, one zero byte and the uncompressed message records, in hexadecimal.
+        """SHA-256 over the header's JSON, one zero byte and `records_sha256` as 32 bytes, in hexadecimal."""
+        return hashlib.sha256(self.header_json.encode() + b"\0" + bytes.fromhex(self.records_sha256)).hexdigest()
+
+    def check_records(self) -> None:
+        """Hash the message records again.
 
         Raises:
-            DatasetError: If the chunk is damaged.
+            DatasetError: If the chunk is damaged, or `records_sha256` is not that of its records.
         """
-        digest = hashlib.sha256(header_to_json(self.header).encode() + b"\0")
-        digest.update(self.contents)
-        return digest.hexdigest()
+        actual = hashlib.sha256(self.contents).hexdigest()
+        if actual != self.records_sha256:
+            raise DatasetError(f"chunk: SHA-256 of its records is {actual}", expected=self.records_sha256)
 
 
 def header_to_json(header: EpisodeHeader) -> str:
@@ -103,14 +117,9 @@ def _layout() -> MessageLayout:
     return MessageLayout(message, [f"layout.dim.{n}.{key}" for n in range(len(_PARTS)) for key in ("size", "stride")])
 
 
-def pack(header: EpisodeHeader, chunk: Chunk) -> bytes:
-    """The CDR bytes of the message that carries an episode.
-
-    Args:
-        header: What is known besides the samples.
-        chunk: The recorded messages.
-    """
-    parts = (header_to_json(header).encode(), chunk.record())
+def pack(episode: Episode) -> bytes:
+    """The CDR bytes of the message that carries an episode."""
+    parts = (episode.header_json.encode(), episode.records_sha256.encode(), episode.chunk.record())
     prefix = bytearray(_layout().template)
     fields = np.frombuffer(prefix, _layout().dtype)
     for number, part in enumerate(parts):
@@ -136,11 +145,22 @@ def unpack(message: bytes) -> Episode:
     sizes = [int(fields[f"layout.dim.{number}.size"]) for number in range(len(_PARTS))]
     (count,) = _COUNT.unpack_from(message, length - _COUNT.size)
     if not layout.describes(_without_count(message[:length])) or sum(sizes) != count:
-        raise DatasetError(f"episode: not a UInt8MultiArray of the parts {' and '.join(_PARTS)}")
+        raise DatasetError(f"episode: not a UInt8MultiArray of the parts {', '.join(_PARTS)}")
     if len(message) != length + count:
         raise DatasetError(f"episode: {len(message) - length} bytes of data", expected=f"{count} as announced")
-    middle = length + sizes[0]
-    return Episode(header_from_json(message[length:middle]), Chunk.parse(message[middle:]))
+    middle, last = length + sizes[0], length + sizes[0] + sizes[1]
+    return make_episode(message[length:middle], message[middle:last], Chunk.parse(message[last:]))
+
+
+def make_episode(header: bytes | str, records_sha256: bytes, chunk: Chunk) -> Episode:
+    """An episode from its parts as they travel and rest.
+
+    Raises:
+        DatasetError: If the header is not what `header_to_json` writes, or the hash not one in hexadecimal.
+    """
+    if not _SHA256.fullmatch(records_sha256):
+        raise DatasetError(f"episode: SHA-256 {records_sha256[:80]!r}", expected="64 hexadecimal digits")
+    return Episode(header_from_json(header), chunk, records_sha256.decode())
 
 
 def _without_count(prefix: bytes) -> np.ndarray[tuple[int, int], np.dtype[np.uint8]]:

@@ -9,7 +9,7 @@ from throwcollect.config.schema import Config
 from throwcollect.config.values import is_physics, leaves, sweepable_keys, with_values
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.chunk import ChunkEncoder, encode_message
-from throwcollect.episode.message import pack
+from throwcollect.episode.message import Episode, pack
 from throwcollect.episode.record import Samples
 from throwcollect.episode.topics import Topic
 from throwcollect.errors import ConfigError
@@ -91,7 +91,7 @@ class SimulationNode(Node):
             interface.publish_state()
         if (episode := simulation.episode()) is not None:
             header, samples, states = episode
-            self._episodes.publish(pack(header, self._encoder.encode(samples, states)))
+            self._episodes.publish(pack(Episode(header, *self._encoder.encode(samples, states))))
 
     def _publish_samples(self) -> None:
         if not self._listened:

@@ -95,7 +95,7 @@ class Collection:
             )
             for name in ("arm_right_controller", "torso_controller")
         }
-        return unpack(pack(header, self.encoder.encode(samples, targets)))
+        return unpack(pack(Episode(header, *self.encoder.encode(samples, targets))))
 
     def result(self, episode: Episode) -> ThrowResult:
         config = self.plan.config_of(self.plan.trials[episode.header.trial])

@@ -18,6 +18,7 @@ import pytest
 import zstandard
 from mcap.opcode import Opcode
 
+from throwcollect.dataset.inspect import digest
 from throwcollect.dataset.mcap_reader import Record, StoredEpisode, opened
 from throwcollect.dataset.verify import verify
 from throwcollect.dataset.writer import create
@@ -83,6 +84,14 @@ def message_index(directory: Path) -> None:
 def stored_digest(directory: Path) -> None:
     facts = stored(directory / SHARD, 3).facts
     flip(directory / SHARD, facts.offset + facts.data.index(b"digest") + 12)
+
+
+def records_hash(directory: Path) -> None:
+    facts = stored(directory / SHARD, 3).facts
+    place = facts.offset + facts.data.index(b"records_sha256") + len(b"records_sha256") + 4
+    data = bytearray((directory / SHARD).read_bytes())
+    data[place] = ord("0") if data[place] != ord("0") else ord("1")
+    (directory / SHARD).write_bytes(data)
 
 
 def header_contact(directory: Path) -> None:
@@ -222,6 +231,7 @@ DEFECTS: dict[Callable[[Path], None], tuple[str, str, str]] = {
     chunk_crc: (SHARD, "trial 4", "CRC differs"),
     chunk_end_time: (SHARD, "trial 4", "times differ"),
     message_index: (SHARD, "trial 5", "message indexes"),
+    records_hash: (SHARD, "trial 3", "SHA-256 of its records is"),
     stored_digest: (SHARD, "trial 3", "metadata at byte"),
     header_contact: (SHARD, "trial 3", "metadata at byte"),
     torn: (SHARD, "", "cut off|beyond the end"),
@@ -280,7 +290,7 @@ def test_what_is_sound_beside_a_defect_is_not_accused(dataset: Path) -> None:
 
 
 def test_a_changed_sample_is_found_even_if_all_checksums_are_made_to_fit(dataset: Path) -> None:
-    """Somebody rewrites one number of a chunk, its CRC and its size: digest, indexes and judgement still say so."""
+    """Somebody rewrites one number of a chunk, its CRC and its size: the hash still says so."""
     path = dataset / SHARD
     episode = stored(path, 4)
     contents = bytearray(episode.episode.chunk.decompress())
@@ -290,8 +300,9 @@ def test_a_changed_sample_is_found_even_if_all_checksums_are_made_to_fit(dataset
     whole = path.read_bytes()
     path.write_bytes(whole[: episode.chunk.offset] + chunk + whole[episode.chunk.end :])
     problems = [str(finding) for finding in verify(dataset)]
-    assert any("metadata at byte" in problem for problem in problems)
-    assert any("throwcollect.digest" in problem for problem in problems)
+    assert any("SHA-256 of its records is" in problem for problem in problems)
+    with pytest.raises(DatasetError, match="trial 4: chunk: SHA-256 of its records is"):
+        digest(dataset)
 
 
 def kicked(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:

@@ -191,7 +191,7 @@ def test_an_episode_is_taken_once_and_only_if_it_is_waited_for(collection: Any, 
         with pytest.raises(DatasetError, match=f"no episode of trial {trial} is waited for"):
             writer.append_lost(trial, "gone")
     stranger = collection.episode(1)
-    stranger = Episode(replace(stranger.header, trial=99), stranger.chunk)
+    stranger = Episode(replace(stranger.header, trial=99), stranger.chunk, stranger.records_sha256)
     with pytest.raises(DatasetError, match="no episode of trial 99 is waited for"):
         writer.append(stranger, collection.result(collection.episode(1)))
     writer.close()
@@ -200,7 +200,7 @@ def test_an_episode_is_taken_once_and_only_if_it_is_waited_for(collection: Any, 
 def test_a_damaged_episode_is_not_written(collection: Any, tmp_path: Path) -> None:
     writer = DatasetWriter.create(tmp_path / "dataset", collection.plan)
     whole = collection.episode(0)
-    damaged = Episode(whole.header, replace(whole.chunk, crc=whole.chunk.crc ^ 1))
+    damaged = Episode(whole.header, replace(whole.chunk, crc=whole.chunk.crc ^ 1), whole.records_sha256)
     with pytest.raises(DatasetError, match="CRC differs"):
         writer.append(damaged, collection.result(whole))
     assert not list((tmp_path / "dataset").glob("*.part"))

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from throwcollect.config.schema import Config
 from throwcollect.episode.channels import Channels
-from throwcollect.episode.chunk import Chunk, ChunkEncoder
-from throwcollect.episode.message import Episode, header_from_json, header_to_json, pack, unpack
+from throwcollect.episode.chunk import ChunkEncoder
+from throwcollect.episode.message import Episode, header_from_json, header_to_json, make_episode, pack, unpack
 from throwcollect.episode.record import EpisodeHeader
 from throwcollect.errors import DatasetError
 from throwcollect.interfaces import deserialize, get_message
@@ -24,40 +24,55 @@ def encoder() -> ChunkEncoder:
 
 
 @pytest.fixture
-def chunk(encoder: ChunkEncoder, make_samples: Any) -> Chunk:
-    return encoder.encode(make_samples(50))
+def sent(encoder: ChunkEncoder, header: EpisodeHeader, make_samples: Any) -> Episode:
+    return Episode(header, *encoder.encode(make_samples(50)))
 
 
-def test_an_episode_arrives_as_it_was_sent(header: EpisodeHeader, chunk: Chunk, make_samples: Any) -> None:
-    episode = unpack(pack(header, chunk))
-    assert (episode.header, episode.chunk) == (header, chunk)
+def test_an_episode_arrives_as_it_was_sent(sent: Episode, make_samples: Any) -> None:
+    episode = unpack(pack(sent))
+    assert vars(episode) == {"header": sent.header, "chunk": sent.chunk, "records_sha256": sent.records_sha256}
     assert episode.samples().ball_position.tolist() == make_samples(50).ball_position.tolist()
 
 
-def test_the_message_is_a_stock_one_that_names_its_parts(header: EpisodeHeader, chunk: Chunk) -> None:
-    message = deserialize(pack(header, chunk), get_message("std_msgs/msg/UInt8MultiArray"))
+def test_the_message_is_a_stock_one_that_names_its_parts(sent: Episode) -> None:
+    message = deserialize(pack(sent), get_message("std_msgs/msg/UInt8MultiArray"))
     sizes = {part.label: part.size for part in message.layout.dim}
-    assert list(sizes) == ["header", "chunk"]
+    assert list(sizes) == ["header", "sha256", "chunk"]
     data = message.data.tobytes()
-    assert header_from_json(data[: sizes["header"]]) == header
-    assert data[sizes["header"] :] == chunk.record()
+    header, sha256 = data[: sizes["header"]], data[sizes["header"] : sizes["header"] + sizes["sha256"]]
+    assert header_from_json(header) == sent.header
+    assert sha256.decode() == hashlib.sha256(sent.contents).hexdigest()
+    assert data[len(header) + len(sha256) :] == sent.chunk.record()
 
 
 def test_the_digest_covers_header_and_messages_but_not_their_packing(
-    encoder: ChunkEncoder, header: EpisodeHeader, chunk: Chunk, make_samples: Any
+    encoder: ChunkEncoder, header: EpisodeHeader, sent: Episode, make_samples: Any
 ) -> None:
-    digest = Episode(header, chunk).digest
-    assert digest == hashlib.sha256(header_to_json(header).encode() + b"\0" + chunk.decompress()).hexdigest()
-    packed_more = ChunkEncoder(Channels(Config(), full_description(Config())), level=9).encode(make_samples(50))
-    assert packed_more.data != chunk.data
-    assert Episode(header, packed_more).digest == digest
+    records = hashlib.sha256(sent.chunk.decompress()).digest()
+    assert sent.digest == hashlib.sha256(header_to_json(header).encode() + b"\0" + records).hexdigest()
+    packer = ChunkEncoder(Channels(Config(), full_description(Config())), level=9)
+    packed_more = Episode(header, *packer.encode(make_samples(50)))
+    assert packed_more.chunk.data != sent.chunk.data
+    assert packed_more.digest == sent.digest
     others = [
-        Episode(replace(header, end_reason="rest"), chunk),
-        Episode(replace(header, contacts=header.contacts[:1]), chunk),
-        Episode(replace(header, goals=()), chunk),
-        Episode(header, encoder.encode(make_samples(50, seed=1))),
+        Episode(replace(header, end_reason="rest"), sent.chunk, sent.records_sha256),
+        Episode(replace(header, contacts=header.contacts[:1]), sent.chunk, sent.records_sha256),
+        Episode(replace(header, goals=()), sent.chunk, sent.records_sha256),
+        Episode(header, *encoder.encode(make_samples(50, seed=1))),
     ]
-    assert len({digest, *(other.digest for other in others)}) == 5
+    assert len({sent.digest, *(other.digest for other in others)}) == 5
+
+
+def test_a_hash_that_is_not_that_of_the_records_is_found(sent: Episode) -> None:
+    sent.check_records()
+    with pytest.raises(DatasetError, match="SHA-256 of its records is"):
+        Episode(sent.header, sent.chunk, "0" * 64).check_records()
+
+
+@pytest.mark.parametrize("sha256", [b"", b"0" * 63, b"0" * 65, b"G" * 64, b"\xff" * 64, b"A" * 64])
+def test_what_is_no_hash_is_refused(sent: Episode, sha256: bytes) -> None:
+    with pytest.raises(DatasetError, match="64 hexadecimal digits"):
+        make_episode(sent.header_json, sha256, sent.chunk)
 
 
 def test_the_header_is_one_text(header: EpisodeHeader) -> None:
@@ -85,19 +100,20 @@ def test_a_wrong_header_is_refused(header: EpisodeHeader, old: str, new: str) ->
         header_from_json(text.replace(old, new, 1))
 
 
-def test_more_samples_than_there_are_is_an_error(header: EpisodeHeader, chunk: Chunk) -> None:
+def test_more_samples_than_there_are_is_an_error(sent: Episode) -> None:
+    claim = Episode(replace(sent.header, samples=51), sent.chunk, sent.records_sha256)
     with pytest.raises(DatasetError, match="are not the records of 51 samples"):
-        unpack(pack(replace(header, samples=51), chunk)).samples()
+        unpack(pack(claim)).samples()
 
 
 @pytest.mark.parametrize("length", [0, 3, 60, 100, 300, -1])
-def test_a_message_that_is_cut_off_is_refused(header: EpisodeHeader, chunk: Chunk, length: int) -> None:
+def test_a_message_that_is_cut_off_is_refused(sent: Episode, length: int) -> None:
     with pytest.raises(DatasetError, match="episode: "):
-        unpack(pack(header, chunk)[:length])
+        unpack(pack(sent)[:length])
 
 
-def test_a_message_of_another_layout_is_refused(header: EpisodeHeader, chunk: Chunk) -> None:
-    message = pack(header, chunk)
+def test_a_message_of_another_layout_is_refused(sent: Episode) -> None:
+    message = pack(sent)
     for wrong in (message + b"x", message.replace(b"chunk", b"blobs", 1), b"\1" + message[1:]):
         with pytest.raises(DatasetError, match="episode: "):
             unpack(wrong)
@@ -105,7 +121,7 @@ def test_a_message_of_another_layout_is_refused(header: EpisodeHeader, chunk: Ch
 
 @pytest.fixture(scope="module")
 def whole(encoder: ChunkEncoder, header: EpisodeHeader, make_samples: Any) -> bytes:
-    return pack(replace(header, samples=3), encoder.encode(make_samples(3)))
+    return pack(Episode(replace(header, samples=3), *encoder.encode(make_samples(3))))
 
 
 @settings(max_examples=300)
