@@ -40,14 +40,15 @@ def sample_quintic(
     Raises:
         ValueError: If the trajectory has fewer than two points.
     """
-    coefficients, powers, spans = _segments_at(trajectory, times)
-    first = np.zeros_like(powers)
-    first[:, 1:] = powers[:, :-1] * _ORDERS[1:]
-    second = np.zeros_like(powers)
-    second[:, 1:] = first[:, :-1] * _ORDERS[1:]
-    velocities = np.einsum("nk,nkj->nj", first / spans, coefficients)
-    accelerations = np.einsum("nk,nkj->nj", second / spans**2, coefficients)
-    return np.einsum("nk,nkj->nj", powers, coefficients), velocities, accelerations
+    coefficients, segments, u = _segments_at(trajectory, times)
+    spans = np.diff(trajectory.times)[segments, np.newaxis]
+    first = coefficients[1:] * _ORDERS[1:, np.newaxis, np.newaxis]
+    second = first[1:] * _ORDERS[1:-1, np.newaxis, np.newaxis]
+    return (
+        _polynomial(coefficients, segments, u),
+        _polynomial(first, segments, u) / spans,
+        _polynomial(second, segments, u) / spans**2,
+    )
 
 
 def sample_positions(trajectory: JointTrajectory, times: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -63,15 +64,13 @@ def sample_positions(trajectory: JointTrajectory, times: NDArray[np.float64]) ->
     Raises:
         ValueError: If the trajectory has fewer than two points.
     """
-    coefficients, powers, _ = _segments_at(trajectory, times)
-    positions: NDArray[np.float64] = np.einsum("nk,nkj->nj", powers, coefficients)
-    return positions
+    return _polynomial(*_segments_at(trajectory, times))
 
 
 def _segments_at(
     trajectory: JointTrajectory, times: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Of the segment at each time: coefficients ``(n, 6, n_joints)``, powers of u ``(n, 6)``, span [s] ``(n, 1)``."""
+) -> tuple[NDArray[np.float64], NDArray[np.intp], NDArray[np.float64]]:
+    """Coefficients of all segments ``(6, n_segments, n_joints)``; segment ``(n,)`` and u ``(n, 1)`` at each time."""
     if len(trajectory.times) < 2:
         raise ValueError(f"a curve needs at least two points, got {len(trajectory.times)}")
     spans = np.diff(trajectory.times)
@@ -87,9 +86,19 @@ def _segments_at(
             accelerations[1:] * step**2,
         ]
     )
-    coefficients = np.einsum("ek,esj->skj", _HERMITE, ends)
-    segments = np.clip(trajectory.times.searchsorted(times, side="right") - 1, 0, len(spans) - 1)
-    u = np.clip((times - trajectory.times[segments]) / spans[segments], 0.0, 1.0)
-    powers = np.ones((len(times), len(_ORDERS)))
-    powers[:, 1:] = np.multiply.accumulate(np.broadcast_to(u[:, None], (len(times), 5)), axis=1)
-    return coefficients[segments], powers, spans[segments][:, None]
+    coefficients = (_HERMITE.T @ ends.reshape(6, -1)).reshape(ends.shape)
+    last = len(spans) - 1
+    segments = np.minimum(np.maximum(trajectory.times.searchsorted(times, side="right") - 1, 0), last)
+    u = np.minimum(np.maximum((times - trajectory.times[segments]) / spans[segments], 0.0), 1.0)
+    return coefficients, segments, u[:, np.newaxis]
+
+
+def _polynomial(
+    coefficients: NDArray[np.float64], segments: NDArray[np.intp], u: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Polynomials in u, lowest order first, of the segment at each time."""
+    values: NDArray[np.float64] = coefficients[-1].take(segments, axis=0)
+    for order in range(len(coefficients) - 2, -1, -1):
+        values *= u
+        values += coefficients[order].take(segments, axis=0)
+    return values

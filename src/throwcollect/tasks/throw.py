@@ -163,12 +163,14 @@ def _joint_measures(
     efforts = np.abs(samples.effort) / (limits.effort * config.robot.effort_scale)
     desired = sample_positions(trajectory, (samples.stamps_ns - start_ns) / NS_PER_S)
     errors = np.abs(measured - desired).max(axis=0)
+    effort_peaks = efforts.max(axis=0)
+    saturated = effort_peaks >= 1 - _SLACK
     return ThrowResult(
         Outcome.LANDED,
         position_peak=_peak(positions, trajectory.joints),
         velocity_peak=_peak(np.abs(samples.velocity).max(axis=0) / limits.velocity, JOINTS),
-        effort_peak=_peak(efforts.max(axis=0), JOINTS),
-        effort_saturated_share=float((efforts >= 1 - _SLACK).any(axis=1).mean()),
+        effort_peak=_peak(effort_peaks, JOINTS),
+        effort_saturated_share=float((efforts[:, saturated] >= 1 - _SLACK).any(axis=1).mean()),
         tracking_error_rad=dict(zip(trajectory.joints, errors.tolist(), strict=True)),
     )
 
