@@ -11,6 +11,8 @@ import psutil
 
 from throwcollect.coordinator.progress import Progress, ProgressListener
 from throwcollect.dataset.writer import create
+from throwcollect.runtime.local import LocalRuntime
+from throwcollect.runtime.nodes import node_environment
 from throwcollect.runtime.supervisor import Supervisor
 from throwcollect.sweep.plan import Plan
 
@@ -55,7 +57,7 @@ class _Watch:
         self._listener = listener
         self._reports = reports
         names = supervisor.runtime.running()
-        self._nodes = {name: psutil.Process(supervisor.runtime.pid(name)) for name in names}
+        self._nodes = {name: psutil.Process(int(supervisor.runtime.handle(name) or 0)) for name in names}
 
     def until(self, ended: int) -> _Mark:
         while not self._reports or self._reports[-1].ended < ended:
@@ -97,11 +99,13 @@ def measure(plan: Plan, simulations: int, directory: Path) -> Collection:
     create(directory, plan)
     reports: list[Progress] = []
     began = time.monotonic()
-    with Supervisor(directory, plan.config.run, simulations=simulations) as supervisor:
+    run = plan.config.run
+    runtime = LocalRuntime(directory, directory / "logs", run)
+    with Supervisor(runtime, run, simulations=simulations) as supervisor:
         supervisor.start()
         while not supervisor.router_answers():
             time.sleep(_POLL_S)
-        os.environ.update(supervisor.environment)
+        os.environ.update(node_environment(runtime.listen, run.domain_id))
         with ProgressListener(reports.append) as listener:
             watch = _Watch(supervisor, listener, reports)
             first = watch.until(1)

@@ -22,7 +22,8 @@ from throwcollect.coordinator.prepare import prepare
 from throwcollect.coordinator.progress import Progress, ProgressListener
 from throwcollect.dataset.inspect import info
 from throwcollect.errors import DatasetError, Interrupted, WorkerError
-from throwcollect.runtime.local import NodeExit
+from throwcollect.runtime.local import LocalRuntime
+from throwcollect.runtime.nodes import NodeExit, node_environment
 from throwcollect.runtime.supervisor import Supervisor
 
 _MANY_TRIALS = 1000
@@ -44,7 +45,8 @@ def collect(path: Path, *, overrides: Sequence[str], output: Path | None, json: 
     config = load(path, overrides)
     directory = output or Path("datasets") / f"{config.name}-{datetime.now():%Y%m%d-%H%M%S}"
     with display(quiet=json) as shown:
-        supervisor = Supervisor(directory, config.run, simulations=config.run.simulations)
+        runtime = LocalRuntime(directory, directory / "logs", config.run)
+        supervisor = Supervisor(runtime, config.run, simulations=config.run.simulations)
         if (config.trials or 0) >= _MANY_TRIALS:
             shown.say(f"plan: checking {config.trials} trials against limits and collisions, about 5 ms each")
         plan = prepare(config, directory, sweep_directory=path.parent)
@@ -54,7 +56,7 @@ def collect(path: Path, *, overrides: Sequence[str], output: Path | None, json: 
         note = f", {refused} refused by calculation (see `throwcollect plan`)" if refused else ""
         shown.say(f"plan: {len(plan.trials)} trials{note}; dataset: {directory}")
         with Interruptions() as interruptions, supervisor:
-            end = _follow(supervisor, shown, interruptions)
+            end = _follow(supervisor, config.run.domain_id, shown, interruptions)
     if interruptions.count and (end is None or end.code != 0):
         raise Interrupted(f"interrupted; finished throws are in {directory}, the dataset is not complete")
     if end is not None and end.code != 0:
@@ -64,7 +66,7 @@ def collect(path: Path, *, overrides: Sequence[str], output: Path | None, json: 
     _print_summary(summary, directory, as_json=json)
 
 
-def _follow(supervisor: Supervisor, shown: Display, interruptions: Interruptions) -> NodeExit | None:
+def _follow(supervisor: Supervisor, domain_id: int, shown: Display, interruptions: Interruptions) -> NodeExit | None:
     """Run until the coordinator ends; how it did, or None when it had to be ended by force."""
 
     def report(progress: Progress) -> None:
@@ -72,7 +74,7 @@ def _follow(supervisor: Supervisor, shown: Display, interruptions: Interruptions
         supervisor.replace(progress.hung)
 
     supervisor.start()
-    os.environ.update(supervisor.environment)
+    os.environ.update(node_environment(supervisor.runtime.listen, domain_id))
     end = listener = None
     with ExitStack() as stack:
         while end is None and not interruptions.count:

@@ -5,16 +5,18 @@ from __future__ import annotations
 import ctypes
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
 from collections import deque
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
-from throwcollect.errors import WorkerError
+from throwcollect.config.schema import RunConfig
+from throwcollect.errors import ConfigError, WorkerError
+from throwcollect.runtime.nodes import ROUTER, NodeExit, node_environment
 
 _PR_SET_PDEATHSIG = 1
 """prctl(2): the signal a process gets when its parent dies."""
@@ -23,27 +25,22 @@ _LIBC = ctypes.CDLL(None)
 
 _LOG_TAIL_LINES = 40
 
+_HOST = "127.0.0.1"
 
-@dataclass(frozen=True)
-class NodeExit:
-    """A node that ended.
 
-    Attributes:
-        name: Its name.
-        code: Exit code; minus the signal's number when a signal ended it.
-        log: Last lines of what it printed.
-    """
-
-    name: str
-    code: int
-    log: str
-
-    @property
-    def reason(self) -> str:
-        """How it ended, in words."""
-        if self.code < 0:
-            return f"ended by {signal.Signals(-self.code).name}"
-        return f"exit code {self.code}"
+def _reserved_port(wanted: int) -> socket.socket:
+    """A socket that keeps a port until it is closed."""
+    probe = socket.socket()
+    probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        probe.bind((_HOST, wanted))
+    except OSError as error:
+        probe.close()
+        raise ConfigError(
+            f"run.router_port: port {wanted} of {_HOST} cannot be used: {error.strerror}",
+            hint="--set run.router_port=0 takes a free one",
+        ) from error
+    return probe
 
 
 def _enter(core: int | None) -> None:
@@ -55,20 +52,36 @@ def _enter(core: int | None) -> None:
 
 
 class LocalRuntime:
-    """Runs nodes as child processes, each with a log file of its own.
+    """Runs nodes as child processes, each with a log file of its own; see `nodes.Runtime` for what it offers.
 
     Children live in sessions of their own, so that Ctrl-C reaches the launcher alone, and are ended by the kernel when
     the launcher dies.
 
+    Attributes:
+        data: Directory of the dataset.
+        listen: Zenoh endpoint at which the router is to listen.
+
     Args:
+        data: Directory of the dataset.
         logs: Directory for the log files.
-        environment: Variables added to every node's environment.
+        run: How to run.
+
+    Raises:
+        ConfigError: If the router's port is taken.
     """
 
-    def __init__(self, logs: Path, environment: Mapping[str, str]) -> None:
+    def __init__(self, data: Path, logs: Path, run: RunConfig) -> None:
+        self.data = str(data)
         self._logs = logs
-        self._environment = {**os.environ, **environment}
+        self._reserved = _reserved_port(run.router_port)
+        self._address: tuple[str, int] = self._reserved.getsockname()
+        self.listen = f"tcp/{_HOST}:{self._address[1]}"
+        self._environment = {**os.environ, **node_environment(self.listen, run.domain_id)}
         self._processes: dict[str, subprocess.Popen[bytes]] = {}
+
+    def router_address(self) -> tuple[str, int]:
+        """Host and port of the router."""
+        return self._address
 
     def start(self, name: str, arguments: Sequence[str], *, core: int | None = None) -> None:
         """Start a node.
@@ -81,6 +94,8 @@ class LocalRuntime:
         Raises:
             WorkerError: If the process cannot be started or its log cannot be written.
         """
+        if name == ROUTER:
+            self._reserved.close()
         try:
             self._logs.mkdir(parents=True, exist_ok=True)
             with (self._logs / f"{name}.log").open("ab") as log:
@@ -96,13 +111,10 @@ class LocalRuntime:
         except OSError as error:
             raise WorkerError(f"{name}: cannot be started: {error}") from error
 
-    def pid(self, name: str) -> int:
-        """Process id of a running node.
-
-        Raises:
-            KeyError: If no such node runs.
-        """
-        return self._processes[name].pid
+    def handle(self, name: str) -> str | None:
+        """Process id of a running node; None if it does not run."""
+        process = self._processes.get(name)
+        return None if process is None else str(process.pid)
 
     def running(self) -> tuple[str, ...]:
         """Names of the nodes whose end has not been reported yet."""
@@ -113,7 +125,15 @@ class LocalRuntime:
         ended = [(name, process.returncode) for name, process in self._processes.items() if process.poll() is not None]
         for name, _ in ended:
             del self._processes[name]
-        return [NodeExit(name, code, self.log_tail(name)) for name, code in ended]
+        return [NodeExit(name, code, _reason(code), self.log_tail(name)) for name, code in ended]
+
+    def frozen(self) -> frozenset[str]:
+        """Nodes that were stopped by a signal and not continued."""
+        return frozenset(name for name, process in self._processes.items() if _is_stopped(process.pid))
+
+    def ready(self, name: str) -> bool:
+        """Whether a simulation of this name has ever said that it is ready."""
+        return self._said(name, f"{name} is ready")
 
     def log_tail(self, name: str) -> str:
         """Last lines that a node printed."""
@@ -122,14 +142,6 @@ class LocalRuntime:
                 return "".join(deque(log, _LOG_TAIL_LINES)).strip()
         except OSError:
             return ""
-
-    def said(self, name: str, line: str) -> bool:
-        """Whether a node of this name has ever printed a line."""
-        try:
-            with (self._logs / f"{name}.log").open(encoding="utf-8", errors="replace") as log:
-                return f"{line}\n" in log
-        except OSError:
-            return False
 
     def signal(self, name: str, number: signal.Signals) -> None:
         """Send a signal to a node; one that has ended is left alone."""
@@ -150,3 +162,29 @@ class LocalRuntime:
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.wait()
+
+    def close(self) -> None:
+        """End all nodes, the router last, and free its port."""
+        self._reserved.close()
+        self.stop([name for name in self._processes if name != ROUTER])
+        self.stop([ROUTER])
+
+    def _said(self, name: str, line: str) -> bool:
+        try:
+            with (self._logs / f"{name}.log").open(encoding="utf-8", errors="replace") as log:
+                return f"{line}\n" in log
+        except OSError:
+            return False
+
+
+def _reason(code: int) -> str:
+    return f"ended by {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
+
+
+def _is_stopped(pid: int) -> bool:
+    try:
+        status = Path(f"/proc/{pid}/stat").read_text(encoding="ascii", errors="replace")
+    except OSError:
+        return False
+    # The name of the command, in brackets, may hold anything; the state is the first field after it.
+    return status.rpartition(")")[2].split()[0] == "T"

@@ -7,80 +7,68 @@ import os
 import signal
 import socket
 import time
-from collections.abc import Callable, Iterable
-from pathlib import Path
+from collections.abc import Callable, Collection, Iterable
+from dataclasses import dataclass
 from types import TracebackType
+from typing import Literal
 
 from throwcollect.config.schema import RunConfig
-from throwcollect.errors import ConfigError, WorkerError
-from throwcollect.runtime.local import LocalRuntime, NodeExit
+from throwcollect.errors import WorkerError
+from throwcollect.runtime.nodes import COORDINATOR, ROUTER, NodeExit, Runtime, simulation_name
 
-_HOST = "127.0.0.1"
-_ROUTER = "router"
-_COORDINATOR = "coordinator"
 _FIRST_BACKOFF_S = 0.2
 _LONGEST_BACKOFF_S = 10.0
 _DRAIN_S = 15.0
 """Time that a coordinator gets to finish its running trials after it was told to stop."""
-
+_FROZEN_S = 3.0
+"""Somebody may stop a node to look at it; after this time it counts as lost."""
 
 _RESTARTS_BEFORE_READY = 1
 """A node that has never worked will hardly do so at the tenth attempt."""
 _CONNECT_S = 0.1
 
 
-def _reserved_port(wanted: int) -> socket.socket:
-    """A socket that keeps a port until it is closed."""
-    probe = socket.socket()
-    probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-    try:
-        probe.bind((_HOST, wanted))
-    except OSError as error:
-        probe.close()
-        raise ConfigError(
-            f"run.router_port: port {wanted} of {_HOST} cannot be used: {error.strerror}",
-            hint="--set run.router_port=0 takes a free one",
-        ) from error
-    return probe
+@dataclass(frozen=True)
+class NodeState:
+    """What is known of one node.
+
+    Attributes:
+        name: Its name.
+        status: ``starting`` until a simulation is ready, ``running``, ``frozen``, ``restarting`` (it ended and waits
+            for its next start), or ``lost`` for good.
+        restarts: How often it was started again.
+        handle: Process or container id; None if it does not run.
+        last_end: How it ended last, in words; None if it never did.
+    """
+
+    name: str
+    status: Literal["starting", "running", "frozen", "restarting", "lost"]
+    restarts: int
+    handle: str | None
+    last_end: str | None
 
 
 class Supervisor:
-    """The processes of one run; use it as a context manager, so that none is left behind.
+    """Keeps the nodes of one run alive; use it as a context manager, so that none is left behind.
 
     Args:
-        directory: Directory of the dataset, holding `config.yaml` and `plan.parquet`; logs go to its `logs/`.
+        runtime: Where the nodes live; closed at the end.
         run: How to run.
         simulations: Number of simulations.
-
-    Raises:
-        ConfigError: If the router's port is taken.
     """
 
-    def __init__(self, directory: Path, run: RunConfig, *, simulations: int) -> None:
-        self._directory = directory
+    def __init__(self, runtime: Runtime, run: RunConfig, *, simulations: int) -> None:
+        self.runtime = runtime
         self._run = run
-        self._simulations = tuple(f"sim_{index}" for index in range(simulations))
-        # Where simulations fill all cores, moving them around was measured to cost about a tenth of the speed.
-        cores = sorted(os.sched_getaffinity(0))
-        bound = simulations >= len(cores)
-        self._cores = {name: cores[k % len(cores)] if bound else None for k, name in enumerate(self._simulations)}
-        self._restarts = dict.fromkeys((_ROUTER, *self._simulations), 0)
+        self._simulations: tuple[str, ...] = tuple(map(simulation_name, range(simulations)))
+        self._restarts: dict[str, int] = {}
+        self._last_end: dict[str, str] = {}
         self._due: dict[str, float] = {}
         self._given_up: dict[str, NodeExit] = {}
         self._ready: set[str] = set()
+        self._frozen_since: dict[str, float] = {}
         self._start_deadline = math.inf
         self._hung: frozenset[str] = frozenset()
-        self._reserved = _reserved_port(run.router_port)
-        self._address: tuple[str, int] = self._reserved.getsockname()
-        self.endpoint = f"tcp/{_HOST}:{self._address[1]}"
-        self.environment = {
-            "ZENOH_CONFIG_OVERRIDE": f'mode="client";connect/endpoints=["{self.endpoint}"]',
-            "ROS_DOMAIN_ID": str(run.domain_id),
-            # One process per core is the parallelism here; threads of numerical libraries would only fight it.
-            "OMP_NUM_THREADS": "1",
-            "OPENBLAS_NUM_THREADS": "1",
-        }
-        self.runtime = LocalRuntime(directory / "logs", self.environment)
 
     def __enter__(self) -> Supervisor:
         return self
@@ -88,27 +76,47 @@ class Supervisor:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._reserved.close()
-        names = [name for name in self.runtime.running() if name != _ROUTER]
-        self.runtime.stop(names)
-        self.runtime.stop([_ROUTER])
+        self.runtime.close()
 
-    def start(self) -> None:
+    def start(self, *, found: Collection[str] = ()) -> None:
         """Start all nodes.
 
+        Args:
+            found: Nodes that run already, of a launcher that died.
+
         Raises:
-            WorkerError: If a process cannot be started.
+            WorkerError: If a node cannot be started.
         """
-        self._reserved.close()
         self._start_deadline = time.monotonic() + self._run.start_timeout_s
-        for name in (_ROUTER, *self._simulations):
+        for name in (ROUTER, *self._simulations, COORDINATOR):
+            if name not in found:
+                self._start(name)
+
+    def scale(self, simulations: int) -> None:
+        """Change the number of simulations: start more, or end the last ones; their trials go to others.
+
+        Raises:
+            WorkerError: If a node cannot be started.
+        """
+        names = tuple(map(simulation_name, range(simulations)))
+        added = [name for name in names if name not in self._simulations]
+        removed = [name for name in self._simulations if name not in names]
+        self._simulations = names
+        for name in removed:
+            for memory in (self._restarts, self._last_end, self._due, self._given_up, self._frozen_since):
+                memory.pop(name, None)
+            self._ready.discard(name)
+        self.runtime.stop(removed)
+        for name in added:
             self._start(name)
-        self.runtime.start(_COORDINATOR, ["coordinator", str(self._directory)])
 
     def router_answers(self) -> bool:
         """Whether nodes can connect to the router by now."""
+        address = self.runtime.router_address()
+        if address is None:
+            return False
         try:
-            socket.create_connection(self._address, _CONNECT_S).close()
+            socket.create_connection(address, _CONNECT_S).close()
         except OSError:
             return False
         return True
@@ -124,14 +132,15 @@ class Supervisor:
                 the evidence.
         """
         end = None
-        news = []
-        self._ready |= {name for name in self._simulations if name not in self._ready and self._was_ready(name)}
+        news = self._end_frozen()
+        self._ready |= {name for name in self._simulations if name not in self._ready and self.runtime.ready(name)}
         for node in self.runtime.exits():
-            if node.name == _COORDINATOR:
+            self._last_end[node.name] = node.reason
+            if node.name == COORDINATOR:
                 end = node
             else:
                 fate = "is started again" if self._schedule_restart(node) else "is given up"
-                news.append(f"{node.name} was lost ({node.reason}) and {fate}")
+                news.append(f"{node.name} was lost ({node.reason}) and {fate}{_last_words(node)}")
         now = time.monotonic()
         for name in [name for name, due in self._due.items() if due <= now]:
             del self._due[name]
@@ -139,6 +148,10 @@ class Supervisor:
         if end is None:
             self._check_hope()
         return end, news
+
+    def states(self) -> list[NodeState]:
+        """All nodes of the run: the router, the simulations, the coordinator."""
+        return [self._state(name) for name in (ROUTER, *self._simulations, COORDINATOR)]
 
     def replace(self, hung: Iterable[str]) -> None:
         """End simulations by force that do not answer any more, so that they are started again.
@@ -159,30 +172,65 @@ class Supervisor:
         Returns:
             How it ended; None when it had to be ended by force.
         """
-        self.runtime.signal(_COORDINATOR, signal.SIGINT)
+        self.runtime.signal(COORDINATOR, signal.SIGINT)
         deadline = time.monotonic() + _DRAIN_S
         while time.monotonic() < deadline and not hurry():
             for node in self.runtime.exits():
-                if node.name == _COORDINATOR:
+                if node.name == COORDINATOR:
                     return node
             time.sleep(0.02)
-        self.runtime.stop([_COORDINATOR], grace_s=0.0)
+        self.runtime.stop([COORDINATOR], grace_s=0.0)
         return None
 
     def _start(self, name: str) -> None:
-        if name == _ROUTER:
-            self.runtime.start(name, ["router", "--listen", self.endpoint])
+        data = self.runtime.data
+        if name == ROUTER:
+            self.runtime.start(name, ["router", "--listen", self.runtime.listen])
+        elif name == COORDINATOR:
+            self.runtime.start(name, ["coordinator", data])
         else:
-            arguments = ["sim", str(self._directory / "config.yaml"), "--name", name]
-            self.runtime.start(name, arguments, core=self._cores[name])
+            self.runtime.start(name, ["sim", f"{data}/config.yaml", "--name", name], core=self._core(name))
 
-    def _was_ready(self, name: str) -> bool:
-        return self.runtime.said(name, f"{name} is ready")
+    def _core(self, name: str) -> int | None:
+        """Where simulations fill all cores, moving them around was measured to cost about a tenth of the speed."""
+        cores = sorted(os.sched_getaffinity(0))
+        if len(self._simulations) < len(cores):
+            return None
+        return cores[self._simulations.index(name) % len(cores)]
+
+    def _state(self, name: str) -> NodeState:
+        handle = self.runtime.handle(name)
+        status: Literal["starting", "running", "frozen", "restarting", "lost"] = "running"
+        if name in self._given_up:
+            status = "lost"
+        elif name in self._due or name not in self.runtime.running():
+            status = "restarting"
+        elif name in self._frozen_since:
+            status = "frozen"
+        elif handle is None or (name in self._simulations and name not in self._ready):
+            status = "starting"
+        return NodeState(name, status, self._restarts.get(name, 0), handle, self._last_end.get(name))
+
+    def _end_frozen(self) -> list[str]:
+        """End nodes by force that have been frozen for long; the coordinator, whose memory is needed, is only named."""
+        now, news = time.monotonic(), []
+        frozen = self.runtime.frozen()
+        self._frozen_since = {name: self._frozen_since.get(name, now) for name in frozen}
+        for name, since in self._frozen_since.items():
+            if now - since >= _FROZEN_S:
+                # Told once: it begins to count anew, from the far future for a coordinator.
+                self._frozen_since[name] = math.inf
+                if name == COORDINATOR:
+                    news.append(f"{name} is frozen (paused or stopped); nothing goes on until it continues")
+                else:
+                    news.append(f"{name} is frozen (paused or stopped) and is ended")
+                    self.runtime.signal(name, signal.SIGKILL)
+        return news
 
     def _schedule_restart(self, node: NodeExit) -> bool:
         """Whether a node that ended will be started again."""
-        count = self._restarts[node.name]
-        worked = node.name == _ROUTER or node.name in self._ready
+        count = self._restarts.get(node.name, 0)
+        worked = node.name == ROUTER or node.name in self._ready
         if count >= (self._run.restarts if worked else min(_RESTARTS_BEFORE_READY, self._run.restarts)):
             self._given_up[node.name] = node
             return False
@@ -191,20 +239,26 @@ class Supervisor:
         return True
 
     def _check_hope(self) -> None:
-        hint = f"look into {self._directory / 'logs'}"
-        router = self._given_up.get(_ROUTER)
-        if router is not None or len(self._given_up) == len(self._simulations):
-            last = router or list(self._given_up.values())[-1]
-            restarts = self._restarts[last.name]
+        hint = "throwcollect logs shows what the nodes said"
+        router = self._given_up.get(ROUTER)
+        lost = [name for name in self._simulations if name in self._given_up]
+        if router is not None or (lost and len(lost) == len(self._simulations)):
+            last = router or self._given_up[lost[-1]]
+            restarts = self._restarts.get(last.name, 0)
             what = "the router" if router else f"no simulation can be kept alive; the last, {last.name},"
             raise WorkerError(
                 f"{what} ended again after {restarts} restart{'' if restarts == 1 else 's'}: {last.reason}",
                 evidence=last.log or None,
                 hint=hint,
             )
-        if not self._ready and time.monotonic() > self._start_deadline:
+        if self._simulations and not self._ready and time.monotonic() > self._start_deadline:
             raise WorkerError(
                 f"no simulation was ready within {self._run.start_timeout_s:g} s (run.start_timeout_s)",
                 evidence=self.runtime.log_tail(self._simulations[0]) or None,
                 hint=hint,
             )
+
+
+def _last_words(node: NodeExit) -> str:
+    lines = node.log.splitlines()
+    return f"; it said last: {lines[-1]}" if lines else ""

@@ -1,4 +1,5 @@
 import signal
+import socket
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -6,8 +7,10 @@ from pathlib import Path
 import psutil
 import pytest
 
-from throwcollect.errors import WorkerError
-from throwcollect.runtime.local import LocalRuntime, NodeExit
+from throwcollect.config.schema import RunConfig
+from throwcollect.errors import ConfigError, WorkerError
+from throwcollect.runtime.local import LocalRuntime
+from throwcollect.runtime.nodes import NodeExit
 
 
 @pytest.fixture
@@ -18,9 +21,11 @@ def runtime(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[LocalRu
     (package / "__init__.py").write_text("")
     (package / "__main__.py").write_text("import sys\nexec(sys.argv[1])\n")
     monkeypatch.chdir(tmp_path / "fake")
-    local = LocalRuntime(tmp_path / "logs", {"ANSWER": "42"})
+    monkeypatch.setenv("ANSWER", "42")
+    local = LocalRuntime(tmp_path, tmp_path / "logs", RunConfig(domain_id=7))
     yield local
     local.stop(local.running(), grace_s=0.0)
+    local.close()
 
 
 def until(condition: Callable[[], bool]) -> None:
@@ -37,11 +42,14 @@ def ended(runtime: LocalRuntime) -> NodeExit:
 
 
 def test_a_node_that_ends_is_reported_once_with_its_code_and_last_lines(runtime: LocalRuntime) -> None:
-    runtime.start("node", ["import os; print(*range(50), os.environ['ANSWER'], sep='\\n'); sys.exit(7)"])
+    runtime.start(
+        "node",
+        ["import os; print(*range(50), os.environ['ANSWER'], os.environ['ROS_DOMAIN_ID'], sep='\\n'); sys.exit(7)"],
+    )
     assert runtime.running() == ("node",)
     end = ended(runtime)
     assert (end.name, end.code, end.reason) == ("node", 7, "exit code 7")
-    assert end.log.splitlines() == [*map(str, range(11, 50)), "42"]
+    assert end.log.splitlines() == [*map(str, range(12, 50)), "42", "7"]
     assert (runtime.exits(), runtime.running()) == ([], ())
 
 
@@ -53,24 +61,53 @@ def test_a_signal_is_named(runtime: LocalRuntime) -> None:
 
 
 def test_what_a_node_has_said_outlives_it(runtime: LocalRuntime) -> None:
-    assert not runtime.said("node", "ready")
-    runtime.start("node", ["print('node is ready')"])
+    assert not runtime.ready("node")
+    runtime.start("node", ["print('node is ready'); import time; time.sleep(60)"])
+    until(lambda: runtime.ready("node"))
+    runtime.signal("node", signal.SIGTERM)
     ended(runtime)
-    assert runtime.said("node", "node is ready")
-    assert not runtime.said("node", "ready")
+    assert runtime.ready("node")
+    assert runtime.log_tail("node") == "node is ready"
+
+
+def test_a_node_that_is_stopped_in_its_tracks_is_frozen(runtime: LocalRuntime) -> None:
+    runtime.start("node", ["import time; time.sleep(60)"])
+    assert runtime.frozen() == frozenset()
+    runtime.signal("node", signal.SIGSTOP)
+    until(lambda: runtime.frozen() == {"node"})
+    runtime.signal("node", signal.SIGCONT)
+    until(lambda: not runtime.frozen())
 
 
 def test_a_node_that_ignores_requests_is_ended_by_force(runtime: LocalRuntime) -> None:
     deaf = "import signal, time; signal.signal(signal.SIGTERM, signal.SIG_IGN); print('deaf', flush=True)"
     runtime.start("node", [f"{deaf}; time.sleep(60)"])
-    until(lambda: runtime.said("node", "deaf"))
-    process = psutil.Process(runtime.pid("node"))
+    until(lambda: runtime.log_tail("node") == "deaf")
+    process = psutil.Process(int(runtime.handle("node") or 0))
     runtime.stop(["node"], grace_s=0.1)
     assert not process.is_running()
-    assert runtime.running() == ()
+    assert (runtime.running(), runtime.handle("node")) == ((), None)
 
 
 def test_a_log_that_cannot_be_written_is_an_error(tmp_path: Path) -> None:
     (tmp_path / "logs").write_text("a file")
     with pytest.raises(WorkerError, match=r"node: cannot be started: .*File exists"):
-        LocalRuntime(tmp_path / "logs", {}).start("node", [""])
+        LocalRuntime(tmp_path, tmp_path / "logs", RunConfig()).start("node", [""])
+
+
+def test_a_busy_port_is_refused_with_a_way_out(tmp_path: Path) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        with pytest.raises(ConfigError, match=f"run.router_port: port {port} of 127.0.0.1 cannot be used") as caught:
+            LocalRuntime(tmp_path, tmp_path / "logs", RunConfig(router_port=port))
+    assert caught.value.hint == "--set run.router_port=0 takes a free one"
+
+
+def test_the_port_is_kept_until_the_router_needs_it(runtime: LocalRuntime) -> None:
+    host, port = runtime.router_address()
+    with socket.socket() as other, pytest.raises(OSError, match="Address already in use"):
+        other.bind((host, port))
+    runtime.start(
+        "router", [f"import socket; socket.create_server(('{host}', {port})); print('router is ready'); input()"]
+    )
+    until(lambda: runtime.ready("router") or bool(runtime.log_tail("router")))
