@@ -84,8 +84,10 @@ def test_a_trial_waits_for_all_its_controllers_and_then_hands_in_its_episode(rob
     assert [robot.outcome(handle)[1] for handle in (first, second)] == [0, 0]
     (message,) = heard
     parts = [each.label for each in message.layout.dim]
-    assert parts == ["header", "chunk"]
-    header = unpack(serialize(message)).header
+    assert parts == ["header", "sha256", "chunk"]
+    episode = unpack(serialize(message))
+    episode.check_records()
+    header = episode.header
     assert (header.trial, header.start_ns, header.end_reason) == (5, start_ns, "landed")
     assert [(each.controller, each.status) for each in header.goals] == [(ARM, 4), (TORSO, 4)]
 
