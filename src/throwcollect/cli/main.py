@@ -166,20 +166,31 @@ def router(
 @app.command(rich_help_panel="Nodes, as `up` starts them")
 def sim(
     config: ConfigArgument = DEFAULT_CONFIG,
-    name: Annotated[str, typer.Option("--name", help="Name of the node and of its namespace.")] = "sim_0",
+    name: Annotated[
+        str | None, typer.Option("--name", help="Name of the node and of its namespace; sim_<host name> by default.")
+    ] = None,
 ) -> None:
     """Run one simulation."""
+    from socket import gethostname
+
+    from throwcollect.runtime.nodes import simulation_name_of
     from throwcollect.sim.main import run
 
-    run(config, name=name)
+    run(config, name=name or simulation_name_of(gethostname()))
 
 
 @app.command(rich_help_panel="Nodes, as `up` starts them")
-def coordinator(directory: DatasetArgument) -> None:
-    """Collect into a directory that holds `config.yaml` and `plan.parquet`."""
-    from throwcollect.coordinator.main import run
+def coordinator(
+    directory: DatasetArgument,
+    config: Annotated[
+        Path | None,
+        typer.Option("--config", metavar="CONFIG", help="Make the plan of this YAML file first.", readable=False),
+    ] = None,
+) -> None:
+    """Collect into a directory that holds `config.yaml` and `plan.parquet`, or into a new one with --config."""
+    from throwcollect.cli.nodes import coordinate
 
-    run(directory)
+    coordinate(directory, config=config)
 
 
 def main() -> None:

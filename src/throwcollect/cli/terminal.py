@@ -45,17 +45,6 @@ def display(*, quiet: bool) -> Display:
     return _Lines(quiet=quiet)
 
 
-def counts(progress: Progress) -> str:
-    """Landed and failed throws, simulations and speed, in one line without markup."""
-    parts = [f"{progress.landed} landed", f"{progress.failed} failed"]
-    if progress.lost:
-        parts.append(f"{progress.lost} lost")
-    alive = progress.simulations
-    parts.append(f"{alive} simulation{'' if alive == 1 else 's'}")
-    parts.append(f"{progress.throws_per_s:.1f} throws/s")
-    return ", ".join(parts)
-
-
 class _Lines:
     def __init__(self, *, quiet: bool) -> None:
         self._quiet = quiet
@@ -74,7 +63,7 @@ class _Lines:
         if now < self._next and progress.ended < progress.total:
             return
         self._next = now + _LINE_EVERY_S
-        self.say(f"{progress.ended}/{progress.total} throws: {counts(progress)}")
+        self.say(progress.line)
 
     def say(self, line: str) -> None:
         if not self._quiet:
@@ -110,7 +99,7 @@ class _Bar:
         self._progress.stop()
 
     def update(self, progress: Progress) -> None:
-        self._progress.update(self._task, total=progress.total, completed=progress.ended, description=counts(progress))
+        self._progress.update(self._task, total=progress.total, completed=progress.ended, description=progress.counts)
 
     def say(self, line: str) -> None:
         self.warn(line)

@@ -14,6 +14,8 @@ from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.errors import Interrupted
 
 _IDLE_S = 0.05
+_TELL_EVERY_S = 10.0
+"""For whoever reads the log; the topic has it more often."""
 
 
 def run(directory: Path) -> None:
@@ -41,7 +43,7 @@ def run(directory: Path) -> None:
     executor.add_node(node)
     # What is here now stays until the end; the garbage collector need not go through it again and again.
     gc.freeze()
-    started = time.monotonic()
+    started = told = time.monotonic()
     try:
         while not node.finished:
             # Simulations come first: what can wait is done when no message is there.
@@ -49,7 +51,10 @@ def run(directory: Path) -> None:
             executor.spin_once(timeout_sec=0.0 if waiting else _IDLE_S)
             if node.backlog:
                 node.write_one()
-        node.report()
+            if time.monotonic() >= told + _TELL_EVERY_S:
+                told = time.monotonic()
+                print(node.report().line, flush=True)
+        print(node.report().line, flush=True)
         if not node.complete:
             raise Interrupted(f"interrupted; what is finished is in {directory}")
         writer.finish(wall_s=time.monotonic() - started)

@@ -120,8 +120,8 @@ class Coordinator(Node):
                 return True
         return False
 
-    def report(self) -> None:
-        """Publish the progress."""
+    def report(self) -> Progress:
+        """Publish the progress, and return it."""
         now = time.monotonic()
         ended = self._leases.ended
         self._ends.append((now, ended))
@@ -137,6 +137,7 @@ class Coordinator(Node):
             hung=[name.strip("/") for name, simulation in self._simulations.items() if simulation.hung],
         )
         self._progress.publish(progress.message())
+        return progress
 
     def _discover(self) -> None:
         changes = self.context.graph.changes

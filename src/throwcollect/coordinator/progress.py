@@ -53,6 +53,21 @@ class Progress:
         """Number of throws with any other outcome."""
         return sum(self.outcomes.values()) - self.landed - self.lost
 
+    @property
+    def counts(self) -> str:
+        """Landed and failed throws, simulations and speed, in one line."""
+        parts = [f"{self.landed} landed", f"{self.failed} failed"]
+        if self.lost:
+            parts.append(f"{self.lost} lost")
+        parts.append(f"{self.simulations} simulation{'' if self.simulations == 1 else 's'}")
+        parts.append(f"{self.throws_per_s:.1f} throws/s")
+        return ", ".join(parts)
+
+    @property
+    def line(self) -> str:
+        """All of it that people want to see, in one line."""
+        return f"{self.ended}/{self.total} throws: {self.counts}"
+
     def message(self) -> Any:
         """The message that carries it: a std_msgs/String of JSON."""
         return String(data=json.dumps(asdict(self)))

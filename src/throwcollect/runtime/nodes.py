@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -14,6 +15,11 @@ COORDINATOR = "coordinator"
 def simulation_name(index: int) -> str:
     """Name of a simulation's node, counted from 0."""
     return f"sim_{index}"
+
+
+def simulation_name_of(host: str) -> str:
+    """Name of the one simulation on a host, as in a container."""
+    return "sim_" + re.sub(r"[^a-z0-9_]", "_", host.lower())
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 import pytest
 
-from throwcollect.cli.terminal import counts, display
+from throwcollect.cli.terminal import display
 from throwcollect.coordinator.progress import Progress
 
 
@@ -9,8 +9,8 @@ def progress(ended: int, **outcomes: int) -> Progress:
 
 
 def test_counts_tell_failures_and_losses() -> None:
-    assert counts(progress(3, landed=3)) == "3 landed, 0 failed, 2 simulations, 3.1 throws/s"
-    assert counts(progress(6, landed=3, self_hit=1, timeout=1, lost=1)) == (
+    assert progress(3, landed=3).counts == "3 landed, 0 failed, 2 simulations, 3.1 throws/s"
+    assert progress(6, landed=3, self_hit=1, timeout=1, lost=1).counts == (
         "3 landed, 2 failed, 1 lost, 2 simulations, 3.1 throws/s"
     )
 

@@ -1,0 +1,33 @@
+"""`throwcollect coordinator`: where nobody has prepared the dataset, it does so itself."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from throwcollect.cli.dataset import describe
+from throwcollect.config.loader import load
+from throwcollect.coordinator.main import run
+from throwcollect.coordinator.prepare import prepare
+from throwcollect.dataset.inspect import info
+
+
+def coordinate(directory: Path, *, config: Path | None) -> None:
+    """Collect into a directory.
+
+    Args:
+        directory: Directory of the dataset: prepared, or new if a configuration is given.
+        config: YAML file of the collection, of which the plan is made first; the summary is printed at the end.
+
+    Raises:
+        ConfigError: If the configuration, the sweep or the directory cannot be used.
+        DatasetError: If the directory holds no plan, or cannot be written.
+        Interrupted: If a signal ended the collection before its last trial.
+    """
+    if config is None:
+        run(directory)
+        return
+    plan = prepare(load(config), directory, sweep_directory=config.parent)
+    print(f"plan: {len(plan.trials)} trials; dataset: {directory}", flush=True)
+    run(directory)
+    sys.stdout.write(describe(info(directory).as_dict()))
