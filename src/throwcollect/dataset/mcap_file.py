@@ -6,11 +6,11 @@ run of records: its chunk, the chunk's message indexes, and a Metadata record na
 
 from __future__ import annotations
 
-import zlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import zstandard
+from isal.isal_zlib import crc32
 from mcap import records
 
 from throwcollect.dataset.bag import FileSummary, bag_information, to_yaml
@@ -143,7 +143,7 @@ class McapFile:
 
     def _put(self, data: bytes) -> None:
         self._write(data)
-        self._crc = zlib.crc32(data, self._crc)
+        self._crc = crc32(data, self._crc)
         self.size += len(data)
 
 
@@ -164,4 +164,4 @@ def latched_run(channels: Channels, stamp_ns: int) -> EpisodeRun:
         offset += len(message)
     contents = b"".join(messages)
     data = zstandard.ZstdCompressor(level=_LATCHED_LEVEL).compress(contents)
-    return _run(Chunk(data, len(contents), zlib.crc32(contents), stamp_ns, stamp_ns), indexes, b"", 1)
+    return _run(Chunk(data, len(contents), crc32(contents), stamp_ns, stamp_ns), indexes, b"", 1)

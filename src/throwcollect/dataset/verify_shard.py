@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from isal.isal_zlib import crc32
 from mcap import records
 from mcap.opcode import Opcode
 
@@ -172,7 +172,7 @@ class ShardCheck:
         end = contents.record(bag.end)
         crc = 0
         for start in range(0, end.offset, _CRC_BLOCK):
-            crc = zlib.crc32(contents.slice(start, min(start + _CRC_BLOCK, end.offset)), crc)
+            crc = crc32(contents.slice(start, min(start + _CRC_BLOCK, end.offset)), crc)
         if end.data != encode_records(records.DataEnd(crc)):
             self._report(f"byte {end.offset}", "the CRC of the data section differs from its contents")
         self._check_summary(contents, end.end, held)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import hashlib
 import struct
-import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,6 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 import zstandard
+from isal.isal_zlib import crc32
 from mcap import records
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
@@ -117,7 +117,7 @@ class Chunk:
             contents = zstandard.ZstdDecompressor().decompress(self.data, allow_extra_data=False)
         except zstandard.ZstdError as error:
             raise DatasetError(f"chunk: cannot be decompressed: {error}") from error
-        if zlib.crc32(contents) != self.crc:
+        if crc32(contents) != self.crc:
             raise DatasetError("chunk: its CRC differs from its contents")
         return contents
 
@@ -166,7 +166,7 @@ class ChunkEncoder:
         chunk = Chunk(
             data=self._compressor.compress(table.data),
             uncompressed_size=table.nbytes,
-            crc=zlib.crc32(table.data),
+            crc=crc32(table.data),
             start_ns=int(samples.stamps_ns[0]),
             end_ns=int(samples.stamps_ns[-1]),
         )

@@ -1,0 +1,41 @@
+#!/bin/sh
+# Collects a dataset on Docker Compose (v2 or 1.29) and takes it out of the volume, for continuous integration:
+#   compose/collect.sh CONFIG SIMULATIONS OUTPUT
+# The exit code is that of the collection. OUTPUT must not exist.
+set -eu
+if [ $# -ne 3 ]; then
+    echo "usage: $0 CONFIG SIMULATIONS OUTPUT" >&2
+    exit 2
+fi
+config=$1 simulations=$2 output=$3
+if [ -e "$output" ]; then
+    echo "$0: $output exists already" >&2
+    exit 2
+fi
+
+CONFIGS=$(cd "$(dirname "$config")" && pwd)
+CONFIG=$(basename "$config")
+RUN_USER=$(id -u):$(id -g)
+THROWCOLLECT_IMAGE=${THROWCOLLECT_IMAGE:-throwcollect:0.1.0}
+export CONFIGS CONFIG RUN_USER THROWCOLLECT_IMAGE
+
+project=throwcollect-$$
+file=$(dirname "$0")/compose.yaml
+compose() {
+    if docker compose version >/dev/null 2>&1; then
+        docker compose -f "$file" -p "$project" "$@"
+    else
+        docker-compose -f "$file" -p "$project" "$@"
+    fi
+}
+# Whatever happens, nothing stays behind.
+trap 'compose down --volumes --timeout 5 >/dev/null 2>&1' EXIT
+trap 'exit 130' INT TERM
+
+code=0
+compose up --scale sim="$simulations" --exit-code-from coordinator || code=$?
+
+mkdir -p "$output"
+docker run --rm --network none --user "$RUN_USER" --entrypoint cp \
+    -v "${project}_data:/data:ro" -v "$(cd "$output" && pwd):/out" "$THROWCOLLECT_IMAGE" -r /data/dataset/. /out
+exit "$code"
