@@ -20,6 +20,11 @@ if TYPE_CHECKING:
     from throwcollect.ros.node import Node
 
 
+_FOREVER = float("inf")
+_LONGEST_WAIT_S = 0.5
+"""A signal that comes just before the wait begins has its Python handler run only when the wait ends."""
+
+
 class Executor:
     """Calls the callbacks of its nodes in order of arrival; timers take turns with everything else.
 
@@ -166,7 +171,7 @@ class Executor:
                         return
                     wait = min(wait, deadline - now)
             try:
-                work = self._queue.get(timeout=0 if queued else None if wait == _FOREVER else wait)
+                work = self._queue.get(timeout=0 if queued else min(wait, _LONGEST_WAIT_S))
             except Empty:
                 continue
             if work is not None and work.run(self):
@@ -181,9 +186,6 @@ class Executor:
                 if left is not None and (left <= 0 or not timer.clock.is_driven) and left / S_TO_NS < least:
                     first, least = timer, left / S_TO_NS
         return first, least
-
-
-_FOREVER = float("inf")
 
 
 class SingleThreadedExecutor(Executor):
