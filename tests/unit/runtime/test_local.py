@@ -62,7 +62,7 @@ def test_a_signal_is_named(runtime: LocalRuntime) -> None:
 
 def test_what_a_node_has_said_outlives_it(runtime: LocalRuntime) -> None:
     assert not runtime.ready("node")
-    runtime.start("node", ["print('node is ready'); import time; time.sleep(60)"])
+    runtime.start("node", ["print('node is ready', flush=True); import time; time.sleep(60)"])
     until(lambda: runtime.ready("node"))
     runtime.signal("node", signal.SIGTERM)
     ended(runtime)
