@@ -21,7 +21,7 @@ from throwcollect.robots.talos import CONTROLLERS
 from throwcollect.ros import Context, Future, Node, Parameter, QoSProfile, SingleThreadedExecutor
 from throwcollect.ros.action import ActionClient
 from throwcollect.ros.qos import HistoryPolicy
-from throwcollect.ros.session import CONFIG_FILE_VARIABLE, OVERRIDE_VARIABLE
+from throwcollect.session_config import CONFIG_FILE_VARIABLE, OVERRIDE_VARIABLE
 
 CONFIG = Config.model_validate({"name": "integration", "tool": {"cup_floor_radius_m": 0.006}})
 """Almost the defaults: the smallest balls fall through this spoon."""

@@ -10,16 +10,18 @@ import signal
 import socket
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from queue import SimpleQueue
+from contextlib import contextmanager, suppress
+from queue import Empty, SimpleQueue
 
 import zenoh
 
 from throwcollect.errors import ConfigError, ThrowcollectError
-from throwcollect.ros.session import router_config
+from throwcollect.session_config import router_config
 
 DEFAULT_LISTEN = "tcp/127.0.0.1:7447"
 """Reachable from this host alone, at the port that nodes connect to by default."""
+
+_SLICE_S = 0.5
 
 _PORT_ATTEMPTS = 5
 
@@ -90,7 +92,11 @@ def serve(listen: str = DEFAULT_LISTEN) -> None:
         signal.signal(number, lambda received, _frame: stop.put(received))
     with router(listen) as endpoint:
         print(f"router listening on {endpoint}", flush=True)
-        stop.get()
+        # In slices: a signal just before the wait would have its handler run only when the wait ends.
+        while True:
+            with suppress(Empty):
+                stop.get(timeout=_SLICE_S)
+                return
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -8,7 +8,7 @@ import pytest
 
 from throwcollect.ros import Context, Node, SingleThreadedExecutor
 from throwcollect.ros.router import router
-from throwcollect.ros.session import OVERRIDE_VARIABLE
+from throwcollect.session_config import OVERRIDE_VARIABLE
 
 _domains = itertools.count(1)
 

@@ -1,0 +1,20 @@
+#!/bin/sh
+# Fails if something is missing in the image: loads every module, makes a plan, runs every kind of node, reads the result.
+set -eu
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+cd "$work"
+python - <<'PYTHON'
+import importlib
+import pkgutil
+
+import throwcollect
+
+for module in pkgutil.walk_packages(throwcollect.__path__, "throwcollect."):
+    if not module.name.endswith("__main__"):
+        importlib.import_module(module.name)
+PYTHON
+throwcollect --help > help
+throwcollect up -n 1 --runtime local --trials 4 --output dataset "$(dirname "$0")/quickstart.yaml"
+throwcollect dataset info dataset > info
+throwcollect dataset verify dataset

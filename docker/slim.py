@@ -1,0 +1,130 @@
+"""Takes out of an environment what throwcollect never loads: ``python3 slim.py SITE_PACKAGES``.
+
+The rules are those of one application: tests, headers, other robots, file systems in clouds. What they take too much
+shows at the end of the image's build, when a collection runs with what is left.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Callable, Mapping
+from fnmatch import fnmatchcase
+from pathlib import Path, PurePosixPath
+
+from elf import is_elf, needed, stripped
+
+DROPPED = (
+    # For compilers, type checkers and developers.
+    "*/tests/*",
+    "*/include/*",
+    "*.a",
+    "*.h",
+    "*.hpp",
+    "*.pxd",
+    "*.pxi",
+    "*.pyi",
+    "*.pyx",
+    # Robots and scenes that come with the physics, and its renderer for servers with a graphics card.
+    "eglRenderer*",
+    "pybullet_*/*",
+    # Tables in clouds and from other machines.
+    "pyarrow/_azurefs*",
+    "pyarrow/_flight*",
+    "pyarrow/_gcsfs*",
+    "pyarrow/_hdfs*",
+    "pyarrow/_orc*",
+    "pyarrow/_parquet_encryption*",
+    "pyarrow/_dataset_orc*",
+    "pyarrow/_dataset_parquet_encryption*",
+    "pyarrow/_s3fs*",
+    "pyarrow/_substrait*",
+    "pyarrow/src/*",
+    # Parts that the samplers do not use.
+    "scipy/cluster/*",
+    "scipy/datasets/*",
+    "scipy/fftpack/*",
+    "scipy/io/*",
+    "scipy/odr/*",
+    "scipy/signal/*",
+    # Recordings in the formats of rosbags: of that package, the interface definitions alone are used.
+    "apsw/*",
+    "backports/zstd/*",
+    "lz4/*",
+    # The second of two bindings to the same library.
+    "zstandard/_cffi*",
+    "zstandard/backend_cffi*",
+    # Nothing here prints source code in colour.
+    "pygments/lexers/[a-z]*.py",
+    # Nothing installs or removes packages later on.
+    "*.dist-info/RECORD",
+)
+
+CMEEL = "cmeel.prefix/*"
+"""Where Pinocchio's packages put what others put into ``/usr``."""
+KEPT_OF_CMEEL = (
+    "cmeel.prefix/lib/lib*.so*",
+    "cmeel.prefix/lib/python*/site-packages/coal/*",
+    "cmeel.prefix/lib/python*/site-packages/eigenpy/*",
+    "cmeel.prefix/lib/python*/site-packages/pinocchio/*",
+    "cmeel.prefix/share/example-robot-data/robots/talos_data/*",
+)
+
+LIBRARY = re.compile(r"lib[^.]*\.so(\.\d+)*")
+"""File names of libraries; those of modules say for which Python: ``lib.cpython-311-x86_64-linux-gnu.so``."""
+
+
+def kept(path: str) -> bool:
+    """Whether a file stays, as far as its name tells.
+
+    Args:
+        path: Relative to the directory of the packages, with slashes.
+    """
+    if fnmatchcase(path, CMEEL) and not any(fnmatchcase(path, pattern) for pattern in KEPT_OF_CMEEL):
+        return False
+    return not any(fnmatchcase(path, pattern) for pattern in DROPPED)
+
+
+def unreached(files: Mapping[str, Callable[[], bytes]]) -> set[str]:
+    """Shared libraries that no extension module loads, be it by way of others.
+
+    Wheels hold a library up to three times, under the names that elsewhere are links to it; one of them is loaded.
+
+    Args:
+        files: What stays, by path: functions that read the content.
+
+    Returns:
+        Paths of the libraries.
+    """
+    shared = {path: needed(content) for path, read in files.items() if ".so" in path and is_elf(content := read())}
+    libraries = {path for path in shared if LIBRARY.fullmatch(PurePosixPath(path).name)}
+    reached = set(shared) - libraries
+    fresh = set(reached)
+    while fresh:
+        names = {name for path in fresh for name in shared[path]}
+        fresh = {path for path in libraries - reached if PurePosixPath(path).name in names}
+        reached |= fresh
+    return libraries - reached
+
+
+def slim(directory: Path) -> None:
+    """Remove from a directory of installed packages what is not needed, and shorten what is.
+
+    Args:
+        directory: Such as ``lib/python3.11/site-packages`` of an environment.
+    """
+    files = {path.relative_to(directory).as_posix(): path for path in directory.rglob("*") if not path.is_dir()}
+    staying = {name: path for name, path in files.items() if kept(name)}
+    superfluous = unreached({name: path.read_bytes for name, path in staying.items()})
+    for name, path in files.items():
+        if name not in staying or name in superfluous:
+            path.unlink()
+        elif ".so" in name and is_elf(content := path.read_bytes()):
+            path.write_bytes(stripped(content))
+    for path in sorted(directory.rglob("*"), reverse=True):
+        if path.is_dir() and not any(path.iterdir()):
+            path.rmdir()
+
+
+if __name__ == "__main__":
+    slim(Path(sys.argv[1]))

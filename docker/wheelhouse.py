@@ -1,0 +1,131 @@
+"""Fills a directory with everything that pip needs to build the image without network: ``python3 wheelhouse.py DIR``.
+
+Wheels of the dependencies in `pyproject.toml`, slimmed as the image will be, and of what builds throwcollect itself. A
+directory that was filled for the same dependencies by the same rules is left as it is. Runs on Python 3.11 and later,
+with pip.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import platform
+import shutil
+import subprocess
+import sys
+import tempfile
+import zipfile
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+import tomllib
+from elf import is_elf, stripped
+from slim import kept, unreached
+
+ROOT = Path(__file__).parents[1]
+PYTHON = "3.11"
+"""Version in the image; pybullet has no wheels for later ones."""
+GLIBC_MINOR = 36
+"""Version 2.36 of the C library is that of Debian bookworm."""
+STAMP = "made-from.sha256"
+_EPOCH = (1980, 1, 1, 0, 0, 0)
+
+
+def requirements() -> list[str]:
+    """What throwcollect needs at run time and to be built, and pip, as it may be missing in the base image."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    return [*project["project"]["dependencies"], *project["build-system"]["requires"], "pip"]
+
+
+def digest() -> str:
+    """Hash over everything that determines what is in the wheelhouse."""
+    scripts = [(Path(__file__).parent / name).read_bytes() for name in ("elf.py", "slim.py", "wheelhouse.py")]
+    return hashlib.sha256(b"\0".join([*scripts, "\n".join(requirements()).encode()])).hexdigest()
+
+
+def download(directory: Path) -> None:
+    """Download the wheels for the image's Python and C library, whatever those of this machine are.
+
+    Args:
+        directory: Where they go.
+
+    Raises:
+        subprocess.CalledProcessError: If a wheel cannot be had; pip has said which.
+    """
+    machine = platform.machine()
+    platforms = [f"manylinux_2_{minor}_{machine}" for minor in range(GLIBC_MINOR, 4, -1)]
+    platforms += [f"manylinux2014_{machine}", f"manylinux2010_{machine}", f"manylinux1_{machine}"]
+    command = [sys.executable, "-m", "pip", "download", "--quiet", "--disable-pip-version-check"]
+    command += ["--only-binary=:all:", f"--python-version={PYTHON}", "--implementation=cp", "--dest", str(directory)]
+    subprocess.run([*command, *(f"--platform={name}" for name in platforms), *requirements()], check=True)
+
+
+def repack(wheels: list[Path], directory: Path) -> None:
+    """Write wheels anew without what `slim` takes out.
+
+    Args:
+        wheels: All wheels, as libraries in one are loaded by modules in another.
+        directory: Where the new ones go, under the same names.
+    """
+    archives = {wheel: zipfile.ZipFile(wheel) for wheel in wheels}
+    files: dict[str, Callable[[], bytes]] = {
+        name: partial(archive.read, name) for archive in archives.values() for name in archive.namelist() if kept(name)
+    }
+    superfluous = unreached(files)
+    for wheel, archive in archives.items():
+        names = [name for name in archive.namelist() if name in files and name not in superfluous]
+        _write_wheel(directory / wheel.name, archive, [name for name in names if not name.endswith("/")])
+        archive.close()
+
+
+def _write_wheel(target: Path, archive: zipfile.ZipFile, names: list[str]) -> None:
+    # Setuptools carries such lists of other packages further down.
+    record = next(name for name in archive.namelist() if name.endswith(".dist-info/RECORD") and name.count("/") == 1)
+    rows = []
+    with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as slimmed:
+        for name in names:
+            content = archive.read(name)
+            if ".so" in name and is_elf(content):
+                content = stripped(content)
+            hashed = base64.urlsafe_b64encode(hashlib.sha256(content).digest()).rstrip(b"=").decode()
+            rows.append(f"{name},sha256={hashed},{len(content)}\n")
+            entry = zipfile.ZipInfo(name, _EPOCH)
+            entry.external_attr = archive.getinfo(name).external_attr
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            slimmed.writestr(entry, content)
+        slimmed.writestr(zipfile.ZipInfo(record, _EPOCH), "".join([*rows, f"{record},,\n"]))
+
+
+def main(directory: Path) -> None:
+    """Fill a directory, unless it is up to date.
+
+    Args:
+        directory: The wheelhouse; everything in it is replaced.
+
+    Raises:
+        subprocess.CalledProcessError: If a wheel cannot be downloaded.
+    """
+    stamp = directory / STAMP
+    if stamp.is_file() and stamp.read_text(encoding="ascii") == digest():
+        print(f"{directory}: up to date")
+        return
+    if directory.exists() and (
+        foreign := [path for path in directory.iterdir() if path.suffix not in (".whl", ".sha256")]
+    ):
+        sys.exit(f"{directory}: holds {foreign[0].name}, which is no wheel; name a new or empty directory")
+    with tempfile.TemporaryDirectory() as downloads:
+        download(Path(downloads))
+        wheels = sorted(Path(downloads).glob("*.whl"))
+        shutil.rmtree(directory, ignore_errors=True)
+        directory.mkdir(parents=True)
+        repack(wheels, directory)
+        before, after = (
+            sum(path.stat().st_size for path in place.glob("*.whl")) for place in (Path(downloads), directory)
+        )
+    stamp.write_text(digest(), encoding="ascii")
+    print(f"{directory}: {len(wheels)} wheels, {after / 1e6:.0f} MB ({before / 1e6:.0f} MB before slimming)")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

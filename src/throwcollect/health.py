@@ -1,0 +1,105 @@
+"""Whether a node answers, for health checks: they run often and in every container, so they must cost next to nothing.
+
+A request goes to a service that every node offers. Its answer comes from the loop that does the node's work, so a node
+that is stuck does not answer, however alive its process looks. The request is put together here, as a client node
+would have to load all interfaces, and everybody in the ROS graph would hear of it.
+
+``python -m throwcollect.health`` is ``throwcollect health`` without the command line's own cost, five times that of the
+check.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import struct
+import sys
+import time
+
+import zenoh
+
+from throwcollect.errors import ConfigError, ThrowcollectError
+from throwcollect.session_config import client_config
+
+NODE_VARIABLE = "THROWCOLLECT_NODE"
+"""Names the node of a container."""
+
+TIMEOUT_S = 3.0
+"""Time for the session, and then for the answer."""
+
+_ROUTER, _COORDINATOR = "router", "coordinator"
+_NAME = re.compile("[A-Za-z_][A-Za-z0-9_]*")
+
+REQUEST = b"\0\1\0\0" + struct.pack("<I", 0)
+"""CDR of ``rcl_interfaces/srv/GetParameters_Request`` that asks for no parameter."""
+
+
+def check(node: str | None = None) -> None:
+    """Ask a node for a sign of life.
+
+    Args:
+        node: ``router``, ``coordinator``, or the name of a simulation; None for the one that ``THROWCOLLECT_NODE``
+            names.
+
+    Raises:
+        ConfigError: If no node is named, or a variable of the environment does not hold what it should.
+        ThrowcollectError: If it does not answer.
+    """
+    name = node or os.environ.get(NODE_VARIABLE)
+    if not name or not _NAME.fullmatch(name):
+        raise ConfigError(
+            f"health: got {name!r} as node" if name else "health: no node is named",
+            expected=f"router, coordinator, or the name of a simulation; by default what {NODE_VARIABLE} says",
+        )
+    config = client_config()
+    config.insert_json5("transport/unicast/open_timeout", str(round(TIMEOUT_S * 1000)))
+    try:
+        session = zenoh.open(config)
+    except zenoh.ZError as error:
+        raise ThrowcollectError(
+            f"{name}: no session with the router: {config.get_json('connect/endpoints')}"
+        ) from error
+    try:
+        if name != _ROUTER and not _answers(session, name):
+            raise ThrowcollectError(f"{name}: does not answer")
+    finally:
+        session.close()  # type: ignore[no-untyped-call]
+
+
+def attachment() -> bytes:
+    """What rmw_zenoh_cpp (0.2.4 and later) puts on a request: number, time [ns], and identifier of the client."""
+    return struct.pack("<qqB16s", 1, time.time_ns(), 16, os.urandom(16))
+
+
+def _answers(session: zenoh.Session, name: str) -> bool:
+    domain = os.environ.get("ROS_DOMAIN_ID") or "0"
+    # A simulation lives in a namespace of its own name.
+    path = name if name == _COORDINATOR else f"{name}/{name}"
+    replies = session.get(
+        # Type and type hash of the service follow; there is but one.
+        f"{domain}/{path}/get_parameters/**",
+        target=zenoh.QueryTarget.ALL,
+        consolidation=zenoh.ConsolidationMode.NONE,
+        timeout=TIMEOUT_S,
+        payload=REQUEST,
+        attachment=attachment(),
+    )
+    return any(reply.ok is not None for reply in replies)
+
+
+def main() -> int:
+    """Ask the node that the environment names.
+
+    Returns:
+        Exit code.
+    """
+    try:
+        check()
+    except ThrowcollectError as error:
+        print(error, file=sys.stderr)
+        return error.exit_code
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,83 @@
+"""The way to a Docker engine, and what it says when something is wrong."""
+
+from __future__ import annotations
+
+import json
+import os
+import struct
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from docker.client import DockerClient
+from docker.errors import APIError, DockerException
+from urllib3.exceptions import HTTPError
+
+from throwcollect.errors import WorkerError
+
+# Connections that break in the middle of an answer or of a stream show as any of the last three.
+ENGINE_ERRORS = (DockerException, HTTPError, OSError, struct.error, json.JSONDecodeError)
+"""Whatever the client raises when the engine refuses, fails or is gone."""
+
+_DEFAULT_HOST = "unix:///var/run/docker.sock"
+
+
+def engine_address() -> str:
+    """Where the engine is looked for: ``DOCKER_HOST``, or the usual socket."""
+    return os.environ.get("DOCKER_HOST") or _DEFAULT_HOST
+
+
+def connect(*, timeout_s: float = 30.0) -> DockerClient:
+    """A client of the engine that ``DOCKER_HOST`` names.
+
+    Args:
+        timeout_s: How long to wait for each answer [s].
+
+    Raises:
+        WorkerError: If no engine answers.
+    """
+    try:
+        return DockerClient.from_env(timeout=timeout_s)
+    except ENGINE_ERRORS as error:
+        raise WorkerError(
+            f"no Docker engine answers at {engine_address()}: {in_words(error)}",
+            hint="start it, let DOCKER_HOST name another one, or use processes: --runtime local",
+        ) from error
+
+
+def in_words(error: BaseException) -> str:
+    """What the engine, or else the system, said."""
+    if isinstance(error, APIError):
+        return str(error.explanation or error).strip()
+    cause: BaseException | None = error
+    while cause is not None:
+        for each in (*_inside(cause), cause):
+            if isinstance(each, OSError) and isinstance(each.strerror, str):
+                return each.strerror
+        cause = cause.__cause__ or cause.__context__
+    return str(error) or type(error).__name__
+
+
+def _inside(error: BaseException) -> Iterator[object]:
+    """What an exception wraps as its arguments, at any depth."""
+    for argument in error.args:
+        for each in argument if isinstance(argument, tuple) else (argument,):
+            yield each
+            if isinstance(each, BaseException):
+                yield from _inside(each)
+
+
+@contextmanager
+def engine_errors(what: str, *, hint: str | None = None) -> Iterator[None]:
+    """Errors of the engine become ours.
+
+    Args:
+        what: What could not be done, for the message.
+        hint: One command or one edit that gets further.
+
+    Raises:
+        WorkerError: In the place of any of `ENGINE_ERRORS`.
+    """
+    try:
+        yield
+    except ENGINE_ERRORS as error:
+        raise WorkerError(f"{what}: {in_words(error)}", hint=hint) from error

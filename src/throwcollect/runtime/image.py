@@ -1,0 +1,215 @@
+"""The image that containers are made from: built from a clone of the project, or pulled."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import tarfile
+import tempfile
+from collections import deque
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import IO
+from urllib.parse import urlsplit
+
+from docker.client import DockerClient
+from docker.errors import ImageNotFound
+
+import throwcollect
+from throwcollect.errors import ConfigError, WorkerError
+from throwcollect.runtime.docker_engine import engine_errors
+
+DEFAULT_BASE = "python:3.11-slim-bookworm"
+"""Base image, as in the Dockerfile."""
+
+_DOCKERFILE = "docker/Dockerfile"
+_TARGET = "embedded"
+_SOURCES = ("pyproject.toml", "README.md", "configs/quickstart.yaml", "src")
+_LEFT_OUT = re.compile(r"__pycache__|.*\.egg-info")
+_EVIDENCE_LINES = 15
+_STEP = re.compile(r"Step (\d+/\d+) : (.*)")
+_STEP_COLUMNS = 100
+_COLOURS = re.compile(r"\x1b\[[0-9;]*m")
+_BOOKKEEPING = re.compile(r" ---> |Removing intermediate container ")
+_MISSING_WHEEL = re.compile(r"No matching distribution found for (.*)")
+_UNKNOWN = "unknown"
+
+
+def default_tag() -> str:
+    """Tag of the image that belongs to this version."""
+    return f"throwcollect:{throwcollect.__version__}"
+
+
+def build(
+    client: DockerClient,
+    tag: str,
+    *,
+    base: str = DEFAULT_BASE,
+    wheelhouse: Path | None = None,
+    say: Callable[[str], None],
+) -> int:
+    """Build the image from the clone that this package runs from.
+
+    Args:
+        client: Client of the engine.
+        tag: Name of the image.
+        base: Base image, which is pulled if the engine does not have it.
+        wheelhouse: Directory of wheels, as `docker/wheelhouse.py` fills it; None takes them from the package index.
+        say: Called with one line for each step.
+
+    Returns:
+        Size of the image [B].
+
+    Raises:
+        ConfigError: If the package does not run from a clone, or the wheelhouse holds no wheels.
+        WorkerError: If the engine does not answer, the base image cannot be had, or a step fails.
+    """
+    root = source_root()
+    if wheelhouse is not None and not any(wheelhouse.glob("*.whl")):
+        raise ConfigError(f"{wheelhouse}: holds no wheels", hint=f"python {root}/docker/wheelhouse.py {wheelhouse}")
+    if not _is_there(client, base):
+        hint = "--base IMAGE names another one; docker/base.sh makes one from Debian packages"
+        say(f"pulling {base}")
+        with engine_errors(f"the base image {base} is not here and cannot be pulled", hint=hint):
+            client.images.pull(base)
+    arguments = {"BASE_IMAGE": base, **_provenance(root)}
+    with engine_errors(f"{tag}: cannot be built"), tempfile.TemporaryFile() as context:
+        _write_context(context, root, wheelhouse)
+        context.seek(0)
+        _run_steps(client, context, tag, arguments, wheelhouse, say)
+        return int(client.images.get(tag).attrs["Size"])
+
+
+def ensure(client: DockerClient, tag: str, *, say: Callable[[str], None]) -> None:
+    """Make sure that the engine has an image: the default one is built from a clone, any other is pulled.
+
+    Args:
+        client: Client of the engine.
+        tag: Name of the image.
+        say: Called with one line before anything that takes long.
+
+    Raises:
+        WorkerError: If the image is missing and cannot be had.
+    """
+    if _is_there(client, tag):
+        return
+    if tag != default_tag():
+        say(f"image {tag} is not here; pulling it")
+        with engine_errors(
+            f"the image {tag} is not here and cannot be pulled", hint="docker load brings one from a file"
+        ):
+            client.images.pull(tag)
+        return
+    try:
+        root = source_root()
+        say(f"image {tag} is not here; building it from {root}, once, which takes minutes")
+        build(client, tag, say=lambda _line: None)
+    except ConfigError as error:
+        raise WorkerError(
+            f"the image {tag} is not here and cannot be built: {error.message}", hint=error.hint
+        ) from error
+
+
+def source_root() -> Path:
+    """Directory of the clone that this package runs from.
+
+    Raises:
+        ConfigError: If it was installed in another way than from a clone, in editable mode.
+    """
+    root = Path(throwcollect.__path__[0]).parents[1]
+    if not all((root / name).exists() for name in (_DOCKERFILE, *_SOURCES)):
+        raise ConfigError(
+            f"{throwcollect.__path__[0]}: is not in a clone of the project, so there is nothing to build an image from",
+            hint="clone it and run: pip install -e .; or name an image that exists",
+        )
+    return root
+
+
+def _is_there(client: DockerClient, image: str) -> bool:
+    with engine_errors(f"the engine does not say whether it has the image {image}"):
+        try:
+            client.images.get(image)
+        except ImageNotFound:
+            return False
+        return True
+
+
+def _write_context(archive: IO[bytes], root: Path, wheelhouse: Path | None) -> None:
+    """Write what the Dockerfile copies, and nothing else, as a tar archive."""
+
+    def entry(info: tarfile.TarInfo) -> tarfile.TarInfo | None:
+        info.uid = info.gid = 0
+        info.uname = info.gname = ""
+        return None if _LEFT_OUT.fullmatch(Path(info.name).name) else info
+
+    with tarfile.open(fileobj=archive, mode="w") as context:
+        for name in _SOURCES:
+            context.add(root / name, name, filter=entry)
+        for path in sorted((root / "docker").iterdir()):
+            if path.is_file():
+                context.add(path, f"docker/{path.name}", filter=entry)
+        for wheel in sorted(wheelhouse.glob("*.whl")) if wheelhouse is not None else ():
+            context.add(wheel, f"docker/wheelhouse/{wheel.name}", filter=entry)
+
+
+def _run_steps(
+    client: DockerClient,
+    context: IO[bytes],
+    tag: str,
+    arguments: Mapping[str, str],
+    wheelhouse: Path | None,
+    say: Callable[[str], None],
+) -> None:
+    printed: deque[str] = deque(maxlen=_EVIDENCE_LINES)
+    missing: str | None = None
+    answers = client.api.build(
+        fileobj=context,
+        custom_context=True,
+        dockerfile=_DOCKERFILE,
+        target=_TARGET,
+        tag=tag,
+        buildargs=arguments,
+        rm=True,
+        forcerm=True,
+        decode=True,
+    )
+    for answer in answers:
+        for line in _COLOURS.sub("", answer.get("stream", "")).splitlines():
+            if step := _STEP.fullmatch(line.strip()):
+                say(f"step {step[1]}: {' '.join(step[2].split()):.{_STEP_COLUMNS}}")
+            elif line.strip() and not _BOOKKEEPING.match(line):
+                printed.append(line.rstrip())
+            if found := _MISSING_WHEEL.search(line):
+                missing = found[1]
+        if "error" in answer:
+            raise _failure(tag, answer["error"].strip(), missing, wheelhouse, "\n".join(printed))
+
+
+def _failure(tag: str, error: str, missing: str | None, wheelhouse: Path | None, log: str) -> WorkerError:
+    if missing is None:
+        return WorkerError(f"{tag}: cannot be built: {error}", evidence=log)
+    if wheelhouse is None:
+        hint = "--wheelhouse DIR takes wheels from a directory; docker/wheelhouse.py fills one"
+        return WorkerError(f"{tag}: cannot be built: the package index gives no {missing}", evidence=log, hint=hint)
+    hint = f"python docker/wheelhouse.py {wheelhouse}"
+    return WorkerError(f"{tag}: cannot be built: {wheelhouse} lacks {missing}", evidence=log, hint=hint)
+
+
+def _provenance(root: Path) -> dict[str, str]:
+    """Where the sources come from, for the labels."""
+    revision = source = None
+    if (root / ".git").exists() and (revision := _git(root, "rev-parse", "HEAD")):
+        revision += "-dirty" if _git(root, "status", "--porcelain", "--", "docker", *_SOURCES) else ""
+        address = urlsplit(_git(root, "remote", "get-url", "origin") or "")
+        # Without the name and the password that the address of a clone may hold.
+        source = address._replace(netloc=address.netloc.rpartition("@")[2]).geturl()
+    return {"VERSION": throwcollect.__version__, "REVISION": revision or _UNKNOWN, "SOURCE": source or _UNKNOWN}
+
+
+def _git(root: Path, *arguments: str) -> str | None:
+    """What git prints; None where it cannot say."""
+    try:
+        answer = subprocess.run(["git", "-C", root, *arguments], capture_output=True, text=True, check=True)
+    except (OSError, subprocess.CalledProcessError):
+        return None
+    return answer.stdout.strip()

@@ -1,0 +1,29 @@
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+from docker.client import DockerClient
+from docker.errors import ImageNotFound
+
+from throwcollect.errors import WorkerError
+from throwcollect.runtime.docker_engine import connect
+from throwcollect.runtime.image import default_tag
+
+UNAVAILABLE = Path(__file__).parents[2] / "build" / "engine-unavailable"
+
+
+@pytest.fixture(scope="session")
+def client() -> Iterator[DockerClient]:
+    """A client of an engine that has the image."""
+    try:
+        found = connect()
+    except WorkerError as error:
+        # Where continuous integration has tried to start one, it says why it could not.
+        pytest.skip(UNAVAILABLE.read_text().strip() if UNAVAILABLE.exists() else error.message)
+    with closing(found):
+        try:
+            found.images.get(default_tag())
+        except ImageNotFound:
+            pytest.skip(f"the engine has no image {default_tag()}; throwcollect image build makes it")
+        yield found

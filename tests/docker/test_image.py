@@ -1,0 +1,127 @@
+"""The image as it is: what it can do in a container that may do next to nothing, and what is not in it."""
+
+from __future__ import annotations
+
+import uuid
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from docker.client import DockerClient
+from docker.errors import ContainerError
+
+import throwcollect
+from throwcollect.runtime.image import default_tag
+
+pytestmark = pytest.mark.docker
+
+CONFINED = {
+    "init": True,
+    "read_only": True,
+    "tmpfs": {"/tmp": ""},
+    "cap_drop": ["ALL"],
+    "security_opt": ["no-new-privileges"],
+    "network_mode": "none",
+}
+"""What a container of a run is allowed, or less."""
+
+
+def run(client: DockerClient, *command: str, **options: Any) -> str:
+    return client.containers.run(default_tag(), list(command), remove=True, **{**CONFINED, **options}).decode()
+
+
+def script(client: DockerClient, text: str, **options: Any) -> str:
+    return run(client, "-c", text, entrypoint="sh", **options)
+
+
+@pytest.fixture
+def volume(client: DockerClient) -> Iterator[str]:
+    made = client.volumes.create(f"throwcollect-test-{uuid.uuid4().hex[:8]}")
+    yield made.name
+    made.remove()
+
+
+def test_the_command_decides_what_runs(client: DockerClient) -> None:
+    assert run(client, "--version") == f"throwcollect {throwcollect.__version__}\n"
+
+
+@pytest.mark.parametrize("user", ["4242:4242", "0:0", None])
+def test_any_user_makes_a_plan_on_a_file_system_that_cannot_be_written(client: DockerClient, user: str | None) -> None:
+    sweep = "{sampler: sobol, parameters: {task.duration_s: {min: 1.0, max: 1.3}}}"
+    command = f"echo '{{trials: 4, sweep: {sweep}}}' > /tmp/c.yaml && throwcollect plan /tmp/c.yaml --json"
+    assert '"trial": 3' in script(client, command, user=user)
+
+
+@pytest.mark.parametrize("user", ["4242:4242", "0:0"])
+def test_any_user_may_write_into_a_new_volume_for_data(client: DockerClient, volume: str, user: str) -> None:
+    mounted = {volume: {"bind": "/data", "mode": "rw"}}
+    assert script(client, "pwd && mkdir mine && ls", user=user, volumes=mounted) == "/data\nmine\n"
+    assert script(client, "stat -c %a /data", volumes=mounted) == "1777\n"
+
+
+def test_nothing_that_builds_or_installs_is_left(client: DockerClient) -> None:
+    tools = "pip pip3 gcc cc ld strip make cmake git"
+    assert script(client, f"for tool in {tools}; do command -v $tool; done; true") == ""
+    with pytest.raises(ContainerError, match="No module named pip"):
+        script(client, "python -m pip")
+    kinds = " -o ".join(f"-name '*.{kind}'" for kind in ("a", "whl", "hpp", "pyi"))
+    assert script(client, f"find /opt /build /wheelhouse {kinds} 2>/dev/null; true") == ""
+
+
+def test_of_the_robots_talos_alone_is_there(client: DockerClient) -> None:
+    robots = "ls /opt/venv/lib/python3*/site-packages/cmeel.prefix/share/example-robot-data/robots"
+    assert script(client, robots) == "talos_data\n"
+
+
+def test_labels_say_what_it_is_and_where_it_comes_from(client: DockerClient) -> None:
+    labels = client.images.get(default_tag()).labels
+    assert labels["org.opencontainers.image.title"] == "throwcollect"
+    assert labels["org.opencontainers.image.version"] == throwcollect.__version__
+    assert {"org.opencontainers.image.revision", "org.opencontainers.image.source"} <= labels.keys()
+
+
+def test_it_runs_as_nobody_special_and_leaves_no_volume(client: DockerClient) -> None:
+    config = client.images.get(default_tag()).attrs["Config"]
+    assert config["User"] == "10001:10001"
+    assert not config.get("Volumes")
+    assert config["Healthcheck"]["Interval"] == 10 * 10**9
+
+
+@pytest.fixture
+def router(client: DockerClient) -> Iterator[Any]:
+    options = {**CONFINED, "network_mode": None, "environment": {"THROWCOLLECT_NODE": "router"}}
+    container = client.containers.run(default_tag(), ["router"], detach=True, **options)
+    try:
+        for line in container.logs(stream=True):
+            if b"router listening" in line:
+                break
+        yield container
+    finally:
+        container.remove(force=True)
+
+
+def healthcheck(client: DockerClient, container: Any, **environment: str) -> int:
+    command = client.images.get(default_tag()).attrs["Config"]["Healthcheck"]["Test"]
+    assert command[0] == "CMD-SHELL"
+    code: int = container.exec_run(["sh", "-c", command[1]], environment=environment).exit_code
+    return code
+
+
+def test_the_health_check_asks_the_node_that_the_container_names(client: DockerClient, router: Any) -> None:
+    assert healthcheck(client, router) == 0
+    assert healthcheck(client, router, THROWCOLLECT_NODE="sim_0") == 1
+
+
+def test_a_container_that_runs_no_node_is_not_asked(client: DockerClient, router: Any) -> None:
+    assert healthcheck(client, router, THROWCOLLECT_NODE="") == 0
+
+
+def test_a_router_that_is_stuck_is_unhealthy(client: DockerClient, router: Any) -> None:
+    assert router.exec_run(["sh", "-c", "kill -STOP $(cat /proc/1/task/1/children)"]).exit_code == 0
+    assert healthcheck(client, router) == 1
+
+
+def test_a_node_ends_when_it_is_told_to(router: Any) -> None:
+    router.stop(timeout=30)
+    router.reload()
+    assert router.attrs["State"]["ExitCode"] == 0
