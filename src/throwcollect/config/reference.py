@@ -7,7 +7,8 @@ from collections.abc import Iterator
 
 from throwcollect.config.kinds import JOINT_NAMES
 from throwcollect.config.loader import value_as_yaml
-from throwcollect.config.schema import Config, DynamicMovementPrimitive, Section
+from throwcollect.config.schema import Config, DynamicMovementPrimitive
+from throwcollect.config.section import Section
 from throwcollect.config.shape import Shape, json_schema, root
 from throwcollect.config.values import sweepable_keys
 
@@ -16,7 +17,7 @@ __all__ = ["json_schema", "page"]
 _INTRODUCTION = """\
 # Configuration
 
-<!-- Printed by `python -m throwcollect.config.reference`; edit the docstrings in config/schema.py instead. -->
+<!-- Printed by `python -m throwcollect.config.reference`; edit the docstrings in src/throwcollect/config instead. -->
 
 A configuration is a YAML 1.2 file. Every key may be left out, unless it is marked as required; `throwcollect config`
 prints all keys with the values that they then have, and `throwcollect config --schema` the JSON Schema for editors.
@@ -63,9 +64,27 @@ def _sections(shape: Shape, prefix: str) -> Iterator[str]:
                 family = each.child("family").choices[0]
                 yield f"### `{key}` with `family: {family}`\n\n{each.node['description']}\n"
                 yield _table(each, f"{key}.")
+        elif len(twins := _twins(shape, child)) > 1:
+            if name == twins[0]:
+                yield f"## {', '.join(f'`{prefix}{twin}`' for twin in twins)}\n\n{_own_sentence(child)}\n"
+                yield from _sections(child, f"{prefix}<node>.")
         elif child.keys:
             yield f"## `{key}`\n\n{child.node['description']}\n"
             yield from _sections(child, f"{key}.")
+        elif child.child(0).keys:
+            yield f"### Items of `{key}`\n\n{child.child(0).node['description']}\n"
+            yield _table(child.child(0), "")
+
+
+def _twins(shape: Shape, child: Shape) -> list[str]:
+    """Keys of sections that hold the same as one of them."""
+    title = child.node.get("title")
+    return [name for name, each in shape.keys.items() if child.keys and each.keys and each.node.get("title") == title]
+
+
+def _own_sentence(shape: Shape) -> str:
+    """What a section says of itself, and not the key that holds it."""
+    return str(json_schema()["$defs"][shape.node["title"]]["description"])
 
 
 def _table(shape: Shape, prefix: str) -> str:
@@ -85,6 +104,8 @@ def _sentence(shape: Shape) -> str:
 def _default(child: Shape, name: str, holder: Shape) -> str:
     if name in holder.node.get("required", []):
         return "required"
+    if "default" not in child.node:
+        return "absent"
     return f"`{value_as_yaml(child.node['default'])}`"
 
 

@@ -9,18 +9,15 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Discriminator, Field, PositiveFloat, PositiveInt, Tag, model_validator
+from pydantic import BaseModel, Discriminator, Field, PositiveFloat, PositiveInt, Tag, model_validator
 
+from throwcollect.config.containers import ContainersConfig
 from throwcollect.config.kinds import Angle, ContradictionError, Joint, Name
+from throwcollect.config.run import RunConfig
+from throwcollect.config.section import Section
 
 _BETWEEN_TRIALS_S = 10
 """Simulated time between the slots of two trials: results of a trial's goals expire before the next one."""
-
-
-class Section(BaseModel):
-    """Base of all sections: unknown keys are errors, values never change."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True, allow_inf_nan=False)
 
 
 class RobotConfig(Section):
@@ -320,27 +317,6 @@ class RecordConfig(Section):
         return self
 
 
-class RunConfig(Section):
-    """How a collection is run; nothing in this section changes the dataset."""
-
-    simulations: Annotated[int, Field(ge=1, le=256)] = 2
-    """Number of simulations, unless `-n` says otherwise."""
-    runtime: Literal["auto", "local"] = "auto"
-    """Where the nodes run."""
-    router_port: Annotated[int, Field(ge=0, le=65535)] = 0
-    """TCP port of the router on the loopback interface; 0 takes a free one, 7447 is the port ROS nodes look for."""
-    domain_id: Annotated[int, Field(ge=0, le=232)] = 0
-    """ROS domain."""
-    trial_timeout_s: PositiveFloat = 60.0
-    """Real time that a simulation may take for one trial before it counts as lost, besides what slow motion takes."""
-    start_timeout_s: PositiveFloat = 60.0
-    """Real time within which the first simulation must be ready."""
-    retries: Annotated[int, Field(ge=0, le=100)] = 3
-    """How often a trial is given to another simulation before it is recorded as failed."""
-    restarts: Annotated[int, Field(ge=0, le=1000)] = 10
-    """How often one simulation is restarted before it is given up."""
-
-
 class Config(Section):
     """One collection: from the robot to the dataset."""
 
@@ -368,6 +344,8 @@ class Config(Section):
     """What is recorded."""
     run: RunConfig = RunConfig()
     """How it is run."""
+    containers: ContainersConfig = ContainersConfig()
+    """Runs in containers."""
 
     @model_validator(mode="after")
     def _sections_agree(self) -> Config:
@@ -379,9 +357,17 @@ class Config(Section):
         for joint in self.robot.posture:
             if joint in self.task.start:
                 wrong[f"robot.posture.{joint}"] = "should be left out, as task.start sets this joint"
+        if self.containers.sim.ports and self.run.simulations > 1:
+            wrong["containers.sim.ports"] = (
+                f"should be left out, as {self.run.simulations} simulations cannot share a port of this machine"
+            )
         if wrong:
             raise ContradictionError(wrong)
         return self
+
+    def without_run(self) -> Config:
+        """This configuration with all that does not change the dataset at its default."""
+        return self.model_copy(update={"run": RunConfig(), "containers": ContainersConfig()})
 
     def trial_start_ns(self, number: int) -> int:
         """Simulated time at which a trial starts [ns]; the slots of different trials never overlap.

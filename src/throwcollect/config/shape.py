@@ -98,6 +98,8 @@ def _words_allowed(node: dict[str, Any]) -> list[str]:
 
 def _in_words(shape: Shape) -> str:
     node = shape.node
+    if own := node.get("words"):
+        return str(own)
     words = _words_allowed(node)
     if node.get("title") == "Joint":
         return "a joint's name"

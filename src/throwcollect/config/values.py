@@ -8,7 +8,8 @@ from typing import Any, TypeVar
 from pydantic import ValidationError
 
 from throwcollect.config.problems import Location, dotted, findings, unknown_key
-from throwcollect.config.schema import Config, Section
+from throwcollect.config.schema import Config
+from throwcollect.config.section import Section
 from throwcollect.errors import ConfigError, Problem
 
 _SWEEPABLE = (

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import pyarrow as pa
 
 from throwcollect.config.loader import load, resolved_yaml
-from throwcollect.config.schema import Config, RunConfig
+from throwcollect.config.schema import Config
 from throwcollect.dataset.bag import FileSummary, bag_information, to_yaml
 from throwcollect.dataset.card import Provenance, data_card
 from throwcollect.dataset.digest import combined_digest
@@ -190,8 +190,8 @@ class DatasetWriter:
         custom = {"throwcollect.format": FORMAT, "throwcollect.digest": digest}
         metadata = {"rosbag2_bagfile_information": bag_information(files, self._channels.all, custom)}
         provenance = Provenance.of_this_machine(simulations=simulations, wall_s=wall_s)
-        # Nothing under `run` may change the dataset, so what is kept of it is in the data card alone.
-        config = self._config.model_copy(update={"run": RunConfig()})
+        # How it was run may not change the dataset, so what is kept of that is in the data card alone.
+        config = self._config.without_run()
         write_file(self._directory / THROWS, encode_table(throws))
         write_file(self._directory / CARD, data_card(config, throws, provenance).encode())
         write_file(self._directory / CONFIG, resolved_yaml(config).encode())

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
-import http.client
 import os
 import shutil
 import socket
 import sys
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Literal
 
-from throwcollect.errors import ConfigError
+from docker.errors import ImageNotFound
+
+from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.robots.model import half_sitting, joint_limits, urdf_path
+from throwcollect.runtime.docker_engine import connect, engine_address, engine_errors
+from throwcollect.runtime.image import default_tag
 
 _GIB = 1024**3
 _SIMULATION_MEMORY_GIB = 0.3
@@ -25,6 +29,7 @@ _ROS_ROUTER_PORT = 7447
 """Port where ROS 2 nodes on rmw_zenoh_cpp look for a router."""
 
 _LEAST_DISK_GIB = 1.0
+_ENGINE_S = 3.0
 
 
 @dataclass(frozen=True)
@@ -81,29 +86,19 @@ def _robot() -> Check:
         return Check("robot", "problem", "; try: ".join(filter(None, [error.message, error.hint])))
 
 
-class _UnixConnection(http.client.HTTPConnection):
-    def __init__(self, path: str) -> None:
-        super().__init__("localhost", timeout=2.0)
-        self._path = path
-
-    def connect(self) -> None:
-        self.sock = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-        self.sock.settimeout(self.timeout)
-        self.sock.connect(self._path)
-
-
 def _docker() -> Check:
-    path = os.environ.get("DOCKER_HOST", "unix:///var/run/docker.sock").removeprefix("unix://")
-    connection = _UnixConnection(path)
     try:
-        connection.request("GET", "/version")
-        answer = connection.getresponse()
-        server = answer.getheader("Server") or "an engine"
-        return Check("docker", "ok", f"{server} answers at {path}")
-    except OSError as error:
-        return Check("docker", "note", f"no engine answers at {path} ({error.strerror or error}); runs use processes")
-    finally:
-        connection.close()
+        with closing(connect(timeout_s=_ENGINE_S)) as client, engine_errors("the Docker engine fails"):
+            engine = client.version()["Version"]
+            found = f"Docker {engine} answers at {engine_address()}"
+            try:
+                client.images.get(default_tag())
+            except ImageNotFound:
+                lacking = f"the image {default_tag()} is not there yet; throwcollect image build makes it"
+                return Check("docker", "note", f"{found}; {lacking}")
+    except WorkerError as error:
+        return Check("docker", "note", f"{error.message}; runs use processes")
+    return Check("docker", "ok", f"{found}, with the image {default_tag()}")
 
 
 def _port() -> Check:

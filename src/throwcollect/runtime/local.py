@@ -5,42 +5,23 @@ from __future__ import annotations
 import ctypes
 import os
 import signal
-import socket
 import subprocess
 import sys
 import time
-from collections import deque
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
-from throwcollect.config.schema import RunConfig
-from throwcollect.errors import ConfigError, WorkerError
+from throwcollect.config.run import RunConfig
+from throwcollect.errors import WorkerError
+from throwcollect.runtime.node_logs import NodeLogs
 from throwcollect.runtime.nodes import ROUTER, NodeExit, node_environment
+from throwcollect.runtime.ports import reserved_port
 
 _PR_SET_PDEATHSIG = 1
 """prctl(2): the signal a process gets when its parent dies."""
 
 _LIBC = ctypes.CDLL(None)
-
-_LOG_TAIL_LINES = 40
-
-_HOST = "127.0.0.1"
-
-
-def _reserved_port(wanted: int) -> socket.socket:
-    """A socket that keeps a port until it is closed."""
-    probe = socket.socket()
-    probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-    try:
-        probe.bind((_HOST, wanted))
-    except OSError as error:
-        probe.close()
-        raise ConfigError(
-            f"run.router_port: port {wanted} of {_HOST} cannot be used: {error.strerror}",
-            hint="--set run.router_port=0 takes a free one",
-        ) from error
-    return probe
 
 
 def _enter(core: int | None) -> None:
@@ -72,10 +53,10 @@ class LocalRuntime:
 
     def __init__(self, data: Path, logs: Path, run: RunConfig) -> None:
         self.data = str(data)
-        self._logs = logs
-        self._reserved = _reserved_port(run.router_port)
+        self._logs = NodeLogs(logs)
+        self._reserved = reserved_port(run.router_port)
         self._address: tuple[str, int] = self._reserved.getsockname()
-        self.listen = f"tcp/{_HOST}:{self._address[1]}"
+        self.listen = "tcp/{}:{}".format(*self._address)
         self._environment = {**os.environ, **node_environment(self.listen, run.domain_id)}
         self._processes: dict[str, subprocess.Popen[bytes]] = {}
 
@@ -97,8 +78,9 @@ class LocalRuntime:
         if name == ROUTER:
             self._reserved.close()
         try:
-            self._logs.mkdir(parents=True, exist_ok=True)
-            with (self._logs / f"{name}.log").open("ab") as log:
+            path = self._logs.path(name)
+            path.parent.mkdir(parents=True, exist_ok=True)
+            with path.open("ab") as log:
                 self._processes[name] = subprocess.Popen(
                     [sys.executable, "-m", "throwcollect", *arguments],
                     stdin=subprocess.DEVNULL,
@@ -133,15 +115,11 @@ class LocalRuntime:
 
     def ready(self, name: str) -> bool:
         """Whether a simulation of this name has ever said that it is ready."""
-        return self._said(name, f"{name} is ready")
+        return self._logs.said_ready(name)
 
     def log_tail(self, name: str) -> str:
         """Last lines that a node printed."""
-        try:
-            with (self._logs / f"{name}.log").open(encoding="utf-8", errors="replace") as log:
-                return "".join(deque(log, _LOG_TAIL_LINES)).strip()
-        except OSError:
-            return ""
+        return self._logs.tail(name)
 
     def signal(self, name: str, number: signal.Signals) -> None:
         """Send a signal to a node; one that has ended is left alone."""
@@ -168,13 +146,6 @@ class LocalRuntime:
         self._reserved.close()
         self.stop([name for name in self._processes if name != ROUTER])
         self.stop([ROUTER])
-
-    def _said(self, name: str, line: str) -> bool:
-        try:
-            with (self._logs / f"{name}.log").open(encoding="utf-8", errors="replace") as log:
-                return f"{line}\n" in log
-        except OSError:
-            return False
 
 
 def _reason(code: int) -> str:

@@ -10,6 +10,8 @@ from typing import Protocol
 
 ROUTER = "router"
 COORDINATOR = "coordinator"
+LAUNCHER = "launcher"
+"""Lives beside the nodes, never in a container."""
 
 
 def simulation_name(index: int) -> str:

@@ -1,10 +1,13 @@
-import socket
+import json
+import socketserver
 import threading
+from http.server import BaseHTTPRequestHandler
 from pathlib import Path
 
 import pytest
 
 from throwcollect.runtime.doctor import examine
+from throwcollect.runtime.image import default_tag
 
 
 def test_a_machine_that_runs_the_tests_has_no_problem(tmp_path: Path) -> None:
@@ -14,7 +17,35 @@ def test_a_machine_that_runs_the_tests_has_no_problem(tmp_path: Path) -> None:
     assert str(tmp_path) in checks["disk"].finding
 
 
-def test_a_docker_engine_is_found_by_its_socket(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+class Engine(BaseHTTPRequestHandler):
+    """As much of a Docker engine as says its version, and whether it has an image."""
+
+    images: tuple[str, ...] = ()
+
+    def do_GET(self) -> None:
+        path = self.path.removeprefix("/v1.41")
+        if path == "/version":
+            self.answer(200, {"Version": "27.1", "ApiVersion": "1.41"})
+        elif path in [f"/images/{image}/json" for image in self.images]:
+            self.answer(200, {"Id": "sha256:0"})
+        else:
+            self.answer(404, {"message": f"No such image: {path}"})
+
+    def answer(self, code: int, document: dict[str, str]) -> None:
+        body = json.dumps(document).encode()
+        self.send_response(code)
+        self.send_header("Content-Length", str(len(body)))
+        self.end_headers()
+        self.wfile.write(body)
+
+    def address_string(self) -> str:
+        return "client"
+
+    def log_message(self, *_: object) -> None:
+        pass
+
+
+def test_a_docker_engine_and_its_image_are_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "docker.sock"
     monkeypatch.setenv("DOCKER_HOST", f"unix://{path}")
 
@@ -22,18 +53,14 @@ def test_a_docker_engine_is_found_by_its_socket(tmp_path: Path, monkeypatch: pyt
         check = {check.name: check for check in examine(tmp_path)}["docker"]
         return check.status, check.finding
 
-    assert found() == ("note", f"no engine answers at {path} (No such file or directory); runs use processes")
-    with socket.socket(socket.AF_UNIX) as engine:
-        engine.bind(str(path))
-        engine.listen()
-
-        def answer() -> None:
-            connection, _ = engine.accept()
-            with connection:
-                connection.recv(4096)
-                connection.sendall(b"HTTP/1.1 200 OK\r\nServer: Docker/27\r\nContent-Length: 0\r\n\r\n")
-
-        thread = threading.Thread(target=answer)
-        thread.start()
-        assert found() == ("ok", f"Docker/27 answers at {path}")
-        thread.join()
+    assert found() == (
+        "note",
+        f"no Docker engine answers at unix://{path}: No such file or directory; runs use processes",
+    )
+    with socketserver.ThreadingUnixStreamServer(str(path), Engine) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        lacking = f"the image {default_tag()} is not there yet; throwcollect image build makes it"
+        assert found() == ("note", f"Docker 27.1 answers at unix://{path}; {lacking}")
+        monkeypatch.setattr(Engine, "images", (default_tag(),))
+        assert found() == ("ok", f"Docker 27.1 answers at unix://{path}, with the image {default_tag()}")
+        server.shutdown()

@@ -7,7 +7,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from throwcollect.config.schema import RunConfig
+from throwcollect.config.run import RunConfig
 from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.runtime.local import LocalRuntime
 from throwcollect.runtime.nodes import NodeExit

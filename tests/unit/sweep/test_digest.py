@@ -4,7 +4,9 @@ import json
 import numpy as np
 import pytest
 
-from throwcollect.config.schema import Config, Range, RunConfig, SweepConfig
+from throwcollect.config.containers import ContainersConfig, NodeContainerConfig
+from throwcollect.config.run import RunConfig
+from throwcollect.config.schema import Config, Range, SweepConfig
 from throwcollect.config.values import leaves, with_values
 from throwcollect.sweep.digest import config_digest, trial_digests
 from throwcollect.sweep.points import Points
@@ -20,7 +22,7 @@ def digests(config: Config, points: Points = POINTS, seeds: tuple[int, ...] = (5
 def test_digests_are_sha_256_over_the_effective_keys_in_order():
     kept = dict(leaves(with_values(Config(), {"ball.mass_kg": 0.1, "task.duration_s": 1.0}))) | {"seed": 5}
     for key in list(kept):
-        if key.startswith(("sweep", "run.")) or key in WITHOUT_EFFECT:
+        if key.startswith(("sweep", "run.", "containers.")) or key in WITHOUT_EFFECT:
             del kept[key]
     text = "\n".join(["throwcollect trial 1", *(f"{key}={json.dumps(kept[key])}" for key in sorted(kept))])
     assert digests(Config())[0] == hashlib.sha256(text.encode()).hexdigest()
@@ -40,6 +42,7 @@ def test_it_does_not_matter_whether_a_value_was_swept_or_fixed():
         {"trials": 9},
         {"sweep": SweepConfig(parameters={"scene.gravity_mps2": Range(min=9, max=10)})},
         {"run": RunConfig(simulations=7)},
+        {"containers": ContainersConfig(volume="throws", sim=NodeContainerConfig(memory="512m"))},
         {"sim": Config().sim.model_copy(update={"real_time_factor": 1.0})},
         {"record": Config().record.model_copy(update={"zstd_level": 9, "trials_per_shard": 9})},
     ],
@@ -74,5 +77,6 @@ def test_values_and_seed_of_a_trial_change_its_digest_alone():
 
 
 def test_the_digest_of_a_configuration_is_over_everything_but_how_it_is_run():
-    assert config_digest(Config(run=RunConfig(simulations=9))) == config_digest(Config())
+    otherwise = Config(run=RunConfig(simulations=9), containers=ContainersConfig(volume="throws"))
+    assert config_digest(otherwise) == config_digest(Config())
     assert config_digest(Config(name="other")) != config_digest(Config())

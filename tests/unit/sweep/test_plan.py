@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from throwcollect.config.schema import Config, Range, RunConfig, SweepConfig, Values
+from throwcollect.config.run import RunConfig
+from throwcollect.config.schema import Config, Range, SweepConfig, Values
 from throwcollect.errors import ConfigError, DatasetError, PlanError
 from throwcollect.sweep.plan import Plan, Trial, make_plan
 

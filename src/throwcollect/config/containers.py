@@ -1,0 +1,260 @@
+"""Keys for runs in containers: the image, where the dataset lies, and what each kind of node gets."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import PurePosixPath
+from typing import Annotated, Any
+
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    PositiveFloat,
+    PositiveInt,
+    WithJsonSchema,
+    model_validator,
+)
+from typing_extensions import TypedDict
+
+from throwcollect.config.kinds import ContradictionError
+from throwcollect.config.section import Section
+
+_LEAST_MEMORY = 6 * 1024**2
+"""What Docker engines ask for."""
+
+_SIZE_UNITS = {"": 1, "b": 1, "k": 1024, "m": 1024**2, "g": 1024**3}
+_OWN_VARIABLES = ("THROWCOLLECT_NODE", "ZENOH_CONFIG_OVERRIDE", "ROS_DOMAIN_ID")
+_SOCKETS = ("docker.sock", "containerd.sock", "podman.sock")
+_ABOVE_SOCKETS = ("/", "/run", "/var", "/var/run")
+_LABELS = "throwcollect."
+
+_POWER = "is refused, as it would give a container power over its host"
+_SEE = "should be left out; use {} beside options"
+_LAUNCHER = "is refused, as the launcher decides it"
+_REFUSED = {
+    **dict.fromkeys(("privileged", "cap_add", "security_opt", "device_cgroup_rules", "volumes_from"), _POWER),
+    **dict.fromkeys(("pid_mode", "ipc_mode", "uts_mode", "userns_mode", "cgroupns", "cgroup_parent"), _POWER),
+    **dict.fromkeys(
+        ("network_mode", "network_disabled", "network", "networking_config", "links"), _SEE.format("networks")
+    ),
+    **dict.fromkeys(("volumes", "mounts", "binds"), _SEE.format("mounts")),
+    **dict.fromkeys(("mem_limit", "memswap_limit"), _SEE.format("memory")),
+    **dict.fromkeys(("nano_cpus", "cpu_period", "cpu_quota", "cpu_count"), _SEE.format("cpus")),
+    "cpuset_cpus": _SEE.format("cpuset"),
+    "environment": _SEE.format("environment"),
+    **dict.fromkeys(("ports", "publish_all_ports"), _SEE.format("ports")),
+    **dict.fromkeys(("image", "command", "entrypoint", "name", "user", "working_dir", "healthcheck"), _LAUNCHER),
+    **dict.fromkeys(("detach", "tty", "stdin_open", "auto_remove", "restart_policy", "log_config"), _LAUNCHER),
+    **dict.fromkeys(("init", "read_only", "cap_drop", "stop_signal"), _LAUNCHER),
+}
+
+
+def _size(text: str) -> str:
+    match = re.fullmatch(r"([1-9][0-9]{0,17})([bkmg]?)", text)
+    if match is None or int(match[1]) * _SIZE_UNITS[match[2]] < _LEAST_MEMORY:
+        raise ValueError(f"should be a size of 6m or more, such as 512m or 2g, got '{text}'")
+    return text
+
+
+def _cpuset(text: str) -> str:
+    if not re.fullmatch(r"\d+(-\d+)?(,\d+(-\d+)?)*", text):
+        raise ValueError(f"should be numbers and ranges of cores, such as 0-3,6, got '{text}'")
+    return text
+
+
+def _own_path(text: str) -> bool:
+    """Whether a path in a container belongs to the runtime: the dataset's directory and what is in it."""
+    path = PurePosixPath(text)
+    return PurePosixPath("/data") in (path, *path.parents)
+
+
+def _mount(text: str) -> str:
+    source, _, rest = text.partition(":")
+    target, _, mode = rest.partition(":")
+    if not (source.startswith("/") and target.startswith("/")) or ".." in text.split("/") or mode not in ("", "ro"):
+        raise ValueError(f"should be HOST:CONTAINER or HOST:CONTAINER:ro with absolute paths, got '{text}'")
+    plain = str(PurePosixPath(source.replace("//", "/")))
+    if plain.endswith(_SOCKETS) or plain in _ABOVE_SOCKETS:
+        raise ValueError(f"{source} is refused, as it holds the engine's socket, and with it power over the host")
+    if _own_path(target) or PurePosixPath(target) == PurePosixPath("/"):
+        raise ValueError(f"{target} is refused, as the dataset or the image is there in the container")
+    return text
+
+
+def _network(text: str) -> str:
+    if text in ("host", "none") or text.startswith("container:"):
+        raise ValueError(f"{text} is refused; a network of the engine is joined besides the run's own")
+    return text
+
+
+def _volume(text: str) -> str:
+    if not re.fullmatch(r"[a-zA-Z0-9][a-zA-Z0-9_.-]+", text):
+        raise ValueError(f"should be a volume's name: letters, digits, _, . and -, got '{text}'")
+    return text
+
+
+def _variable(text: str) -> str:
+    if text in _OWN_VARIABLES:
+        raise ValueError(_LAUNCHER)
+    if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", text):
+        raise ValueError("should be the name of a variable: letters, digits and _")
+    return text
+
+
+def _port(text: str) -> str:
+    match = re.fullmatch(r"([1-9][0-9]{0,4})(/tcp|/udp)?", text)
+    if match is None or int(match[1]) > 65535:
+        raise ValueError("should be a port of the container from 1 to 65535, with /udp if it is not TCP")
+    return text
+
+
+def _label(text: str) -> str:
+    if text.startswith(_LABELS):
+        raise ValueError(f"is refused, as labels that begin with {_LABELS} are the launcher's")
+    return text
+
+
+def _tmpfs(text: str) -> str:
+    if not text.startswith("/") or _own_path(text):
+        raise ValueError("should be an absolute path in the container, outside of /data")
+    return text
+
+
+def _refuse(options: Any) -> Any:
+    """Options that are known and yet not taken get a reason, where others are only unknown."""
+    if isinstance(options, Mapping) and (refused := {key: _REFUSED[key] for key in options if key in _REFUSED}):
+        raise ContradictionError(refused)
+    return options
+
+
+def _in_words(words: str) -> WithJsonSchema:
+    return WithJsonSchema({"type": "string", "words": words})
+
+
+Size = Annotated[str, AfterValidator(_size), _in_words("a size such as 512m or 2g")]
+Cores = Annotated[str, AfterValidator(_cpuset), _in_words("cores such as 0-3,6")]
+Mount = Annotated[str, AfterValidator(_mount), _in_words("HOST:CONTAINER[:ro]")]
+Network = Annotated[str, AfterValidator(_network), _in_words("names of networks")]
+Volume = Annotated[str, AfterValidator(_volume), _in_words("a volume's name")]
+Variable = Annotated[str, AfterValidator(_variable)]
+ContainerPort = Annotated[str, AfterValidator(_port)]
+HostPort = Annotated[int, Field(ge=1, le=65535)]
+
+_OPTIONAL_KEYS = ConfigDict(extra="forbid", use_attribute_docstrings=True)
+
+
+class DeviceRequest(TypedDict, total=False):
+    """Devices such as GPUs that a driver of the engine provides."""
+
+    __pydantic_config__ = _OPTIONAL_KEYS  # type: ignore[misc]
+    driver: str
+    """Driver, such as `nvidia`."""
+    count: int
+    """Number of devices; -1 for all."""
+    device_ids: list[str]
+    """Devices by name, in the place of a number."""
+    capabilities: list[list[str]]
+    """Alternatives of what the devices must be able to do, such as `[[gpu]]`."""
+    options: dict[str, str]
+    """What the driver is told besides."""
+
+
+class ContainerOptions(TypedDict, total=False):
+    """Further keywords of `docker.containers.create` of the Docker SDK for Python; absent ones are the engine's."""
+
+    __pydantic_config__ = _OPTIONAL_KEYS  # type: ignore[misc]
+    hostname: str
+    """Name of the host inside."""
+    domainname: str
+    """Domain of the host inside."""
+    dns: list[str]
+    """Addresses of name servers."""
+    dns_search: list[str]
+    """Domains in which names are looked up."""
+    dns_opt: list[str]
+    """Options of the resolver."""
+    extra_hosts: dict[str, str]
+    """Further host names and their addresses."""
+    labels: dict[Annotated[str, AfterValidator(_label)], str]
+    """Further labels."""
+    group_add: list[str | int]
+    """Further groups of the process."""
+    shm_size: Size
+    """Size of /dev/shm."""
+    tmpfs: dict[Annotated[str, AfterValidator(_tmpfs)], str]
+    """Further directories in memory and their mount options; those of /tmp join the ones it has."""
+    ulimits: dict[str, int]
+    """Resource limits by their names, such as `nofile`."""
+    sysctls: dict[str, str | int]
+    """Kernel parameters of the container's namespaces."""
+    pids_limit: PositiveInt
+    """Upper bound of threads and processes, in the place of 512."""
+    mem_reservation: Size
+    """Memory down to which it is shrunk when the host has little."""
+    oom_score_adj: Annotated[int, Field(ge=-1000, le=1000)]
+    """How readily the kernel ends it when the host runs out of memory."""
+    cpu_shares: PositiveInt
+    """Weight of its computing time; 1024 if nothing is said."""
+    cpuset_mems: Cores
+    """NUMA nodes whose memory it uses."""
+    blkio_weight: Annotated[int, Field(ge=10, le=1000)]
+    """Weight of its disk access."""
+    devices: list[str]
+    """Devices of the host as HOST:CONTAINER:PERMISSIONS, such as `/dev/dri:/dev/dri:rw`."""
+    device_requests: list[DeviceRequest]
+    """Devices that a driver provides, such as GPUs."""
+    runtime: str
+    """OCI runtime that the engine knows, such as `nvidia`."""
+
+
+class NodeContainerConfig(Section):
+    """What the containers of one kind of node get beyond what they need."""
+
+    cpus: PositiveFloat | None = None
+    """Upper bound of processor time, in cores."""
+    memory: Size | None = None
+    """Upper bound of memory; nothing is swapped out beyond it."""
+    cpuset: Cores | None = None
+    """Cores it runs on; null: any, or one each where simulations fill all cores."""
+    environment: dict[Variable, str | int | float] = {}
+    """Further environment variables."""
+    mounts: list[Mount] = []
+    """Directories and files of the host that are there in the container, too; not below /data."""
+    networks: list[Network] = []
+    """Networks of the engine that it joins besides the run's own."""
+    ports: dict[ContainerPort, HostPort] = {}
+    """Ports of the container (`80`, `53/udp`) and those of 127.0.0.1 at which they are published."""
+    options: Annotated[ContainerOptions, BeforeValidator(_refuse)] = {}
+    """Further options."""
+
+
+class ContainersConfig(Section):
+    """How nodes run in containers; nothing in this section changes the dataset."""
+
+    image: str | None = None
+    """Image of all nodes; null takes `throwcollect` of this version, which is built if it is missing."""
+    volume: Volume | None = None
+    """Volume of the engine that holds the dataset; null writes it to a directory of this machine."""
+    router: NodeContainerConfig = NodeContainerConfig()
+    """The router."""
+    sim: NodeContainerConfig = NodeContainerConfig()
+    """Each simulation."""
+    coordinator: NodeContainerConfig = NodeContainerConfig()
+    """The coordinator."""
+
+    @model_validator(mode="after")
+    def _host_ports_differ(self) -> ContainersConfig:
+        taken: dict[int, str] = {}
+        wrong = {}
+        for node in ("router", "sim", "coordinator"):
+            for port, host_port in getattr(self, node).ports.items():
+                key = f"{node}.ports.{port}"
+                if host_port in taken:
+                    wrong[key] = f"should differ from {taken[host_port]}, got {host_port}, too"
+                taken.setdefault(host_port, key)
+        if wrong:
+            raise ContradictionError(wrong)
+        return self

@@ -1,0 +1,32 @@
+"""Keys for how a collection is run, wherever its nodes live."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, PositiveFloat
+
+from throwcollect.config.section import Section
+
+
+class RunConfig(Section):
+    """How a collection is run; nothing in this section changes the dataset."""
+
+    simulations: Annotated[int, Field(ge=1, le=256)] = 2
+    """Number of simulations, unless `-n` says otherwise."""
+    runtime: Literal["auto", "local", "docker"] = "auto"
+    """Where the nodes run: in processes (`local`) or in containers; `auto` takes containers if an engine answers."""
+    router_port: Annotated[int, Field(ge=0, le=65535)] = 0
+    """TCP port of the router on the loopback interface; 7447 is the one ROS nodes look for.
+
+    0 takes a free one, and publishes none of a container."""
+    domain_id: Annotated[int, Field(ge=0, le=232)] = 0
+    """ROS domain."""
+    trial_timeout_s: PositiveFloat = 60.0
+    """Real time that a simulation may take for one trial before it counts as lost, besides what slow motion takes."""
+    start_timeout_s: PositiveFloat = 60.0
+    """Real time within which the first simulation must be ready."""
+    retries: Annotated[int, Field(ge=0, le=100)] = 3
+    """How often a trial is given to another simulation before it is recorded as failed."""
+    restarts: Annotated[int, Field(ge=0, le=1000)] = 10
+    """How often one simulation is restarted before it is given up."""

@@ -1,0 +1,41 @@
+"""Whether the nodes of a run live in processes or in containers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import closing
+from typing import Literal
+
+from throwcollect.config.schema import Config
+from throwcollect.errors import WorkerError
+from throwcollect.runtime.docker_engine import connect
+from throwcollect.runtime.docker_options import image
+from throwcollect.runtime.image import ensure
+
+_PROBE_S = 3.0
+
+
+def choose(config: Config, *, say: Callable[[str], None]) -> Literal["local", "docker"]:
+    """The runtime that a configuration asks for; with ``auto``, containers where they can be had.
+
+    Args:
+        config: The configuration.
+        say: Told in one line what was chosen, and before that what is done to get the image.
+
+    Raises:
+        WorkerError: If containers are asked for, and no engine answers or the image cannot be had.
+    """
+    wanted = config.run.runtime
+    if wanted == "local":
+        say("runtime: local processes")
+        return "local"
+    try:
+        with closing(connect(timeout_s=_PROBE_S)) as client:
+            ensure(client, image(config), say=say)
+    except WorkerError as error:
+        if wanted == "docker":
+            raise
+        say(f"runtime: local processes (auto, as {error.message})")
+        return "local"
+    say(f"runtime: Docker containers of {image(config)}{' (auto)' if wanted == 'auto' else ''}")
+    return "docker"

@@ -1,0 +1,296 @@
+"""Nodes as containers of a Docker engine."""
+
+from __future__ import annotations
+
+import math
+import signal
+import time
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from docker.client import DockerClient
+from docker.errors import NotFound
+
+from throwcollect.config.schema import Config
+from throwcollect.errors import ConfigError, Interrupted, WorkerError
+from throwcollect.runtime.docker_checks import check
+from throwcollect.runtime.docker_engine import ENGINE_ERRORS, connect, engine_errors
+from throwcollect.runtime.docker_node import NodeContainer
+from throwcollect.runtime.docker_options import (
+    NODE_LABEL,
+    ROUTER_ENDPOINT,
+    ROUTER_PORT,
+    RUN_LABEL,
+    RunPlace,
+    node_options,
+    published,
+    section_of,
+)
+from throwcollect.runtime.docker_runs import remove
+from throwcollect.runtime.docker_volume import dataset_info, place_directory
+from throwcollect.runtime.docker_watch import ContainerState, EngineWatch
+from throwcollect.runtime.node_logs import NodeLogs
+from throwcollect.runtime.nodes import ROUTER, NodeExit
+from throwcollect.runtime.ports import LOOPBACK
+
+_SILENCE_S = 10.0
+"""An engine that has not answered for so long will hardly come back before the nodes are missed."""
+
+_LOG_S = 2.0
+"""What a node printed last is in its file within this time after its end."""
+
+_BEGIN_S = 30.0
+_AT_ONCE = 8
+_SIGNALLED = 128
+"""Exit codes above this are those of a signal."""
+
+
+class DockerRuntime:
+    """Runs nodes as containers that can do little but compute; see `nodes.Runtime` for what it offers.
+
+    Everything that is made carries the run's name as a label, by which another process finds it again.
+
+    Attributes:
+        data: Directory of the dataset, as nodes see it.
+        listen: Zenoh endpoint at which the router is to listen.
+
+    Args:
+        run_id: Name of the run; unique on the engine.
+        config: Configuration of the run.
+        directory: Directory of the dataset; None if it lies in the volume ``containers.volume``.
+        logs: Directory for the log files.
+        client: Client of the engine; None for that which ``DOCKER_HOST`` names.
+
+    Raises:
+        ConfigError: If something that the configuration asks for is not there, or taken.
+        WorkerError: If no engine answers, or it does not have the image.
+    """
+
+    def __init__(
+        self,
+        run_id: str,
+        config: Config,
+        *,
+        directory: Path | None,
+        logs: Path,
+        client: DockerClient | None = None,
+    ) -> None:
+        source = config.containers.volume if directory is None else str(directory.resolve())
+        if source is None:
+            raise ConfigError("containers.volume: missing, as the dataset has no directory either")
+        self.listen = ROUTER_ENDPOINT
+        self._place = RunPlace(run_id, source)
+        self.data = self._place.data
+        self._config = config
+        self._logs = NodeLogs(logs)
+        self._client = client or connect()
+        self._watch: EngineWatch | None = None
+        self._nodes: dict[str, NodeContainer] = {}
+        self._ended_at: dict[str, float] = {}
+        check(self._client, self._place, config)
+
+    def open(self) -> None:
+        """Make the run's network and volume unless they exist, and begin to watch its containers.
+
+        Raises:
+            WorkerError: If the engine refuses.
+        """
+        place = self._place
+        hint = "throwcollect ps shows the runs that there are; throwcollect down removes one"
+        with engine_errors(f"run {place.run_id} cannot be prepared on the Docker engine", hint=hint):
+            if place.in_volume:
+                try:
+                    self._client.volumes.get(place.source)
+                except NotFound:
+                    self._client.volumes.create(place.source, labels=place.labels())
+            if not self._client.networks.list(filters={"label": f"{RUN_LABEL}={place.run_id}"}):
+                self._client.networks.create(
+                    place.network, driver="bridge", internal=not published(self._config), labels=place.labels()
+                )
+        self._watch = EngineWatch(self._client, place)
+
+    def found(self) -> tuple[str, ...]:
+        """Names of the nodes whose containers exist already, of a launcher that died; they become nodes of this one.
+
+        Those that have ended are among the next `exits`.
+
+        Raises:
+            WorkerError: If the engine does not answer.
+        """
+        filters = {"label": [f"{RUN_LABEL}={self._place.run_id}", NODE_LABEL]}
+        with engine_errors(f"the nodes of run {self._place.run_id} cannot be found"):
+            for container in self._client.containers.list(all=True, filters=filters):
+                name = container.labels[NODE_LABEL]
+                # What was created and never started is replaced when the node is.
+                if name not in self._nodes and container.status != "created":
+                    self._opened.look(container.id)
+                    self._nodes[name] = NodeContainer(self._client, name, self._logs.path(name))
+                    self._nodes[name].adopt(container)
+        return self.running()
+
+    def place(self, directory: Path) -> None:
+        """Copy a prepared directory to where the nodes look for the dataset, if that is in a volume.
+
+        Raises:
+            WorkerError: If the engine refuses.
+        """
+        place_directory(self._client, self._place, self._config, directory)
+
+    def info(self) -> dict[str, Any]:
+        """Summary of a dataset in a volume, as ``throwcollect dataset info --json`` prints it.
+
+        Raises:
+            WorkerError: If the engine does not answer.
+            DatasetError: If the dataset is not finished.
+        """
+        return dataset_info(self._client, self._place, self._config)
+
+    def router_address(self) -> tuple[str, int] | None:
+        """Where this machine reaches the router; None while there is no way to it."""
+        state = self._state(ROUTER)
+        if state is None or state.ended:
+            return None
+        if self._config.run.router_port:
+            return LOOPBACK, self._config.run.router_port
+        return (state.address, ROUTER_PORT) if state.address else None
+
+    def start(self, name: str, arguments: Sequence[str], *, core: int | None = None) -> None:
+        """Begin to start a node; if it cannot be started, that is one of the next `exits`.
+
+        Args:
+            name: Its name; names the log file too.
+            arguments: Arguments of the `throwcollect` command.
+            core: Processor core that it is bound to unless the configuration binds it; None for any.
+        """
+        options = node_options(name, arguments, place=self._place, config=self._config, core=core)
+        node = NodeContainer(self._client, name, self._logs.path(name))
+        self._nodes[name] = node
+        node.start(options, networks=section_of(self._config, name).networks)
+
+    def handle(self, name: str) -> str | None:
+        """Short id of a running node's container; None if it does not run (yet)."""
+        node = self._nodes.get(name)
+        return node.handle[:12] if node and node.handle else None
+
+    def running(self) -> tuple[str, ...]:
+        """Names of the nodes whose end has not been reported yet."""
+        return tuple(self._nodes)
+
+    def exits(self) -> list[NodeExit]:
+        """Nodes that ended, or could not be started, since the last call.
+
+        Raises:
+            WorkerError: If the engine does not answer any more.
+        """
+        if self._silent:
+            raise WorkerError(
+                f"the Docker engine has not answered for {self._opened.silent_s:.0f} s; "
+                f"finished throws are safe in {self._place.source}",
+                evidence=self._opened.last_error or None,
+                hint=f"once it answers: throwcollect down --run {self._place.run_id} ends what may still run",
+            )
+        ends = [end for node in self._nodes.values() if (end := self._end_of(node)) is not None]
+        for end in ends:
+            del self._nodes[end.name]
+        return ends
+
+    def frozen(self) -> frozenset[str]:
+        """Nodes whose containers are paused."""
+        return frozenset(name for name in self._nodes if (state := self._state(name)) and state.status == "paused")
+
+    def ready(self, name: str) -> bool:
+        """Whether a simulation of this name has ever said that it is ready, or its health check does."""
+        state = self._state(name)
+        return (state is not None and state.healthy) or self._logs.said_ready(name)
+
+    def log_tail(self, name: str) -> str:
+        """Last lines that a node printed."""
+        return self._logs.tail(name)
+
+    def signal(self, name: str, number: signal.Signals) -> None:
+        """Send a signal to a node, once it runs; one that has ended is left alone."""
+        if (node := self._nodes.get(name)) is None:
+            return
+        node.wait_begun(_BEGIN_S)
+        if node.handle is not None:
+            with suppress(*ENGINE_ERRORS):
+                self._client.api.kill(node.handle, int(number))
+
+    def stop(self, names: Sequence[str], *, grace_s: float = 3.0) -> None:
+        """End nodes and remove their containers: politely, then after `grace_s` [s], in whole seconds, by force."""
+        nodes = [self._nodes.pop(name) for name in names if name in self._nodes]
+        with ThreadPoolExecutor(_AT_ONCE) as pool:
+            for node in nodes:
+                pool.submit(self._end, node, math.ceil(grace_s))
+
+    def close(self) -> None:
+        """End all nodes, the router last, and remove all that was made for the run but its volume."""
+        if not self._silent:
+            self.stop([name for name in self._nodes if name != ROUTER])
+            self.stop([ROUTER])
+            # Somebody may have joined the network with a container of his own, and keeps it alive.
+            with suppress(WorkerError):
+                remove(self._client, self._place.run_id, volumes=False)
+        if self._watch is not None:
+            self._watch.close()
+        for node in self._nodes.values():
+            node.close()
+
+    @property
+    def _opened(self) -> EngineWatch:
+        if self._watch is None:
+            raise WorkerError(f"run {self._place.run_id} is not open on the Docker engine")
+        return self._watch
+
+    @property
+    def _silent(self) -> bool:
+        return self._watch is not None and self._watch.silent_s > _SILENCE_S
+
+    def _state(self, name: str) -> ContainerState | None:
+        node = self._nodes.get(name)
+        return self._opened.state(node.handle) if node else None
+
+    def _end_of(self, node: NodeContainer) -> NodeExit | None:
+        """How a node ended, once its last words are in its log; None if it runs."""
+        if node.failure is not None:
+            return NodeExit(node.name, None, f"cannot be started: {node.failure}", self.log_tail(node.name))
+        state = self._opened.state(node.handle)
+        if state is None or not state.ended:
+            self._ended_at.pop(node.name, None)
+            return None
+        now = time.monotonic()
+        if not node.log_complete and now - self._ended_at.setdefault(node.name, now) < _LOG_S:
+            return None
+        self._ended_at.pop(node.name, None)
+        memory = section_of(self._config, node.name).memory
+        return NodeExit(node.name, state.code, end_in_words(state, memory), self.log_tail(node.name))
+
+    def _end(self, node: NodeContainer, grace_s: int) -> None:
+        node.wait_begun(_BEGIN_S)
+        if node.handle is None:
+            return
+        with suppress(*ENGINE_ERRORS):
+            self._client.api.stop(node.handle, timeout=grace_s)
+            node.wait_log(_LOG_S)
+            self._client.api.remove_container(node.handle, v=True, force=True)
+
+
+def end_in_words(state: ContainerState, memory: str | None) -> str:
+    """How a container ended.
+
+    Args:
+        state: Its last state.
+        memory: Its memory limit; None if it had none.
+    """
+    if state.code is None:
+        return "its container was removed"
+    # The kernel may have ended some other process of the container, and that did not end it.
+    if state.out_of_memory and state.code == _SIGNALLED + signal.SIGKILL:
+        return "ran out of memory" + (f" (limit {memory})" if memory else "")
+    if state.code > _SIGNALLED and state.code != Interrupted.exit_code:
+        with suppress(ValueError):
+            return f"ended by {signal.Signals(state.code - _SIGNALLED).name}"
+    return f"exit code {state.code}"

@@ -1,0 +1,172 @@
+"""What the containers of a run are made with: names, labels, limits, mounts, environment."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from docker.types import EndpointConfig, LogConfig, Mount, Ulimit
+
+import throwcollect
+from throwcollect.config.containers import NodeContainerConfig
+from throwcollect.config.schema import Config
+from throwcollect.runtime.image import default_tag
+from throwcollect.runtime.nodes import COORDINATOR, ROUTER, node_environment
+from throwcollect.runtime.ports import LOOPBACK
+
+RUN_LABEL = "throwcollect.run"
+NODE_LABEL = "throwcollect.node"
+DIRECTORY_LABEL = "throwcollect.directory"
+VERSION_LABEL = "throwcollect.version"
+LOG_LABEL = "throwcollect.log-offset"
+"""Size of a node's log file when this container began to write to it [bytes]."""
+
+ROUTER_PORT = 7447
+ROUTER_ENDPOINT = f"tcp/{ROUTER}:{ROUTER_PORT}"
+"""In the router itself, its name means its address in the run's network; it listens nowhere else."""
+
+DATA = "/data"
+
+_API_VERSION = "1.41"
+_PIDS = 512
+_TMPFS = "rw,noexec,nosuid,size=64m"
+_LOG_SIZE = {"max-size": "10m", "max-file": "2"}
+
+
+@dataclass(frozen=True)
+class RunPlace:
+    """A run and where its dataset lies.
+
+    Attributes:
+        run_id: Name of the run.
+        source: Absolute path of a directory of this machine, or name of a volume.
+    """
+
+    run_id: str
+    source: str
+
+    @property
+    def in_volume(self) -> bool:
+        """Whether the dataset lies in a volume."""
+        return not self.source.startswith("/")
+
+    @property
+    def data(self) -> str:
+        """Directory of the dataset, as nodes see it; a volume may hold those of several runs."""
+        return f"{DATA}/{self.run_id}" if self.in_volume else DATA
+
+    @property
+    def network(self) -> str:
+        """Name of the run's network."""
+        return f"throwcollect-{self.run_id}"
+
+    def container(self, node: str) -> str:
+        """Name of a node's container."""
+        return f"throwcollect-{self.run_id}-{node}"
+
+    def labels(self, node: str | None = None) -> dict[str, str]:
+        """Labels of what is made for the run, or for one of its nodes."""
+        labels = {
+            RUN_LABEL: self.run_id,
+            DIRECTORY_LABEL: self.source,
+            VERSION_LABEL: throwcollect.__version__,
+        }
+        return labels if node is None else {**labels, NODE_LABEL: node}
+
+    def mount(self, *, read_only: bool) -> Mount:
+        """The dataset, or the volume that it lies in, for a container."""
+        kind = "volume" if self.in_volume else "bind"
+        return Mount(target=DATA, source=self.source, type=kind, read_only=read_only)
+
+
+def image(config: Config) -> str:
+    """Image of all nodes."""
+    return config.containers.image or default_tag()
+
+
+def section_of(config: Config, name: str) -> NodeContainerConfig:
+    """What the configuration says of a node's container."""
+    return config.containers.sim if name not in (ROUTER, COORDINATOR) else getattr(config.containers, name)
+
+
+def published(config: Config) -> bool:
+    """Whether anything is published to this machine, which a network without a way out does not allow."""
+    each = (config.containers.router, config.containers.sim, config.containers.coordinator)
+    return bool(config.run.router_port or any(node.ports for node in each))
+
+
+def confined(place: RunPlace, config: Config) -> dict[str, Any]:
+    """Keywords for `containers.create` that every container of a run gets: it can do little but compute."""
+    return {
+        "image": image(config),
+        "labels": place.labels(),
+        "environment": {"HOME": "/tmp"},  # noqa: S108 - the one place in the container that can be written
+        "user": f"{os.getuid()}:{os.getgid()}",
+        "init": True,
+        "read_only": True,
+        "tmpfs": {"/tmp": _TMPFS},  # noqa: S108
+        "cap_drop": ["ALL"],
+        "security_opt": ["no-new-privileges"],
+        "pids_limit": _PIDS,
+        "stop_signal": "SIGTERM",
+        "log_config": LogConfig(type=LogConfig.types.JSON, config=_LOG_SIZE),
+    }
+
+
+def node_options(
+    name: str, arguments: Sequence[str], *, place: RunPlace, config: Config, core: int | None
+) -> dict[str, Any]:
+    """Keywords for `containers.create` that make the container of a node.
+
+    Args:
+        name: Name of the node.
+        arguments: Arguments of the `throwcollect` command.
+        place: The run.
+        config: Its configuration.
+        core: Processor core that it is bound to unless the configuration binds it; None for any.
+    """
+    node = section_of(config, name)
+    options: dict[str, Any] = dict(node.options)
+    general = confined(place, config)
+    own: Mapping[str, str] = node_environment(ROUTER_ENDPOINT, config.run.domain_id)
+    wanted = {key: str(value) for key, value in node.environment.items()}
+    ports = {port: (LOOPBACK, host_port) for port, host_port in node.ports.items()}
+    if name == ROUTER and config.run.router_port:
+        ports[f"{ROUTER_PORT}/tcp"] = (LOOPBACK, config.run.router_port)
+    mounts = [] if name == ROUTER else [place.mount(read_only=name != COORDINATOR)]
+    return {
+        **general,
+        **options,
+        "command": list(arguments),
+        "name": place.container(name),
+        "labels": {**options.get("labels", {}), **place.labels(name)},
+        "environment": {**general["environment"], **own, **wanted, "THROWCOLLECT_NODE": name},
+        "tmpfs": _with_tmpfs(general["tmpfs"], options.get("tmpfs", {})),
+        "ulimits": [Ulimit(name=key, soft=value, hard=value) for key, value in options.get("ulimits", {}).items()],
+        "mounts": [*mounts, *map(_bind, node.mounts)],
+        "network": place.network,
+        "networking_config": {place.network: EndpointConfig(_API_VERSION, aliases=[name])},
+        "ports": ports,
+        "nano_cpus": None if node.cpus is None else round(node.cpus * 10**9),
+        "mem_limit": node.memory,
+        "memswap_limit": node.memory,
+        "cpuset_cpus": node.cpuset or (None if core is None else str(core)),
+    }
+
+
+def mount_source(mount: str) -> Path:
+    """Path on this machine of a mount of the configuration."""
+    return Path(mount.partition(":")[0])
+
+
+def _bind(mount: str) -> Mount:
+    source, target, *mode = mount.split(":")
+    return Mount(target=target, source=source, type="bind", read_only=bool(mode))
+
+
+def _with_tmpfs(own: Mapping[str, str], wanted: Mapping[str, str]) -> dict[str, str]:
+    # The last of contradicting mount options wins.
+    return {**own, **{path: ",".join(filter(None, [own.get(path), options])) for path, options in wanted.items()}}

@@ -1,0 +1,39 @@
+"""The log files of a run's nodes, one each, to which all that a node ever printed is appended."""
+
+from __future__ import annotations
+
+from collections import deque
+from pathlib import Path
+
+_TAIL_LINES = 40
+
+
+class NodeLogs:
+    """The directory of the log files; it need not exist yet.
+
+    Args:
+        directory: Its path.
+    """
+
+    def __init__(self, directory: Path) -> None:
+        self._directory = directory
+
+    def path(self, name: str) -> Path:
+        """File of a node."""
+        return self._directory / f"{name}.log"
+
+    def tail(self, name: str) -> str:
+        """Last lines that a node printed."""
+        try:
+            with self.path(name).open(encoding="utf-8", errors="replace") as log:
+                return "".join(deque(log, _TAIL_LINES)).strip()
+        except OSError:
+            return ""
+
+    def said_ready(self, name: str) -> bool:
+        """Whether a simulation has ever printed that it is ready for trials."""
+        try:
+            with self.path(name).open(encoding="utf-8", errors="replace") as log:
+                return f"{name} is ready\n" in log
+        except OSError:
+            return False

@@ -1,0 +1,101 @@
+"""Collections in containers, driven as the launcher drives them."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from uuid import uuid4
+
+from docker.client import DockerClient
+
+from tests.e2e.collection import CONFIG
+from throwcollect.config.loader import load
+from throwcollect.config.schema import Config
+from throwcollect.coordinator.prepare import prepare
+from throwcollect.dataset.inspect import info
+from throwcollect.runtime.docker import DockerRuntime
+from throwcollect.runtime.docker_runs import remove
+from throwcollect.runtime.nodes import NodeExit
+from throwcollect.runtime.supervisor import Supervisor
+
+TRIALS = 40
+
+
+def config_for(directory: Path, *overrides: str) -> Config:
+    path = directory / "small.yaml"
+    path.write_text(CONFIG.format(trials=TRIALS))
+    return load(path, overrides)
+
+
+@dataclass
+class Collection:
+    """A collection in containers.
+
+    Attributes:
+        runtime: Where its nodes live.
+        supervisor: Keeps them alive.
+        directory: Directory of the dataset; prepared.
+        news: What happened to nodes other than the coordinator.
+        end: How the coordinator ended.
+    """
+
+    runtime: DockerRuntime
+    supervisor: Supervisor
+    directory: Path
+    news: list[str] = field(default_factory=list)
+    end: NodeExit | None = None
+
+    def until(self, condition: Callable[[], bool]) -> None:
+        """Look after the nodes until something has happened."""
+        deadline = time.monotonic() + 120
+        while not condition():
+            assert time.monotonic() < deadline, (self.news, self.supervisor.states())
+            assert self.end is None, (self.end, self.news)
+            self.end, news = self.supervisor.poll()
+            self.news += news
+            time.sleep(0.02)
+
+    def until_more_is_written(self) -> None:
+        before = self.written()
+        self.until(lambda: self.written() > before)
+
+    def finish(self) -> str:
+        """Wait for the coordinator's end; the digest of the dataset."""
+        self.until(lambda: self.end is not None)
+        assert self.end is not None
+        assert self.end.code == 0, self.end
+        return info(self.directory).digest
+
+    def written(self) -> int:
+        return sum(path.stat().st_size for path in self.directory.glob("*.mcap*"))
+
+    def status(self, node: str) -> str:
+        return next(each.status for each in self.supervisor.states() if each.name == node)
+
+
+def new_run() -> str:
+    return f"test-{uuid4().hex[:8]}"
+
+
+@contextmanager
+def collecting(
+    client: DockerClient, directory: Path, *overrides: str, run: str | None = None, found: tuple[str, ...] = ()
+) -> Iterator[Collection]:
+    """A collection whose nodes are started, or those of this run taken over; nothing of it is left afterwards."""
+    run = run or new_run()
+    config = config_for(directory, *overrides)
+    dataset = directory / "dataset"
+    if not dataset.exists():
+        prepare(config, dataset, sweep_directory=directory)
+    runtime = DockerRuntime(run, config, directory=dataset, logs=dataset / "logs", client=client)
+    try:
+        with Supervisor(runtime, config.run, simulations=config.run.simulations) as supervisor:
+            runtime.open()
+            assert sorted(runtime.found()) == sorted(found)
+            supervisor.start(found=found)
+            yield Collection(runtime, supervisor, dataset)
+    finally:
+        remove(client, run, volumes=True)

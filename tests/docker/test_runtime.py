@@ -1,0 +1,372 @@
+"""Nodes as containers of a real engine."""
+
+from __future__ import annotations
+
+import os
+import re
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from docker.client import DockerClient
+from docker.models.containers import Container
+
+from tests.docker.collection import Collection, collecting, config_for, new_run
+from tests.docker.cut_line import CutLine
+from throwcollect.coordinator.prepare import prepare
+from throwcollect.dataset.inspect import info
+from throwcollect.errors import ConfigError, WorkerError
+from throwcollect.runtime import docker_watch
+from throwcollect.runtime.docker import DockerRuntime
+from throwcollect.runtime.docker_engine import connect
+from throwcollect.runtime.docker_runs import remove, runs
+from throwcollect.runtime.local import LocalRuntime
+from throwcollect.runtime.nodes import COORDINATOR, ROUTER, NodeExit
+from throwcollect.runtime.supervisor import Supervisor
+
+pytestmark = pytest.mark.docker
+
+MEMORY_HOG = """
+import os
+for pid in filter(str.isdecimal, os.listdir('/proc')):
+    if int(pid) not in (1, os.getpid()):
+        open(f'/proc/{pid}/oom_score_adj', 'w').write('1000')
+hog = bytearray(1 << 30)
+"""
+
+
+@pytest.fixture(scope="module")
+def digest(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """Digest of the dataset, collected in processes."""
+    directory = tmp_path_factory.mktemp("local")
+    config = config_for(directory)
+    prepare(config, directory / "dataset", sweep_directory=directory)
+    runtime = LocalRuntime(directory / "dataset", directory / "logs", config.run)
+    with Supervisor(runtime, config.run, simulations=2) as supervisor:
+        supervisor.start()
+        until(lambda: supervisor.poll()[0] is not None)
+    return info(directory / "dataset").digest
+
+
+def until(condition: Callable[[], bool], *, seconds: float = 60) -> None:
+    deadline = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < deadline, "did not happen"
+        time.sleep(0.02)
+
+
+def ended(runtime: DockerRuntime) -> NodeExit:
+    found: list[NodeExit] = []
+    until(lambda: bool(found.extend(runtime.exits()) or found))
+    return found[0]
+
+
+def container(client: DockerClient, collection: Collection, node: str) -> Container:
+    handle = collection.runtime.handle(node)
+    assert handle is not None
+    return client.containers.get(handle)
+
+
+def left_of(client: DockerClient, label: str) -> list[Any]:
+    filters = {"label": label}
+    return [*client.containers.list(all=True, filters=filters), *client.networks.list(filters=filters)]
+
+
+def test_a_collection_in_containers_yields_the_dataset_of_one_in_processes(
+    client: DockerClient, tmp_path: Path, digest: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    caller = os.getuid() or 4242  # root may be anybody
+    monkeypatch.setattr(os, "getuid", lambda: caller)
+    run = new_run()
+    prepared = tmp_path / "dataset"
+    prepare(config_for(tmp_path), prepared, sweep_directory=tmp_path)
+    (prepared / "logs").mkdir()
+    for path in (prepared, *prepared.iterdir()):
+        os.chown(path, caller, -1)
+    with collecting(client, tmp_path, run=run) as collection:
+        collection.until(lambda: collection.status("sim_1") == "running")
+        known = next(each for each in runs(client) if each.run_id == run)
+        assert known.source == str(prepared)
+        assert [node.name for node in known.nodes] == [COORDINATOR, ROUTER, "sim_0", "sim_1"]
+        for node in collection.runtime.running():
+            details = container(client, collection, node).attrs
+            host = details["HostConfig"]
+            assert (host["Privileged"], host["PidMode"], host["CapDrop"]) == (False, "", ["ALL"])
+            assert (host["ReadonlyRootfs"], host["SecurityOpt"], host["Init"]) == (True, ["no-new-privileges"], True)
+            assert host["NetworkMode"] == f"throwcollect-{run}"
+            assert not any(details["NetworkSettings"]["Ports"].values())
+            binds = [(each["Source"], each["Destination"], each["RW"]) for each in details["Mounts"]]
+            writes = node == COORDINATOR
+            assert binds == ([] if node == ROUTER else [(str(prepared), "/data", writes)])
+        assert client.networks.get(f"throwcollect-{run}").attrs["Internal"]
+        listening = container(client, collection, ROUTER).exec_run(["cat", "/proc/net/tcp"]).output.decode()
+        assert ":1D17" in listening
+        assert "00000000:1D17 00000000:0000 0A" not in listening
+        assert collection.finish() == digest
+    assert left_of(client, f"throwcollect.run={run}") == []
+    assert {path.stat().st_uid for path in prepared.iterdir()} == {caller}
+    assert "sim_0 is ready" in (prepared / "logs" / "sim_0.log").read_text()
+    assert re.search(r"^40/40 throws", (prepared / "logs" / "coordinator.log").read_text(), re.MULTILINE)
+
+
+def test_simulations_that_are_killed_paused_or_out_of_memory_are_named_and_replaced(
+    client: DockerClient, tmp_path: Path, digest: str
+) -> None:
+    with collecting(client, tmp_path, "run.simulations=1", "run.retries=9", "containers.sim.memory=400m") as collection:
+        collection.until_more_is_written()
+        container(client, collection, "sim_0").kill()
+        collection.until(lambda: any("ended by SIGKILL" in line for line in collection.news))
+        collection.until_more_is_written()
+        container(client, collection, "sim_0").exec_run(["python3", "-c", MEMORY_HOG])
+        collection.until(lambda: any("ran out of memory (limit 400m)" in line for line in collection.news))
+        collection.until_more_is_written()
+        container(client, collection, "sim_0").pause()
+        collection.until(lambda: any("sim_0 is frozen" in line for line in collection.news))
+        collection.until_more_is_written()
+        assert collection.finish() == digest
+        assert all(line.startswith("sim_0") for line in collection.news)
+    log = (collection.directory / "logs" / "sim_0.log").read_text()
+    assert log.count("sim_0 is ready\n") == 4
+
+
+def test_a_router_that_comes_back_at_another_address_is_found_again(
+    client: DockerClient, tmp_path: Path, digest: str
+) -> None:
+    with collecting(client, tmp_path) as collection:
+        collection.until_more_is_written()
+        address = collection.runtime.router_address()
+        router = container(client, collection, ROUTER)
+        network = router.attrs["HostConfig"]["NetworkMode"]
+        squatter = client.containers.create(
+            router.image, ["router", "--listen", "tcp/127.0.0.1:7447"], network=network, labels=router.labels
+        )
+        router.kill()
+        squatter.start()
+        collection.until(collection.supervisor.router_answers)
+        assert collection.runtime.router_address() not in (address, None)
+        assert collection.finish() == digest
+        assert collection.news == [
+            "router was lost (ended by SIGKILL) and is started again; it said last: router listening on tcp/router:7447"
+        ]
+
+
+def test_runs_side_by_side_do_not_disturb_one_another(client: DockerClient, tmp_path: Path, digest: str) -> None:
+    (tmp_path / "one").mkdir()
+    (tmp_path / "other").mkdir()
+    volume = f"{new_run()}-volume"
+    run = new_run()
+    config = config_for(tmp_path / "other", f"containers.volume={volume}", "run.simulations=1")
+    prepare(config, tmp_path / "other" / "dataset", sweep_directory=tmp_path)
+    runtime = DockerRuntime(run, config, directory=None, logs=tmp_path / "other" / "logs", client=client)
+    assert runtime.data == f"/data/{run}"
+    try:
+        with (
+            Supervisor(runtime, config.run, simulations=1) as supervisor,
+            collecting(client, tmp_path / "one", "run.simulations=1") as collection,
+        ):
+            runtime.open()
+            runtime.place(tmp_path / "other" / "dataset")
+            supervisor.start()
+            assert collection.finish() == digest
+            collection.supervisor.runtime.close()
+            until(lambda: supervisor.poll()[0] is not None)
+            assert runtime.info()["digest"] == digest
+        assert left_of(client, f"throwcollect.run={run}") == []
+        assert client.volumes.get(volume).attrs["Labels"]["throwcollect.run"] == run
+    finally:
+        assert remove(client, run, volumes=True) == [f"volume {volume}"]
+
+
+LAUNCHER = """
+import sys, time
+from pathlib import Path
+from throwcollect.config.loader import load
+from throwcollect.runtime.docker import DockerRuntime
+from throwcollect.runtime.supervisor import Supervisor
+run, directory = sys.argv[1], Path(sys.argv[2])
+config = load(directory / "config.yaml")
+runtime = DockerRuntime(run, config, directory=directory, logs=directory / "logs")
+runtime.open()
+supervisor = Supervisor(runtime, config.run, simulations=2)
+supervisor.start()
+while True:
+    supervisor.poll()
+    time.sleep(0.02)
+"""
+
+
+def test_a_run_whose_launcher_vanished_is_taken_over(client: DockerClient, tmp_path: Path, digest: str) -> None:
+    run = new_run()
+    dataset = tmp_path / "dataset"
+    prepare(config_for(tmp_path), dataset, sweep_directory=tmp_path)
+    launcher = subprocess.Popen([sys.executable, "-c", LAUNCHER, run, str(dataset)])
+    nodes = (ROUTER, "sim_0", "sim_1", COORDINATOR)
+    try:
+        until(lambda: any(path.stat().st_size for path in dataset.glob("*.mcap*")))
+    finally:
+        launcher.kill()
+        launcher.wait()
+    client.containers.get(f"throwcollect-{run}-sim_1").kill()
+    with collecting(client, tmp_path, run=run, found=nodes) as collection:
+        assert collection.finish() == digest
+    assert [line for line in collection.news if "sim_1 was lost (ended by SIGKILL)" in line]
+    # What the first launcher has copied already is not copied again.
+    assert (dataset / "logs" / "sim_0.log").read_text().count("sim_0 is ready") == 1
+
+
+@pytest.fixture
+def bare(client: DockerClient, tmp_path: Path) -> Any:
+    """Makes runtimes without a dataset, for nodes that need none."""
+    made: list[tuple[DockerRuntime, str]] = []
+
+    def make(*overrides: str, through: DockerClient = client) -> DockerRuntime:
+        run = new_run()
+        runtime = DockerRuntime(
+            run, config_for(tmp_path, *overrides), directory=tmp_path, logs=tmp_path / "logs", client=through
+        )
+        made.append((runtime, run))
+        runtime.open()
+        return runtime
+
+    yield make
+    for runtime, run in made:
+        runtime.close()
+        remove(client, run, volumes=True)
+
+
+def test_what_the_engine_refuses_is_the_reason_of_an_end(bare: Any) -> None:
+    runtime = bare("containers.sim.options.devices=[/dev/nowhere]", "containers.coordinator.memory=16m")
+    runtime.start("sim_0", ["--version"])
+    end = ended(runtime)
+    assert (end.name, end.code) == ("sim_0", None)
+    assert "cannot be started" in end.reason
+    assert "/dev/nowhere" in end.reason
+    assert (runtime.running(), runtime.handle("sim_0")) == ((), None)
+    runtime.start(COORDINATOR, ["config", "/data/small.yaml"])
+    assert ended(runtime).reason == "ran out of memory (limit 16m)"
+
+
+def test_a_node_says_how_it_ended_and_what_it_said_last(monkeypatch: pytest.MonkeyPatch, bare: Any) -> None:
+    monkeypatch.setattr(docker_watch, "_LOOK_EVERY_S", 3600.0)  # the engine's events are enough
+    runtime = bare()
+    runtime.start("sim_0", ["sim", "/data/nothing.yaml"])
+    end = ended(runtime)
+    assert (end.code, end.reason) == (2, "exit code 2")
+    assert end.log.splitlines()[-1] == "throwcollect: /data/nothing.yaml: no such file"
+    assert runtime.exits() == []
+    runtime.start("sim_0", ["--version"])
+    assert ended(runtime).log.splitlines()[-2:] == [*end.log.splitlines()[-1:], "throwcollect 0.1.0"]
+
+
+def test_a_container_that_somebody_removes_has_ended(bare: Any, client: DockerClient) -> None:
+    runtime = bare()
+    runtime.start(ROUTER, ["router", "--listen", runtime.listen])
+    until(lambda: runtime.handle(ROUTER) is not None)
+    client.containers.get(runtime.handle(ROUTER)).remove(force=True)
+    assert ended(runtime).reason in ("its container was removed", "ended by SIGKILL")
+
+
+def test_a_published_router_is_reached_on_the_loopback_interface_alone(bare: Any, client: DockerClient) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as probe:
+        port = probe.getsockname()[1]
+        with pytest.raises(ConfigError, match=f"run.router_port: port {port} of 127.0.0.1 cannot be used"):
+            bare(f"run.router_port={port}")
+    runtime = bare(f"run.router_port={port}")
+    runtime.start(ROUTER, ["router", "--listen", runtime.listen])
+    until(lambda: runtime.log_tail(ROUTER) != "")
+    assert runtime.router_address() == ("127.0.0.1", port)
+    socket.create_connection(("127.0.0.1", port), 5).close()
+    ports = client.containers.get(runtime.handle(ROUTER)).attrs["NetworkSettings"]["Ports"]
+    assert ports == {"7447/tcp": [{"HostIp": "127.0.0.1", "HostPort": str(port)}]}
+    runtime.stop([ROUTER])
+    assert runtime.router_address() is None
+
+
+def test_what_is_not_there_is_found_before_anything_is_started(bare: Any, tmp_path: Path) -> None:
+    with pytest.raises(WorkerError, match="the Docker engine has no image nobody/has:this"):
+        bare("containers.image=nobody/has:this")
+    sock = tmp_path / "link"
+    sock.symlink_to("/var/run")
+    with pytest.raises(ConfigError, match="does not exist") as caught:
+        bare(f"containers.sim.mounts=[/no/where:/x, {sock}:/y]", "containers.router.networks=[nowhere]")
+    assert [str(problem) for problem in caught.value.problems] == [
+        "containers.router.networks.0: the Docker engine has no network nowhere; create it first",
+        "containers.sim.mounts.0: /no/where does not exist on this machine",
+        f"containers.sim.mounts.1: {sock} is refused, as it holds the engine's socket",
+    ]
+
+
+def test_mounts_environment_and_networks_of_the_configuration_are_there(
+    bare: Any, client: DockerClient, tmp_path: Path
+) -> None:
+    network = client.networks.create(new_run())
+    try:
+        (tmp_path / "extra").write_text("extra")
+        runtime = bare(
+            f"containers.router.mounts=['{tmp_path}/extra:/extra:ro']",
+            "containers.router.environment={ANSWER: 42}",
+            f"containers.router.networks=[{network.name}]",
+            "containers.router.cpuset='0'",
+            "containers.router.options={ulimits: {nofile: 99}, tmpfs: {/tmp: size=1m}}",
+        )
+        runtime.start(ROUTER, ["router", "--listen", runtime.listen])
+        until(lambda: runtime.log_tail(ROUTER) != "")
+        script = (
+            "cat /extra; echo $ANSWER; ulimit -n; grep Cpus_allowed_list /proc/self/status; grep ' /tmp ' /proc/mounts"
+        )
+        router = client.containers.get(runtime.handle(ROUTER))
+        said = router.exec_run(["sh", "-c", script]).output.decode()
+        assert said.splitlines()[:2] == ["extra42", "99"]
+        assert re.search(r"Cpus_allowed_list:\s0\n", said)
+        assert re.search(r"tmpfs /tmp tmpfs rw,nosuid,nodev,noexec,relatime,size=1024k", said)
+        assert network.name in router.attrs["NetworkSettings"]["Networks"]
+        runtime.close()
+    finally:
+        network.remove()
+
+
+@pytest.fixture
+def line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> CutLine:
+    line = CutLine(tmp_path / "line.sock", "/var/run/docker.sock")
+    monkeypatch.setenv("DOCKER_HOST", f"unix://{tmp_path}/line.sock")
+    return line
+
+
+def test_a_broken_line_to_the_engine_is_mended(bare: Any, client: DockerClient, line: CutLine) -> None:
+    runtime = bare(through=connect())
+    runtime.start(ROUTER, ["router", "--listen", runtime.listen])
+    until(lambda: runtime.log_tail(ROUTER) != "")
+    handle = runtime.handle(ROUTER)
+    line.interrupt()
+    client.containers.get(handle).kill("SIGTERM")
+    assert ended(runtime).reason == "exit code 0"
+    assert runtime.log_tail(ROUTER) == "router listening on tcp/router:7447"
+
+
+@pytest.mark.parametrize(("trouble", "evidence"), [("cut", "Connection refused"), ("clog", None)])
+def test_an_engine_that_does_not_answer_any_more_is_said_so_with_what_is_safe(
+    monkeypatch: pytest.MonkeyPatch,
+    line: CutLine,
+    bare: Any,
+    client: DockerClient,
+    tmp_path: Path,
+    trouble: str,
+    evidence: str | None,
+) -> None:
+    monkeypatch.setattr("throwcollect.runtime.docker._SILENCE_S", 3.0)
+    runtime = bare(through=connect())
+    runtime.start(ROUTER, ["router", "--listen", runtime.listen])
+    until(lambda: runtime.log_tail(ROUTER) != "")
+    handle = runtime.handle(ROUTER)
+    getattr(line, trouble)()
+    with pytest.raises(WorkerError, match=r"engine has not answered for \d+ s; .* safe in \S+") as caught:
+        until(lambda: bool(runtime.exits()))
+    assert caught.value.message.endswith(str(tmp_path))
+    assert (caught.value.evidence, caught.value.exit_code) == (evidence, 3)
+    runtime.close()
+    assert client.containers.get(handle).status == "running"

@@ -1,0 +1,132 @@
+from pathlib import Path
+
+import pytest
+from docker.models import containers as sdk
+
+from throwcollect.config.containers import ContainerOptions, ContainersConfig
+from throwcollect.config.loader import load, resolved_yaml
+from throwcollect.config.schema import Config
+from throwcollect.errors import ConfigError
+
+POWER = "is refused, as it would give a container power over its host"
+LAUNCHER = "is refused, as the launcher decides it"
+SOCKET = "is refused, as it holds the engine's socket, and with it power over the host"
+INSTEAD = "should be left out; use {} beside options"
+NETWORK = "is refused; a network of the engine is joined besides the run's own"
+PORT = "should be a port of the container from 1 to 65535, with /udp if it is not TCP"
+LABEL = "is refused, as labels that begin with throwcollect. are the launcher's"
+OUTSIDE = "should be an absolute path in the container, outside of /data"
+VARIABLE = "should be the name of a variable: letters, digits and _"
+PATHS = "should be HOST:CONTAINER or HOST:CONTAINER:ro with absolute paths"
+
+
+def problems(tmp_path: Path, text: str) -> list[str]:
+    path = tmp_path / "run.yaml"
+    path.write_text(text)
+    with pytest.raises(ConfigError, match=r"\S") as caught:
+        load(path)
+    return [str(problem).replace(f"{tmp_path}/", "") for problem in caught.value.problems]
+
+
+FULL = """\
+run: {simulations: 1, runtime: docker}
+containers:
+  image: lab/throws:2
+  volume: throws_1
+  router: {ports: {80: 8080, 53/udp: 5353}}
+  coordinator: {mounts: [/a:/b], options: {device_requests: [{driver: nvidia, count: -1, capabilities: [[gpu]]}]}}
+  sim:
+    cpus: 0.5
+    memory: 512m
+    cpuset: 0-3,6
+    environment: {A: text, B: 1, C: 0.5}
+    mounts: [/a:/b:ro]
+    networks: [lab]
+    options: {shm_size: 64m, ulimits: {nofile: 9}, dns: [1.1.1.1], tmpfs: {/cache: size=1m}, labels: {team: a}}
+"""
+
+
+def test_everything_that_may_be_said_of_containers_is_read_and_written_again(tmp_path: Path) -> None:
+    path = tmp_path / "run.yaml"
+    path.write_text(FULL)
+    config = load(path)
+    assert config.containers.sim.environment == {"A": "text", "B": 1, "C": 0.5}
+    assert config.containers.router.ports == {"80": 8080, "53/udp": 5353}
+    assert config.containers.sim.options["ulimits"] == {"nofile": 9}
+    again = tmp_path / "again.yaml"
+    again.write_text(resolved_yaml(config))
+    assert load(again) == config
+
+
+@pytest.mark.parametrize(
+    ("section", "message"),
+    [
+        ("imgae: x", "imgae: unknown key; did you mean 'image'?"),
+        ("volume: a b", "volume: should be a volume's name: letters, digits, _, . and -, got 'a b'"),
+        ("sim: {cpus: 0}", "sim.cpus: should be a number above 0 or null, got 0"),
+        ("sim: {memory: 5m}", "sim.memory: should be a size of 6m or more, such as 512m or 2g, got '5m'"),
+        ("sim: {memory: 512MB}", "sim.memory: should be a size of 6m or more, such as 512m or 2g, got '512MB'"),
+        ("sim: {memory: 512}", "sim.memory: should be a size such as 512m or 2g or null, got 512"),
+        ("sim: {cpuset: 0-}", "sim.cpuset: should be numbers and ranges of cores, such as 0-3,6, got '0-'"),
+        ("sim: {environment: {A-B: x}}", f"sim.environment.A-B: {VARIABLE}"),
+        ("sim: {environment: {ROS_DOMAIN_ID: 3}}", f"sim.environment.ROS_DOMAIN_ID: {LAUNCHER}"),
+        ("sim: {environment: {A: true}}", "sim.environment.A: should be text or a whole number or a number, got true"),
+        ("sim: {mounts: [a:/b]}", f"sim.mounts.0: {PATHS}, got 'a:/b'"),
+        ("sim: {mounts: [/a]}", f"sim.mounts.0: {PATHS}, got '/a'"),
+        ("sim: {mounts: [/a:/b:rw]}", f"sim.mounts.0: {PATHS}, got '/a:/b:rw'"),
+        ("sim: {mounts: [/a/../run:/b]}", f"sim.mounts.0: {PATHS}, got '/a/../run:/b'"),
+        ("sim: {mounts: [/run/docker.sock:/b]}", f"sim.mounts.0: /run/docker.sock {SOCKET}"),
+        ("sim: {mounts: [//:/b]}", f"sim.mounts.0: // {SOCKET}"),
+        ("sim: {mounts: [/var/run/:/b]}", f"sim.mounts.0: /var/run/ {SOCKET}"),
+        (
+            "sim: {mounts: [/a:/data/b]}",
+            "sim.mounts.0: /data/b is refused, as the dataset or the image is there in the container",
+        ),
+        ("sim: {networks: [host]}", f"sim.networks.0: host {NETWORK}"),
+        ("sim: {ports: {http: 80}}", f"sim.ports.http: {PORT}"),
+        ("sim: {ports: {80: 0}}", "sim.ports.80: should be a whole number from 1 to 65535, got 0"),
+        ("sim: {options: {shm_siez: 1m}}", "sim.options.shm_siez: unknown key; did you mean 'shm_size'?"),
+        ("sim: {options: {privileged: true}}", f"sim.options.privileged: {POWER}"),
+        ("sim: {options: {network_mode: host}}", f"sim.options.network_mode: {INSTEAD.format('networks')}"),
+        ("sim: {options: {volumes: [/run/docker.sock]}}", f"sim.options.volumes: {INSTEAD.format('mounts')}"),
+        ("sim: {options: {user: root}}", f"sim.options.user: {LAUNCHER}"),
+        (
+            "sim: {options: {labels: {throwcollect.run: x}}}",
+            f"sim.options.labels.throwcollect.run: {LABEL}",
+        ),
+        ("sim: {options: {tmpfs: {/data/x: size=1m}}}", f"sim.options.tmpfs./data/x: {OUTSIDE}"),
+        (
+            "sim: {options: {device_requests: [{cuont: 1}]}}",
+            "sim.options.device_requests.0.cuont: unknown key; did you mean 'count'?",
+        ),
+    ],
+)
+def test_mistakes_are_named_with_file_line_and_key(tmp_path: Path, section: str, message: str) -> None:
+    assert problems(tmp_path, f"containers:\n  {section}") == [f"run.yaml:2: containers.{message}"]
+
+
+def test_a_port_of_this_machine_is_given_away_once(tmp_path: Path) -> None:
+    text = "containers:\n  router: {ports: {80: 9000}}\n  coordinator: {ports: {81: 9000}}"
+    assert problems(tmp_path, text) == [
+        "run.yaml:3: containers.coordinator.ports.81: should differ from router.ports.80, got 9000, too"
+    ]
+
+
+def test_several_simulations_cannot_share_a_port(tmp_path: Path) -> None:
+    text = "run: {{simulations: {}}}\ncontainers: {{sim: {{ports: {{80: 80}}}}}}"
+    assert problems(tmp_path, text.format(3)) == [
+        "run.yaml:2: containers.sim.ports: should be left out, as 3 simulations cannot share a port of this machine"
+    ]
+    path = tmp_path / "run.yaml"
+    path.write_text(text.format(1))
+    assert load(path).containers.sim.ports == {"80": 80}
+
+
+@pytest.mark.parametrize("option", ContainerOptions.__annotations__)
+def test_every_option_is_a_keyword_of_the_sdk(option: str) -> None:
+    assert option in {*sdk.RUN_CREATE_KWARGS, *sdk.RUN_HOST_CONFIG_KWARGS}
+
+
+def test_containers_do_not_change_the_dataset() -> None:
+    containers = ContainersConfig(image="other", volume="throws")
+    assert Config(containers=containers).without_run() == Config()
