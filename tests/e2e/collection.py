@@ -23,6 +23,7 @@ sweep:
     task.end.arm_right_4_joint: {{min: -0.7, max: -0.4}}
     task.duration_s: {{min: 1.0, max: 1.2}}
     ball.mass_kg: {{min: 0.03, max: 0.06}}
+run: {{runtime: local}}
 """
 
 
@@ -72,7 +73,7 @@ class Running:
 
 def start(config: Path, directory: Path, simulations: int, *options: str) -> Running:
     process = subprocess.Popen(
-        command("up", "-n", str(simulations), config, "--output", directory, *options),
+        command("up", "-n", str(simulations), "--runtime", "local", config, "--output", directory, *options),
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

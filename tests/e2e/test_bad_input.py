@@ -71,7 +71,10 @@ def small(tmp_path: Path) -> Path:
         (["up", "-n", "300", "small.yaml"], "run.simulations: should be a whole number from 1 to 256, got 300"),
         (["up", "-n", "two", "small.yaml"], "run.simulations: should be a whole number from 1 to 256, got 'two'"),
         (["up", "--trials", "0", "small.yaml"], "trials: should be a whole number from 1 to 10000000 or null, got 0"),
-        (["up", "--runtime", "dockr", "small.yaml"], "run.runtime: should be 'auto' or 'local', got 'dockr'"),
+        (
+            ["up", "--runtime", "dockr", "small.yaml"],
+            "run.runtime: should be one of 'auto', 'local', 'docker', got 'dockr'; did you mean 'docker'?",
+        ),
         (["up", "--set", "trials", "small.yaml"], "an override should be KEY=VALUE, got 'trials'"),
         (["up", "--set", "=3", "small.yaml"], "an override should be KEY=VALUE, got '=3'"),
         (["up", "--set", "trails=3", "small.yaml"], "trails: unknown key; did you mean 'trials'?"),
@@ -338,6 +341,7 @@ def test_output_that_cannot_be_written_is_an_error(small: Path) -> None:
 
 def test_every_command_has_help(say: Callable[..., Said]) -> None:
     commands = ["up", "config", "plan", "doctor", "dataset", "router", "sim", "coordinator"]
+    commands += ["ps", "wait", "logs", "events", "scale", "stop", "down"]
     for arguments in (
         [],
         *([name] for name in commands),

@@ -26,6 +26,8 @@ app = typer.Typer(
 )
 dataset_app = typer.Typer(help="Look into datasets.", no_args_is_help=True)
 app.add_typer(dataset_app, name="dataset")
+image_app = typer.Typer(help="Make the image that containers are made from.", no_args_is_help=True)
+app.add_typer(image_app, name="image")
 
 
 ConfigArgument = Annotated[
@@ -38,9 +40,17 @@ SetOption = Annotated[
 ]
 TrialsOption = Annotated[str | None, typer.Option("--trials", metavar="K", help="Number of trials.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+RunOption = Annotated[
+    str | None,
+    typer.Option(
+        "--run", metavar="RUN", help="Id of a run, its beginning, or the dataset's directory; by default, the only one."
+    ),
+]
+FollowOption = Annotated[bool, typer.Option("-f", "--follow", help="Go on until the run ends.")]
 DatasetArgument = Annotated[Path, typer.Argument(metavar="DIR", help="Directory of the dataset.", readable=False)]
 
 DEFAULT_CONFIG = Path("throwcollect.yaml")
+RUNS = "Runs"
 
 
 _OUTPUT_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
@@ -75,19 +85,101 @@ def up(
     ] = None,
     settings: SetOption = None,
     runtime: Annotated[
-        str | None, typer.Option("--runtime", metavar="auto|local", help="Where the nodes run: run.runtime.")
+        str | None, typer.Option("--runtime", metavar="auto|local|docker", help="Where the nodes run: run.runtime.")
     ] = None,
     output: Annotated[
         Path | None, typer.Option("--output", metavar="DIR", help="Directory of the dataset; must be new or empty.")
     ] = None,
     trials: TrialsOption = None,
+    detach: Annotated[
+        bool, typer.Option("-d", "--detach", help="Print the id of the run as soon as its nodes are started.")
+    ] = False,
     json: JsonOption = False,
 ) -> None:
     """Collect a dataset: start the simulations, run all trials, write the files."""
     from throwcollect.cli.up import collect
 
     overrides = _overrides(settings, trials=trials, run__simulations=simulations, run__runtime=runtime)
-    collect(config, overrides=overrides, output=output, json=json)
+    collect(config, overrides=overrides, output=output, detach=detach, json=json)
+
+
+@app.command(rich_help_panel=RUNS)
+def ps(
+    everything: Annotated[bool, typer.Option("-a", "--all", help="Runs that have ended, too.")] = False,
+    json: JsonOption = False,
+) -> None:
+    """List the runs of this machine, with their nodes."""
+    from throwcollect.cli.ps import show_runs
+
+    show_runs(everything=everything, json=json)
+
+
+@app.command(rich_help_panel=RUNS)
+def wait(run: RunOption = None, json: JsonOption = False) -> None:
+    """Show the progress of a run until it ends, and then its summary; Ctrl-C leaves it alone."""
+    from throwcollect.cli.wait import wait_for
+
+    wait_for(run, json=json)
+
+
+@app.command(rich_help_panel=RUNS)
+def logs(
+    nodes: Annotated[list[str] | None, typer.Argument(metavar="[NODE]...", help="Names of nodes; all if none.")] = None,
+    follow: FollowOption = False,
+    run: RunOption = None,
+) -> None:
+    """Print what the nodes of a run print."""
+    from throwcollect.cli.logs import show_logs
+
+    show_logs(run, nodes or (), follow=follow)
+
+
+@app.command(rich_help_panel=RUNS)
+def events(follow: FollowOption = False, run: RunOption = None, json: JsonOption = False) -> None:
+    """Print what has happened in a run: nodes started, ready, lost and so on."""
+    from throwcollect.cli.logs import show_events
+
+    show_events(run, follow=follow, json=json)
+
+
+@app.command(rich_help_panel=RUNS)
+def scale(
+    simulations: Annotated[int, typer.Argument(metavar="N", min=0, max=256, help="Number of simulations.")],
+    run: RunOption = None,
+) -> None:
+    """Change the number of simulations of a run."""
+    from throwcollect.cli.control import change_scale
+
+    change_scale(run, simulations)
+
+
+@app.command(rich_help_panel=RUNS)
+def stop(run: RunOption = None) -> None:
+    """Finish the running trials of a run, close its files and end it."""
+    from throwcollect.cli.control import stop_run
+
+    stop_run(run)
+
+
+@app.command(rich_help_panel=RUNS)
+def down(
+    volumes: Annotated[
+        bool, typer.Option("-v", "--volumes", help="Remove the volume that holds the dataset, too.")
+    ] = False,
+    run: RunOption = None,
+) -> None:
+    """End everything of a run, by force if need be, and forget it; never removes a directory with a dataset."""
+    from throwcollect.cli.control import end_run
+
+    end_run(run, volumes=volumes)
+
+
+@app.command(hidden=True)
+def launch(run: str, lock: Annotated[int, typer.Option("--lock", help="Descriptor of the run's locked file.")]) -> None:
+    """Launch a prepared run, as `up -d` does."""
+    from throwcollect.cli.up import serve
+
+    serve(run, lock)
 
 
 @app.command()
@@ -151,6 +243,31 @@ def dataset_digest(directory: DatasetArgument) -> None:
     show_digest(directory)
 
 
+@image_app.command("build")
+def image_build(
+    base: Annotated[
+        str | None,
+        typer.Option("--base", metavar="IMAGE", help="Base image; an official one of Python 3.11 by default."),
+    ] = None,
+    wheelhouse: Annotated[
+        Path | None,
+        typer.Option(
+            "--wheelhouse",
+            metavar="DIR",
+            help="Take the wheels from here, not from the package index; docker/wheelhouse.py fills it.",
+            readable=False,
+        ),
+    ] = None,
+    tag: Annotated[
+        str | None, typer.Option("--tag", metavar="TAG", help="Name of the image; throwcollect:VERSION by default.")
+    ] = None,
+) -> None:
+    """Build the image from a clone of the project."""
+    from throwcollect.cli.image import build_image
+
+    build_image(base=base, wheelhouse=wheelhouse, tag=tag)
+
+
 @app.command(rich_help_panel="Nodes, as `up` starts them")
 def router(
     listen: Annotated[
@@ -191,6 +308,22 @@ def coordinator(
     from throwcollect.cli.nodes import coordinate
 
     coordinate(directory, config=config)
+
+
+@app.command(rich_help_panel="Nodes, as `up` starts them")
+def health(
+    node: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="NODE",
+            help="router, coordinator, or the name of a simulation; by default what THROWCOLLECT_NODE says.",
+        ),
+    ] = None,
+) -> None:
+    """Ask a node for a sign of life; exit code 1 if there is none."""
+    from throwcollect.health import check
+
+    check(node)
 
 
 def main() -> None:

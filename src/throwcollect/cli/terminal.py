@@ -34,13 +34,14 @@ class Display(Protocol):
         """Show a line that stays, also where all else is silent."""
 
 
-def display(*, quiet: bool) -> Display:
+def display(*, quiet: bool, bar: bool = True) -> Display:
     """The display that fits where standard error goes.
 
     Args:
         quiet: Show nothing but warnings.
+        bar: Whether there will be progress to show.
     """
-    if sys.stderr.isatty() and not quiet:
+    if sys.stderr.isatty() and bar and not quiet:
         return _Bar()
     return _Lines(quiet=quiet)
 

@@ -1,39 +1,48 @@
-"""`throwcollect up`: from a YAML file to a dataset."""
+"""`throwcollect up`: from a YAML file to a dataset, in this terminal or by a launcher that outlives it."""
 
 from __future__ import annotations
 
-import json
+import json as jsonlib
 import os
-import sys
-import time
 from collections.abc import Sequence
-from contextlib import ExitStack
-from datetime import datetime
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass
+from datetime import datetime, timezone
 from pathlib import Path
-from typing import Any
 
 import typer
 
-from throwcollect.cli.dataset import describe
 from throwcollect.cli.interruptions import Interruptions
+from throwcollect.cli.summary import print_summary
 from throwcollect.cli.terminal import Display, display
 from throwcollect.config.loader import load
+from throwcollect.config.schema import Config
 from throwcollect.coordinator.prepare import prepare
-from throwcollect.coordinator.progress import Progress, ProgressListener
-from throwcollect.dataset.inspect import info
-from throwcollect.errors import DatasetError, Interrupted, WorkerError
-from throwcollect.runtime.local import LocalRuntime
-from throwcollect.runtime.nodes import NodeExit, node_environment
-from throwcollect.runtime.supervisor import Supervisor
+from throwcollect.dataset.directory import CONFIG, PLAN
+from throwcollect.errors import ConfigError
+from throwcollect.runtime.choice import choose
+from throwcollect.runtime.detached import start_launcher, wait_for_nodes
+from throwcollect.runtime.launcher import launch, place_of
+from throwcollect.runtime.ports import reserved_port
+from throwcollect.runtime.records import OpenRun, Record, Records, Run
+from throwcollect.runtime.runs import busy, left_in
 
 _MANY_TRIALS = 1000
 """From here on the plan takes long enough to be announced."""
 
-_POLL_S = 0.05
+
+@dataclass(frozen=True)
+class _Request:
+    """What the user asked for: the configuration, where its file lies, the directory of the dataset, and when."""
+
+    config: Config
+    sweep_directory: Path
+    directory: Path
+    started: datetime
 
 
-def collect(path: Path, *, overrides: Sequence[str], output: Path | None, json: bool) -> None:
-    """Collect a dataset and print its summary.
+def collect(path: Path, *, overrides: Sequence[str], output: Path | None, detach: bool, json: bool) -> None:
+    """Collect a dataset and print its summary or, detached, the id of the run.
 
     Raises:
         ConfigError: If the configuration, the sweep or the output directory cannot be used.
@@ -41,63 +50,120 @@ def collect(path: Path, *, overrides: Sequence[str], output: Path | None, json: 
         DatasetError: If the dataset cannot be written.
         Interrupted: If the user stopped the collection.
     """
-    started = time.monotonic()
+    started = datetime.now(timezone.utc)
     config = load(path, overrides)
     directory = output or Path("datasets") / f"{config.name}-{datetime.now():%Y%m%d-%H%M%S}"
-    with display(quiet=json) as shown:
-        runtime = LocalRuntime(directory, directory / "logs", config.run)
-        supervisor = Supervisor(runtime, config.run, simulations=config.run.simulations)
+    records = Records()
+    with display(quiet=json, bar=not detach) as shown:
+        left = left_in(records, directory)
+        if left is not None:
+            run, config = _taken_over(records, left, config)
+            shown.say(f"run {run.run}: its launcher had died; it goes on where its containers are")
+        else:
+            run = _prepared(records, _Request(config, path.parent, directory, started), shown)
+        if not detach:
+            with Interruptions() as interruptions:
+                summary = launch(run, config, onlooker=shown, interruptions=lambda: interruptions.count)
+    if detach:
+        _detach(records, run, json=json)
+    else:
+        print_summary(summary, None if run.record.volume else directory, as_json=json)
+
+
+def serve(run: str, lock: int) -> None:
+    """Launch a prepared run in this process, which outlives the one that prepared it.
+
+    Args:
+        run: Id of the run.
+        lock: Descriptor of its locked file, which this process has inherited.
+
+    Raises:
+        ConfigError: If its record or configuration cannot be read.
+        WorkerError: If nodes cannot be started or kept alive.
+        DatasetError: If the dataset cannot be written.
+        Interrupted: If somebody stopped the collection.
+    """
+    with display(quiet=True) as shown, Interruptions() as interruptions:
+        inherited = Records().inherited(run, lock)
+        config = load(Path(inherited.record.directory) / CONFIG)
+        launch(inherited, config, onlooker=shown, interruptions=lambda: interruptions.count)
+
+
+def _prepared(records: Records, request: _Request, shown: Display) -> OpenRun:
+    """A run that is ready to be launched; nothing is left behind if that fails."""
+    config = request.config
+    with ExitStack() as undo:
+        run = records.new(config.name)
+        undo.callback(run.forget)
+        reserved_port(config.run.router_port).close()
+        # Getting an image may take minutes, so all that may be wrong is found before; but where there is a volume, it
+        # is the runtime that decides where the dataset is.
+        volume = config.containers.volume
+        runtime = choose(config, say=shown.say) if volume else None
+        if runtime == "local":
+            volume = None
+        directory = run.directory / "data" if volume else request.directory
         if (config.trials or 0) >= _MANY_TRIALS:
             shown.say(f"plan: checking {config.trials} trials against limits and collisions, about 5 ms each")
-        plan = prepare(config, directory, sweep_directory=path.parent)
-        if config.run.runtime == "auto":
-            shown.say("runtime: local processes (auto)")
-        refused = sum(trial.refused is not None for trial in plan.trials)
-        note = f", {refused} refused by calculation (see `throwcollect plan`)" if refused else ""
-        shown.say(f"plan: {len(plan.trials)} trials{note}; dataset: {directory}")
-        with Interruptions() as interruptions, supervisor:
-            end = _follow(supervisor, config.run.domain_id, shown, interruptions)
-    if interruptions.count and (end is None or end.code != 0):
-        raise Interrupted(f"interrupted; finished throws are in {directory}, the dataset is not complete")
-    if end is not None and end.code != 0:
-        kind = DatasetError if end.code == DatasetError.exit_code else WorkerError
-        raise kind(f"the coordinator stopped: {end.reason}", evidence=end.log or None)
-    summary = {**info(directory).as_dict(), "wall_s": time.monotonic() - started}
-    _print_summary(summary, directory, as_json=json)
+        made = not directory.exists()
+        plan = prepare(config, directory, sweep_directory=request.sweep_directory)
+        undo.callback(_remove_plan, directory, made=made)
+        runtime = runtime or choose(config, say=shown.say)
+        record = Record(
+            run=run.run,
+            name=config.name,
+            runtime=runtime,
+            directory=str(directory.absolute()),
+            volume=volume,
+            logs=str((run.directory if volume else directory).absolute() / "logs"),
+            domain_id=config.run.domain_id,
+            started=request.started,
+            launcher=os.getpid(),
+            simulations=config.run.simulations,
+        )
+        # Finds what cannot be had of what the configuration asks for.
+        place_of(record, config).close()
+        run.write(record)
+        undo.pop_all()
+    refused = sum(trial.refused is not None for trial in plan.trials)
+    note = f", {refused} refused by calculation (see `throwcollect plan`)" if refused else ""
+    where = f"volume {volume}" if volume else directory
+    shown.say(f"plan: {len(plan.trials)} trials{note}; dataset: {where}")
+    return run
 
 
-def _follow(supervisor: Supervisor, domain_id: int, shown: Display, interruptions: Interruptions) -> NodeExit | None:
-    """Run until the coordinator ends; how it did, or None when it had to be ended by force."""
-
-    def report(progress: Progress) -> None:
-        shown.update(progress)
-        supervisor.replace(progress.hung)
-
-    supervisor.start()
-    os.environ.update(node_environment(supervisor.runtime.listen, domain_id))
-    end = listener = None
-    with ExitStack() as stack:
-        while end is None and not interruptions.count:
-            if listener is not None:
-                listener.spin(_POLL_S)
-            elif supervisor.router_answers():
-                listener = stack.enter_context(ProgressListener(report))
-            else:
-                time.sleep(_POLL_S)
-            end, news = supervisor.poll()
-            for line in news:
-                shown.warn(line)
-        if end is None:
-            shown.say("interrupted: finishing the running trials; once more ends at once")
-            end = supervisor.drain(hurry=lambda: interruptions.count > 1)
-        if listener is not None:
-            listener.spin(_POLL_S)
-    return end
+def _remove_plan(directory: Path, *, made: bool) -> None:
+    with suppress(OSError):
+        for name in (CONFIG, PLAN):
+            (directory / name).unlink()
+        if made:
+            directory.rmdir()
 
 
-def _print_summary(summary: dict[str, Any], directory: Path, *, as_json: bool) -> None:
-    if as_json:
-        typer.echo(json.dumps(summary, indent=2))
+def _taken_over(records: Records, left: Run, config: Config) -> tuple[OpenRun, Config]:
+    """A run whose launcher died, with its own configuration."""
+    record = left.record
+    own = load(Path(record.directory) / CONFIG)
+    if own.without_run() != config.without_run():
+        raise ConfigError(
+            f"{record.directory}: run {record.run} collects into it, with another configuration",
+            hint=f"throwcollect down --run {record.run} ends that run",
+        )
+    run = records.take(record.run)
+    if run is None:
+        raise busy(record)
+    return run, own
+
+
+def _detach(records: Records, run: OpenRun, *, json: bool) -> None:
+    """Hand the run over to a process of its own, and say how to follow it."""
+    record = run.record
+    with Interruptions() as interruptions:
+        process = start_launcher(run)
+        wait_for_nodes(records, record, process, interruptions=lambda: interruptions.count)
+    if json:
+        where = {"volume": record.volume} if record.volume else {"directory": record.directory}
+        typer.echo(jsonlib.dumps({"run": record.run, **where}, indent=2))
         return
-    sys.stdout.write(describe(summary))
-    typer.echo(f"look into it: throwcollect dataset info {directory}   (or open the .mcap files in Foxglove)")
+    typer.echo(record.run)
+    typer.echo(f"follow it: throwcollect wait --run {record.run}   (or ps, logs -f, stop)", err=True)

@@ -76,16 +76,23 @@ class Progress:
 class ProgressListener:
     """A node of its own that hears the coordinator's progress; use it as a context manager.
 
+    Attributes:
+        node: The node.
+
     Args:
         on_progress: Called with every report, within `spin`.
+        name: Name of the node.
+
+    Raises:
+        ThrowcollectError: If there is no router.
     """
 
-    def __init__(self, on_progress: Callable[[Progress], None]) -> None:
+    def __init__(self, on_progress: Callable[[Progress], None], *, name: str = "progress_listener") -> None:
         ros.init()
-        self._node = ros.Node("progress_listener")
+        self.node = ros.Node(name)
         self._executor = ros.SingleThreadedExecutor()
-        self._executor.add_node(self._node)
-        self._node.create_subscription(
+        self._executor.add_node(self.node)
+        self.node.create_subscription(
             String, PROGRESS_TOPIC, lambda message: on_progress(Progress(**json.loads(message.data))), PROGRESS_QOS
         )
 
@@ -95,7 +102,7 @@ class ProgressListener:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._node.destroy_node()
+        self.node.destroy_node()
         ros.shutdown()
 
     def spin(self, seconds: float) -> None:

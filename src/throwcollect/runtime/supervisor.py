@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import Literal
 
-from throwcollect.config.schema import RunConfig
+from throwcollect.config.run import RunConfig
 from throwcollect.errors import WorkerError
 from throwcollect.runtime.nodes import COORDINATOR, ROUTER, NodeExit, Runtime, simulation_name
 
@@ -107,6 +107,8 @@ class Supervisor:
                 memory.pop(name, None)
             self._ready.discard(name)
         self.runtime.stop(removed)
+        if not self._ready:
+            self._start_deadline = time.monotonic() + self._run.start_timeout_s
         for name in added:
             self._start(name)
 

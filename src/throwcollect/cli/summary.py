@@ -1,0 +1,29 @@
+"""What is printed of a finished collection."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import typer
+
+from throwcollect.cli.dataset import describe
+
+
+def print_summary(summary: Mapping[str, Any], directory: Path | None, *, as_json: bool) -> None:
+    """Print the summary of a dataset.
+
+    Args:
+        summary: What `dataset info` says, and ``wall_s`` [s].
+        directory: Directory of the dataset; None if it is in a volume.
+        as_json: Whether to print one JSON document.
+    """
+    if as_json:
+        typer.echo(json.dumps(summary, indent=2))
+        return
+    sys.stdout.write(describe(summary))
+    if directory is not None:
+        typer.echo(f"look into it: throwcollect dataset info {directory}   (or open the .mcap files in Foxglove)")

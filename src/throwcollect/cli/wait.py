@@ -1,0 +1,46 @@
+"""`throwcollect wait`: a run followed from any terminal."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from throwcollect.cli.interruptions import Interruptions
+from throwcollect.cli.summary import print_summary
+from throwcollect.cli.terminal import display
+from throwcollect.errors import Interrupted
+from throwcollect.runtime.events import EVENTS, parse
+from throwcollect.runtime.listening import follow
+from throwcollect.runtime.logs import Tail
+from throwcollect.runtime.records import Records
+from throwcollect.runtime.runs import died, failure, find
+
+
+def wait_for(named: str | None, *, json: bool) -> None:
+    """Show the progress of a run until it ends, and then its summary.
+
+    Raises:
+        ThrowcollectError: What the run ended with.
+        ConfigError: If there is no such run.
+        WorkerError: If its launcher died.
+        Interrupted: If the user leaves; the run goes on.
+    """
+    records = Records()
+    run = find(records, named, ended=True)
+    events = Tail(Path(run.record.logs) / EVENTS)
+    events.skip()
+    with display(quiet=json) as shown, Interruptions() as interruptions:
+        looks = follow(records, run.record.run, on_progress=shown.update, keep_on=lambda: not interruptions.count)
+        for look in looks:
+            run = look
+            for event in filter(None, map(parse, events.lines())):
+                if event.alarming:
+                    shown.warn(str(event))
+    record = run.record
+    if run.status == "running":
+        raise Interrupted(f"left; run {record.run} goes on", hint=f"throwcollect wait --run {record.run}")
+    if run.status == "died":
+        raise died(record)
+    error = failure(record)
+    if error is not None:
+        raise error
+    print_summary(record.summary or {}, None if record.volume else Path(record.directory), as_json=json)

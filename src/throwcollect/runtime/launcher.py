@@ -1,0 +1,255 @@
+"""The launcher of a run: keeps its nodes alive, remembers what happens, and obeys those who ask over ROS 2.
+
+It is the node ``/launcher``; setting its integer parameter ``simulations`` scales the run.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Mapping
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol, Union
+
+from throwcollect import ros
+from throwcollect.config.schema import Config
+from throwcollect.coordinator.progress import Progress
+from throwcollect.dataset.inspect import info
+from throwcollect.errors import ConfigError, DatasetError, Interrupted, ThrowcollectError, WorkerError
+from throwcollect.runtime.events import EventLog, RunEvent
+from throwcollect.runtime.listening import Listening
+from throwcollect.runtime.local import LocalRuntime
+from throwcollect.runtime.nodes import LAUNCHER, NodeExit
+from throwcollect.runtime.records import OpenRun, Record
+from throwcollect.runtime.scaling import offer_scaling
+from throwcollect.runtime.supervisor import NodeState, Supervisor
+
+if TYPE_CHECKING:
+    from throwcollect.runtime.docker import DockerRuntime
+
+Place = Union[LocalRuntime, "DockerRuntime"]
+"""Where the nodes of a run live."""
+
+_POLL_S = 0.05
+_WRITE_PROGRESS_S = 1.0
+
+
+class Onlooker(Protocol):
+    """Is told what goes on."""
+
+    def update(self, progress: Progress) -> None:
+        """A progress report of the coordinator."""
+
+    def say(self, line: str) -> None:
+        """Something that is good to know."""
+
+    def warn(self, line: str) -> None:
+        """Something that went wrong."""
+
+
+def place_of(record: Record, config: Config) -> Place:
+    """The place where the nodes of a run are to live, or live already.
+
+    Raises:
+        ConfigError: If the router's port is taken, or something that the configuration asks for is not there.
+        WorkerError: If there is no such place on this machine.
+    """
+    if record.runtime == "local":
+        return LocalRuntime(Path(record.directory), Path(record.logs), config.run)
+    from throwcollect.runtime.docker import DockerRuntime
+
+    directory = None if record.volume else Path(record.directory)
+    return DockerRuntime(record.run, config, directory=directory, logs=Path(record.logs))
+
+
+def launch(
+    run: OpenRun,
+    config: Config,
+    *,
+    onlooker: Onlooker,
+    interruptions: Callable[[], int],
+) -> Mapping[str, Any]:
+    """Run a prepared collection until its coordinator ends, or go on with one whose launcher died.
+
+    Args:
+        run: The run, with a record; its end is written there, and the run is let go of.
+        config: Configuration of the collection.
+        onlooker: Is told what goes on.
+        interruptions: How often the user has asked to stop: at first running trials are finished, then no more.
+
+    Returns:
+        What the dataset holds, and ``wall_s``: the time since the run was started [s].
+
+    Raises:
+        ConfigError: If the configuration cannot be used after all.
+        WorkerError: If nodes cannot be started or kept alive.
+        DatasetError: If the dataset cannot be written.
+        Interrupted: If the user stopped the collection.
+    """
+    notes = _Notes(run, onlooker)
+    code, message, summary = 1, "internal error", None
+    try:
+        summary = _Launcher(run, config, notes, onlooker, interruptions).run_to_the_end()
+        code, message = 0, ""
+        return summary
+    except ThrowcollectError as error:
+        code, message = error.exit_code, str(error)
+        raise
+    finally:
+        notes.end(code, message, summary)
+        run.close()
+
+
+class _Notes:
+    """Writes down what happens in a run; where that is impossible, the run itself may still go on."""
+
+    def __init__(self, run: OpenRun, onlooker: Onlooker) -> None:
+        self._run = run
+        self._onlooker = onlooker
+        self._events = EventLog(Path(run.record.logs), run.run)
+        self._states: list[NodeState] = []
+        self._progress: Progress | None = None
+        self._written_at = 0.0
+        self._failed = False
+
+    def progress(self, progress: Progress) -> None:
+        """A progress report of the coordinator, to be written with what comes next."""
+        self._progress = progress
+
+    def event(self, event: RunEvent, **details: Any) -> None:
+        """Something that happened to the run."""
+        self._write(lambda: self._events.run_event(event, **details))
+
+    def known(self, states: list[NodeState]) -> None:
+        """Nodes of which a launcher before this one has written."""
+        self._states = states
+
+    def nodes(self, states: list[NodeState], *, endpoint: str | None, simulations: int) -> None:
+        """How the nodes are by now."""
+        if states != self._states:
+            before, self._states = self._states, states
+            self._write(lambda: self._events.node_events(before, states))
+        trials = {}
+        if time.monotonic() >= self._written_at + _WRITE_PROGRESS_S:
+            self._written_at = time.monotonic()
+            trials = self._trials()
+        self._write(lambda: self._run.update(nodes=tuple(states), endpoint=endpoint, simulations=simulations, **trials))
+
+    def end(self, code: int, message: str, summary: dict[str, Any] | None) -> None:
+        """How the run ended, last of all."""
+        event: RunEvent = "failed"
+        if code in (0, Interrupted.exit_code):
+            event = "stopped" if code else "finished"
+        self.event(event, reason=message or None, exit_code=code)
+        end = {"ended": datetime.now(timezone.utc), "exit_code": code, "message": message, "summary": summary}
+        self._write(lambda: self._run.update(nodes=(), endpoint=None, **end, **self._trials()))
+
+    def _trials(self) -> dict[str, int]:
+        progress = self._progress
+        return {} if progress is None else {"trials": progress.total, "trials_ended": progress.ended}
+
+    def _write(self, write: Callable[[], None]) -> None:
+        try:
+            write()
+        except (OSError, ConfigError) as error:
+            if not self._failed:
+                self._failed = True
+                reason = error.message if isinstance(error, ConfigError) else str(error)
+                self._onlooker.warn(f"what happens in this run is not written down any more: {reason}")
+
+
+class _Launcher:
+    """What `launch` does until the nodes have ended."""
+
+    def __init__(
+        self, run: OpenRun, config: Config, notes: _Notes, onlooker: Onlooker, interruptions: Callable[[], int]
+    ) -> None:
+        self._run = run
+        self._notes = notes
+        self._onlooker = onlooker
+        self._interruptions = interruptions
+        self._simulations = self._wanted = run.record.simulations
+        self._place = place_of(run.record, config)
+        self._supervisor = Supervisor(self._place, config.run, simulations=self._simulations)
+        self._listening = Listening(
+            self._report, domain_id=run.record.domain_id, name=LAUNCHER, on_connect=self._offer_scaling
+        )
+
+    def run_to_the_end(self) -> dict[str, Any]:
+        self._run.update(launcher=os.getpid(), nodes=(), endpoint=None)
+        with self._supervisor, self._listening:
+            found = self._open()
+            self._notes.event("adopted" if found else "started", simulations=self._simulations)
+            self._supervisor.start(found=found)
+            self._notes.known([state for state in self._supervisor.states() if state.name in found])
+            self._check(self._follow())
+            whole = self._summary()
+        wall_s = (datetime.now(timezone.utc) - self._run.record.started).total_seconds()
+        # Somebody may have set the clock back.
+        return {**whole, "wall_s": max(wall_s, _POLL_S)}
+
+    def _open(self) -> tuple[str, ...]:
+        """Make what the nodes need; names of those that a launcher before this one has left."""
+        if isinstance(self._place, LocalRuntime):
+            return ()
+        self._place.open()
+        found = self._place.found()
+        record = self._run.record
+        if record.volume is not None and not found:
+            self._place.place(Path(record.directory))
+        return found
+
+    def _follow(self) -> NodeExit | None:
+        """How the coordinator ended; None when it had to be ended by force."""
+        end = None
+        while end is None and not self._interruptions():
+            self._listen()
+            if self._wanted != self._simulations:
+                self._simulations = self._wanted
+                self._notes.event("scaled", simulations=self._simulations)
+                self._supervisor.scale(self._simulations)
+            end, news = self._supervisor.poll()
+            for line in news:
+                self._onlooker.warn(line)
+            states = self._supervisor.states()
+            self._notes.nodes(states, endpoint=self._endpoint(), simulations=self._simulations)
+        if end is None:
+            self._notes.event("stopping")
+            self._onlooker.say("interrupted: finishing the running trials; once more ends at once")
+            end = self._supervisor.drain(hurry=lambda: self._interruptions() > 1)
+        self._listen()
+        return end
+
+    def _check(self, end: NodeExit | None) -> None:
+        if self._interruptions() and (end is None or end.code != 0):
+            dataset = self._run.record.dataset
+            raise Interrupted(f"interrupted; finished throws are in {dataset}, the dataset is not complete")
+        if end is not None and end.code != 0:
+            kind = DatasetError if end.code == DatasetError.exit_code else WorkerError
+            raise kind(f"the coordinator stopped: {end.reason}", evidence=end.log or None)
+
+    def _summary(self) -> dict[str, Any]:
+        record = self._run.record
+        if record.volume is not None and not isinstance(self._place, LocalRuntime):
+            return self._place.info()
+        return info(Path(record.directory)).as_dict()
+
+    def _listen(self) -> None:
+        self._listening.spin(self._endpoint(), _POLL_S)
+
+    def _endpoint(self) -> str | None:
+        address = self._place.router_address()
+        return f"tcp/{address[0]}:{address[1]}" if address is not None else None
+
+    def _report(self, progress: Progress) -> None:
+        self._notes.progress(progress)
+        self._onlooker.update(progress)
+        self._supervisor.replace(progress.hung)
+
+    def _offer_scaling(self, node: ros.Node) -> None:
+        offer_scaling(node, self._simulations, self._want)
+
+    def _want(self, simulations: int) -> None:
+        # Not done here: whoever asks shall not have to wait for nodes that are slow to end.
+        self._wanted = simulations

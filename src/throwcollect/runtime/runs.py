@@ -1,0 +1,151 @@
+"""Which run is meant, what it ended with, and what a Docker engine knows of runs."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from throwcollect.dataset.directory import CONFIG
+from throwcollect.errors import ConfigError, DatasetError, Interrupted, ThrowcollectError, WorkerError
+from throwcollect.runtime.nodes import COORDINATOR
+from throwcollect.runtime.records import Record, Records, Run
+
+if TYPE_CHECKING:
+    from throwcollect.runtime.docker_runs import FoundRun
+
+_ENGINE_S = 2.0
+_SOCKET = "/var/run/docker.sock"
+
+
+def find(records: Records, named: str | None, *, ended: bool = False) -> Run:
+    """The run that a user means.
+
+    Args:
+        records: All runs.
+        named: Id, unique beginning of one, or directory of the dataset; None for the only one that lives.
+        ended: Whether, if none lives, the latest that has ended is meant.
+
+    Raises:
+        ConfigError: If there is no such run, or more than one.
+    """
+    if named is not None:
+        return records.get(id_of(records, named))
+    runs = records.all()
+    living = [run for run in runs if run.status == "running"]
+    if len(living) == 1:
+        return living[0]
+    if living:
+        raise ConfigError(f"{len(living)} runs live", expected=_listed(living), hint="name one of them with --run")
+    if ended and runs:
+        return runs[-1]
+    over = f"; of those that are over, there is {_listed(runs)}" if runs else ""
+    raise ConfigError(f"no run lives{over}", hint="throwcollect up -d starts one" if not runs else "name it with --run")
+
+
+def id_of(records: Records, named: str) -> str:
+    """Id of the run that a user names by its id, a unique beginning of that, or the directory of the dataset.
+
+    Raises:
+        ConfigError: If there is no such run, or more than one.
+    """
+    ids = records.ids()
+    if named in ids:
+        return named
+    if into := _into(records, Path(named)):
+        return into[0].record.run
+    alike = [run for run in ids if run.startswith(named)]
+    if len(alike) == 1:
+        return alike[0]
+    if alike:
+        raise ConfigError(f"{len(alike)} runs begin with {named!r}", expected=f"one of {', '.join(alike)}")
+    raise ConfigError(f"no run {named!r}", expected=f"one of {', '.join(ids)}" if ids else None)
+
+
+def _listed(runs: Sequence[Run]) -> str:
+    return ", ".join(run.record.run for run in runs)
+
+
+def left_in(records: Records, directory: Path) -> Run | None:
+    """The run whose launcher died while its nodes live on, and collect into a directory.
+
+    Args:
+        records: All runs.
+        directory: Directory of a dataset.
+
+    Raises:
+        ConfigError: If a run whose launcher lives collects into it.
+    """
+    for run in _into(records, directory):
+        if run.status == "running":
+            raise busy(run.record)
+        if run.status == "died" and run.record.runtime == "docker":
+            nodes = {node.name for found in on_engine() if found.run_id == run.record.run for node in found.nodes}
+            # Its memory cannot be had back: without it there is nothing to go on with.
+            if COORDINATOR in nodes:
+                return run
+    return None
+
+
+def _into(records: Records, directory: Path) -> list[Run]:
+    """Runs that collect, or have collected, into a directory; the latest first."""
+    path = str(directory.absolute())
+    return [run for run in reversed(records.all()) if run.record.volume is None and run.record.directory == path]
+
+
+def busy(record: Record) -> ConfigError:
+    """The error that says that a run collects into a directory."""
+    return ConfigError(
+        f"{record.directory}: run {record.run} collects into it",
+        hint=f"throwcollect wait --run {record.run} follows it",
+    )
+
+
+def failure(record: Record) -> ThrowcollectError | None:
+    """The error that an ended run ended with; None if it finished its dataset."""
+    if record.exit_code == 0:
+        return None
+    kinds = (ConfigError, WorkerError, DatasetError, Interrupted)
+    kind = next((each for each in kinds if each.exit_code == record.exit_code), ThrowcollectError)
+    return kind(record.message)
+
+
+def died(record: Record) -> WorkerError:
+    """The error that says that the launcher of a run died before the run ended."""
+    hint = f"throwcollect down --run {record.run} cleans up"
+    if record.runtime == "docker" and record.volume is None:
+        again = f"throwcollect up {record.directory}/{CONFIG} --output {record.directory}"
+        hint = f"{again} goes on where its containers are; {hint}"
+    return WorkerError(
+        f"run {record.run}: its launcher died; finished throws are in {record.dataset}",
+        evidence=f"the logs are in {record.logs}",
+        hint=hint,
+    )
+
+
+def living(run: Run) -> Record:
+    """The record of a run that lives.
+
+    Raises:
+        ConfigError: If it has ended.
+        WorkerError: If its launcher died.
+    """
+    if run.status == "died":
+        raise died(run.record)
+    if run.status == "ended":
+        raise ConfigError(f"run {run.record.run} has ended", hint="throwcollect ps lists those that live")
+    return run.record
+
+
+def on_engine() -> list[FoundRun]:
+    """Runs of which a Docker engine holds something; none if there is no engine that answers quickly."""
+    if "DOCKER_HOST" not in os.environ and not Path(_SOCKET).exists():
+        return []
+    from throwcollect.runtime.docker_engine import connect
+    from throwcollect.runtime.docker_runs import runs
+
+    try:
+        return runs(connect(timeout_s=_ENGINE_S))
+    except WorkerError:
+        return []

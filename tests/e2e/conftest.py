@@ -1,0 +1,14 @@
+"""Runs of tests are remembered apart from those of the user."""
+
+from collections.abc import Iterator
+
+import pytest
+
+from throwcollect.runtime.records import STATE_VARIABLE
+
+
+@pytest.fixture(scope="session", autouse=True)
+def state(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv(STATE_VARIABLE, str(tmp_path_factory.mktemp("state")))
+        yield

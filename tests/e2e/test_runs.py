@@ -1,0 +1,416 @@
+"""Runs that outlive the terminal in which they were started."""
+
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import Any
+
+import psutil
+import pytest
+
+from tests.e2e.collection import call, collect, command, fingerprints, start, write_config
+from throwcollect.cli.main import main
+from throwcollect.runtime.records import STATE_VARIABLE, Record, Records
+
+pytestmark = pytest.mark.e2e
+TRIALS = 40
+SLOWLY = ("--set", "sim.real_time_factor=2")
+"""Long enough to look at it."""
+
+Say = Callable[..., tuple[object, str, str]]
+
+
+@pytest.fixture(scope="module")
+def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_config(tmp_path_factory.mktemp("config"), trials=TRIALS)
+
+
+@pytest.fixture(scope="module")
+def reference(config: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A collection that nobody disturbed."""
+    directory = tmp_path_factory.mktemp("reference") / "data"
+    collect(config, directory, 2)
+    return directory
+
+
+@pytest.fixture(autouse=True)
+def records(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Records]:
+    """Where the runs of one test are remembered; whatever it leaves running is ended."""
+    monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "state"))
+    # Runs of others on an engine of this machine are none of these tests' business.
+    monkeypatch.setenv("DOCKER_HOST", f"unix://{tmp_path}/none.sock")
+    records = Records()
+    yield records
+    for run in records.all():
+        if run.lives:
+            os.kill(run.record.launcher, signal.SIGKILL)
+
+
+@pytest.fixture
+def say(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Iterator[Say]:
+    """The command, called in this process: exit code, output, errors."""
+    before = signal.getsignal(signal.SIGTERM)
+
+    def say(*arguments: str | Path) -> tuple[object, str, str]:
+        monkeypatch.setattr(sys, "argv", ["throwcollect", *map(str, arguments)])
+        try:
+            main()
+        except SystemExit as end:
+            return (end.code, *capfd.readouterr())
+        raise AssertionError("the command did not exit")
+
+    yield say
+    signal.signal(signal.SIGTERM, before)
+
+
+def detach(config: Path, directory: Path, *options: str) -> str:
+    """A run by itself; its id."""
+    said = call("up", "-d", config, "--output", directory, *options)
+    assert said.returncode == 0, said.stderr
+    return said.stdout.strip()
+
+
+def listed(*options: str) -> list[dict[str, Any]]:
+    said = call("ps", "--json", *options)
+    assert (said.returncode, said.stderr) == (0, "")
+    documents: list[dict[str, Any]] = json.loads(said.stdout)
+    return documents
+
+
+def until(condition: Callable[[], bool], *, seconds: float = 60) -> None:
+    deadline = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < deadline, "did not happen"
+        time.sleep(0.05)
+
+
+def in_the_middle(records: Records, run: str, ended: int = 5) -> None:
+    until(lambda: records.get(run).record.trials_ended >= ended)
+
+
+def nodes(records: Records, run: str) -> dict[str, psutil.Process]:
+    return {node.name: psutil.Process(int(node.handle)) for node in records.get(run).record.nodes if node.handle}
+
+
+def status(records: Records, run: str, name: str) -> str | None:
+    return next((node.status for node in records.get(run).record.nodes if node.name == name), None)
+
+
+def handle(records: Records, run: str, name: str) -> str:
+    return next(node.handle or "" for node in records.get(run).record.nodes if node.name == name)
+
+
+def assert_gone(processes: dict[str, psutil.Process]) -> None:
+    _, alive = psutil.wait_procs(list(processes.values()), timeout=10)
+    assert alive == []
+
+
+def test_a_run_goes_on_by_itself_and_is_waited_for_elsewhere(
+    config: Path, reference: Path, records: Records, tmp_path: Path
+) -> None:
+    said = call("up", "-d", config, "--output", tmp_path / "data")
+    run = said.stdout.strip()
+    assert re.fullmatch(r"small-[0-9a-f]{4}", run)
+    assert f"follow it: throwcollect wait --run {run}" in said.stderr
+    record = records.get(run).record
+    # It belongs to no terminal's session, so that nothing ends it when one is closed.
+    assert os.getsid(record.launcher) == record.launcher
+    assert [node.name for node in record.nodes] == ["router", "sim_0", "sim_1", "coordinator"]
+    waited = call("wait")
+    assert waited.returncode == 0, waited.stderr
+    assert f"{TRIALS}/{TRIALS} throws: {TRIALS} landed, 0 failed" in waited.stderr
+    info = call("dataset", "info", tmp_path / "data").stdout
+    assert waited.stdout.startswith(info)
+    assert "look into it: throwcollect dataset info" in waited.stdout
+    assert fingerprints(tmp_path / "data") == fingerprints(reference)
+    assert listed() == []
+    (ended,) = listed("-a")
+    assert (ended["run"], ended["status"], ended["exit_code"], ended["trials_ended"]) == (run, "ended", 0, TRIALS)
+    # Whoever comes late gets the same answer.
+    again = call("wait", "--run", tmp_path / "data", "--json")
+    assert (again.returncode, again.stderr) == (0, "")
+    assert (
+        json.loads(again.stdout).items()
+        >= json.loads(call("dataset", "info", tmp_path / "data", "--json").stdout).items()
+    )
+
+
+def test_scaling_and_losses_do_not_change_the_dataset(config: Path, records: Records, tmp_path: Path) -> None:
+    few = ("--trials", "24", *SLOWLY)
+    undisturbed = start(config, tmp_path / "reference", 2, *few)
+    assert undisturbed.finish()[0] == 0
+    run = detach(config, tmp_path / "data", "-n", "1", *few)
+    assert call("scale", "3").stdout == f"{run}: 1 -> 3 simulations\n"
+    until(lambda: status(records, run, "sim_2") == "running")
+    assert records.get(run).record.simulations == 3
+    first = handle(records, run, "sim_0")
+    os.kill(int(first), signal.SIGKILL)
+    until(lambda: handle(records, run, "sim_0") not in ("", first))
+    removed = nodes(records, run)["sim_2"]
+    assert call("scale", "2", "--run", run[:7]).returncode == 0
+    assert_gone({"sim_2": removed})
+    assert call("wait").returncode == 0
+    assert fingerprints(tmp_path / "data") == fingerprints(tmp_path / "reference")
+    told = [re.sub(r": \d+$", "", line.split("  ", 1)[1]) for line in call("events").stdout.splitlines()]
+    for line in (
+        f"{run} scaled: 3 simulations",
+        "sim_0 lost: ended by SIGKILL",
+        "sim_0 restarting",
+        f"{run} scaled: 2 simulations",
+        "sim_2 removed",
+        f"{run} finished",
+    ):
+        assert told.count(line) == 1, told
+    assert told.count("sim_0 started") == 2
+    assert told.index("sim_2 ready") < told.index("sim_2 removed")
+
+
+def test_stopping_drains_as_ctrl_c_does(config: Path, records: Records, say: Say, tmp_path: Path) -> None:
+    run = detach(config, tmp_path / "data", "-n", "1", *SLOWLY)
+    in_the_middle(records, run)
+    processes = nodes(records, run)
+    stopped = call("stop")
+    assert (stopped.returncode, stopped.stdout) == (
+        0,
+        f"{run}: stopped; the dataset is not complete: {tmp_path / 'data'}\n",
+    )
+    assert_gone(processes)
+    assert (tmp_path / "data" / "small_00000.mcap.part").exists()
+    ending = f"throwcollect: interrupted; finished throws are in {tmp_path / 'data'}, the dataset is not complete\n"
+    assert say("wait") == (130, "", ending)
+    hint = "  try: throwcollect ps lists those that live\n"
+    assert say("stop", "--run", run) == (2, "", f"throwcollect: run {run} has ended\n{hint}")
+
+
+def test_down_ends_everything_and_keeps_the_directory(config: Path, records: Records, tmp_path: Path) -> None:
+    run = detach(config, tmp_path / "data", "-n", "1", *SLOWLY)
+    in_the_middle(records, run)
+    processes = nodes(records, run)
+    said = call("down", "-v")
+    assert (said.returncode, said.stdout) == (0, f"{run}: ended and forgotten\n")
+    assert_gone(processes)
+    assert listed("-a") == []
+    assert list((tmp_path / "state" / "runs").iterdir()) == []
+    assert (tmp_path / "data" / "small_00000.mcap.part").stat().st_size > 0
+
+
+def test_a_killed_launcher_takes_its_processes_along_and_is_told(
+    config: Path, records: Records, say: Say, tmp_path: Path
+) -> None:
+    run = detach(config, tmp_path / "data", "-n", "1", *SLOWLY)
+    in_the_middle(records, run, 1)
+    processes = nodes(records, run)
+    os.kill(records.get(run).record.launcher, signal.SIGKILL)
+    assert_gone(processes)
+    code, table, _ = say("ps")
+    assert code == 0
+    assert re.search(rf"^{run} +local +1 +\d+/{TRIALS} +died +{tmp_path / 'data'}$", table, flags=re.MULTILINE)
+    for verb in (["wait"], ["stop", "--run", run], ["scale", "3", "--run", run]):
+        code, out, err = say(*verb)
+        assert (verb, code, out) == (verb, 3, "")
+        assert f"throwcollect: run {run}: its launcher died; finished throws are in {tmp_path / 'data'}" in err
+        assert f"try: throwcollect down --run {run} cleans up" in err
+    code, _, err = say("up", config, "--output", tmp_path / "data")
+    assert (code, f"{tmp_path / 'data'}: holds config.yaml, logs, plan.parquet" in err) == (2, True)
+    assert say("down") == (0, f"{run}: ended and forgotten\n", "")
+    assert records.ids() == []
+
+
+def test_a_run_in_the_foreground_is_a_run_like_any_other(config: Path, records: Records, tmp_path: Path) -> None:
+    running = start(config, tmp_path / "data", 2, *SLOWLY)
+    running.wait_until(lambda: bool(records.ids()))
+    (run,) = records.ids()
+    in_the_middle(records, run)
+    second = call("up", config, "--output", tmp_path / "data")
+    assert (second.returncode, second.stdout) == (2, "")
+    assert second.stderr == (
+        f"throwcollect: {tmp_path / 'data'}: run {run} collects into it\n"
+        f"  try: throwcollect wait --run {run} follows it\n"
+    )
+    table = call("ps").stdout.splitlines()
+    assert table[0].split() == ["RUN", "RUNTIME", "SIMULATIONS", "THROWS", "STATUS", "DATASET"]
+    assert [line.split()[:2] for line in table[1:]] == [
+        [run, "local"],
+        ["router", "running"],
+        ["sim_0", "running"],
+        ["sim_1", "running"],
+        ["coordinator", "running"],
+    ]
+    assert call("stop").returncode == 0
+    code, out, err = running.finish()
+    assert (code, out) == (130, "")
+    assert "interrupted: finishing the running trials; once more ends at once" in err
+
+
+def test_a_run_whose_record_cannot_be_written_goes_on(config: Path, records: Records, tmp_path: Path) -> None:
+    running = start(config, tmp_path / "data", 1, "--trials", "4")
+    running.wait_until(lambda: bool(records.ids()))
+    shutil.rmtree(tmp_path / "state" / "runs")
+    code, _, err = running.finish()
+    assert code == 0, err
+    assert err.count("what happens in this run is not written down any more: ") == 1
+    (tmp_path / "state" / "runs").mkdir()
+
+
+def test_ctrl_c_leaves_a_run_that_is_only_watched(config: Path, records: Records, tmp_path: Path) -> None:
+    run = detach(config, tmp_path / "data", "-n", "1", *SLOWLY)
+    watchers = [
+        subprocess.Popen(command("wait"), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) for _ in range(2)
+    ]
+    for watcher in watchers:
+        assert watcher.stderr is not None
+        assert f"/{TRIALS} throws: " in watcher.stderr.readline()
+    for watcher in watchers:
+        watcher.send_signal(signal.SIGINT)
+    for watcher in watchers:
+        out, err = watcher.communicate(timeout=30)
+        assert (watcher.returncode, out) == (130, "")
+        assert f"throwcollect: left; run {run} goes on\n  try: throwcollect wait --run {run}\n" in err
+    assert records.get(run).status == "running"
+
+
+def test_logs_follow_a_run_to_its_end(config: Path, records: Records, tmp_path: Path) -> None:
+    run = detach(config, tmp_path / "data", "--trials", "12")
+    following = subprocess.Popen(command("logs", "-f"), stdout=subprocess.PIPE, text=True)
+    documents = subprocess.Popen(command("events", "-f", "--json"), stdout=subprocess.PIPE, text=True)
+    out, _ = following.communicate(timeout=120)
+    assert records.get(run).status == "ended"
+    lines = out.splitlines()
+    assert {line.split(" | ")[0].rstrip() for line in lines} == {"router", "coordinator", "sim_0", "sim_1"}
+    assert "sim_1       | sim_1 is ready" in lines
+    assert any(line.startswith("coordinator | 12/12 throws: 12 landed") for line in lines)
+    assert sorted(call("logs", "--run", run).stdout.splitlines()) == sorted(lines)
+    only = call("logs", "sim_1").stdout.splitlines()
+    assert only == [line for line in lines if line.startswith("sim_1 ")]
+    unknown = call("logs", "sim_7")
+    assert unknown.returncode == 2
+    assert f"throwcollect: run {run}: no node 'sim_7' has printed anything" in unknown.stderr
+    events = [json.loads(line) for line in documents.communicate(timeout=30)[0].splitlines()]
+    assert {event["run"] for event in events} == {run}
+    assert [event["event"] for event in events if "node" not in event] == ["started", "finished"]
+    assert (tmp_path / "data" / "logs" / "launcher.log").read_text() == ""
+
+
+def test_mistakes_are_seen_in_the_foreground_and_leave_nothing_behind(
+    config: Path, say: Say, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "used").mkdir()
+    (tmp_path / "used" / "notes.txt").write_text("mine")
+    for arguments, message in (
+        (["none.yaml"], "none.yaml: no such file"),
+        ([config, "--output", "used"], "used: holds notes.txt"),
+        ([config, "--set", "sweep.parameters.task.duration_s={min: 0.2, max: 0.2}"], "are refused"),
+    ):
+        code, out, err = say("up", "-d", *arguments)
+        assert (code, out) == (2, "")
+        assert message in err
+    assert list((tmp_path / "state" / "runs").iterdir()) == []
+    assert not (tmp_path / "datasets").exists()
+
+
+def test_a_launcher_that_cannot_start_its_nodes_is_told_by_the_command_that_started_it(
+    config: Path, records: Records, tmp_path: Path
+) -> None:
+    # A log that is a directory cannot be written.
+    site = tmp_path / "site"
+    site.mkdir()
+    (site / "sitecustomize.py").write_text(
+        "import sys\nif 'launch' in sys.argv:\n    import pathlib\n"
+        f"    pathlib.Path({str(tmp_path / 'data')!r}, 'logs', 'router.log').mkdir(parents=True, exist_ok=True)\n"
+    )
+    said = subprocess.run(
+        command("up", "-d", config, "--output", tmp_path / "data"),
+        env={**os.environ, "PYTHONPATH": str(site)},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert (said.returncode, said.stdout) == (3, "")
+    assert "throwcollect: router: cannot be started: [Errno 21] Is a directory" in said.stderr
+    (run,) = records.all()
+    assert (run.status, run.record.exit_code) == ("ended", 3)
+
+
+def test_a_failure_is_told_to_whoever_waits(config: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "pybullet.py").write_text("raise ImportError('broken pybullet')")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    detach(config, tmp_path / "data", "--set", "run.restarts=0")
+    waited = call("wait")
+    assert (waited.returncode, waited.stdout) == (3, "")
+    assert "throwcollect: no simulation can be kept alive; the last, sim_" in waited.stderr
+    assert "broken pybullet" in waited.stderr
+
+
+def test_ctrl_c_while_a_run_is_being_started_ends_it(config: Path, records: Records, tmp_path: Path) -> None:
+    starting = subprocess.Popen(
+        command("up", "-d", config, "--output", tmp_path / "data"),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    log = tmp_path / "data" / "logs" / "launcher.log"
+    until(log.exists)
+    starting.send_signal(signal.SIGINT)
+    out, err = starting.communicate(timeout=60)
+    assert (starting.returncode, out) == (130, "")
+    assert "throwcollect: interrupted" in err
+    assert [run.status for run in records.all() if run.lives] == []
+
+
+def test_among_several_runs_one_must_be_named(records: Records, say: Say, tmp_path: Path) -> None:
+    started = datetime.now(timezone.utc)
+    runs = [records.new(name) for name in ("first", "second")]
+    for run in runs:
+        run.write(Record(run.run, run.run, "local", "/data", None, "/data/logs", 0, started, os.getpid(), 2))
+    for verb in (["wait"], ["stop"], ["scale", "2"], ["down"], ["logs"], ["events"]):
+        code, out, err = say(*verb)
+        assert (verb, code, out) == (verb, 2, "")
+        assert all(run.run in err for run in runs)
+        assert "name one of them with --run" in err
+    for run in runs:
+        run.close()
+
+
+def test_without_any_run_every_verb_says_so(say: Say) -> None:
+    for verb in (["wait"], ["stop"], ["scale", "2"], ["down"], ["logs"], ["events"]):
+        code, out, err = say(*verb)
+        assert (verb, code, out) == (verb, 2, "")
+        assert err.startswith("throwcollect: no run lives")
+        assert say(*verb, "--run", "none") == (2, "", "throwcollect: no run 'none'\n")
+    code, out, _ = say("ps")
+    assert (code, out.split()) == (0, ["RUN", "RUNTIME", "SIMULATIONS", "THROWS", "STATUS", "DATASET"])
+
+
+def test_a_damaged_record_is_named_and_can_be_forgotten(say: Say, tmp_path: Path) -> None:
+    path = tmp_path / "state" / "runs" / "small-0000.json"
+    path.write_text('{"run": "small-0000"')
+    message = f"throwcollect: {path}: the record of the run is damaged\n  try: throwcollect down --run small-0000"
+    for verb in (["wait"], ["stop"], ["scale", "2"], ["logs"], ["events"]):
+        code, _, err = say(*verb, "--run", "small-0000")
+        assert (verb, code, err.startswith(message)) == (verb, 2, True)
+    code, _, err = say("ps")
+    assert (code, err.startswith(message)) == (0, True)
+    assert say("down", "--run", "small-0000") == (0, "small-0000: ended and forgotten\n", "")
+    assert not path.exists()
+
+
+def test_a_state_directory_that_cannot_be_used_is_named(
+    config: Path, say: Say, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "file"))
+    for arguments in (["ps"], ["wait"], ["up", config, "--output", tmp_path / "data"]):
+        code, out, err = say(*arguments)
+        assert (arguments, code, out) == (arguments, 2, "")
+        assert err.startswith(f"throwcollect: {tmp_path / 'file'}: runs cannot be remembered there: ")
+    assert not (tmp_path / "data").exists()

@@ -1,0 +1,261 @@
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from datetime import datetime, timedelta, timezone
+from pathlib import Path
+
+import pytest
+
+from throwcollect.errors import ConfigError
+from throwcollect.runtime.records import STATE_VARIABLE, OpenRun, Record, Records
+from throwcollect.runtime.supervisor import NodeState
+
+NOW = datetime.now(timezone.utc)
+NODE = NodeState("sim_0", "restarting", 2, None, "ended by SIGKILL")
+
+
+@pytest.fixture
+def state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "state"))
+    return tmp_path / "state"
+
+
+def record(run: OpenRun, **fields: object) -> Record:
+    values = {
+        "name": "small",
+        "runtime": "local",
+        "directory": "/data/small",
+        "volume": None,
+        "logs": "/data/small/logs",
+        "domain_id": 0,
+        "started": NOW,
+        "launcher": 1,
+        "simulations": 2,
+    }
+    return Record(run=run.run, **{**values, **fields})  # type: ignore[arg-type]
+
+
+def remember(records: Records, **fields: object) -> str:
+    """A run whose launcher is gone."""
+    run = records.new("small")
+    run.write(record(run, **fields))
+    run.close()
+    return run.run
+
+
+def test_what_is_written_is_read_by_others(state: Path) -> None:
+    run = Records().new("small")
+    written = record(run, nodes=(NODE,), trials=7, endpoint="tcp/127.0.0.1:1", summary={"episodes": 3})
+    run.write(written)
+    assert Records().get(run.run).record == written
+    run.update(trials_ended=5, message="ä")
+    assert Records().get(run.run).record == replace(written, trials_ended=5, message="ä")
+    assert Records().ids() == [run.run]
+
+
+def test_a_run_is_named_after_its_collection_and_never_like_another(
+    state: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    draws = iter(["aaaa", "aaaa", "bbbb"])
+    monkeypatch.setattr("throwcollect.runtime.records.secrets.token_hex", lambda _: next(draws))
+    records = Records()
+    assert [records.new("small").run, records.new("small").run] == ["small-aaaa", "small-bbbb"]
+
+
+def test_a_run_without_a_record_is_none(state: Path) -> None:
+    records = Records()
+    run = records.new("small")
+    assert records.ids() == []
+    with pytest.raises(ConfigError, match=f"no run {run.run}"):
+        records.get(run.run)
+
+
+def test_a_record_is_written_only_when_something_has_changed(state: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    run = Records().new("small")
+    run.write(record(run))
+    written: list[Record] = []
+    monkeypatch.setattr(run, "write", written.append)
+    run.update(simulations=2, nodes=())
+    assert written == []
+    run.update(simulations=3)
+    assert [each.simulations for each in written] == [3]
+
+
+def test_a_run_lives_as_long_as_somebody_holds_it(state: Path) -> None:
+    records = Records()
+    run = records.new("small")
+    run.write(record(run))
+    assert (records.lives(run.run), records.get(run.run).status) == (True, "running")
+    run.close()
+    assert (records.lives(run.run), records.get(run.run).status) == (False, "died")
+
+
+def test_a_run_that_has_ended_has_not_died(state: Path) -> None:
+    records = Records()
+    assert records.get(remember(records, ended=NOW, exit_code=3)).status == "ended"
+
+
+def test_a_launcher_that_is_killed_holds_nothing_though_its_pid_may_be_used_again(state: Path) -> None:
+    code = (
+        "import sys; from throwcollect.runtime.records import Records; sys.path.insert(0, sys.argv[1])\n"
+        "from test_records import record; run = Records().new('small'); run.write(record(run, launcher=1))\n"
+        "print(run.run, flush=True); sys.stdin.read()"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", code, str(Path(__file__).parent)], stdin=-1, stdout=-1, text=True
+    ) as process:
+        assert process.stdout is not None
+        run = process.stdout.readline().strip()
+        records = Records()
+        assert records.get(run).status == "running"
+        assert records.take(run) is None
+        process.kill()
+        process.wait()
+    assert records.get(run).status == "died"
+
+
+def test_a_run_is_handed_to_another_process_without_ever_seeming_dead(state: Path) -> None:
+    records = Records()
+    run = records.new("small")
+    run.write(record(run))
+    with subprocess.Popen(["/bin/cat"], stdin=-1, pass_fds=[run.lock]) as process:
+        inherited = records.inherited(run.run, os.dup(run.lock))
+        run.close()
+        inherited.close()
+        assert records.lives(run.run)
+        process.kill()
+        process.wait()
+    assert not records.lives(run.run)
+
+
+def test_a_dead_run_is_taken_by_one_and_refused_to_others(state: Path) -> None:
+    records = Records()
+    name = remember(records)
+    taken = records.take(name)
+    assert taken is not None
+    assert records.take(name) is None
+    assert records.get(name).status == "running"
+    taken.update(simulations=5)
+    taken.close()
+    assert records.get(name).record.simulations == 5
+
+
+def test_what_is_forgotten_leaves_no_file_but_datasets(state: Path, tmp_path: Path) -> None:
+    (tmp_path / "data").mkdir()
+    records = Records()
+    run = records.new("small")
+    run.write(record(run, directory=str(tmp_path / "data")))
+    (run.directory / "logs").mkdir(parents=True)
+    run.forget()
+    assert list((state / "runs").iterdir()) == []
+    assert (tmp_path / "data").exists()
+
+
+@pytest.mark.parametrize(
+    ("fields", "remembered"),
+    [
+        ({"ended": NOW - timedelta(days=6)}, True),
+        ({"ended": NOW - timedelta(days=8)}, False),
+        ({"started": NOW - timedelta(days=8)}, False),
+        ({"started": NOW - timedelta(days=8), "runtime": "docker"}, True),
+        ({"started": NOW - timedelta(days=8), "ended": NOW}, True),
+    ],
+)
+def test_runs_are_remembered_for_a_week_after_their_end(
+    fields: dict[str, object], remembered: bool, state: Path
+) -> None:
+    records = Records()
+    name = remember(records, **fields)
+    records.new("small")
+    assert (name in records.ids()) == remembered
+
+
+def test_a_long_run_is_not_forgotten_while_it_lives(state: Path) -> None:
+    records = Records()
+    run = records.new("small")
+    run.write(record(run, started=NOW - timedelta(days=80)))
+    records.new("small")
+    assert records.ids() == [run.run]
+
+
+def truncated(text: str) -> str:
+    return text[: len(text) // 2]
+
+
+def without(key: str) -> Callable[[str], str]:
+    return lambda text: json.dumps({name: value for name, value in json.loads(text).items() if name != key})
+
+
+@pytest.mark.parametrize(
+    ("damage", "message"),
+    [
+        (truncated, "the record of the run is damaged"),
+        (lambda _: "[]", "the record of the run is damaged"),
+        (lambda _: "", "the record of the run is damaged"),
+        (without("launcher"), "the record of the run is damaged"),
+        (
+            lambda text: text.replace('"version":1', '"version":2').replace('"version": 1', '"version": 2'),
+            "another ver",
+        ),
+    ],
+)
+def test_a_record_that_cannot_be_read_is_one_message_and_no_obstacle(
+    damage: Callable[[str], str], message: str, state: Path
+) -> None:
+    records = Records()
+    name, whole = remember(records), remember(records)
+    path = state / "runs" / f"{name}.json"
+    path.write_text(damage(path.read_text()))
+    with pytest.raises(ConfigError, match=message) as caught:
+        records.get(name)
+    assert caught.value.hint == f"throwcollect down --run {name} ends what is left of it, and forgets it"
+    assert [each.record.run for each in records.all()] == [whole]
+    records.new("small")
+
+
+def test_runs_come_in_the_order_of_their_start(state: Path) -> None:
+    records = Records()
+    late, early = remember(records, started=NOW), remember(records, started=NOW - timedelta(hours=1))
+    assert [each.record.run for each in records.all()] == [early, late]
+
+
+def test_by_default_the_state_is_the_users_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(STATE_VARIABLE, raising=False)
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    Records()
+    directory = tmp_path / f"throwcollect-{os.getuid()}"
+    assert directory.stat().st_mode & 0o777 == 0o700
+    directory.chmod(0o777)
+    with pytest.raises(ConfigError, match="belongs to somebody else, or others may write there"):
+        Records()
+
+
+def test_a_link_that_somebody_else_has_laid_is_not_followed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(STATE_VARIABLE, raising=False)
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    (tmp_path / "elsewhere").mkdir(mode=0o700)
+    (tmp_path / f"throwcollect-{os.getuid()}").symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(ConfigError, match="belongs to somebody else, or others may write there"):
+        Records()
+
+
+def test_a_state_directory_that_is_none_is_named_with_a_way_out(state: Path) -> None:
+    state.write_text("a file")
+    with pytest.raises(ConfigError, match=f"{state}.*: runs cannot be remembered there: ") as caught:
+        Records()
+    assert "name another directory in THROWCOLLECT_STATE" in str(caught.value)
+
+
+def test_a_full_disk_is_named(state: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    run = Records().new("small")
+
+    def full(*_: object) -> int:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    with pytest.raises(ConfigError, match="runs cannot be remembered there: No space left on device") as caught:
+        run.write(record(run))
+    assert "free space there" in str(caught.value)

@@ -1,0 +1,180 @@
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from datetime import datetime, timedelta, timezone
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from throwcollect.errors import ConfigError, DatasetError, Interrupted, ThrowcollectError, WorkerError
+from throwcollect.runtime import runs as module
+from throwcollect.runtime.records import STATE_VARIABLE, Record, Records
+from throwcollect.runtime.runs import died, failure, find, left_in, living
+
+NOW = datetime.now(timezone.utc)
+Make = Callable[..., Record]
+
+
+@pytest.fixture
+def records(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Records:
+    monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "state"))
+    monkeypatch.setattr(module, "on_engine", list)
+    return Records()
+
+
+@pytest.fixture
+def make(records: Records, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Make]:
+    """Makes a run: ``lives``, ``died`` or ``ended``, in directories of its own unless told otherwise."""
+    held = ExitStack()
+
+    def make(name: str, status: str, *, age_h: int = 0, **fields: object) -> Record:
+        monkeypatch.setattr("throwcollect.runtime.records.secrets.token_hex", lambda _: "0123")
+        run = records.new(name)
+        values = {
+            "name": name,
+            "runtime": "local",
+            "directory": str(tmp_path / name),
+            "volume": None,
+            "logs": "logs",
+            "domain_id": 0,
+            "started": NOW - timedelta(hours=age_h),
+            "launcher": 1,
+            "simulations": 2,
+            "ended": NOW if status == "ended" else None,
+        }
+        run.write(Record(run=run.run, **{**values, **fields}))  # type: ignore[arg-type]
+        if status == "lives":
+            held.callback(run.close)
+        else:
+            run.close()
+        return run.record
+
+    with held:
+        yield make
+
+
+@pytest.mark.parametrize("named", ["b-0123", "b", "b-0"])
+def test_a_run_is_found_by_its_id_or_the_beginning_of_it(named: str, records: Records, make: Make) -> None:
+    make("a", "lives")
+    record = make("b", "ended")
+    assert find(records, named).record == record
+
+
+def test_a_run_is_found_by_the_directory_of_its_dataset(
+    records: Records, make: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    make("a", "ended", age_h=2, directory=str(tmp_path / "data"))
+    latest = make("b", "ended", age_h=1, directory=str(tmp_path / "data"))
+    make("c", "ended", directory=str(tmp_path / "data"), volume="other")
+    monkeypatch.chdir(tmp_path)
+    assert find(records, "data").record == latest
+    assert find(records, str(tmp_path / "data")).record == latest
+
+
+def test_an_exact_id_wins_over_longer_ones(records: Records, make: Make) -> None:
+    make("a-0123", "ended")
+    short = make("a", "ended")
+    assert find(records, "a-0123").record == short
+
+
+def test_a_name_of_several_or_of_none_is_refused_with_what_there_is(records: Records, make: Make) -> None:
+    with pytest.raises(ConfigError, match="no run 'x'"):
+        find(records, "x")
+    make("ab", "ended")
+    make("ac", "ended")
+    with pytest.raises(ConfigError, match=r"2 runs begin with 'a'\n  expected: one of ab-0123, ac-0123"):
+        find(records, "a")
+    with pytest.raises(ConfigError, match=r"no run 'x'\n  expected: one of ab-0123, ac-0123"):
+        find(records, "x")
+
+
+def test_without_a_name_it_is_the_only_one_that_lives(records: Records, make: Make) -> None:
+    with pytest.raises(ConfigError, match=r"no run lives\n  try: throwcollect up -d starts one"):
+        find(records, None)
+    make("a", "ended")
+    make("b", "died")
+    with pytest.raises(ConfigError, match="no run lives; of those that are over, there is a-0123, b-0123"):
+        find(records, None)
+    only = make("c", "lives")
+    assert find(records, None).record == only
+    make("d", "lives")
+    with pytest.raises(ConfigError, match=r"2 runs live\n  expected: c-0123, d-0123\n  try: name one of them"):
+        find(records, None)
+
+
+def test_if_none_lives_it_may_be_the_latest(records: Records, make: Make) -> None:
+    latest = make("a", "ended")
+    make("b", "ended", age_h=1)
+    assert find(records, None, ended=True).record == latest
+    living = make("c", "lives", age_h=9)
+    assert find(records, None, ended=True).record == living
+
+
+@pytest.mark.parametrize(
+    ("code", "kind"),
+    [(1, ThrowcollectError), (2, ConfigError), (3, WorkerError), (4, DatasetError), (130, Interrupted)],
+)
+def test_what_a_run_ended_with_is_told_with_its_exit_code(code: int, kind: type, make: Make) -> None:
+    error = failure(make("a", "ended", exit_code=code, message="no luck\n  evidence: none"))
+    assert (type(error), error and error.exit_code, str(error)) == (kind, code, "no luck\n  evidence: none")
+
+
+def test_a_finished_run_has_no_error(make: Make) -> None:
+    assert failure(make("a", "ended", exit_code=0)) is None
+
+
+def test_only_a_living_run_can_be_changed(records: Records, make: Make) -> None:
+    record = make("a", "lives")
+    assert living(find(records, "a")) == record
+    make("b", "ended")
+    with pytest.raises(ConfigError, match="run b-0123 has ended"):
+        living(find(records, "b"))
+    make("c", "died")
+    with pytest.raises(WorkerError, match="run c-0123: its launcher died; finished throws are in /"):
+        living(find(records, "c"))
+
+
+def test_a_directory_into_which_a_living_run_collects_is_refused(records: Records, make: Make, tmp_path: Path) -> None:
+    make("a", "lives")
+    with pytest.raises(ConfigError, match=r"/a: run a-0123 collects into it\n  try: throwcollect wait --run a-0123"):
+        left_in(records, tmp_path / "a")
+    assert left_in(records, tmp_path / "b") is None
+
+
+@pytest.mark.parametrize(
+    ("fields", "nodes", "left"),
+    [
+        ({"runtime": "docker"}, ["router", "coordinator"], True),
+        ({"runtime": "docker"}, ["router", "sim_0"], False),
+        ({"runtime": "docker"}, [], False),
+        ({"runtime": "local"}, ["coordinator"], False),
+        ({"runtime": "docker", "ended": NOW}, ["coordinator"], False),
+    ],
+)
+def test_containers_outlive_their_launcher(
+    fields: dict[str, object],
+    nodes: list[str],
+    left: bool,
+    records: Records,
+    make: Make,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    record = make("a", "died", **fields)
+    found = SimpleNamespace(run_id="a-0123", nodes=[SimpleNamespace(name=name) for name in nodes])
+    monkeypatch.setattr(module, "on_engine", lambda: [found])
+    run = left_in(records, tmp_path / "a")
+    assert (run is not None) == left
+    assert run is None or run.record == record
+
+
+def test_the_way_on_after_the_death_of_a_launcher_depends_on_where_nodes_live(make: Make) -> None:
+    assert "throwcollect up" not in str(died(make("a", "died")))
+    again = died(make("b", "died", runtime="docker", directory="/b"))
+    assert "try: throwcollect up /b/config.yaml --output /b goes on where its containers are" in str(again)
+    assert "throwcollect up" not in str(died(make("c", "died", runtime="docker", volume="v")))
+
+
+def test_an_engine_that_is_not_there_is_not_waited_for(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("DOCKER_HOST", f"unix://{tmp_path}/none.sock")
+    assert module.on_engine() == []

@@ -1,0 +1,78 @@
+import threading
+from collections.abc import Iterator
+from datetime import datetime, timezone
+
+import pytest
+
+from throwcollect.errors import ConfigError, WorkerError
+from throwcollect.ros import Context, Node, SingleThreadedExecutor
+from throwcollect.ros.router import router
+from throwcollect.runtime import scaling
+from throwcollect.runtime.nodes import LAUNCHER
+from throwcollect.runtime.records import Record, Run
+from throwcollect.runtime.scaling import offer_scaling, scale
+from throwcollect.session_config import CONFIG_FILE_VARIABLE, OVERRIDE_VARIABLE
+
+
+def living(endpoint: str | None) -> Run:
+    started = datetime.now(timezone.utc)
+    return Run(Record("a-0123", "a", "local", "/a", None, "/a/logs", 0, started, 1, 2, endpoint=endpoint), lives=True)
+
+
+@pytest.fixture
+def endpoint(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
+    # What a client sets in its environment is undone, too.
+    for variable in (OVERRIDE_VARIABLE, CONFIG_FILE_VARIABLE, "ROS_DOMAIN_ID"):
+        monkeypatch.setenv(variable, "")
+    with router("tcp/127.0.0.1:0") as endpoint:
+        yield endpoint
+
+
+@pytest.fixture
+def wanted(endpoint: str, monkeypatch: pytest.MonkeyPatch) -> Iterator[list[int]]:
+    """What a launcher that offers scaling is asked for."""
+    asked: list[int] = []
+    monkeypatch.setenv(OVERRIDE_VARIABLE, f'connect/endpoints=["{endpoint}"]')
+    context = Context()
+    context.init()
+    node = Node(LAUNCHER, context=context)
+    offer_scaling(node, 2, asked.append)
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(node)
+    done = threading.Event()
+
+    def serve() -> None:
+        while not done.is_set():
+            executor.spin_once(timeout_sec=0.05)
+
+    thread = threading.Thread(target=serve)
+    thread.start()
+    yield asked
+    done.set()
+    thread.join()
+    context.shutdown()
+
+
+def test_the_launcher_is_asked_for_another_number(endpoint: str, wanted: list[int]) -> None:
+    for simulations in (5, 0, 256):
+        scale(living(endpoint), simulations)
+    assert wanted == [5, 0, 256]
+
+
+@pytest.mark.parametrize("simulations", [-1, 257])
+def test_the_launcher_refuses_what_is_out_of_range(simulations: int, endpoint: str, wanted: list[int]) -> None:
+    with pytest.raises(ConfigError, match=f"run a-0123: .* out of range. Min: 0, max: 256, value: {simulations}"):
+        scale(living(endpoint), simulations)
+    assert wanted == []
+
+
+def test_a_launcher_that_is_not_there_is_one_message(endpoint: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(scaling, "_ANSWER_S", 0.2)
+    with pytest.raises(WorkerError, match=f"run a-0123: its launcher does not answer over the router at {endpoint}"):
+        scale(living(endpoint), 3)
+
+
+@pytest.mark.parametrize("nowhere", [None, "tcp/127.0.0.1:1"])
+def test_a_router_that_is_not_there_is_one_message(nowhere: str | None) -> None:
+    with pytest.raises(WorkerError, match="run a-0123: its launcher does not answer"):
+        scale(living(nowhere), 3)
