@@ -9,8 +9,9 @@ import statistics
 import tempfile
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
-from bench import collection, intake, raw
+from bench import collection, containers, intake, raw
 from throwcollect.config.loader import load
 from throwcollect.sweep.plan import make_plan
 
@@ -26,7 +27,7 @@ def main() -> None:
     arguments = parser.parse_args()
     cores = len(os.sched_getaffinity(0))
     plan = make_plan(load(CONFIG, [f"trials={arguments.trials}"]))
-    report: dict[str, object] = {"cores": cores, "trials": arguments.trials, "rounds": arguments.rounds}
+    report: dict[str, Any] = {"cores": cores, "trials": arguments.trials, "rounds": arguments.rounds}
     with tempfile.TemporaryDirectory(prefix="throwcollect-bench-") as scratch:
         for simulations in sorted({1, cores}):
             rounds = []
@@ -36,6 +37,12 @@ def main() -> None:
                 rounds.append({"raw_throws_per_s": limit, "ratio": found.throws_per_s / limit, **asdict(found)})
             report[f"n={simulations}"] = rounds
             _print_table(simulations, rounds)
+        if containers.image_mb() is None:
+            print("\nno containers: no engine answers, or it does not have the image (throwcollect image build)")
+        else:
+            few = make_plan(load(CONFIG, [f"trials={10 * containers.MANY}"]))
+            report["containers"] = containers.measure(plan, few, arguments.rounds, Path(scratch))
+            _print_containers(report["containers"])
         episodes = [intake.measure(Path(scratch) / "1-0") for _ in range(arguments.rounds)]
     report["intake_episodes_per_s"] = episodes
     print(f"\ncoordinator takes in {statistics.median(episodes):.0f} episodes/s (unpack, judge, append; one thread)")
@@ -72,6 +79,27 @@ def _print_table(simulations: int, rounds: list[dict]) -> None:
         print(f"| memory of a {role} | {median('memory_mb', role):.0f} MB |")
     print(f"| recordings | {median('bytes_per_throw') / 1e3:.0f} kB a throw |")
     print(f"| start of the nodes to the first throw | {median('first_throw_s'):.1f} s |", flush=True)
+
+
+def _print_containers(report: dict[str, Any]) -> None:
+    print("\n## Containers beside processes, medians\n")
+    print("| what | processes | containers | containers over processes |\n|---|---|---|---|")
+
+    def row(what: str, number: str, *keys: str) -> None:
+        medians = []
+        for kind in ("processes", "containers"):
+            values = report[number][kind]
+            for key in keys:
+                values = [value[key] for value in values]
+            medians.append(statistics.median(values))
+        print(f"| {what} | {medians[0]:.1f} | {medians[1]:.1f} | {medians[1] / medians[0]:.2f} |")
+
+    for number in (key for key in report if key.startswith("n=")):
+        row(f"start to the first throw, {number} [s]", number, "first_throw_s")
+        row(f"throws/s, {number}", number, "throws_per_s")
+        for role in collection.ROLES:
+            row(f"memory of a {role}, {number} [MB]", number, "memory_mb", role)
+    print(f"\nimage: {report['image_mb']:.0f} MB", flush=True)
 
 
 if __name__ == "__main__":

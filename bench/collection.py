@@ -1,18 +1,21 @@
-"""`throwcollect up` in steady state: throws per second, and where processor time and memory go."""
+"""A collection in steady state, in processes or containers: throws a second, and where time and memory go."""
 
 from __future__ import annotations
 
 import os
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+import docker
 import psutil
 
 from throwcollect.coordinator.progress import Progress, ProgressListener
 from throwcollect.dataset.writer import create
+from throwcollect.runtime.docker import DockerRuntime
 from throwcollect.runtime.local import LocalRuntime
-from throwcollect.runtime.nodes import node_environment
+from throwcollect.runtime.nodes import Runtime, node_environment
 from throwcollect.runtime.supervisor import Supervisor
 from throwcollect.sweep.plan import Plan
 
@@ -49,6 +52,15 @@ class _Mark:
     kernel_s: dict[str, float]
 
 
+def _until(supervisor: Supervisor, listener: ProgressListener, reports: list[Progress], ended: int) -> float:
+    """Wait until so many trials have ended; the time."""
+    while not reports or reports[-1].ended < ended:
+        listener.spin(_POLL_S)
+        if (end := supervisor.poll()[0]) is not None:
+            raise RuntimeError(f"the collection ended early: {end.reason}: {end.log}")
+    return time.monotonic()
+
+
 class _Watch:
     """Follows one collection from the outside."""
 
@@ -57,15 +69,11 @@ class _Watch:
         self._listener = listener
         self._reports = reports
         names = supervisor.runtime.running()
-        self._nodes = {name: psutil.Process(int(supervisor.runtime.handle(name) or 0)) for name in names}
+        self._nodes = {name: _process(supervisor.runtime.handle(name) or "") for name in names}
 
     def until(self, ended: int) -> _Mark:
-        while not self._reports or self._reports[-1].ended < ended:
-            self._listener.spin(_POLL_S)
-            if (end := self._supervisor.poll()[0]) is not None:
-                raise RuntimeError(f"the collection ended early: {end.reason}: {end.log}")
         return _Mark(
-            time.monotonic(),
+            _until(self._supervisor, self._listener, self._reports, ended),
             self._reports[-1].ended,
             self._sum(lambda node: sum(node.cpu_times()[:2])),
             self._sum(lambda node: node.cpu_times().system),
@@ -87,28 +95,53 @@ class _Watch:
         }
 
 
-def measure(plan: Plan, simulations: int, directory: Path) -> Collection:
+def _process(handle: str) -> psutil.Process:
+    """The process of a node, by the id of its process or container."""
+    if handle.isdigit():
+        return psutil.Process(int(handle))
+    init = docker.from_env().containers.get(handle).attrs["State"]["Pid"]
+    (node,) = psutil.Process(init).children()
+    return node
+
+
+def local_runtime(plan: Plan, directory: Path) -> LocalRuntime:
+    """Nodes as processes."""
+    return LocalRuntime(directory, directory / "logs", plan.config.run)
+
+
+def docker_runtime(plan: Plan, directory: Path) -> DockerRuntime:
+    """Nodes as containers of the default image."""
+    runtime = DockerRuntime(f"bench-{os.getpid()}", plan.config, directory=directory, logs=directory / "logs")
+    runtime.open()
+    return runtime
+
+
+def measure(
+    plan: Plan, simulations: int, directory: Path, make_runtime: Callable[[Plan, Path], Runtime] = local_runtime
+) -> Collection:
     """Collect all trials of a plan, as the command does, and watch the processes.
 
     Args:
         plan: The trials.
         simulations: Number of simulations.
         directory: Where the dataset is left.
+        make_runtime: Makes the place where the nodes live; the time it takes counts.
     """
     trials = sum(trial.refused is None for trial in plan.trials)
     create(directory, plan)
     reports: list[Progress] = []
     began = time.monotonic()
     run = plan.config.run
-    runtime = LocalRuntime(directory, directory / "logs", run)
+    runtime = make_runtime(plan, directory)
     with Supervisor(runtime, run, simulations=simulations) as supervisor:
         supervisor.start()
         while not supervisor.router_answers():
             time.sleep(_POLL_S)
-        os.environ.update(node_environment(runtime.listen, run.domain_id))
+        host, port = runtime.router_address() or ("", 0)
+        os.environ.update(node_environment(f"tcp/{host}:{port}", run.domain_id))
         with ProgressListener(reports.append) as listener:
+            first = _until(supervisor, listener, reports, 1)
             watch = _Watch(supervisor, listener, reports)
-            first = watch.until(1)
             start, stop = watch.until(trials // 10), watch.until(trials * 9 // 10)
             memory = watch.memory_mb()
             watch.finish()
@@ -120,5 +153,5 @@ def measure(plan: Plan, simulations: int, directory: Path) -> Collection:
         disk_ms_per_throw=(stop.kernel_s["coordinator"] - start.kernel_s["coordinator"]) / counted * 1e3,
         memory_mb=memory,
         bytes_per_throw=size / trials,
-        first_throw_s=first.time_s - began,
+        first_throw_s=first - began,
     )

@@ -1,0 +1,81 @@
+#!/usr/bin/env bash
+# Makes a fresh Debian machine ready for the tests that need a Docker engine: engine, base image, wheelhouse, image.
+# What is there already is left as it is, so running it again takes seconds. `PYTHON` names one that has throwcollect
+# installed from this clone, and pip.
+#
+# Where no engine can be had, it says why on standard output and in build/engine-unavailable, and succeeds: the tests
+# that need one are then skipped, with that reason.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+python=${PYTHON:-.venv/bin/python}
+base=throwcollect-base:bookworm
+wheelhouse=build/wheelhouse
+state=${THROWCOLLECT_ENGINE_DIR:-/var/lib/throwcollect-engine}
+reason=build/engine-unavailable
+export DEBIAN_FRONTEND=noninteractive
+mkdir -p build
+rm -f "$reason"
+
+unavailable() {
+    echo "$*" > "$reason"
+    echo "engine unavailable: $*"
+    exit 0
+}
+
+answers() { docker version --format '{{.Server.Version}}' > /dev/null 2>&1; }
+
+# Installs what is missing of the commands of a package.
+need() {
+    local package=$1 command
+    shift
+    for command; do
+        command -v "$command" > /dev/null || {
+            [ "$(id -u)" = 0 ] || unavailable "$command is not installed, and only root can install $package"
+            command -v apt-get > /dev/null || unavailable "$command is not installed, and there is no apt-get"
+            apt-get update -qq && apt-get install -qq -y --no-install-recommends "$package" > build/apt.log 2>&1 \
+                || unavailable "$package cannot be installed: $(tail -n 1 build/apt.log 2> /dev/null)"
+            return
+        }
+    done
+}
+
+start_engine() {
+    [ -z "${DOCKER_HOST:-}" ] || unavailable "no Docker engine answers at $DOCKER_HOST"
+    [ "$(id -u)" = 0 ] || unavailable "no Docker engine answers, and only root can start one"
+    # Engines share the machine's bridge and packet filter: a second one takes them from the first.
+    [ -z "$(pidof dockerd)" ] || unavailable "dockerd runs, but does not answer"
+    need docker.io dockerd docker
+    # Where services are started when they are installed, it runs by now.
+    answers && return
+    mkdir -p "$state"
+    setsid dockerd --data-root "$state/data" --exec-root "$state/exec" --pidfile "$state/dockerd.pid" \
+        > "$state/dockerd.log" 2>&1 < /dev/null &
+    local process=$!
+    for _ in $(seq 300); do
+        if answers; then
+            echo "engine started; end it with: kill \$(cat $state/dockerd.pid)"
+            return
+        fi
+        kill -0 $process 2> /dev/null || break
+        sleep 0.1
+    done
+    # A second one would fail in the same way.
+    kill $process 2> /dev/null || true
+    unavailable "dockerd does not answer: $(grep -E 'level=(error|fatal)|failed' "$state/dockerd.log" | tail -n 1)"
+}
+
+if command -v docker > /dev/null && answers; then
+    echo "engine: $(docker version --format '{{.Server.Version}}')"
+else
+    start_engine
+fi
+if ! docker image inspect "$base" > /dev/null 2>&1; then
+    need mmdebstrap mmdebstrap
+    docker/base.sh "$base" > build/base.log 2>&1 || { tail -n 5 build/base.log; unavailable "no base image could be made"; }
+    echo "base image: $base"
+fi
+need docker-compose docker-compose
+.ci/compose.sh || echo "no Compose v2 for the tests"
+"$python" docker/wheelhouse.py "$wheelhouse"
+"$python" -m throwcollect image build --base "$base" --wheelhouse "$wheelhouse" 2> build/image.log \
+    || { tail -n 25 build/image.log; exit 1; }

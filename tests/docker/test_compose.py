@@ -1,0 +1,103 @@
+"""Collections on Docker Compose, as the documentation shows them."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from tests.e2e.collection import collect, fingerprints, write_config
+
+pytestmark = [pytest.mark.docker, pytest.mark.usefixtures("client")]
+ROOT = Path(__file__).parents[2]
+SCRIPT = ROOT / "compose" / "collect.sh"
+DOCUMENT = (ROOT / "docs" / "compose.md").read_text(encoding="utf-8")
+COMMAND = "compose/collect.sh configs/quickstart.yaml 4 dataset"
+
+
+PLUGINS = ROOT / "build" / "docker-config"
+"""Where continuous integration puts Compose v2 if the machine has none."""
+
+
+def answers(environment: dict[str, str], *command: str) -> bool:
+    try:
+        return subprocess.run(command, env=environment, capture_output=True, check=False).returncode == 0
+    except FileNotFoundError:
+        return False
+
+
+@pytest.fixture(params=["v2", "1.29"])
+def environment(request: pytest.FixtureRequest, tmp_path: Path) -> dict[str, str]:
+    """An environment in which the script finds this version of Compose, and no other."""
+    variables = dict(os.environ)
+    if request.param == "v2":
+        if not answers(variables, "docker", "compose", "version"):
+            variables["DOCKER_CONFIG"] = str(PLUGINS)
+        if not answers(variables, "docker", "compose", "version"):
+            pytest.skip("no Docker Compose v2 here")
+    else:
+        variables["DOCKER_CONFIG"] = str(tmp_path / "no-plugins")
+        if not answers(variables, "docker-compose", "version"):
+            pytest.skip("no Docker Compose 1.29 here")
+        if answers(variables, "docker", "compose", "version"):
+            pytest.skip("Compose v2 is installed for all users; the script prefers it")
+    return variables
+
+
+def leftovers() -> str:
+    parts = [["ps", "-aq"], ["network", "ls", "-q"], ["volume", "ls", "-q"]]
+    label = ["--filter", "label=com.docker.compose.project"]
+    return "".join(
+        subprocess.run(["docker", *part, *label], capture_output=True, text=True, check=False).stdout for part in parts
+    )
+
+
+def run(environment: dict[str, str], *arguments: str | Path, cwd: Path = ROOT) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [str(argument) for argument in arguments],
+        env=environment,
+        cwd=cwd,
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+
+
+def test_the_files_are_those_of_processes_for_any_number(environment: dict[str, str], tmp_path: Path) -> None:
+    config = write_config(tmp_path, trials=24)
+    collect(config, tmp_path / "local", 2)
+    expected = fingerprints(tmp_path / "local")
+    before = leftovers()
+    for simulations in ("1", "4", "8"):
+        output = tmp_path / simulations
+        done = run(environment, SCRIPT, config, simulations, output)
+        assert done.returncode == 0, done.stdout + done.stderr
+        assert fingerprints(output) == expected
+        assert {path.stat().st_uid for path in output.iterdir()} == {os.getuid()}
+    assert leftovers() == before
+
+
+def test_the_exit_code_is_that_of_the_collection(environment: dict[str, str], tmp_path: Path) -> None:
+    before = leftovers()
+    (tmp_path / "wrong.yaml").write_text("name: wrong\ntrials: 0\n")
+    done = run(environment, SCRIPT, tmp_path / "wrong.yaml", "1", tmp_path / "data")
+    assert done.returncode == 2, done.stdout + done.stderr
+    assert "wrong.yaml:2: trials: should be" in done.stdout + done.stderr
+    assert leftovers() == before
+
+
+def test_the_documented_command_runs(environment: dict[str, str], tmp_path: Path) -> None:
+    assert len(re.findall(rf"^.*{re.escape(COMMAND)}$", DOCUMENT, flags=re.MULTILINE)) == 3
+    for name in ("compose", "configs"):
+        shutil.copytree(ROOT / name, tmp_path / name)
+    done = run(environment, *COMMAND.split(), cwd=tmp_path)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "200 landed" in done.stdout
+    assert (tmp_path / "dataset" / "throws.parquet").is_file()
+    again = run(environment, *COMMAND.split(), cwd=tmp_path)
+    assert (again.returncode, again.stderr) == (2, "compose/collect.sh: dataset exists already\n")

@@ -1,0 +1,156 @@
+"""`throwcollect up --runtime docker`: the same files as with processes, whatever happens to containers and launcher."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import docker
+import pytest
+
+from tests.e2e.collection import Running, call, collect, fingerprints, start, write_config
+
+pytestmark = [pytest.mark.docker, pytest.mark.usefixtures("client")]
+LABEL = "throwcollect.run"
+
+
+@pytest.fixture(scope="module")
+def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_config(tmp_path_factory.mktemp("config"), trials=64)
+
+
+@pytest.fixture(scope="module")
+def expected(config: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """Fingerprints of the files that processes collect."""
+    directory = tmp_path_factory.mktemp("reference") / "data"
+    collect(config, directory, 2)
+    return fingerprints(directory)
+
+
+@pytest.fixture
+def engine() -> Iterator[docker.DockerClient]:
+    """The engine; afterwards nothing of ours may be left on it."""
+    client = docker.from_env()
+    before = left_on(client)
+    yield client
+    assert left_on(client) == before
+    client.close()
+
+
+def left_on(client: docker.DockerClient) -> set[str]:
+    filters = {"label": LABEL}
+    containers = client.containers.list(all=True, filters=filters)
+    return {each.name for each in (*containers, *client.networks.list(filters=filters))}
+
+
+def containers_of(client: docker.DockerClient, directory: Path) -> dict[str, docker.models.containers.Container]:
+    filters = {"label": f"throwcollect.directory={directory}"}
+    return {each.labels["throwcollect.node"]: each for each in client.containers.list(filters=filters)}
+
+
+@pytest.mark.parametrize("simulations", [1, 4, 8])
+def test_the_files_are_those_of_processes(
+    config: Path, expected: dict[str, str], engine: docker.DockerClient, tmp_path: Path, simulations: int
+) -> None:
+    code, _, err = start(config, tmp_path / "data", simulations, "--runtime", "docker").finish()
+    assert code == 0, err
+    assert fingerprints(tmp_path / "data") == expected
+    assert {path.stat().st_uid for path in (tmp_path / "data").rglob("*")} == {os.getuid()}
+
+
+def test_chaos(engine: docker.DockerClient, tmp_path: Path) -> None:
+    """Simulations are killed, one is paused, the router is killed, then the launcher; a second `up` completes it."""
+    config, directory = write_config(tmp_path, trials=300), tmp_path / "data"
+    collect(config, tmp_path / "undisturbed", 2)
+    running = start(config, directory, 4, "--runtime", "docker")
+    running.wait_until(lambda: running.written() > 0)
+    chance = random.Random(time.time_ns())
+    harms = ["kill", "kill", "pause", "router"]
+    chance.shuffle(harms)
+    victims = chance.sample(range(4), 3)
+    for harm in harms:
+        nodes = containers_of(engine, directory)
+        if harm == "router":
+            nodes["router"].kill()
+        elif victim := nodes.get(f"sim_{victims.pop()}"):
+            victim.pause() if harm == "pause" else victim.kill()
+        time.sleep(chance.uniform(0.2, 2.0))
+    assert running.process.poll() is None, running.finish()
+    running.process.send_signal(signal.SIGKILL)
+    running.process.communicate()
+    assert {"router", "coordinator"} & containers_of(engine, directory).keys()
+    time.sleep(chance.uniform(0.0, 2.0))
+    code, _, err = start(config, directory, 4, "--runtime", "docker").finish()
+    assert code == 0, err
+    assert fingerprints(directory) == fingerprints(tmp_path / "undisturbed")
+
+
+def test_what_a_killed_launcher_leaves_is_cleaned_up(config: Path, engine: docker.DockerClient, tmp_path: Path) -> None:
+    directory = tmp_path / "data"
+    running = start(config, directory, 2, "--runtime", "docker")
+    running.wait_until(lambda: len(containers_of(engine, directory)) == 4)
+    running.process.kill()
+    running.process.communicate()
+    done = call("down", "--run", directory)
+    assert done.returncode == 0, done.stderr
+    assert not containers_of(engine, directory)
+
+
+def test_a_container_gets_nothing_that_it_does_not_need(
+    config: Path, engine: docker.DockerClient, tmp_path: Path
+) -> None:
+    directory = tmp_path / "data"
+    running = start(config, directory, 2, "--runtime", "docker", "--set", "containers.sim.memory=512m")
+    running.wait_until(lambda: len(containers_of(engine, directory)) == 4)
+    for name, container in containers_of(engine, directory).items():
+        host = container.attrs["HostConfig"]
+        assert (host["Privileged"], host["CapDrop"], host["CapAdd"]) == (False, ["ALL"], None)
+        assert host["ReadonlyRootfs"]
+        assert "no-new-privileges" in " ".join(host["SecurityOpt"])
+        assert not any(host["PortBindings"] or {})
+        assert not any("docker.sock" in str(mount) for mount in container.attrs["Mounts"])
+        assert [mount["RW"] for mount in container.attrs["Mounts"]] == (
+            {"router": [], "coordinator": [True]}.get(name, [False])
+        )
+        assert (host["Memory"] == 512 * 1024**2) == name.startswith("sim")
+        listening = container.exec_run(["cat", "/proc/net/tcp", "/proc/net/tcp6"]).output.decode()
+        addresses = [line.split()[1] for line in listening.splitlines() if " 0A " in line]
+        assert not [address for address in addresses if set(address.split(":")[0]) == {"0"}]
+    assert running.finish()[0] == 0
+
+
+def test_ctrl_c_leaves_nothing_behind(config: Path, engine: docker.DockerClient, tmp_path: Path) -> None:
+    running: Running = start(config, tmp_path / "data", 2, "--runtime", "docker", "--trials", "5000")
+    running.wait_until(lambda: running.written() > 0)
+    running.process.send_signal(signal.SIGINT)
+    code, _, err = running.finish()
+    assert (code, "interrupted; finished throws are in" in err) == (130, True), err
+
+
+def test_several_runs_do_not_disturb_one_another(
+    config: Path, expected: dict[str, str], engine: docker.DockerClient, tmp_path: Path
+) -> None:
+    both = [start(config, tmp_path / name, 2, "--runtime", "docker") for name in ("one", "other")]
+    for running in both:
+        code, _, err = running.finish()
+        assert code == 0, err
+        assert fingerprints(running.directory) == expected
+
+
+def test_a_detached_run_is_followed_scaled_and_waited_for(
+    config: Path, expected: dict[str, str], engine: docker.DockerClient, tmp_path: Path
+) -> None:
+    directory = tmp_path / "data"
+    begun = call("up", "-d", "-n", "1", config, "--runtime", "docker", "--output", directory)
+    assert begun.returncode == 0, begun.stderr
+    assert "sim_0" in call("ps").stdout
+    assert call("scale", "3", "--run", directory).returncode == 0
+    done = call("wait", "--run", directory)
+    assert done.returncode == 0, done.stderr
+    assert fingerprints(directory) == expected
+    told = call("logs", "--run", directory).stdout
+    assert "sim_0" in told
