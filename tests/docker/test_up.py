@@ -124,7 +124,7 @@ def test_a_container_gets_nothing_that_it_does_not_need(
 
 
 def test_ctrl_c_leaves_nothing_behind(config: Path, engine: docker.DockerClient, tmp_path: Path) -> None:
-    running: Running = start(config, tmp_path / "data", 2, "--runtime", "docker", "--trials", "5000")
+    running: Running = start(config, tmp_path / "data", 2, "--runtime", "docker", "--trials", "800")
     running.wait_until(lambda: running.written() > 0)
     running.process.send_signal(signal.SIGINT)
     code, _, err = running.finish()

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import struct
+import threading
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -39,6 +40,16 @@ _MESSAGE_INDEX_HEADER = struct.Struct("<BQHI")
 """Opcode, length, channel, size of the entries."""
 _CONSTANT_HEADER_BYTES = 11
 """Opcode, length and channel: what is the same in all records of a channel."""
+
+
+class _OfEachThread(threading.local):
+    """A decompressor must not be shared; making one takes almost as long as it then takes to decompress a chunk."""
+
+    def __init__(self) -> None:
+        self.decompressor = zstandard.ZstdDecompressor()
+
+
+_of_this_thread = _OfEachThread()
 
 
 def encode_records(*parts: records.McapRecord) -> bytes:
@@ -114,7 +125,7 @@ class Chunk:
             size = zstandard.frame_content_size(self.data)
             if size != self.uncompressed_size:
                 raise DatasetError(f"chunk: holds {size} bytes", expected=f"{self.uncompressed_size} as announced")
-            contents = zstandard.ZstdDecompressor().decompress(self.data, allow_extra_data=False)
+            contents = _of_this_thread.decompressor.decompress(self.data, allow_extra_data=False)
         except zstandard.ZstdError as error:
             raise DatasetError(f"chunk: cannot be decompressed: {error}") from error
         if crc32(contents) != self.crc:
