@@ -35,7 +35,9 @@ trap 'exit 130' INT TERM
 code=0
 compose up --scale sim="$simulations" --exit-code-from coordinator || code=$?
 
+# Also of a collection that was broken off, if it ever began.
 mkdir -p "$output"
-docker run --rm --network none --user "$RUN_USER" --entrypoint cp \
-    -v "${project}_data:/data:ro" -v "$(cd "$output" && pwd):/out" "$THROWCOLLECT_IMAGE" -r /data/dataset/. /out
+docker run --rm --network none --user "$RUN_USER" --entrypoint sh \
+    -v "${project}_data:/data:ro" -v "$(cd "$output" && pwd):/out" "$THROWCOLLECT_IMAGE" \
+    -c 'test ! -d /data/dataset || cp -r /data/dataset/. /out'
 exit "$code"

@@ -5,12 +5,15 @@ from __future__ import annotations
 import os
 import re
 import shutil
+import signal
 import subprocess
+import time
 from pathlib import Path
 
 import pytest
 
 from tests.e2e.collection import collect, fingerprints, write_config
+from throwcollect.runtime.docker_engine import connect
 
 pytestmark = [pytest.mark.docker, pytest.mark.usefixtures("client")]
 ROOT = Path(__file__).parents[2]
@@ -101,3 +104,34 @@ def test_the_documented_command_runs(environment: dict[str, str], tmp_path: Path
     assert (tmp_path / "dataset" / "throws.parquet").is_file()
     again = run(environment, *COMMAND.split(), cwd=tmp_path)
     assert (again.returncode, again.stderr) == (2, "compose/collect.sh: dataset exists already\n")
+
+
+def test_a_node_that_dies_is_started_again(environment: dict[str, str], tmp_path: Path) -> None:
+    config = write_config(tmp_path, trials=150)
+    collect(config, tmp_path / "undisturbed", 2)
+    command = [str(SCRIPT), str(config), "2", str(tmp_path / "data")]
+    process = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    project = f"throwcollect-{process.pid}"
+    for service in ("sim", "router"):
+        kill_node_of(project, service)
+    out, _ = process.communicate(timeout=200)
+    assert process.returncode == 0, out
+    assert len(re.findall(r"sim_\w+ is ready", out)) == 3, out
+    assert len(re.findall(r"router listening", out)) == 2, out
+    assert fingerprints(tmp_path / "data") == fingerprints(tmp_path / "undisturbed")
+
+
+def kill_node_of(project: str, service: str) -> None:
+    """End the node in one of a service's containers, once it works."""
+    labels = [f"com.docker.compose.project={project}", f"com.docker.compose.service={service}"]
+    client, deadline = connect(), time.monotonic() + 60
+    while time.monotonic() < deadline:
+        for container in client.containers.list(filters={"label": labels})[:1]:
+            if b"ready" in container.logs() or b"listening" in container.logs():
+                time.sleep(2.0)
+                for row in container.top()["Processes"]:
+                    if f"throwcollect {service} " in row[-1] and "until" not in row[-1]:
+                        os.kill(int(row[1]), signal.SIGKILL)
+                        return
+        time.sleep(0.2)
+    raise AssertionError(f"no {service} to kill")
