@@ -13,6 +13,8 @@ wheelhouse=build/wheelhouse
 state=${THROWCOLLECT_ENGINE_DIR:-/var/lib/throwcollect-engine}
 reason=build/engine-unavailable
 export DEBIAN_FRONTEND=noninteractive
+# Where dockerd and what it calls live; not in everybody's path.
+export PATH="$PATH:/usr/sbin:/sbin"
 mkdir -p build
 rm -f "$reason"
 
