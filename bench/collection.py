@@ -11,11 +11,12 @@ from pathlib import Path
 import docker
 import psutil
 
-from throwcollect.coordinator.progress import Progress, ProgressListener
+from throwcollect.coordinator.progress import Progress
 from throwcollect.dataset.writer import create
 from throwcollect.runtime.docker import DockerRuntime
+from throwcollect.runtime.listening import Listening
 from throwcollect.runtime.local import LocalRuntime
-from throwcollect.runtime.nodes import Runtime, node_environment
+from throwcollect.runtime.nodes import Runtime, endpoint_of
 from throwcollect.runtime.supervisor import Supervisor
 from throwcollect.sweep.plan import Plan
 
@@ -52,10 +53,10 @@ class _Mark:
     kernel_s: dict[str, float]
 
 
-def _until(supervisor: Supervisor, listener: ProgressListener, reports: list[Progress], ended: int) -> float:
+def _until(supervisor: Supervisor, listening: Listening, reports: list[Progress], ended: int) -> float:
     """Wait until so many trials have ended; the time."""
     while not reports or reports[-1].ended < ended:
-        listener.spin(_POLL_S)
+        listening.spin(endpoint_of(supervisor.runtime), _POLL_S)
         if (end := supervisor.poll()[0]) is not None:
             raise RuntimeError(f"the collection ended early: {end.reason}: {end.log}")
     return time.monotonic()
@@ -64,16 +65,16 @@ def _until(supervisor: Supervisor, listener: ProgressListener, reports: list[Pro
 class _Watch:
     """Follows one collection from the outside."""
 
-    def __init__(self, supervisor: Supervisor, listener: ProgressListener, reports: list[Progress]) -> None:
+    def __init__(self, supervisor: Supervisor, listening: Listening, reports: list[Progress]) -> None:
         self._supervisor = supervisor
-        self._listener = listener
+        self._listening = listening
         self._reports = reports
         names = supervisor.runtime.running()
         self._nodes = {name: _process(supervisor.runtime.handle(name) or "") for name in names}
 
     def until(self, ended: int) -> _Mark:
         return _Mark(
-            _until(self._supervisor, self._listener, self._reports, ended),
+            _until(self._supervisor, self._listening, self._reports, ended),
             self._reports[-1].ended,
             self._sum(lambda node: sum(node.cpu_times()[:2])),
             self._sum(lambda node: node.cpu_times().system),
@@ -87,7 +88,7 @@ class _Watch:
 
     def finish(self) -> None:
         while self._supervisor.poll()[0] is None:
-            self._listener.spin(_POLL_S)
+            self._listening.spin(endpoint_of(self._supervisor.runtime), _POLL_S)
 
     def _sum(self, measure) -> dict[str, float]:
         return {
@@ -135,13 +136,9 @@ def measure(
     runtime = make_runtime(plan, directory)
     with Supervisor(runtime, run, simulations=simulations) as supervisor:
         supervisor.start()
-        while not supervisor.router_answers():
-            time.sleep(_POLL_S)
-        host, port = runtime.router_address() or ("", 0)
-        os.environ.update(node_environment(f"tcp/{host}:{port}", run.domain_id))
-        with ProgressListener(reports.append) as listener:
-            first = _until(supervisor, listener, reports, 1)
-            watch = _Watch(supervisor, listener, reports)
+        with Listening(reports.append, domain_id=run.domain_id) as listening:
+            first = _until(supervisor, listening, reports, 1)
+            watch = _Watch(supervisor, listening, reports)
             start, stop = watch.until(trials // 10), watch.until(trials * 9 // 10)
             memory = watch.memory_mb()
             watch.finish()

@@ -280,7 +280,7 @@ def test_ctrl_c_leaves_a_run_that_is_only_watched(config: Path, records: Records
 def test_logs_follow_a_run_to_its_end(config: Path, records: Records, tmp_path: Path) -> None:
     run = detach(config, tmp_path / "data", "--trials", "12")
     following = subprocess.Popen(command("logs", "-f"), stdout=subprocess.PIPE, text=True)
-    documents = subprocess.Popen(command("events", "-f", "--json"), stdout=subprocess.PIPE, text=True)
+    documents = subprocess.Popen(command("events", "--json"), stdout=subprocess.PIPE, text=True)
     out, _ = following.communicate(timeout=120)
     assert records.get(run).status == "ended"
     lines = out.splitlines()

@@ -42,8 +42,8 @@ def show_logs(named: str | None, nodes: Sequence[str], *, follow: bool) -> None:
             time.sleep(_POLL_S)
 
 
-def show_events(named: str | None, *, follow: bool, json: bool) -> None:
-    """Print what has happened in a run.
+def show_events(named: str | None, *, json: bool) -> None:
+    """Print what happens in a run, from its start until it ends.
 
     Raises:
         ConfigError: If there is no such run.
@@ -53,7 +53,7 @@ def show_events(named: str | None, *, follow: bool, json: bool) -> None:
     tail = Tail(Path(run.record.logs) / EVENTS)
     goes_on = True
     while goes_on:
-        goes_on = follow and _runs(records, run.record.run)
+        goes_on = _runs(records, run.record.run)
         for line in tail.lines():
             event = parse(line)
             if event is not None:

@@ -135,11 +135,11 @@ def logs(
 
 
 @app.command(rich_help_panel=RUNS)
-def events(follow: FollowOption = False, run: RunOption = None, json: JsonOption = False) -> None:
-    """Print what has happened in a run: nodes started, ready, lost and so on."""
+def events(run: RunOption = None, json: JsonOption = False) -> None:
+    """Print what happens in a run, from its start until it ends: nodes started, ready, lost and so on."""
     from throwcollect.cli.logs import show_events
 
-    show_events(run, follow=follow, json=json)
+    show_events(run, json=json)
 
 
 @app.command(rich_help_panel=RUNS)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 import subprocess
 import tarfile
@@ -26,6 +27,8 @@ _DOCKERFILE = "docker/Dockerfile"
 _TARGET = "embedded"
 _SOURCES = ("pyproject.toml", "README.md", "configs/quickstart.yaml", "src")
 _LEFT_OUT = re.compile(r"__pycache__|.*\.egg-info")
+SOURCES_LABEL = "throwcollect.sources"
+"""Label that tells which sources are installed in an image."""
 _EVIDENCE_LINES = 15
 _STEP = re.compile(r"Step (\d+/\d+) : (.*)")
 _STEP_COLUMNS = 100
@@ -86,12 +89,14 @@ def ensure(client: DockerClient, tag: str, *, say: Callable[[str], None]) -> Non
     Args:
         client: Client of the engine.
         tag: Name of the image.
-        say: Called with one line before anything that takes long.
+        say: Called with one line before anything that takes long, and if the default image is not that of the clone.
 
     Raises:
         WorkerError: If the image is missing and cannot be had.
     """
     if _is_there(client, tag):
+        if tag == default_tag() and _is_outdated(client, tag):
+            say(f"image {tag} was made from other sources than these; throwcollect image build makes it anew")
         return
     if tag != default_tag():
         say(f"image {tag} is not here; pulling it")
@@ -132,6 +137,28 @@ def _is_there(client: DockerClient, image: str) -> bool:
         except ImageNotFound:
             return False
         return True
+
+
+def _is_outdated(client: DockerClient, tag: str) -> bool:
+    """Whether the label of an image says that it holds other sources than the clone."""
+    try:
+        root = source_root()
+    except ConfigError:
+        return False
+    with engine_errors(f"the engine does not say what the image {tag} holds"):
+        label = client.images.get(tag).labels.get(SOURCES_LABEL, _UNKNOWN)
+    return label not in (_UNKNOWN, _digest_of(root))
+
+
+def _digest_of(root: Path) -> str:
+    """SHA-256 over all that is installed of a clone, in hexadecimal."""
+    digest = hashlib.sha256()
+    for path in [root / "pyproject.toml", *sorted((root / "src").rglob("*"))]:
+        inside = path.relative_to(root)
+        if path.is_file() and not any(map(_LEFT_OUT.fullmatch, inside.parts)):
+            content = path.read_bytes()
+            digest.update(f"{inside.as_posix()}\0{len(content)}\0".encode() + content)
+    return digest.hexdigest()
 
 
 def _write_context(archive: IO[bytes], root: Path, wheelhouse: Path | None) -> None:
@@ -203,7 +230,12 @@ def _provenance(root: Path) -> dict[str, str]:
         address = urlsplit(_git(root, "remote", "get-url", "origin") or "")
         # Without the name and the password that the address of a clone may hold.
         source = address._replace(netloc=address.netloc.rpartition("@")[2]).geturl()
-    return {"VERSION": throwcollect.__version__, "REVISION": revision or _UNKNOWN, "SOURCE": source or _UNKNOWN}
+    return {
+        "VERSION": throwcollect.__version__,
+        "REVISION": revision or _UNKNOWN,
+        "SOURCE": source or _UNKNOWN,
+        "SOURCES": _digest_of(root),
+    }
 
 
 def _git(root: Path, *arguments: str) -> str | None:

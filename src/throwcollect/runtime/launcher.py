@@ -20,7 +20,7 @@ from throwcollect.errors import ConfigError, DatasetError, Interrupted, Throwcol
 from throwcollect.runtime.events import EventLog, RunEvent
 from throwcollect.runtime.listening import Listening
 from throwcollect.runtime.local import LocalRuntime
-from throwcollect.runtime.nodes import LAUNCHER, NodeExit
+from throwcollect.runtime.nodes import LAUNCHER, NodeExit, endpoint_of
 from throwcollect.runtime.records import OpenRun, Record
 from throwcollect.runtime.scaling import offer_scaling
 from throwcollect.runtime.supervisor import NodeState, Supervisor
@@ -213,7 +213,7 @@ class _Launcher:
             for line in news:
                 self._onlooker.warn(line)
             states = self._supervisor.states()
-            self._notes.nodes(states, endpoint=self._endpoint(), simulations=self._simulations)
+            self._notes.nodes(states, endpoint=endpoint_of(self._place), simulations=self._simulations)
         if end is None:
             self._notes.event("stopping")
             self._onlooker.say("interrupted: finishing the running trials; once more ends at once")
@@ -236,11 +236,7 @@ class _Launcher:
         return info(Path(record.directory)).as_dict()
 
     def _listen(self) -> None:
-        self._listening.spin(self._endpoint(), _POLL_S)
-
-    def _endpoint(self) -> str | None:
-        address = self._place.router_address()
-        return f"tcp/{address[0]}:{address[1]}" if address is not None else None
+        self._listening.spin(endpoint_of(self._place), _POLL_S)
 
     def _report(self, progress: Progress) -> None:
         self._notes.progress(progress)

@@ -99,6 +99,12 @@ class Runtime(Protocol):
         """End everything that still runs, and remove all that was made for the run but the dataset."""
 
 
+def endpoint_of(runtime: Runtime) -> str | None:
+    """Zenoh endpoint at which this process reaches the router of a runtime; None while there is no way to it."""
+    address = runtime.router_address()
+    return None if address is None else "tcp/{}:{}".format(*address)
+
+
 def node_environment(endpoint: str, domain_id: int) -> Mapping[str, str]:
     """Environment variables of a process that joins a run.
 

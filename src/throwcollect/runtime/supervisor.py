@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 import signal
-import socket
 import time
 from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass
@@ -25,7 +24,6 @@ _FROZEN_S = 3.0
 
 _RESTARTS_BEFORE_READY = 1
 """A node that has never worked will hardly do so at the tenth attempt."""
-_CONNECT_S = 0.1
 
 
 @dataclass(frozen=True)
@@ -111,17 +109,6 @@ class Supervisor:
             self._start_deadline = time.monotonic() + self._run.start_timeout_s
         for name in added:
             self._start(name)
-
-    def router_answers(self) -> bool:
-        """Whether nodes can connect to the router by now."""
-        address = self.runtime.router_address()
-        if address is None:
-            return False
-        try:
-            socket.create_connection(address, _CONNECT_S).close()
-        except OSError:
-            return False
-        return True
 
     def poll(self) -> tuple[NodeExit | None, list[str]]:
         """Look after the nodes: restart what died.

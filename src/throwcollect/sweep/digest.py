@@ -6,7 +6,6 @@ import hashlib
 import json
 from collections.abc import Iterator, Sequence
 
-from throwcollect.config.loader import resolved_yaml
 from throwcollect.config.schema import Config
 from throwcollect.config.values import leaves
 from throwcollect.sweep.points import Points
@@ -15,13 +14,14 @@ _FORMAT = "throwcollect trial 1"
 
 # What does not change the samples of a trial: names and numbers of trials, how and where they are run, how fast they
 # are shown, and how samples are packed into files. The root seed acts through the values and the seed of each trial.
-_WITHOUT_EFFECT = frozenset({"name", "trials", "sweep", "run", "containers"})
+_RUN = frozenset({"run", "containers"})
+_WITHOUT_EFFECT = _RUN | {"name", "trials", "sweep"}
 _WITHOUT_EFFECT_INSIDE = frozenset({"sim.real_time_factor", "record.zstd_level", "record.trials_per_shard"})
 
 
 def config_digest(config: Config) -> str:
-    """SHA-256 in hex over a configuration, whatever its sections `run` and `containers` hold."""
-    return hashlib.sha256(resolved_yaml(config.without_run()).encode()).hexdigest()
+    """SHA-256 in hex over a configuration; its sections `run` and `containers`, and their keys, do not count."""
+    return hashlib.sha256(json.dumps(config.model_dump(mode="json", exclude=set(_RUN))).encode()).hexdigest()
 
 
 def trial_digests(config: Config, points: Points, seeds: Sequence[int]) -> Iterator[str]:

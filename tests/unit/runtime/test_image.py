@@ -33,13 +33,14 @@ class Engine:
         self.answers = answers or [{"stream": "Step 1/1 : FROM   base\n"}]
         self.images = self.api = self
         self.pulled: list[str] = []
+        self.labels: dict[str, str] = {}
         self.options: dict[str, Any] = {}
         self.context: dict[str, tarfile.TarInfo] = {}
 
     def get(self, name: str) -> SimpleNamespace:
         if name not in self.here:
             raise ImageNotFound(f"no such image: {name}")
-        return SimpleNamespace(attrs={"Size": 1234})
+        return SimpleNamespace(attrs={"Size": 1234}, labels=self.labels)
 
     def pull(self, name: str) -> None:
         if name not in self.registry:
@@ -221,3 +222,31 @@ def test_the_source_is_the_address_of_the_clone_without_what_is_secret_in_it(tmp
     assert image._provenance(tmp_path)["SOURCE"] == "unknown"
     git(tmp_path, "remote", "add", "origin", "https://me:token@example.org/lab/throws.git")
     assert image._provenance(tmp_path)["SOURCE"] == "https://example.org/lab/throws.git"
+
+
+def test_an_image_of_other_sources_than_the_clone_is_used_and_told(said: list[str]) -> None:
+    engine = Engine("base", default_tag())
+    build(engine, default_tag(), base="base", say=lambda _line: None)
+    engine.labels = {image.SOURCES_LABEL: engine.options["buildargs"]["SOURCES"]}
+    ensure(engine, default_tag(), say=said.append)
+    engine.labels = {image.SOURCES_LABEL: "unknown"}
+    ensure(engine, default_tag(), say=said.append)
+    assert not said
+    engine.labels = {image.SOURCES_LABEL: "0" * 64}
+    ensure(engine, default_tag(), say=said.append)
+    assert said == [
+        f"image {default_tag()} was made from other sources than these; throwcollect image build makes it anew"
+    ]
+
+
+def test_whatever_is_installed_changes_the_label_of_the_sources(said: list[str], tmp_path: Path) -> None:
+    (tmp_path / "src" / "__pycache__").mkdir(parents=True)
+    changes = {"pyproject.toml": "a", "src/a.py": "a", "src/b.py": "a", "src/__pycache__/a.pyc": "a"}
+    for name, content in changes.items():
+        (tmp_path / name).write_text(content)
+    digests = [image._digest_of(tmp_path)]
+    for name in changes:
+        (tmp_path / name).write_text("b")
+        digests.append(image._digest_of(tmp_path))
+    assert len(set(digests)) == 4
+    assert digests[-1] == digests[-2]
