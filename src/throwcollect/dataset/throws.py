@@ -171,22 +171,22 @@ class ThrowsTable:
             result: What came of it.
             place: Where its episode lies; None if there is none.
         """
-        row = self._empty(trial, values)
-        row.update(outcome=result.outcome.value, reason=result.reason)
-        row.update((column.name, column.read(result)) for column in self._columns)
+        row = self._known(trial, values, result.outcome.value, result.reason)
+        for column in self._columns:
+            row[column.name] = column.read(result)
         if place is not None:
             row.update(vars(place))
         return row
 
     def refused_row(self, trial: int, values: Mapping[str, float], reason: str) -> Row:
         """Row of a trial that the plan refused."""
-        return {**self._empty(trial, values), "outcome": REFUSED, "reason": reason}
+        return self._known(trial, values, REFUSED, reason)
 
-    def _empty(self, trial: int, values: Mapping[str, float]) -> Row:
-        return {**dict.fromkeys(self.schema.names), "trial": trial, **{key: values[key] for key in self._parameters}}
+    def _known(self, trial: int, values: Mapping[str, float], outcome: str, reason: str | None) -> Row:
+        return {"trial": trial, **{key: values[key] for key in self._parameters}, "outcome": outcome, "reason": reason}
 
     def table(self, rows: Iterable[Row]) -> pa.Table:
-        """Rows, in the given order, as an Arrow table."""
+        """Rows, in the given order, as an Arrow table; what a row lacks is null."""
         return pa.Table.from_pylist(list(rows), schema=self.schema)
 
 

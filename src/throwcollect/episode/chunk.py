@@ -38,8 +38,15 @@ _MESSAGE_HEADER = struct.Struct("<BQHIQQ")
 """Opcode, length, channel, sequence, log time, publish time."""
 _MESSAGE_INDEX_HEADER = struct.Struct("<BQHI")
 """Opcode, length, channel, size of the entries."""
-_CONSTANT_HEADER_BYTES = 11
-"""Opcode, length and channel: what is the same in all records of a channel."""
+_MESSAGE_HEADERS = np.dtype(
+    {
+        "names": ["opcode", "length", "channel", "sequence", "log_time", "publish_time"],
+        "formats": ["u1", "<u8", "<u2", "<u4", "<u8", "<u8"],
+    }
+)
+"""`_MESSAGE_HEADER`, of many records at once."""
+_ALIKE = ("opcode", "length", "channel")
+"""What is the same in all records of a channel."""
 
 
 class _OfEachThread(threading.local):
@@ -265,12 +272,12 @@ class MessageTable:
             opcode, length, channel, *_ = _MESSAGE_HEADER.unpack(header)
             column = _Column(offset, 9 + length)
             offset += column.size
-            constant = self._table[:, column.offset : column.offset + _CONSTANT_HEADER_BYTES]
             if opcode != Opcode.MESSAGE or length < 22 or offset > width or channel in self.columns:
                 raise DatasetError(f"chunk: not one message per channel and sample at byte {column.offset}")
-            if (constant != constant[0]).any():
-                raise DatasetError(f"chunk: the records of channel {channel} are not alike")
             self.columns[channel] = column
+            headers = self._headers(channel)
+            if any((headers[name] != headers[name][0]).any() for name in _ALIKE):
+                raise DatasetError(f"chunk: the records of channel {channel} are not alike")
         self.log_times = self._headers(next(iter(self.columns)))["log_time"]
 
     def __len__(self) -> int:
@@ -278,15 +285,7 @@ class MessageTable:
 
     def _headers(self, channel: int) -> Rows:
         column = self.columns[channel]
-        dtype = np.dtype(
-            {
-                "names": ["sequence", "log_time", "publish_time"],
-                "formats": ["<u4", "<u8", "<u8"],
-                "offsets": [11, 15, 23],
-                "itemsize": _MESSAGE_HEADER.size,
-            }
-        )
-        return self._table[:, column.offset : column.offset + dtype.itemsize].view(dtype)[:, 0]
+        return self._table[:, column.offset : column.offset + _MESSAGE_HEADERS.itemsize].view(_MESSAGE_HEADERS)[:, 0]
 
     def are_timed_by(self, stamps_ns: NDArray[np.int64]) -> bool:
         """Whether all records are numbered from 0 and logged and published at these times [ns], ``(n_samples,)``."""

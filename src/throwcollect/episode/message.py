@@ -120,12 +120,17 @@ def _layout() -> MessageLayout:
 def pack(episode: Episode) -> bytes:
     """The CDR bytes of the message that carries an episode."""
     parts = (episode.header_json.encode(), episode.records_sha256.encode(), episode.chunk.record())
+    return b"".join((_prefix([len(part) for part in parts]), *parts))
+
+
+def _prefix(sizes: list[int]) -> bytes:
+    """What comes before the data: the layout, and at the end the data's size."""
     prefix = bytearray(_layout().template)
     fields = np.frombuffer(prefix, _layout().dtype)
-    for number, part in enumerate(parts):
-        fields[f"layout.dim.{number}.size"] = fields[f"layout.dim.{number}.stride"] = len(part)
-    _COUNT.pack_into(prefix, len(prefix) - _COUNT.size, sum(map(len, parts)))
-    return b"".join((prefix, *parts))
+    for number, size in enumerate(sizes):
+        fields[f"layout.dim.{number}.size"] = fields[f"layout.dim.{number}.stride"] = size
+    _COUNT.pack_into(prefix, len(prefix) - _COUNT.size, sum(sizes) % 2**32)
+    return bytes(prefix)
 
 
 def unpack(message: bytes) -> Episode:
@@ -141,11 +146,11 @@ def unpack(message: bytes) -> Episode:
     length = len(layout.template)
     if len(message) < length:
         raise DatasetError(f"episode: a message of {len(message)} bytes", expected=f"at least {length}")
-    fields = np.frombuffer(message[:length], layout.dtype)[0]
+    fields = np.frombuffer(message, layout.dtype, count=1)[0]
     sizes = [int(fields[f"layout.dim.{number}.size"]) for number in range(len(_PARTS))]
-    (count,) = _COUNT.unpack_from(message, length - _COUNT.size)
-    if not layout.describes(_without_count(message[:length])) or sum(sizes) != count:
+    if message[:length] != _prefix(sizes):
         raise DatasetError(f"episode: not a UInt8MultiArray of the parts {', '.join(_PARTS)}")
+    count = sum(sizes)
     if len(message) != length + count:
         raise DatasetError(f"episode: {len(message) - length} bytes of data", expected=f"{count} as announced")
     middle, last = length + sizes[0], length + sizes[0] + sizes[1]
@@ -161,8 +166,3 @@ def make_episode(header: bytes | str, records_sha256: bytes, chunk: Chunk) -> Ep
     if not _SHA256.fullmatch(records_sha256):
         raise DatasetError(f"episode: SHA-256 {records_sha256[:80]!r}", expected="64 hexadecimal digits")
     return Episode(header_from_json(header), chunk, records_sha256.decode())
-
-
-def _without_count(prefix: bytes) -> np.ndarray[tuple[int, int], np.dtype[np.uint8]]:
-    """The bytes before the data with the data's length set to 0, as in the template."""
-    return np.frombuffer(prefix[: -_COUNT.size] + bytes(_COUNT.size), np.uint8).reshape(1, -1)

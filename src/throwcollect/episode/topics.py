@@ -71,10 +71,11 @@ def _rotate(quaternion_xyzw: NDArray[np.float64], *vectors: NDArray[np.float64],
     Returns:
         Shape ``(len(vectors), n, 3)``.
     """
-    x, y, z, w = quaternion_xyzw.T
+    # Recorded columns lie far apart in memory; everything below reads them many times.
+    x, y, z, w = np.ascontiguousarray(quaternion_xyzw.T)
     if inverse:
         x, y, z = -x, -y, -z
-    a, b, c = np.moveaxis(np.stack(vectors), -1, 0)
+    a, b, c = np.stack([vector.T for vector in vectors], axis=1)
     # v' = v + w t + u × t with t = 2 u × v, for a unit quaternion (u, w).
     ta, tb, tc = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
     turned = np.empty((len(vectors), len(x), 3))

@@ -39,15 +39,22 @@ class Flight:
             time_s: Since the start of the trial [s].
             knot: The knot before that time; there is one after it.
         """
-        span = self.times[knot + 1] - self.times[knot]
-        u = (time_s - self.times[knot]) / span
-        (p0, p1), (v0, v1) = self.positions[knot : knot + 2], self.velocities[knot : knot + 2]
-        position = p0 + (p1 - p0) * (u * u * (3 - 2 * u)) + span * u * (1 - u) * (v0 * (1 - u) - v1 * u)
-        return _state(time_s, position, v0 + (v1 - v0) * u)
+        before, after = self.times[knot : knot + 2].tolist()
+        span = after - before
+        u = (time_s - before) / span
+        smooth, bump = u * u * (3 - 2 * u), span * u * (1 - u)
+        # Three numbers are not worth an array.
+        axes = list(
+            zip(*self.positions[knot : knot + 2].tolist(), *self.velocities[knot : knot + 2].tolist(), strict=True)
+        )
+        x, y, z = (p0 + (p1 - p0) * smooth + bump * (v0 * (1 - u) - v1 * u) for p0, p1, v0, v1 in axes)
+        vx, vy, vz = (v0 + (v1 - v0) * u for _, _, v0, v1 in axes)
+        return BallState(time_s, (x, y, z), (vx, vy, vz))
 
     def knot_state(self, knot: int) -> BallState:
         """Ball at a knot."""
-        return _state(float(self.times[knot]), self.positions[knot], self.velocities[knot])
+        (x, y, z), (vx, vy, vz) = self.positions[knot].tolist(), self.velocities[knot].tolist()
+        return BallState(float(self.times[knot]), (x, y, z), (vx, vy, vz))
 
     def landing(self, height: float) -> tuple[int, BallState] | None:
         """First downward crossing of a height by the ball's centre.
@@ -226,12 +233,6 @@ def ballistic_positions(
         z += vz * dt
         path.append((x, y, z))
     return np.array(path)
-
-
-def _state(time_s: float, position: NDArray[np.float64], velocity: NDArray[np.float64]) -> BallState:
-    x, y, z = position.tolist()
-    vx, vy, vz = velocity.tolist()
-    return BallState(float(time_s), (x, y, z), (vx, vy, vz))
 
 
 def _root(cubic: tuple[float, float, float, float]) -> float:

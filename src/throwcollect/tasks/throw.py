@@ -63,20 +63,18 @@ def judge(
         return ThrowResult(Outcome.TRACKING_FAILED, reason="the samples hold numbers that are not finite")
     result = _joint_measures(samples, header.start_ns, config=config, trajectory=trajectory, limits=limits)
     release_ns = release_of(header.contacts, gap_s=config.task.recatch_gap_s)
-    touched: list[Contact] = []
+    touched: list[Contact] | None = None
     if release_ns is not None and release_ns <= samples.stamps_ns[-1]:
         flight = flight_after(samples, start_ns=header.start_ns, release_ns=release_ns)
         if impacts := [contact.start_ns for contact in header.contacts if contact.body == "ground"]:
             flight = without_impact(flight, (min(impacts) - header.start_ns) / NS_PER_S, config=config)
         result = _flight_measures(result, flight, config)
-        end_s = result.landing.time_s if result.landing else math.inf
-        touched = _touches(header, release_ns, end_s)
-        result = replace(result, recontacts=len(touched))
+        touched = _touches(header, release_ns, result.landing.time_s if result.landing else math.inf)
     outcome, reason = _outcome(result, header, touched)
-    return replace(result, outcome=outcome, reason=reason)
+    return replace(result, outcome=outcome, reason=reason, recontacts=None if touched is None else len(touched))
 
 
-def _outcome(result: ThrowResult, header: EpisodeHeader, touched: list[Contact]) -> tuple[Outcome, str | None]:
+def _outcome(result: ThrowResult, header: EpisodeHeader, touched: list[Contact] | None) -> tuple[Outcome, str | None]:
     for goal in header.goals:
         if goal.status in _FAILED_GOALS:
             detail = f": {goal.error_string}" if goal.error_string else f" with error code {goal.error_code}"
@@ -126,23 +124,18 @@ def _touches(header: EpisodeHeader, release_ns: int, end_s: float) -> list[Conta
 def _flight_measures(result: ThrowResult, flight: Flight, config: Config) -> ThrowResult:
     release = flight.knot_state(0)
     found = flight.landing(config.scene.landing_height_m + config.ball.radius_m)
+    last, landing = found or (len(flight.times) - 1, None)
     speed, elevation = _direction(release)
-    result = replace(
+    return replace(
         result,
         release=release,
         release_speed_mps=speed,
         release_elevation_rad=elevation,
-        apex=flight.apex(found[0] + 1 if found else len(flight.times)),
+        apex=flight.apex(last + 1),
+        landing=landing,
+        flight_time_s=landing.time_s - release.time_s if landing else None,
+        hit_angle_rad=-_direction(landing)[1] if landing else None,
     )
-    if found:
-        landing = found[1]
-        result = replace(
-            result,
-            landing=landing,
-            flight_time_s=landing.time_s - release.time_s,
-            hit_angle_rad=-_direction(landing)[1],
-        )
-    return result
 
 
 def _direction(ball: BallState) -> tuple[float, float]:
@@ -160,17 +153,18 @@ def _joint_measures(
     lower, upper = limits.lower[moving], limits.upper[moving]
     measured = samples.position[:, moving]
     positions = np.abs(measured - (lower + upper) / 2).max(axis=0) / ((upper - lower) / 2)
-    efforts = np.abs(samples.effort) / (limits.effort * config.robot.effort_scale)
+    efforts, effort_limits = np.abs(samples.effort), limits.effort * config.robot.effort_scale
+    effort_peaks = efforts.max(axis=0) / effort_limits
+    saturated = np.flatnonzero(effort_peaks >= 1 - _SLACK)
+    at_limit = (efforts[:, saturated] / effort_limits[saturated] >= 1 - _SLACK).any(axis=1)
     desired = sample_positions(trajectory, (samples.stamps_ns - start_ns) / NS_PER_S)
     errors = np.abs(measured - desired).max(axis=0)
-    effort_peaks = efforts.max(axis=0)
-    saturated = effort_peaks >= 1 - _SLACK
     return ThrowResult(
         Outcome.LANDED,
         position_peak=_peak(positions, trajectory.joints),
         velocity_peak=_peak(np.abs(samples.velocity).max(axis=0) / limits.velocity, JOINTS),
         effort_peak=_peak(effort_peaks, JOINTS),
-        effort_saturated_share=float((efforts[:, saturated] >= 1 - _SLACK).any(axis=1).mean()),
+        effort_saturated_share=float(at_limit.mean()),
         tracking_error_rad=dict(zip(trajectory.joints, errors.tolist(), strict=True)),
     )
 
