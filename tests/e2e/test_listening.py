@@ -13,8 +13,7 @@ from tests.e2e.collection import collect, fingerprints, start, write_config
 from tests.integration.robot import connected
 from throwcollect.dataset.reader import Dataset
 from throwcollect.interfaces import get_message
-from throwcollect.ros import Context, Node, QoSProfile, SingleThreadedExecutor
-from throwcollect.ros.qos import HistoryPolicy
+from throwcollect.ros import Context, HistoryPolicy, Node, QoSProfile, SingleThreadedExecutor
 
 pytestmark = pytest.mark.e2e
 TRIALS = 16

@@ -6,7 +6,7 @@ import pytest
 
 from tests.integration.robot import PLAYING, Robot, connected, start_simulation
 from throwcollect.ros import Context
-from throwcollect.ros.parameter import parameter_value_to_python
+from throwcollect.ros.embedded.parameter import parameter_value_to_python
 from throwcollect.ros.router import router
 
 NAME = "sim_0"

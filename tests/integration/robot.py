@@ -18,9 +18,16 @@ from throwcollect.config.schema import Config
 from throwcollect.interfaces import Message, get_action, get_message, get_service
 from throwcollect.robots.description import start_posture
 from throwcollect.robots.talos import CONTROLLERS
-from throwcollect.ros import Context, Future, Node, Parameter, QoSProfile, SingleThreadedExecutor
-from throwcollect.ros.action import ActionClient
-from throwcollect.ros.qos import HistoryPolicy
+from throwcollect.ros import (
+    ActionClient,
+    Context,
+    Future,
+    HistoryPolicy,
+    Node,
+    Parameter,
+    QoSProfile,
+    SingleThreadedExecutor,
+)
 from throwcollect.session_config import CONFIG_FILE_VARIABLE, OVERRIDE_VARIABLE
 
 CONFIG = Config.model_validate({"name": "integration", "tool": {"cup_floor_radius_m": 0.006}})

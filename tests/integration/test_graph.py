@@ -8,8 +8,8 @@ import pytest
 
 from tests.integration.robot import CONFIG, PAUSED, Robot
 from throwcollect.robots.talos import CONTROLLERS, JOINTS
-from throwcollect.ros.action import get_action_server_names_and_types_by_node
-from throwcollect.ros.qos import DurabilityPolicy, QoSProfile
+from throwcollect.ros import DurabilityPolicy, QoSProfile
+from throwcollect.ros.embedded.action import get_action_server_names_and_types_by_node
 
 LATE = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 ACTION = "control_msgs/action/FollowJointTrajectory"

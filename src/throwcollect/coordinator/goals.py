@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.interfaces import get_action, get_message
 from throwcollect.robots.talos import CONTROLLERS, controller_of
 from throwcollect.robots.trajectory import JointTrajectory
+from throwcollect.ros import get_action, get_message
 
 FollowJointTrajectory: Any = get_action("control_msgs/action/FollowJointTrajectory")
 JointTrajectoryPoint: Any = get_message("trajectory_msgs/msg/JointTrajectoryPoint")

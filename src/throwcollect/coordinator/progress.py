@@ -9,8 +9,7 @@ from types import TracebackType
 from typing import Any
 
 from throwcollect import ros
-from throwcollect.interfaces import get_message
-from throwcollect.ros.qos import DurabilityPolicy
+from throwcollect.ros import DurabilityPolicy, get_message
 
 String: Any = get_message("std_msgs/msg/String")
 

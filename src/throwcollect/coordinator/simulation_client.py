@@ -6,10 +6,17 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from throwcollect.coordinator.goals import TrialGoals
-from throwcollect.interfaces import get_message, get_service
-from throwcollect.ros import Future, Node, Parameter, QoSProfile
-from throwcollect.ros.action import ActionClient
-from throwcollect.ros.qos import HistoryPolicy, ReliabilityPolicy
+from throwcollect.ros import (
+    ActionClient,
+    Future,
+    HistoryPolicy,
+    Node,
+    Parameter,
+    QoSProfile,
+    ReliabilityPolicy,
+    get_message,
+    get_service,
+)
 
 ResetSimulation: Any = get_service("simulation_interfaces/srv/ResetSimulation")
 SetParametersAtomically: Any = get_service("rcl_interfaces/srv/SetParametersAtomically")

@@ -1,18 +1,53 @@
-"""The ROS 2 edge: nodes by the API of rclpy, over Zenoh as rmw_zenoh_cpp speaks it, without a ROS installation."""
+"""The ROS 2 edge: what a node needs of rclpy's API, and the classes of its messages.
 
-from throwcollect.ros.clock import Clock, ROSClock
-from throwcollect.ros.context import Context, get_default_context, init, ok, shutdown, try_shutdown
-from throwcollect.ros.duration import Duration
-from throwcollect.ros.exceptions import ExternalShutdownException
-from throwcollect.ros.executors import Executor, SingleThreadedExecutor
-from throwcollect.ros.node import Node, create_node
-from throwcollect.ros.parameter import Parameter, ParameterDescriptor, SetParametersResult
-from throwcollect.ros.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
-from throwcollect.ros.spinning import get_global_executor, spin, spin_once, spin_until_future_complete
-from throwcollect.ros.task import Future, Task
-from throwcollect.ros.time import ClockType, Time
+Nodes import from here and from nowhere below, so that they run unchanged on every backend.
+"""
+
+from throwcollect.ros.embedded import (
+    ActionClient,
+    ActionServer,
+    CancelResponse,
+    Clock,
+    ClockType,
+    Context,
+    DurabilityPolicy,
+    Duration,
+    Executor,
+    ExternalShutdownException,
+    Future,
+    GoalResponse,
+    HistoryPolicy,
+    IntegerRange,
+    Node,
+    Parameter,
+    ParameterDescriptor,
+    Publisher,
+    QoSProfile,
+    ReliabilityPolicy,
+    ROSClock,
+    SetParametersResult,
+    SingleThreadedExecutor,
+    Task,
+    Time,
+    create_node,
+    get_action,
+    get_default_context,
+    get_global_executor,
+    get_message,
+    get_service,
+    init,
+    ok,
+    shutdown,
+    spin,
+    spin_once,
+    spin_until_future_complete,
+    try_shutdown,
+)
 
 __all__ = [
+    "ActionClient",
+    "ActionServer",
+    "CancelResponse",
     "Clock",
     "ClockType",
     "Context",
@@ -21,10 +56,13 @@ __all__ = [
     "Executor",
     "ExternalShutdownException",
     "Future",
+    "GoalResponse",
     "HistoryPolicy",
+    "IntegerRange",
     "Node",
     "Parameter",
     "ParameterDescriptor",
+    "Publisher",
     "QoSProfile",
     "ROSClock",
     "ReliabilityPolicy",
@@ -33,8 +71,11 @@ __all__ = [
     "Task",
     "Time",
     "create_node",
+    "get_action",
     "get_default_context",
     "get_global_executor",
+    "get_message",
+    "get_service",
     "init",
     "ok",
     "shutdown",

@@ -9,8 +9,7 @@ from typing import Any
 
 from throwcollect import ros
 from throwcollect.errors import ConfigError, WorkerError
-from throwcollect.interfaces import get_service
-from throwcollect.ros.parameter import IntegerRange
+from throwcollect.ros import IntegerRange, get_service
 from throwcollect.runtime.listening import answers
 from throwcollect.runtime.nodes import LAUNCHER, node_environment
 from throwcollect.runtime.records import Record, Run

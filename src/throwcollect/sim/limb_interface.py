@@ -7,9 +7,7 @@ from collections.abc import Hashable
 from typing import Any
 
 from throwcollect.control import GoalResult, GoalStatus, JointTolerance, Trajectory, TrajectoryGoal, TrajectoryPoint
-from throwcollect.interfaces import get_action, get_message
-from throwcollect.ros import Future, Node
-from throwcollect.ros.action import ActionServer, CancelResponse, GoalResponse
+from throwcollect.ros import ActionServer, CancelResponse, Future, GoalResponse, Node, get_action, get_message
 from throwcollect.sim.simulation import Simulation
 
 FollowJointTrajectory: Any = get_action("control_msgs/action/FollowJointTrajectory")

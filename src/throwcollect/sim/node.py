@@ -13,11 +13,17 @@ from throwcollect.episode.message import Episode, pack
 from throwcollect.episode.record import Samples
 from throwcollect.episode.topics import Topic
 from throwcollect.errors import ConfigError
-from throwcollect.interfaces import get_message
 from throwcollect.robots.description import full_description
-from throwcollect.ros import Node, ParameterDescriptor, QoSProfile, Time
-from throwcollect.ros.publisher import Publisher
-from throwcollect.ros.qos import DurabilityPolicy, HistoryPolicy
+from throwcollect.ros import (
+    DurabilityPolicy,
+    HistoryPolicy,
+    Node,
+    ParameterDescriptor,
+    Publisher,
+    QoSProfile,
+    Time,
+    get_message,
+)
 from throwcollect.sim.limb_interface import LimbInterface
 from throwcollect.sim.simulation import Simulation, State, TrialSetup
 from throwcollect.sim.simulation_control import SimulationControl

@@ -7,8 +7,7 @@ from typing import Any
 
 import throwcollect
 from throwcollect.errors import ConfigError
-from throwcollect.interfaces import get_message, get_service
-from throwcollect.ros import Node
+from throwcollect.ros import Node, get_message, get_service
 from throwcollect.sim.recording import BallState
 from throwcollect.sim.simulation import Simulation, State
 

@@ -13,7 +13,7 @@ from throwcollect.coordinator.progress import Progress
 from throwcollect.coordinator.simulation_client import SimulationClient
 from throwcollect.interfaces import get_service
 from throwcollect.robots.description import start_posture
-from throwcollect.ros.action import ActionServer, GoalResponse
+from throwcollect.ros import ActionServer, GoalResponse
 from throwcollect.ros.router import router
 from throwcollect.tasks.trajectory import throw_trajectory
 

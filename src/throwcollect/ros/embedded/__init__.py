@@ -1,0 +1,57 @@
+"""The API of rclpy over Zenoh, as rmw_zenoh_cpp speaks it, without a ROS installation."""
+
+from throwcollect.interfaces import get_action, get_message, get_service
+from throwcollect.ros.embedded.action import ActionClient, ActionServer, CancelResponse, GoalResponse
+from throwcollect.ros.embedded.clock import Clock, ROSClock
+from throwcollect.ros.embedded.context import Context, get_default_context, init, ok, shutdown, try_shutdown
+from throwcollect.ros.embedded.duration import Duration
+from throwcollect.ros.embedded.exceptions import ExternalShutdownException
+from throwcollect.ros.embedded.executors import Executor, SingleThreadedExecutor
+from throwcollect.ros.embedded.node import Node, create_node
+from throwcollect.ros.embedded.parameter import IntegerRange, Parameter, ParameterDescriptor, SetParametersResult
+from throwcollect.ros.embedded.publisher import Publisher
+from throwcollect.ros.embedded.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from throwcollect.ros.embedded.spinning import get_global_executor, spin, spin_once, spin_until_future_complete
+from throwcollect.ros.embedded.task import Future, Task
+from throwcollect.ros.embedded.time import ClockType, Time
+
+__all__ = [
+    "ActionClient",
+    "ActionServer",
+    "CancelResponse",
+    "Clock",
+    "ClockType",
+    "Context",
+    "DurabilityPolicy",
+    "Duration",
+    "Executor",
+    "ExternalShutdownException",
+    "Future",
+    "GoalResponse",
+    "HistoryPolicy",
+    "IntegerRange",
+    "Node",
+    "Parameter",
+    "ParameterDescriptor",
+    "Publisher",
+    "QoSProfile",
+    "ROSClock",
+    "ReliabilityPolicy",
+    "SetParametersResult",
+    "SingleThreadedExecutor",
+    "Task",
+    "Time",
+    "create_node",
+    "get_action",
+    "get_default_context",
+    "get_global_executor",
+    "get_message",
+    "get_service",
+    "init",
+    "ok",
+    "shutdown",
+    "spin",
+    "spin_once",
+    "spin_until_future_complete",
+    "try_shutdown",
+]

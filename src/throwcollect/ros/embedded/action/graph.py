@@ -1,0 +1,41 @@
+"""Actions in the ROS graph: an action is where its feedback topic is."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from throwcollect.ros.embedded.graph import group_types
+from throwcollect.ros.embedded.node_graph import NamesAndTypes
+
+if TYPE_CHECKING:
+    from throwcollect.ros.embedded.node import Node
+
+_TOPIC, _TYPE = "/_action/feedback", "_FeedbackMessage"
+
+
+def get_action_names_and_types(node: Node) -> NamesAndTypes:
+    """All actions that somebody offers or uses."""
+    return _actions(node.get_topic_names_and_types())
+
+
+def get_action_server_names_and_types_by_node(
+    node: Node, remote_node_name: str, remote_node_namespace: str
+) -> NamesAndTypes:
+    """Actions that one node offers."""
+    return _actions(node.get_publisher_names_and_types_by_node(remote_node_name, remote_node_namespace))
+
+
+def get_action_client_names_and_types_by_node(
+    node: Node, remote_node_name: str, remote_node_namespace: str
+) -> NamesAndTypes:
+    """Actions that one node has clients of."""
+    return _actions(node.get_subscriber_names_and_types_by_node(remote_node_name, remote_node_namespace))
+
+
+def _actions(topics: NamesAndTypes) -> NamesAndTypes:
+    return group_types(
+        (name.removesuffix(_TOPIC), type_name.removesuffix(_TYPE))
+        for name, types in topics
+        for type_name in types
+        if name.endswith(_TOPIC) and type_name.endswith(_TYPE)
+    )

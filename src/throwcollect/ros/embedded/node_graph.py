@@ -1,0 +1,64 @@
+"""What a node can ask about the ROS graph."""
+
+from __future__ import annotations
+
+from throwcollect.ros.embedded.context import Context
+from throwcollect.ros.embedded.keys import EntityKind
+
+NamesAndTypes = list[tuple[str, list[str]]]
+"""Names of topics or services, each with its types."""
+
+
+class NodeGraph:
+    """The graph as the node's context sees it; hidden names are included.
+
+    Args:
+        context: Context of the node.
+    """
+
+    def __init__(self, context: Context) -> None:
+        self.context = context
+
+    def get_node_names_and_namespaces(self) -> list[tuple[str, str]]:
+        """Names and namespaces of all nodes."""
+        return sorted((token.node, token.namespace) for token in self.context.graph.tokens(EntityKind.NODE))
+
+    def get_node_names(self) -> list[str]:
+        """Names of all nodes, without namespaces."""
+        return [name for name, _ in self.get_node_names_and_namespaces()]
+
+    def get_topic_names_and_types(self) -> NamesAndTypes:
+        """All topics."""
+        return self.context.graph.names_and_types(EntityKind.PUBLISHER, EntityKind.SUBSCRIPTION)
+
+    def get_service_names_and_types(self) -> NamesAndTypes:
+        """All services that are offered."""
+        return self.context.graph.names_and_types(EntityKind.SERVICE)
+
+    def get_publisher_names_and_types_by_node(self, node_name: str, node_namespace: str) -> NamesAndTypes:
+        """Topics that a node publishes."""
+        return self.context.graph.names_and_types(EntityKind.PUBLISHER, node=(node_namespace, node_name))
+
+    def get_subscriber_names_and_types_by_node(self, node_name: str, node_namespace: str) -> NamesAndTypes:
+        """Topics that a node subscribes to."""
+        return self.context.graph.names_and_types(EntityKind.SUBSCRIPTION, node=(node_namespace, node_name))
+
+    def get_service_names_and_types_by_node(self, node_name: str, node_namespace: str) -> NamesAndTypes:
+        """Services that a node offers."""
+        return self.context.graph.names_and_types(EntityKind.SERVICE, node=(node_namespace, node_name))
+
+    def get_client_names_and_types_by_node(self, node_name: str, node_namespace: str) -> NamesAndTypes:
+        """Services that a node has clients of."""
+        return self.context.graph.names_and_types(EntityKind.CLIENT, node=(node_namespace, node_name))
+
+    def count_publishers(self, topic_name: str) -> int:
+        """Publishers of a topic, given by its absolute, relative or private name."""
+        return self.context.graph.count(EntityKind.PUBLISHER, self.resolve_topic_name(topic_name))
+
+    def count_subscribers(self, topic_name: str) -> int:
+        """Subscriptions to a topic, given by its absolute, relative or private name."""
+        return self.context.graph.count(EntityKind.SUBSCRIPTION, self.resolve_topic_name(topic_name))
+
+    def resolve_topic_name(self, topic: str) -> str:
+        """Absolute name of a topic."""
+        raise NotImplementedError

@@ -1,0 +1,136 @@
+import json
+import signal
+import subprocess
+import sys
+import threading
+
+import pytest
+import zenoh
+
+from throwcollect import health
+from throwcollect.errors import ConfigError, ThrowcollectError
+from throwcollect.health import check
+from throwcollect.interfaces import get_service, serialize
+from throwcollect.ros.embedded.attachment import unpack
+from throwcollect.session_config import OVERRIDE_VARIABLE
+
+
+@pytest.fixture
+def spinning(rig):
+    """Spins the nodes of the rig in a thread of their own while the test asks them."""
+    ended = threading.Event()
+    thread = threading.Thread(target=lambda: rig.spin(ended.is_set, timeout=60.0))
+    yield thread.start
+    ended.set()
+    if thread.is_alive():
+        thread.join()
+
+
+@pytest.fixture
+def impatient(monkeypatch):
+    monkeypatch.setattr(health, "TIMEOUT_S", 0.3)
+
+
+def test_the_request_is_what_a_client_node_would_send():
+    assert serialize(get_service("rcl_interfaces/srv/GetParameters").Request()) == health.REQUEST
+    received = unpack(health.attachment())
+    assert received.sequence == 1
+    assert health.attachment() != health.attachment()
+
+
+@pytest.mark.parametrize(("name", "namespace"), [("sim_3", "/sim_3"), ("coordinator", "/")])
+def test_a_node_that_works_answers(rig, spinning, name, namespace):
+    rig.node(name, namespace=namespace)
+    spinning()
+    check(name)
+
+
+def test_asking_leaves_no_trace_in_the_graph_and_in_the_logs(rig, spinning, capfd):
+    node = rig.node("sim_3", namespace="/sim_3")
+    spinning()
+    changes = node.context.graph.changes
+    check("sim_3")
+    assert node.context.graph.changes == changes
+    assert "ignored" not in capfd.readouterr().err
+
+
+def test_a_node_whose_loop_is_stuck_does_not_answer(rig, impatient):
+    rig.node("sim_3", namespace="/sim_3")
+    with pytest.raises(ThrowcollectError, match="sim_3: does not answer") as caught:
+        check("sim_3")
+    assert caught.value.exit_code == 1
+    assert "\n" not in str(caught.value)
+
+
+def test_a_node_that_is_not_there_does_not_answer(environment):
+    with pytest.raises(ThrowcollectError, match="sim_4: does not answer"):
+        check("sim_4")
+
+
+def test_a_node_of_another_domain_is_another_node(rig, spinning, monkeypatch):
+    rig.node("sim_3", namespace="/sim_3")
+    spinning()
+    monkeypatch.setenv("ROS_DOMAIN_ID", "231")
+    with pytest.raises(ThrowcollectError, match="sim_3: does not answer"):
+        check("sim_3")
+
+
+def test_the_environment_names_the_node(environment, monkeypatch):
+    monkeypatch.setenv("THROWCOLLECT_NODE", "router")
+    check()
+    monkeypatch.setenv("THROWCOLLECT_NODE", "sim_4")
+    with pytest.raises(ThrowcollectError, match="sim_4: does not answer"):
+        check()
+
+
+@pytest.mark.parametrize("name", ["", "a*", "**", "a/b", "$x"])
+def test_a_name_that_is_none_is_refused(environment, monkeypatch, name):
+    monkeypatch.delenv("THROWCOLLECT_NODE", raising=False)
+    with pytest.raises(ConfigError, match="health: "):
+        check(name)
+
+
+def test_without_a_router_nothing_is_healthy(environment, monkeypatch):
+    monkeypatch.setenv(OVERRIDE_VARIABLE, 'connect/endpoints=["tcp/127.0.0.1:1"]')
+    for node in ("router", "sim_3"):
+        with pytest.raises(ThrowcollectError, match=f"{node}: no session with the router: .*tcp/127.0.0.1:1"):
+            check(node)
+
+
+def test_a_router_that_is_stuck_is_not_healthy(environment, monkeypatch, impatient):
+    command = [sys.executable, "-m", "throwcollect.ros.router", "--listen", "tcp/127.0.0.1:0"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as router:
+        try:
+            endpoint = router.stdout.readline().split()[-1]
+            monkeypatch.setenv(OVERRIDE_VARIABLE, f"connect/endpoints={json.dumps([endpoint])}")
+            check("router")
+            router.send_signal(signal.SIGSTOP)
+            with pytest.raises(ThrowcollectError, match="router: no session with the router"):
+                check("router")
+        finally:
+            router.kill()
+
+
+def test_a_session_is_waited_for_no_longer_than_an_answer(environment, monkeypatch):
+    opened = []
+
+    def refuse(config):
+        opened.append(json.loads(config.get_json("transport/unicast/open_timeout")))
+        raise zenoh.ZError("no")
+
+    monkeypatch.setattr(zenoh, "open", refuse)
+    with pytest.raises(ThrowcollectError, match="router: no session"):
+        check("router")
+    assert opened == [health.TIMEOUT_S * 1000]
+
+
+def test_the_check_loads_neither_the_command_line_nor_the_interfaces(environment):
+    code = "import sys, throwcollect.health; print(*({'typer', 'numpy', 'rosbags'} & sys.modules.keys()))"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "\n"
+
+
+@pytest.mark.parametrize(("node", "code", "message"), [("router", 0, ""), ("sim_4", 1, "sim_4: does not answer\n")])
+def test_as_a_module_it_ends_with_the_exit_code_and_one_line(environment, monkeypatch, node, code, message):
+    monkeypatch.setenv("THROWCOLLECT_NODE", node)
+    ended = subprocess.run([sys.executable, "-m", "throwcollect.health"], capture_output=True, text=True, check=False)
+    assert (ended.returncode, ended.stderr, ended.stdout) == (code, message, "")

@@ -1,0 +1,72 @@
+import pytest
+
+from throwcollect.interfaces import get_message
+from throwcollect.ros import Context, DurabilityPolicy, Node, QoSProfile
+from throwcollect.ros.embedded.exceptions import NameValidationException, NotInitializedException
+from throwcollect.ros.embedded.logging import LoggingSeverity, get_logger
+
+Log = get_message("rcl_interfaces/msg/Log")
+
+
+def test_a_node_needs_an_initialised_context_and_a_valid_name(rig):
+    with pytest.raises(NotInitializedException, match="cannot create node 'a'"):
+        Node("a", context=Context())
+    with pytest.raises(NameValidationException, match="invalid node name"):
+        rig.node("a/b")
+
+
+def test_a_node_knows_its_names(rig):
+    node = rig.node("sim", namespace="talos")
+    assert (node.get_name(), node.get_namespace()) == ("sim", "/talos")
+    assert node.get_fully_qualified_name() == "/talos/sim"
+    assert node.resolve_service_name("~/x") == "/talos/sim/x"
+
+
+def test_what_a_node_logs_goes_to_standard_error_and_rosout(rig, capsys):
+    node, heard = rig.node("sim", namespace="talos"), []
+    node.get_logger().warning("careful")
+    node.get_logger().debug("not shown")
+    qos = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    rig.node("console").create_subscription(Log, "/rosout", heard.append, qos)
+    assert rig.spin(lambda: heard)
+    assert (heard[0].name, heard[0].level, heard[0].msg) == (
+        "talos.sim",
+        Log.WARN[0] if isinstance(Log.WARN, bytes) else Log.WARN,
+        "careful",
+    )
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 1
+    assert lines[0].startswith("[WARN] [")
+    assert lines[0].endswith("[talos.sim]: careful")
+
+
+def test_logging_goes_on_after_the_node_ended(rig, capsys):
+    node = rig.node("sim")
+    node.destroy_node()
+    node.get_logger().info("late")
+    assert "late" in capsys.readouterr().err
+
+
+def test_levels_are_inherited_by_children(capsys):
+    logger = get_logger("some.node")
+    child = logger.get_child("part")
+    logger.set_level(LoggingSeverity.ERROR)
+    assert not child.warning("hidden")
+    child.set_level(LoggingSeverity.DEBUG)
+    assert child.debug("shown")
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_repeated_messages_can_be_limited(capsys):
+    logger = get_logger("limited")
+    assert [logger.info("once", once=True) for _ in range(3)] == [True, False, False]
+    assert [logger.info("slow", throttle_duration_sec=100.0) for _ in range(3)] == [True, False, False]
+    assert capsys.readouterr().err.count("\n") == 2
+
+
+def test_destroying_a_node_twice_or_after_shutdown_is_harmless(rig):
+    first, second = rig.node("a"), rig.node("b")
+    first.destroy_node()
+    first.destroy_node()
+    second.context.shutdown()
+    second.destroy_node()

@@ -1,0 +1,62 @@
+import pytest
+
+from throwcollect.ros import qos
+from throwcollect.ros.embedded.duration import Duration, Infinite
+from throwcollect.ros.embedded.qos import (
+    DurabilityPolicy,
+    HistoryPolicy,
+    LivelinessPolicy,
+    QoSProfile,
+    ReliabilityPolicy,
+    encode,
+)
+
+
+@pytest.mark.parametrize(
+    ("profile", "text"),
+    [
+        (qos.qos_profile_default, "::,10:,:,:,,"),
+        (qos.qos_profile_services_default, "::,10:,:,:,,"),
+        (qos.qos_profile_sensor_data, "2::,5:,:,:,,"),
+        (qos.qos_profile_system_default, "::,:,:,:,,"),
+        (qos.qos_profile_action_status_default, ":1:,1:,:,:,,"),
+        (qos.qos_profile_rosout, ":1:,1000:,:10,0:,,"),
+        (qos.qos_profile_parameters, "::,1000:,:,:,,"),
+        (qos.qos_profile_parameter_events, "::,1000:,:,:,,"),
+        (QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT), "2::,1:,:,:,,"),
+        (QoSProfile(depth=0, history=HistoryPolicy.KEEP_ALL), "::2,:,:,:,,"),
+        (QoSProfile(depth=42), "::,:,:,:,,"),
+        (QoSProfile(depth=1, deadline=Infinite, lifespan=Infinite), "::,1:,:,:,,"),
+        (QoSProfile(depth=1, deadline=Duration(seconds=1.5)), "::,1:1,500000000:,:,,"),
+        (
+            QoSProfile(
+                depth=1,
+                durability=DurabilityPolicy.BEST_AVAILABLE,
+                liveliness=LivelinessPolicy.MANUAL_BY_TOPIC,
+                liveliness_lease_duration=Duration(seconds=2),
+            ),
+            ":4:,1:,:,:3,2,0",
+        ),
+    ],
+)
+def test_profiles_are_written_as_rmw_zenoh_does(profile, text):
+    assert encode(profile) == text
+
+
+def test_history_or_depth_is_required():
+    with pytest.raises(ValueError, match="history and/or depth"):
+        QoSProfile()
+    with pytest.raises(ValueError, match="KEEP_LAST needs a depth"):
+        QoSProfile(history=HistoryPolicy.KEEP_LAST)
+
+
+@pytest.mark.parametrize(
+    ("profile", "length"),
+    [
+        (QoSProfile(depth=3), 3),
+        (qos.qos_profile_system_default, 42),
+        (QoSProfile(history=HistoryPolicy.KEEP_ALL), None),
+    ],
+)
+def test_receivers_keep_as_many_messages_as_the_profile_says(profile, length):
+    assert profile.queue_length == length
