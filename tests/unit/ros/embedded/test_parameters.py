@@ -4,7 +4,7 @@ import pytest
 
 from throwcollect.interfaces import get_message, get_service
 from throwcollect.ros import Parameter, ParameterDescriptor, SetParametersResult
-from throwcollect.ros import exceptions as ex
+from throwcollect.ros.embedded import exceptions as ex
 from throwcollect.ros.embedded.parameter import FloatingPointRange, IntegerRange
 
 SRV = "rcl_interfaces/srv"

@@ -1,6 +1,6 @@
 import pytest
 
-from throwcollect.ros import qos
+from throwcollect.ros.embedded import qos
 from throwcollect.ros.embedded.duration import Duration, Infinite
 from throwcollect.ros.embedded.qos import (
     DurabilityPolicy,

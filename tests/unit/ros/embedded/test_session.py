@@ -1,7 +1,7 @@
 import pytest
 
 from throwcollect.errors import ConfigError, ThrowcollectError
-from throwcollect.ros import session
+from throwcollect.ros.embedded import session
 from throwcollect.ros.embedded.session import open_session
 
 
