@@ -21,7 +21,7 @@ from throwcollect.robots.description import start_posture
 from throwcollect.robots.model import joint_limits
 from throwcollect.robots.talos import CONTROLLERS, controller_of
 from throwcollect.robots.trajectory import JointTrajectory
-from throwcollect.ros import Node
+from throwcollect.ros import Node, graph_changes
 from throwcollect.sweep.plan import Plan, Trial
 from throwcollect.tasks.throw import Outcome, judge
 from throwcollect.tasks.trajectory import throw_trajectory
@@ -140,7 +140,7 @@ class Coordinator(Node):
         return progress
 
     def _discover(self) -> None:
-        changes = self.context.graph.changes
+        changes = graph_changes(self)
         if changes != self._discovered_changes:
             self._discovered_changes = changes
             self._find_simulations()

@@ -83,9 +83,8 @@ class SimulationClient:
     def begin(self, trial: int, physics: Mapping[str, float], goals: TrialGoals) -> None:
         """Start a trial.
 
-        All requests leave at once: a node handles its inputs in the order of their arrival. Should they be handled in
-        another order, the trial's number in the episode, which is set together with the physics, would not fit, or the
-        reset would abort the goals; either way the lease runs out and the trial is run again.
+        Each request leaves when the one before has been answered, as nothing in ROS 2 says in which order a node
+        handles requests to different services and actions.
 
         Args:
             trial: Number of the trial.
@@ -99,16 +98,23 @@ class SimulationClient:
             *(Parameter(key, value=float(value)) for key, value in physics.items()),
         ]
         request = SetParametersAtomically.Request(parameters=[item.to_parameter_msg() for item in parameters])
+
+        def reset() -> None:
+            self._expect(
+                self._reset.call_async(ResetSimulation.Request(scope=ResetSimulation.Request.SCOPE_ALL)),
+                lambda response: None if response.result.result == _OK else f"reset: {response.result.error_message}",
+                send_goals,
+            )
+
+        def send_goals() -> None:
+            for controller, goal in zip(goals.controllers, goals.goals, strict=True):
+                self._expect(self._actions[controller].send_goal_async(goal), _refusal_of(controller))
+
         self._expect(
             self._parameters.call_async(request),
             lambda response: None if response.result.successful else f"parameters: {response.result.reason}",
+            reset,
         )
-        self._expect(
-            self._reset.call_async(ResetSimulation.Request(scope=ResetSimulation.Request.SCOPE_ALL)),
-            lambda response: None if response.result.result == _OK else f"reset: {response.result.error_message}",
-        )
-        for controller, goal in zip(goals.controllers, goals.goals, strict=True):
-            self._expect(self._actions[controller].send_goal_async(goal), _refusal_of(controller))
 
     def abandon(self) -> None:
         """Forget the running trial: late answers to it are ignored."""
@@ -124,14 +130,19 @@ class SimulationClient:
         self._node.destroy_client(self._reset)
         self._node.destroy_client(self._parameters)
 
-    def _expect(self, answer: Future, refusal: Callable[[Any], str | None]) -> None:
-        """Report a refusal, unless the trial that it concerns is over by then."""
+    def _expect(
+        self, answer: Future, refusal: Callable[[Any], str | None], proceed: Callable[[], None] | None = None
+    ) -> None:
+        """Report a refusal, or else proceed, unless the trial that it concerns is over by then."""
         generation = self._generation
 
         def check(future: Future) -> None:
-            reason = refusal(future.result())
-            if generation == self._generation and reason is not None:
+            if generation != self._generation:
+                return
+            if (reason := refusal(future.result())) is not None:
                 self._on_refusal(self.namespace, reason)
+            elif proceed is not None:
+                proceed()
 
         answer.add_done_callback(check)
 

@@ -1,86 +1,16 @@
 """The ROS 2 edge: what a node needs of rclpy's API, and the classes of its messages.
 
-Nodes import from here and from nowhere below, so that they run unchanged on every backend.
+Nodes import from here and from nowhere below, so that they run unchanged on both backends: genuine rclpy, and the
+embedded one. See `backend`.
 """
 
-from throwcollect.ros.embedded import (
-    ActionClient,
-    ActionServer,
-    CancelResponse,
-    Clock,
-    ClockType,
-    Context,
-    DurabilityPolicy,
-    Duration,
-    Executor,
-    ExternalShutdownException,
-    Future,
-    GoalResponse,
-    HistoryPolicy,
-    IntegerRange,
-    Node,
-    Parameter,
-    ParameterDescriptor,
-    Publisher,
-    QoSProfile,
-    ReliabilityPolicy,
-    ROSClock,
-    SetParametersResult,
-    SingleThreadedExecutor,
-    Task,
-    Time,
-    create_node,
-    get_action,
-    get_default_context,
-    get_global_executor,
-    get_message,
-    get_service,
-    init,
-    ok,
-    shutdown,
-    spin,
-    spin_once,
-    spin_until_future_complete,
-    try_shutdown,
-)
+from typing import TYPE_CHECKING
 
-__all__ = [
-    "ActionClient",
-    "ActionServer",
-    "CancelResponse",
-    "Clock",
-    "ClockType",
-    "Context",
-    "DurabilityPolicy",
-    "Duration",
-    "Executor",
-    "ExternalShutdownException",
-    "Future",
-    "GoalResponse",
-    "HistoryPolicy",
-    "IntegerRange",
-    "Node",
-    "Parameter",
-    "ParameterDescriptor",
-    "Publisher",
-    "QoSProfile",
-    "ROSClock",
-    "ReliabilityPolicy",
-    "SetParametersResult",
-    "SingleThreadedExecutor",
-    "Task",
-    "Time",
-    "create_node",
-    "get_action",
-    "get_default_context",
-    "get_global_executor",
-    "get_message",
-    "get_service",
-    "init",
-    "ok",
-    "shutdown",
-    "spin",
-    "spin_once",
-    "spin_until_future_complete",
-    "try_shutdown",
-]
+from throwcollect.ros.backend import uses_rclpy
+
+if TYPE_CHECKING or not uses_rclpy():
+    from throwcollect.ros.embedded import *  # noqa: F403
+    from throwcollect.ros.embedded import __all__
+else:
+    from throwcollect.ros.genuine import *  # noqa: F403
+    from throwcollect.ros.genuine import __all__  # noqa: F401

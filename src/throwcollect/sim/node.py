@@ -23,6 +23,8 @@ from throwcollect.ros import (
     QoSProfile,
     Time,
     get_message,
+    graph_changes,
+    provide_time,
 )
 from throwcollect.sim.limb_interface import LimbInterface
 from throwcollect.sim.simulation import Simulation, State, TrialSetup
@@ -57,7 +59,7 @@ class SimulationNode(Node):
         self._simulation = simulation
         config = simulation.config
         # The simulation is the source of its time, so the clock is set and not subscribed to.
-        self.get_clock().activate(True)
+        provide_time(self)
         self._declare_parameters(config)
         description = full_description(config)
         self._publish_latched(Channels(config, description))
@@ -109,7 +111,7 @@ class SimulationNode(Node):
 
     def _notice_listeners(self) -> None:
         """Find out who listens, if the graph has changed since the last time."""
-        changes = self.context.graph.changes
+        changes = graph_changes(self)
         if changes == self._noticed_changes:
             return
         self._noticed_changes = changes

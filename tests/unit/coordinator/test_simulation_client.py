@@ -120,6 +120,7 @@ def test_refused_parameters_are_reported_with_the_reason(bench: Bench) -> None:
 def test_a_late_refusal_does_not_touch_the_next_trial(bench: Bench) -> None:
     bench.accepts = False
     bench.client.begin(0, {}, GOALS)
+    assert bench.spin(lambda: bench.requests.count("goal") == 1)
     bench.client.begin(1, {}, GOALS)
     assert bench.spin(lambda: bench.requests.count("goal") == 4)
     bench.settle()
@@ -129,10 +130,20 @@ def test_a_late_refusal_does_not_touch_the_next_trial(bench: Bench) -> None:
 def test_an_abandoned_trial_is_not_heard_of_again(bench: Bench) -> None:
     bench.accepts = False
     bench.client.begin(0, {}, GOALS)
+    assert bench.spin(lambda: bench.requests.count("goal") == 1)
     bench.client.abandon()
-    assert bench.spin(lambda: bench.requests.count("goal") == 2)
     bench.settle()
+    assert bench.requests.count("goal") == 2
     assert bench.refusals == []
+
+
+def test_an_abandoned_trial_goes_no_further(bench: Bench) -> None:
+    bench.client.begin(0, {}, GOALS)
+    assert bench.spin(lambda: bench.requests == ["reset"])
+    bench.client.abandon()
+    bench.settle()
+    bench.settle()
+    assert "goal" not in bench.requests
 
 
 def test_progress_survives_its_message() -> None:

@@ -2,6 +2,7 @@
 
 from throwcollect.interfaces import get_action, get_message, get_service
 from throwcollect.ros.embedded.action import ActionClient, ActionServer, CancelResponse, GoalResponse
+from throwcollect.ros.embedded.beyond import graph_changes, provide_time
 from throwcollect.ros.embedded.clock import Clock, ROSClock
 from throwcollect.ros.embedded.context import Context, get_default_context, init, ok, shutdown, try_shutdown
 from throwcollect.ros.embedded.duration import Duration
@@ -47,8 +48,10 @@ __all__ = [
     "get_global_executor",
     "get_message",
     "get_service",
+    "graph_changes",
     "init",
     "ok",
+    "provide_time",
     "shutdown",
     "spin",
     "spin_once",

@@ -1,0 +1,91 @@
+"""The genuine rclpy, whatever RMW it uses, where it is installed."""
+
+from __future__ import annotations
+
+import time
+
+from rcl_interfaces.msg import IntegerRange, ParameterDescriptor, SetParametersResult
+from rclpy import (
+    create_node,
+    get_global_executor,
+    init,
+    ok,
+    shutdown,
+    spin,
+    spin_once,
+    spin_until_future_complete,
+    try_shutdown,
+)
+from rclpy.action import ActionClient, ActionServer, CancelResponse, GoalResponse
+from rclpy.clock import Clock, ClockType, ROSClock
+from rclpy.context import Context
+from rclpy.duration import Duration
+from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.task import Future, Task
+from rclpy.time import Time
+from rclpy.utilities import get_default_context
+from rosidl_runtime_py.utilities import get_action, get_message, get_service
+
+_GRAPH_PERIOD_S = 0.1
+
+
+def graph_changes(_node: Node) -> int:
+    """A number that differs from what it was before whenever the ROS graph has changed in between.
+
+    rclpy does not tell of changes, so that they count as possible ten times a second.
+    """
+    return int(time.monotonic() / _GRAPH_PERIOD_S)
+
+
+def provide_time(node: Node) -> None:
+    """Make a node the source of its own time: its clock shows what ``set_ros_time_override`` was last given."""
+    # As rclpy's own time source does it; there is no public way.
+    node.get_clock()._set_ros_time_is_active(True)
+
+
+__all__ = [
+    "ActionClient",
+    "ActionServer",
+    "CancelResponse",
+    "Clock",
+    "ClockType",
+    "Context",
+    "DurabilityPolicy",
+    "Duration",
+    "Executor",
+    "ExternalShutdownException",
+    "Future",
+    "GoalResponse",
+    "HistoryPolicy",
+    "IntegerRange",
+    "Node",
+    "Parameter",
+    "ParameterDescriptor",
+    "Publisher",
+    "QoSProfile",
+    "ROSClock",
+    "ReliabilityPolicy",
+    "SetParametersResult",
+    "SingleThreadedExecutor",
+    "Task",
+    "Time",
+    "create_node",
+    "get_action",
+    "get_default_context",
+    "get_global_executor",
+    "get_message",
+    "get_service",
+    "graph_changes",
+    "init",
+    "ok",
+    "provide_time",
+    "shutdown",
+    "spin",
+    "spin_once",
+    "spin_until_future_complete",
+    "try_shutdown",
+]
