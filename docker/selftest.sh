@@ -9,9 +9,10 @@ import importlib
 import pkgutil
 
 import throwcollect
+from throwcollect.ros.backend import uses_rclpy
 
 for module in pkgutil.walk_packages(throwcollect.__path__, "throwcollect."):
-    if not module.name.endswith("__main__"):
+    if not module.name.endswith("__main__") and (uses_rclpy() or module.name != "throwcollect.ros.genuine"):
         importlib.import_module(module.name)
 PYTHON
 throwcollect --help > help
