@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import time
 
+import rclpy
 from rcl_interfaces.msg import IntegerRange, ParameterDescriptor, SetParametersResult
 from rclpy import (
     create_node,
     get_global_executor,
-    init,
     ok,
     shutdown,
     spin,
@@ -21,16 +21,40 @@ from rclpy.clock import Clock, ClockType, ROSClock
 from rclpy.context import Context
 from rclpy.duration import Duration
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future, Task
 from rclpy.time import Time
 from rclpy.utilities import get_default_context
 from rosidl_runtime_py.utilities import get_action, get_message, get_service
 
+from throwcollect.errors import ThrowcollectError
+
 _GRAPH_PERIOD_S = 0.1
+
+
+def init(args: list[str] | None = None, *, context: Context | None = None, domain_id: int | None = None) -> None:
+    """Initialise a context, as ``rclpy.init`` does but for signals: they are left to whoever handles them.
+
+    rclpy's own handlers would take the context away from nodes that still have to finish something.
+
+    Args:
+        args: Command line arguments.
+        context: The context; None for the default one.
+        domain_id: Domain identifier; None takes ``ROS_DOMAIN_ID``, or 0.
+
+    Raises:
+        RuntimeError: If the context is in use already.
+        ThrowcollectError: If the RMW does not start, as rmw_zenoh_cpp does not without a router.
+    """
+    try:
+        rclpy.init(args=args, context=context, domain_id=domain_id, signal_handler_options=SignalHandlerOptions.NO)
+    except rclpy_implementation.RCLError as error:
+        raise ThrowcollectError(f"ROS 2 does not start: {error}") from error
 
 
 def graph_changes(_node: Node) -> int:
