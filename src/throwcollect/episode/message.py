@@ -151,10 +151,11 @@ def unpack(message: bytes) -> Episode:
     if message[:length] != _prefix(sizes):
         raise DatasetError(f"episode: not a UInt8MultiArray of the parts {', '.join(_PARTS)}")
     count = sum(sizes)
-    if len(message) != length + count:
+    # Some RMWs hand over what they have padded.
+    if len(message) < length + count:
         raise DatasetError(f"episode: {len(message) - length} bytes of data", expected=f"{count} as announced")
     middle, last = length + sizes[0], length + sizes[0] + sizes[1]
-    return make_episode(message[length:middle], message[middle:last], Chunk.parse(message[last:]))
+    return make_episode(message[length:middle], message[middle:last], Chunk.parse(message[last : length + count]))
 
 
 def make_episode(header: bytes | str, records_sha256: bytes, chunk: Chunk) -> Episode:

@@ -10,8 +10,6 @@ from throwcollect.interfaces.encoder import HEADER, encoder
 from throwcollect.interfaces.message import Message
 
 _M = TypeVar("_M", bound=Message)
-_MOST_PADDING = 3
-"""Bytes that some writers add to make the length a multiple of four."""
 
 
 def serialize(message: Message) -> bytes:
@@ -39,17 +37,18 @@ def deserialize(data: bytes, message_class: type[_M]) -> _M:
     """Message from its bytes.
 
     Args:
-        data: Little-endian CDR with its encapsulation header.
+        data: Little-endian CDR with its encapsulation header. What follows the message is left alone: rmw_serialize
+            gives as many bytes as the message might have taken, and whoever publishes those sends them all.
         message_class: Class of the message.
 
     Returns:
         A message that shares no memory with ``data``; its number sequences may be changed.
 
     Raises:
-        ValueError: If the data is malformed, too short or too long.
+        ValueError: If the data is malformed or too short.
     """
     name = message_class.TYPE
-    if data[:2] != HEADER[:2]:
+    if data[:2] != HEADER[:2] or len(data) < len(HEADER):
         raise ValueError(f"{name}: not little-endian CDR: begins with {bytes(data[:4]).hex(' ') or 'nothing'}")
     size = len(data) - 4
     body = bytearray(data[4:] + bytes(-size & 7))
@@ -58,6 +57,6 @@ def deserialize(data: bytes, message_class: type[_M]) -> _M:
         message, end = decoder(name)(data, body)
     except (struct.error, IndexError, ValueError) as error:
         raise ValueError(f"{name}: malformed CDR of {len(data)} bytes: {error}") from error
-    if not size - _MOST_PADDING <= end <= size:
+    if end > size:
         raise ValueError(f"{name}: expected {end + 4} bytes of CDR, got {len(data)}")
     return message

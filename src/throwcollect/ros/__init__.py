@@ -4,13 +4,5 @@ Nodes import from here and from nowhere below, so that they run unchanged on bot
 embedded one. See `backend`.
 """
 
-from typing import TYPE_CHECKING
-
-from throwcollect.ros.backend import uses_rclpy
-
-if TYPE_CHECKING or not uses_rclpy():
-    from throwcollect.ros.embedded import *  # noqa: F403
-    from throwcollect.ros.embedded import __all__
-else:
-    from throwcollect.ros.genuine import *  # noqa: F403
-    from throwcollect.ros.genuine import __all__  # noqa: F401
+from throwcollect.ros.chosen import *  # noqa: F403
+from throwcollect.ros.chosen import __all__ as __all__

@@ -112,9 +112,13 @@ def test_a_message_that_is_cut_off_is_refused(sent: Episode, length: int) -> Non
         unpack(pack(sent)[:length])
 
 
+def test_padding_is_left_alone(sent: Episode) -> None:
+    assert unpack(pack(sent) + bytes(3)).chunk == sent.chunk
+
+
 def test_a_message_of_another_layout_is_refused(sent: Episode) -> None:
     message = pack(sent)
-    for wrong in (message + b"x", message.replace(b"chunk", b"blobs", 1), b"\1" + message[1:]):
+    for wrong in (message[:-1], message.replace(b"chunk", b"blobs", 1), b"\1" + message[1:]):
         with pytest.raises(DatasetError, match="episode: "):
             unpack(wrong)
 
