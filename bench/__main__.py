@@ -11,7 +11,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from bench import collection, containers, intake, raw
+from bench import collection, containers, intake, raw, soak
 from throwcollect.config.loader import load
 from throwcollect.sweep.plan import make_plan
 
@@ -43,6 +43,9 @@ def main() -> None:
             few = make_plan(load(CONFIG, [f"trials={10 * containers.MANY}"]))
             report["containers"] = containers.measure(plan, few, arguments.rounds, Path(scratch))
             _print_containers(report["containers"])
+        looks = soak.measure()
+        report["soak"] = [asdict(look) for look in looks]
+        soak.show(looks)
         episodes = [intake.measure(Path(scratch) / "1-0") for _ in range(arguments.rounds)]
     report["intake_episodes_per_s"] = [rate for rate, _ in episodes]
     report["intake_raw_episodes_per_s"] = [limit for _, limit in episodes]

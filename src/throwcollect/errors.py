@@ -7,6 +7,7 @@
     │   └── PlanError                exit 2   the sweep yields no trial that could be run
     ├── WorkerError                  exit 3   a process of the run could not be started or was lost for good
     ├── DatasetError                 exit 4   a dataset is missing, torn or contradicts itself
+    ├── RequestError                 exit 1   what a client asks of a running simulation cannot be done
     └── Interrupted                  exit 130 stopped by the user; what is finished is on disk
 
 A message has up to five facts, in this order: where, what was wrong and what was got; what would be right; the
@@ -101,6 +102,21 @@ class DatasetError(ThrowcollectError):
     """A dataset is missing, torn or contradicts itself."""
 
     exit_code = 4
+
+
+class RequestError(ThrowcollectError):
+    """What a client asks of a running simulation cannot be done; it is told so and the simulation goes on.
+
+    Args:
+        reason: Name of the result code that says why, as the interface definitions spell it: ``NAME_INVALID``.
+        message: What was asked for and what is wrong with it: one line.
+        expected: What would have been right.
+        hint: What gets further.
+    """
+
+    def __init__(self, reason: str, message: str, *, expected: str | None = None, hint: str | None = None) -> None:
+        self.reason = reason
+        super().__init__(message, expected=expected, hint=hint)
 
 
 class Interrupted(ThrowcollectError):

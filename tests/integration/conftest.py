@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from tests.integration.robot import PLAYING, Robot, connected, start_simulation
+from tests.integration.robot import PLAYING, Robot, connected, running_simulation
 from throwcollect.ros import Context
 from throwcollect.ros.embedded.parameter import parameter_value_to_python
 from throwcollect.ros.router import router
@@ -26,13 +26,8 @@ def session(endpoint: str) -> Iterator[Context]:
 
 @pytest.fixture(scope="session")
 def shared(endpoint: str, session: Context, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Robot]:
-    process = start_simulation(tmp_path_factory.mktemp("sim"), endpoint, NAME)
-    robot = Robot(session, NAME)
-    robot.wait_until_ready(process)
-    yield robot
-    process.terminate()
-    output, _ = process.communicate(timeout=20)
-    assert process.returncode == 0, output
+    with running_simulation(tmp_path_factory.mktemp("sim"), endpoint, session, NAME) as robot:
+        yield robot
 
 
 @pytest.fixture(scope="session")

@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 from throwcollect.config.schema import Config
-from throwcollect.interfaces import Message, get_action, get_message, get_service
+from throwcollect.interfaces import Message
 from throwcollect.robots.description import start_posture
 from throwcollect.robots.talos import CONTROLLERS
 from throwcollect.ros import (
@@ -27,7 +27,11 @@ from throwcollect.ros import (
     Parameter,
     QoSProfile,
     SingleThreadedExecutor,
+    get_action,
+    get_message,
+    get_service,
 )
+from throwcollect.ros.backend import VARIABLE
 from throwcollect.session_config import CONFIG_FILE_VARIABLE, OVERRIDE_VARIABLE
 
 CONFIG = Config.model_validate({"name": "integration", "tool": {"cup_floor_radius_m": 0.006}})
@@ -54,19 +58,35 @@ STOPPED, PLAYING, PAUSED, QUITTING = range(4)
 
 def environment(endpoint: str) -> dict[str, str]:
     """Variables that lead a node to a router."""
-    return {OVERRIDE_VARIABLE: f"connect/endpoints={json.dumps([endpoint])}", "ROS_DOMAIN_ID": "0"}
+    return {OVERRIDE_VARIABLE: f'mode="client";connect/endpoints={json.dumps([endpoint])}', "ROS_DOMAIN_ID": "0"}
 
 
-def start_simulation(directory: Path, endpoint: str, name: str) -> subprocess.Popen[str]:
-    config = directory / "integration.json"
-    config.write_text(CONFIG.model_dump_json())
+def start_simulation(directory: Path, endpoint: str, name: str, config: Config = CONFIG) -> subprocess.Popen[str]:
+    path = directory / "integration.json"
+    path.write_text(config.model_dump_json())
+    # Simulation and client may be on different backends.
+    backend = {VARIABLE: os.environ["SIMULATION_ROS"]} if "SIMULATION_ROS" in os.environ else {}
     return subprocess.Popen(
-        [sys.executable, "-m", "throwcollect", "sim", str(config), "--name", name],
-        env={**os.environ, **environment(endpoint)},
+        [sys.executable, "-m", "throwcollect", "sim", str(path), "--name", name],
+        env={**os.environ, **environment(endpoint), **backend},
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
     )
+
+
+@contextmanager
+def running_simulation(
+    directory: Path, endpoint: str, session: Context, name: str, config: Config = CONFIG
+) -> Iterator[Robot]:
+    """A simulation, which must end without an error."""
+    process = start_simulation(directory, endpoint, name, config)
+    robot = Robot(session, name)
+    robot.wait_until_ready(process)
+    yield robot
+    process.terminate()
+    output, _ = process.communicate(timeout=20)
+    assert process.returncode == 0, output
 
 
 @contextmanager
@@ -193,12 +213,14 @@ class Robot:
         return float(heard[-1].feedback.positions[CONTROLLERS[controller].index(name)])
 
     @contextmanager
-    def listening(self, kind: str | type[Message], topic: str, qos: QoSProfile = ALL) -> Iterator[list[Any]]:
-        """Messages of a topic heard so far; the simulation knows of the listener."""
+    def listening(
+        self, kind: str | type[Message], topic: str, qos: QoSProfile = ALL, *, raw: bool = False
+    ) -> Iterator[list[Any]]:
+        """Messages of a topic heard so far, or their bytes; the simulation knows of the listener."""
         heard: list[Any] = []
         name = topic if topic.startswith("/") else self.topic(topic)
         message_type = get_message(kind) if isinstance(kind, str) else kind
-        subscription = self.node.create_subscription(message_type, name, heard.append, qos)
+        subscription = self.node.create_subscription(message_type, name, heard.append, qos, raw=raw)
         # The answer comes after the simulation has been told, as both take the same way.
         self.state()
         yield heard

@@ -9,8 +9,9 @@ from zenoh.ext import declare_advanced_subscriber
 
 from tests.integration.robot import ALL, ARM, CONFIG, Robot, goal, swing
 from throwcollect.episode.message import unpack
-from throwcollect.interfaces import get_message, type_hash
-from throwcollect.ros import attachment
+from throwcollect.interfaces import type_hash
+from throwcollect.ros import get_message
+from throwcollect.ros.embedded import attachment
 
 KIND = "std_msgs/msg/UInt8MultiArray"
 TRIALS = 30

@@ -1,21 +1,23 @@
 """What a simulation offers, as `ros2 node info` and late subscribers see it."""
 
 import xml.etree.ElementTree as ET
+from pathlib import Path
 from typing import Any
 
 import pinocchio
 import pytest
 
-from tests.integration.robot import CONFIG, PAUSED, Robot
+from tests.integration.robot import ARM, CONFIG, PAUSED, Robot
+from throwcollect.interfaces import get_service
 from throwcollect.robots.talos import CONTROLLERS, JOINTS
 from throwcollect.ros import DurabilityPolicy, QoSProfile
 from throwcollect.ros.embedded.action import get_action_server_names_and_types_by_node
+from throwcollect.ros.embedded.keys import EntityKind, Token
 
 LATE = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 ACTION = "control_msgs/action/FollowJointTrajectory"
-TOPICS = {
-    "/rosout": "rcl_interfaces/msg/Log",
-    "/parameter_events": "rcl_interfaces/msg/ParameterEvent",
+EVERY_NODE = {"/rosout": "rcl_interfaces/msg/Log", "/parameter_events": "rcl_interfaces/msg/ParameterEvent"}
+TOPICS = EVERY_NODE | {
     "/sim_0/joint_states": "sensor_msgs/msg/JointState",
     "/sim_0/ball/odometry": "nav_msgs/msg/Odometry",
     "/sim_0/tf": "tf2_msgs/msg/TFMessage",
@@ -24,21 +26,48 @@ TOPICS = {
     "/sim_0/robot_description": "std_msgs/msg/String",
     "/sim_0/episode": "std_msgs/msg/UInt8MultiArray",
 }
-SERVICES = {
-    "get_simulator_features": "simulation_interfaces/srv/GetSimulatorFeatures",
-    "get_simulation_state": "simulation_interfaces/srv/GetSimulationState",
-    "set_simulation_state": "simulation_interfaces/srv/SetSimulationState",
-    "reset_simulation": "simulation_interfaces/srv/ResetSimulation",
-    "step_simulation": "simulation_interfaces/srv/StepSimulation",
-    "get_entity_state": "simulation_interfaces/srv/GetEntityState",
-    "set_entity_state": "simulation_interfaces/srv/SetEntityState",
-    "sim_0/describe_parameters": "rcl_interfaces/srv/DescribeParameters",
-    "sim_0/get_parameters": "rcl_interfaces/srv/GetParameters",
-    "sim_0/get_parameter_types": "rcl_interfaces/srv/GetParameterTypes",
-    "sim_0/list_parameters": "rcl_interfaces/srv/ListParameters",
-    "sim_0/set_parameters": "rcl_interfaces/srv/SetParameters",
-    "sim_0/set_parameters_atomically": "rcl_interfaces/srv/SetParametersAtomically",
-}
+CONTROL = [
+    "GetSimulatorFeatures",
+    "GetSimulationState",
+    "SetSimulationState",
+    "ResetSimulation",
+    "StepSimulation",
+    "SpawnEntity",
+    "SpawnEntities",
+    "DeleteEntity",
+    "GetEntities",
+    "GetEntitiesStates",
+    "GetEntityState",
+    "SetEntityState",
+    "GetEntityInfo",
+    "SetEntityInfo",
+    "GetEntityBounds",
+    "GetSpawnables",
+]
+PARAMETERS = [
+    "DescribeParameters",
+    "GetParameters",
+    "GetParameterTypes",
+    "ListParameters",
+    "SetParameters",
+    "SetParametersAtomically",
+]
+TABLE = Path(__file__).parents[1] / "unit" / "interfaces" / "official_hashes.txt"
+HASHES = dict(line.split() for line in TABLE.read_text(encoding="utf-8").splitlines())
+GetTypeDescription: Any = get_service("type_description_interfaces/srv/GetTypeDescription")
+
+
+def snake(name: str) -> str:
+    return "".join(f"_{letter.lower()}" if letter.isupper() else letter for letter in name).strip("_")
+
+
+def services_of_every_node(full_name: str) -> dict[str, str]:
+    offered = {f"{full_name}/{snake(name)}": f"rcl_interfaces/srv/{name}" for name in PARAMETERS}
+    return offered | {f"{full_name}/get_type_description": GetTypeDescription.TYPE}
+
+
+def tokens(robot: Robot, *kinds: EntityKind) -> list[Token]:
+    return [token for token in robot.node.context.graph.tokens(*kinds) if token.namespace == "/sim_0"]
 
 
 def visible(names_and_types: list[tuple[str, list[str]]]) -> dict[str, str]:
@@ -57,34 +86,80 @@ def description(robot: Robot) -> str:
     return str(latched(robot, "std_msgs/msg/String", "robot_description").data)
 
 
-def test_the_node_has_the_name_of_its_namespace(robot: Robot) -> None:
-    assert ("sim_0", "/sim_0") in robot.node.get_node_names_and_namespaces()
+def test_the_simulation_its_controllers_and_their_manager_are_nodes_of_its_namespace(robot: Robot) -> None:
+    names = [name for name, namespace in robot.node.get_node_names_and_namespaces() if namespace == "/sim_0"]
+    assert sorted(names) == sorted(["sim_0", "controller_manager", *CONTROLLERS])
 
 
-def test_exactly_the_documented_topics_are_published(robot: Robot) -> None:
-    states = {
-        f"/sim_0/{name}/controller_state": "control_msgs/msg/JointTrajectoryControllerState" for name in CONTROLLERS
-    }
-    published = robot.node.get_publisher_names_and_types_by_node("sim_0", "/sim_0")
-    assert visible(published) == TOPICS | states
-
-
-def test_exactly_the_trajectory_topics_are_subscribed_to(robot: Robot) -> None:
-    subscribed = robot.node.get_subscriber_names_and_types_by_node("sim_0", "/sim_0")
-    assert visible(subscribed) == {
-        f"/sim_0/{name}/joint_trajectory": "trajectory_msgs/msg/JointTrajectory" for name in CONTROLLERS
-    }
+def test_exactly_the_documented_topics_are_published_and_none_is_subscribed_to(robot: Robot) -> None:
+    assert visible(robot.node.get_publisher_names_and_types_by_node("sim_0", "/sim_0")) == TOPICS
+    assert visible(robot.node.get_subscriber_names_and_types_by_node("sim_0", "/sim_0")) == {}
 
 
 def test_exactly_the_documented_services_are_offered(robot: Robot) -> None:
-    offered = robot.node.get_service_names_and_types_by_node("sim_0", "/sim_0")
-    assert visible(offered) == {f"/sim_0/{name}": kind for name, kind in SERVICES.items()}
+    offered = visible(robot.node.get_service_names_and_types_by_node("sim_0", "/sim_0"))
+    control = {f"/sim_0/{snake(name)}": f"simulation_interfaces/srv/{name}" for name in CONTROL}
+    assert offered == control | services_of_every_node("/sim_0/sim_0")
 
 
-def test_the_eight_actions_are_named_as_on_the_robot(robot: Robot) -> None:
-    actions = dict(get_action_server_names_and_types_by_node(robot.node, "sim_0", "/sim_0"))
+@pytest.mark.parametrize("name", CONTROLLERS)
+def test_a_controller_offers_what_it_offers_on_the_robot(name: str, robot: Robot) -> None:
+    node = robot.node
+    assert visible(node.get_publisher_names_and_types_by_node(name, "/sim_0")) == EVERY_NODE | {
+        f"/sim_0/{name}/controller_state": "control_msgs/msg/JointTrajectoryControllerState"
+    }
+    assert visible(node.get_subscriber_names_and_types_by_node(name, "/sim_0")) == {
+        f"/sim_0/{name}/joint_trajectory": "trajectory_msgs/msg/JointTrajectory",
+        f"/sim_0/{name}/speed_scaling_input": "control_msgs/msg/SpeedScalingFactor",
+    }
+    services = visible(node.get_service_names_and_types_by_node(name, "/sim_0"))
+    own = {f"/sim_0/{name}/query_state": "control_msgs/srv/QueryTrajectoryState"}
+    assert services == own | services_of_every_node(f"/sim_0/{name}")
+    actions = get_action_server_names_and_types_by_node(node, name, "/sim_0")
+    assert actions == [(f"/sim_0/{name}/follow_joint_trajectory", [ACTION])]
+
+
+def test_the_controllers_are_named_as_on_the_robot() -> None:
     limbs = ("arm_left", "arm_right", "leg_left", "leg_right", "torso", "head", "gripper_left", "gripper_right")
-    assert actions == {f"/sim_0/{limb}_controller/follow_joint_trajectory": [ACTION] for limb in limbs}
+    assert set(CONTROLLERS) == {f"{limb}_controller" for limb in limbs}
+
+
+def test_every_type_is_announced_with_the_hash_of_the_official_generator(robot: Robot) -> None:
+    found = {token.ros_type: token.type_hash for token in tokens(robot, *list(EntityKind)[1:])}
+    assert {f"{ACTION}_{part}" for part in ("SendGoal", "GetResult", "FeedbackMessage")} <= set(found)
+    assert len(found) > 30
+    assert {name: HASHES.get(name) for name in found} == found
+
+
+def test_the_qualities_of_service_are_those_of_genuine_nodes(robot: Robot) -> None:
+    expected = {
+        "/rosout": ":1:,1000:,:10,0:,,",
+        "/parameter_events": "::,1000:,:,:,,",
+        "/sim_0/sim_0/set_parameters": "::,1000:,:,:,,",
+        "/sim_0/sim_0/get_type_description": "::,10:,:,:,,",
+        "/sim_0/reset_simulation": "::,10:,:,:,,",
+        "/sim_0/robot_description": ":1:,1:,:,:,,",
+        f"/sim_0/{ARM}/follow_joint_trajectory/_action/status": ":1:,1:,:,:,,",
+        f"/sim_0/{ARM}/follow_joint_trajectory/_action/feedback": "::,10:,:,:,,",
+        f"/sim_0/{ARM}/follow_joint_trajectory/_action/send_goal": "::,10:,:,:,,",
+    }
+    found = {token.name: token.qos for token in tokens(robot, EntityKind.PUBLISHER, EntityKind.SERVICE)}
+    assert {name: found[name] for name in expected} == expected
+
+
+def test_each_node_describes_every_type_that_it_uses(robot: Robot) -> None:
+    by_node: dict[str, set[tuple[str, str]]] = {}
+    for token in tokens(robot, *list(EntityKind)[1:]):
+        by_node.setdefault(token.node, set()).add((token.ros_type, token.type_hash))
+    assert len(by_node) == len(CONTROLLERS) + 2
+    for node, types in by_node.items():
+        for name, hashed in types:
+            response = robot.result(
+                robot.ask(GetTypeDescription.TYPE, f"{node}/get_type_description", type_hash=hashed)
+            )
+            assert response.successful, (node, name, response.failure_reason)
+            assert response.type_description.type_description.type_name == name
+            assert response.type_sources[0].type_name == name
 
 
 def test_a_late_listener_gets_a_description_with_the_spoon_and_32_movable_joints(description: str) -> None:

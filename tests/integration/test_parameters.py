@@ -1,5 +1,6 @@
 """Trial and physics as ROS parameters."""
 
+import re
 from typing import Any
 
 import pytest
@@ -7,7 +8,7 @@ import pytest
 from tests.integration.robot import ARM, CONFIG, ELBOW, PAUSED, POSTURE, STEP_NS, TORSO, Robot, goal, swing
 from throwcollect.config.values import is_physics, sweepable_keys
 from throwcollect.episode.message import unpack
-from throwcollect.interfaces import serialize
+from throwcollect.interfaces import deserialize, message_class
 from throwcollect.ros import Parameter
 
 OWN = ["trial.number", "trial.controllers", "sim.real_time_factor"]
@@ -35,9 +36,9 @@ def test_parameters_are_described_with_their_types_and_have_the_values_of_the_co
 @pytest.mark.parametrize(
     ("values", "reason"),
     [
-        ({"ball.mass_kg": 1}, "Wrong parameter type of ball.mass_kg, expected DOUBLE, got INTEGER"),
-        ({"trial.number": 1.0}, "Wrong parameter type of trial.number, expected INTEGER, got DOUBLE"),
-        ({"ball.mass_kg": -1.0}, "ball.mass_kg: should be a number above 0 and up to 2 kg, got -1.0"),
+        ({"ball.mass_kg": 1}, "Wrong parameter type.*expected.*DOUBLE.*got.*INTEGER"),
+        ({"trial.number": 1.0}, "Wrong parameter type.*expected.*INTEGER.*got.*DOUBLE"),
+        ({"ball.mass_kg": -1.0}, r"ball\.mass_kg: should be a number above 0 and up to 2 kg, got -1\.0"),
         ({"ball.mass_kg": float("nan")}, "ball.mass_kg"),
         ({"trial.controllers": [ARM, "arm_controller"]}, "no controller 'arm_controller'"),
         ({"sim.real_time_factor": -1.0}, "sim.real_time_factor"),
@@ -48,7 +49,7 @@ def test_parameters_are_described_with_their_types_and_have_the_values_of_the_co
 def test_a_wrong_value_is_refused_with_the_reason(values: dict[str, Any], reason: str, robot: Robot) -> None:
     result = robot.set(values)
     assert not result.successful
-    assert reason in result.reason
+    assert re.search(reason, result.reason)
 
 
 def test_a_wrong_value_keeps_the_others_of_its_request_from_being_set(robot: Robot) -> None:
@@ -76,16 +77,16 @@ def test_a_trial_waits_for_all_its_controllers_and_then_hands_in_its_episode(rob
     robot.reset()
     start_ns = CONFIG.trial_start_ns(5)
     assert robot.now_ns() == start_ns
-    with robot.listening("std_msgs/msg/UInt8MultiArray", "episode") as heard:
+    with robot.listening("std_msgs/msg/UInt8MultiArray", "episode", raw=True) as heard:
         first = robot.send(swing())
         assert robot.now_ns() == start_ns
         second = robot.send(goal(TORSO), TORSO)
         robot.wait_until(lambda: bool(heard), "an episode")
     assert [robot.outcome(handle)[1] for handle in (first, second)] == [0, 0]
     (message,) = heard
-    parts = [each.label for each in message.layout.dim]
+    parts = [each.label for each in deserialize(message, message_class("std_msgs/msg/UInt8MultiArray")).layout.dim]
     assert parts == ["header", "sha256", "chunk"]
-    episode = unpack(serialize(message))
+    episode = unpack(message)
     episode.check_records()
     header = episode.header
     assert (header.trial, header.start_ns, header.end_reason) == (5, start_ns, "landed")

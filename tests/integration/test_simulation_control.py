@@ -1,4 +1,4 @@
-"""The services of simulation_interfaces."""
+"""The services of simulation_interfaces about features, states and resets."""
 
 from typing import Any
 
@@ -16,41 +16,47 @@ from tests.integration.robot import (
     Result,
     Robot,
     goal,
+    stamp_ns,
     swing,
 )
-from throwcollect.interfaces import get_message, get_service
+from throwcollect.ros import get_message, get_service
 
 SetState: Any = get_service("simulation_interfaces/srv/SetSimulationState")
-SetEntityState: Any = get_service("simulation_interfaces/srv/SetEntityState")
 Reset: Any = get_service("simulation_interfaces/srv/ResetSimulation").Request
 Features: Any = get_message("simulation_interfaces/msg/SimulatorFeatures")
-EntityState: Any = get_message("simulation_interfaces/msg/EntityState")
-
-
-def entity_state(*, z: float = 1.0, vx: float = 0.0, w: float = 1.0, frame: str = "world") -> Any:
-    state = EntityState()
-    state.header.frame_id = frame
-    state.pose.position.x, state.pose.position.z = 2.0, z
-    state.pose.orientation.w = w
-    state.twist.linear.x = vx
-    return state
+ABORTED, INVALID_GOAL = 6, -1
 
 
 def test_the_listed_features_are_those_that_work(robot: Robot) -> None:
     features = robot.call("get_simulator_features").features
     assert sorted(features.features) == sorted(
         [
+            Features.SPAWNING,
+            Features.DELETING,
+            Features.ENTITY_TAGS,
+            Features.ENTITY_BOUNDS,
+            Features.ENTITY_BOUNDS_BOX,
+            Features.ENTITY_CATEGORIES,
+            Features.SPAWNING_RESOURCE_STRING,
             Features.ENTITY_STATE_GETTING,
             Features.ENTITY_STATE_SETTING,
+            Features.ENTITY_INFO_GETTING,
+            Features.ENTITY_INFO_SETTING,
+            Features.SPAWNABLES,
             Features.SIMULATION_RESET,
+            Features.SIMULATION_RESET_TIME,
+            Features.SIMULATION_RESET_STATE,
+            Features.SIMULATION_RESET_SPAWNED,
             Features.SIMULATION_STATE_GETTING,
             Features.SIMULATION_STATE_SETTING,
             Features.SIMULATION_STATE_PAUSE,
             Features.STEP_SIMULATION_SINGLE,
             Features.STEP_SIMULATION_MULTIPLE,
+            Features.STEP_SIMULATION_ACTION,
+            Features.SPAWNING_ENTITIES,
         ]
     )
-    assert list(features.spawn_formats) == []
+    assert list(features.spawn_formats) == ["urdf"]
     assert "one step is one physics step of 0.002 s" in features.custom_info
 
 
@@ -100,14 +106,72 @@ def test_a_reset_brings_time_robot_and_ball_back(scope: int, robot: Robot) -> No
     assert robot.joint(ELBOW) == pytest.approx(POSTURE[ELBOW], abs=1e-4)
 
 
-@pytest.mark.parametrize("scope", [Reset.SCOPE_TIME, Reset.SCOPE_STATE, Reset.SCOPE_SPAWNED, 3])
-def test_a_reset_of_parts_is_refused_and_changes_nothing(scope: int, robot: Robot) -> None:
+@pytest.mark.parametrize("scope", [8, 9, 128, 254])
+def test_scopes_that_mean_nothing_are_refused_and_change_nothing(scope: int, robot: Robot) -> None:
     robot.put_into(PAUSED)
     robot.step(5)
     refused = robot.call("reset_simulation", scope=scope).result
     assert refused.result == Result.RESULT_FEATURE_UNSUPPORTED
-    assert refused.error_message == f"scope {scope}: only DEFAULT and ALL are supported"
+    assert refused.error_message.startswith(f"scope {scope} has bits that mean nothing")
     assert robot.now_ns() == 5 * STEP_NS
+
+
+def test_a_reset_of_time_stops_goals_where_they_are_and_tells_the_time_though_paused(robot: Robot) -> None:
+    robot.put_into(PAUSED)
+    with robot.listening("rosgraph_msgs/msg/Clock", "clock") as heard:
+        handle = robot.send(goal(ARM, 1.0, arm_right_4_joint=-0.5))
+        robot.step(250)
+        before = robot.joint(ELBOW)
+        heard.clear()
+        assert robot.call("reset_simulation", scope=Reset.SCOPE_TIME).result.result == Result.RESULT_OK
+        robot.wait_until(lambda: bool(heard), "the time is told")
+    assert [stamp_ns(message.clock) for message in heard] == [0]
+    assert robot.state() == PAUSED
+    assert robot.outcome(handle) == (ABORTED, INVALID_GOAL, "simulation was reset")
+    assert robot.now_ns() == 0
+    robot.step(100)
+    assert robot.joint(ELBOW) == pytest.approx(before, abs=2e-3)
+    assert before == pytest.approx((POSTURE[ELBOW] - 0.5) / 2, abs=0.01)
+    assert robot.now_ns() == 100 * STEP_NS
+
+
+def test_a_reset_of_states_goes_back_to_the_start_while_time_goes_on(robot: Robot) -> None:
+    start = robot.call("get_entity_state", entity="ball").state
+    assert robot.outcome(robot.send(goal(ARM, 1.0, arm_right_4_joint=-1.0)))[1] == 0
+    robot.put_into(PAUSED)
+    later = robot.now_ns()
+    assert robot.call("reset_simulation", scope=Reset.SCOPE_STATE).result.result == Result.RESULT_OK
+    assert robot.now_ns() == later > 0
+    assert robot.call("get_entity_state", entity="ball").state.pose == start.pose
+    # Nothing goes back to what was held before.
+    robot.step(100)
+    assert robot.joint(ELBOW) == pytest.approx(POSTURE[ELBOW], abs=1e-3)
+    assert robot.now_ns() == later + 100 * STEP_NS
+
+
+def test_a_reset_of_states_aborts_goals(robot: Robot) -> None:
+    robot.put_into(PAUSED)
+    handle = robot.send(swing())
+    robot.step(10)
+    assert robot.call("reset_simulation", scope=Reset.SCOPE_STATE).result.result == Result.RESULT_OK
+    assert robot.outcome(handle) == (ABORTED, INVALID_GOAL, "simulation was reset")
+
+
+def test_a_pause_in_the_middle_of_a_goal_changes_nothing_but_the_wait(robot: Robot) -> None:
+    def decided_at(*, pause: bool) -> int:
+        robot.reset()
+        robot.put_into(PAUSED)
+        with robot.listening("rosgraph_msgs/msg/Clock", "clock") as heard:
+            handle = robot.send(goal(ARM, 0.5, arm_right_4_joint=-1.0))
+            robot.step(100)
+            if pause:
+                for _ in range(5):
+                    assert robot.now_ns() == 100 * STEP_NS
+            robot.put_into(PLAYING)
+            assert robot.outcome(handle)[1] == 0
+            return stamp_ns(heard[-1].clock)
+
+    assert decided_at(pause=True) == decided_at(pause=False)
 
 
 def test_a_start_state_that_does_not_exist_is_refused_and_another_one_can_be_set(robot: Robot) -> None:
@@ -120,100 +184,3 @@ def test_a_start_state_that_does_not_exist_is_refused_and_another_one_can_be_set
     assert robot.set({"ball.radius_m": CONFIG.ball.radius_m}).successful
     robot.reset()
     assert robot.outcome(robot.send(swing()))[1] == 0
-
-
-@pytest.mark.parametrize("steps", [1, 7, 500])
-def test_steps_advance_the_clock_exactly(steps: int, robot: Robot) -> None:
-    robot.put_into(PAUSED)
-    assert robot.step(steps).result == Result.RESULT_OK
-    assert robot.now_ns() == steps * STEP_NS
-    assert robot.step(3).result == Result.RESULT_OK
-    assert robot.now_ns() == (steps + 3) * STEP_NS
-    assert robot.state() == PAUSED
-
-
-@pytest.mark.parametrize("state", [PLAYING, STOPPED])
-def test_steps_are_refused_unless_it_is_paused(state: int, robot: Robot) -> None:
-    if state != PLAYING:
-        robot.put_into(state)
-    refused = robot.step(1)
-    assert refused.result == Result.RESULT_INCORRECT_STATE
-    assert "paused" in refused.error_message
-    assert robot.now_ns() == 0
-
-
-def test_more_steps_than_a_caller_would_wait_for_are_refused(robot: Robot) -> None:
-    robot.put_into(PAUSED)
-    refused = robot.step(2**40)
-    assert refused.result == Result.RESULT_OPERATION_FAILED
-    assert "at most" in refused.error_message
-    assert robot.now_ns() == 0
-
-
-def test_steps_carry_a_goal_forward(robot: Robot) -> None:
-    robot.put_into(PAUSED)
-    handle = robot.send(goal(ARM, 1.0, arm_right_4_joint=-0.5))
-    before = robot.joint(ELBOW)
-    robot.step(250)
-    assert robot.joint(ELBOW) == pytest.approx((before - 0.5) / 2, abs=0.01)
-    robot.step(260)
-    assert robot.outcome(handle)[1] == 0
-
-
-def test_an_unknown_entity_is_named_with_those_that_are_known(robot: Robot) -> None:
-    for result in (
-        robot.call("get_entity_state", entity="table").result,
-        robot.call("set_entity_state", entity="table", state=entity_state()).result,
-    ):
-        assert result.result == Result.RESULT_NOT_FOUND
-        assert result.error_message == "no entity 'table'; known: ball, talos"
-
-
-def test_the_ball_lies_in_the_spoon_and_the_robot_stands_on_its_base(robot: Robot) -> None:
-    ball = robot.call("get_entity_state", entity="ball").state
-    assert ball.header.frame_id == "world"
-    assert 0.5 < ball.pose.position.z < 2.0
-    talos = robot.call("get_entity_state", entity="talos").state
-    assert talos.pose.position.z == 1.01927
-    assert talos.pose.orientation.w == 1.0
-
-
-def test_a_ball_that_was_put_somewhere_flies_on_from_there(robot: Robot) -> None:
-    robot.put_into(PAUSED)
-    placed = robot.call("set_entity_state", entity="ball", state=entity_state(z=1.5, vx=1.0))
-    assert placed.result.result == Result.RESULT_OK
-    there = robot.call("get_entity_state", entity="ball").state
-    assert (there.pose.position.x, there.pose.position.z, there.twist.linear.x) == (2.0, 1.5, 1.0)
-    robot.step(100)
-    flown = robot.call("get_entity_state", entity="ball").state
-    assert flown.pose.position.x == pytest.approx(2.2, abs=1e-3)
-    assert flown.pose.position.z == pytest.approx(1.5 - 9.81 * 0.2**2 / 2, abs=5e-3)
-    assert flown.twist.linear.z == pytest.approx(-9.81 * 0.2, abs=1e-2)
-
-
-@pytest.mark.parametrize(
-    ("state", "code", "words"),
-    [
-        (entity_state(w=0.0), SetEntityState.Response.INVALID_POSE, "quaternion of norm 0"),
-        (entity_state(w=0.9), SetEntityState.Response.INVALID_POSE, "quaternion of norm 0.9"),
-        (entity_state(w=float("nan")), SetEntityState.Response.INVALID_POSE, "quaternion of norm nan"),
-        (entity_state(z=float("nan")), SetEntityState.Response.INVALID_POSE, "nan"),
-        (entity_state(z=1e9), SetEntityState.Response.INVALID_POSE, "wanted within 1000 m"),
-        (entity_state(vx=float("inf")), Result.RESULT_OPERATION_FAILED, "inf"),
-        (entity_state(frame="base_link"), Result.RESULT_OPERATION_FAILED, "frame base_link: only world is known"),
-    ],
-)
-def test_a_state_without_meaning_is_refused_and_leaves_the_ball(
-    state: Any, code: int, words: str, robot: Robot
-) -> None:
-    before = robot.call("get_entity_state", entity="ball").state
-    refused = robot.call("set_entity_state", entity="ball", state=state).result
-    assert refused.result == code
-    assert words in refused.error_message
-    assert robot.call("get_entity_state", entity="ball").state == before
-
-
-def test_the_robot_is_fixed(robot: Robot) -> None:
-    refused = robot.call("set_entity_state", entity="talos", state=entity_state()).result
-    assert refused.result == Result.RESULT_OPERATION_FAILED
-    assert refused.error_message == "talos is fixed to the world"

@@ -40,6 +40,10 @@ def test_a_listener_hears_every_sample_of_a_stretch_of_time(topic: str, robot: R
         robot.step(50)
         robot.wait_until(lambda: bool(heard) and time_of(heard[-1]) == 50 * STEP_NS, "the last sample")
     times = [time_of(message) for message in heard]
+    assert times == sorted(set(times))
+    if topic == "clock":
+        # Besides, it tells where a slice of the steps has ended.
+        times = [time for time in times if time % SAMPLE_NS == 0]
     assert times == list(range(times[0], 50 * STEP_NS + 1, SAMPLE_NS))
     assert times[0] in (0, SAMPLE_NS)
 
@@ -77,23 +81,22 @@ def test_the_ball_is_heard_to_fly_and_to_land(robot: Robot) -> None:
     ):
         robot.send(swing())
         robot.wait_until(lambda: bool(episodes), "the episode")
-    # Samples are sent before the episode that they are part of, but may be overtaken by it on the way.
-    robot.state()
+        # Samples are sent before the episode that they are part of, but may be overtaken by it on the way.
+        robot.wait_until(lambda: heard[-1].pose.pose.position.z <= CONFIG.ball.radius_m, "the last sample")
     heights = [message.pose.pose.position.z for message in heard]
     assert max(heights) > heights[0] + 0.1
-    assert heights[-1] <= CONFIG.ball.radius_m
     assert heard[0].header.frame_id == "world"
     assert heard[0].child_frame_id == "ball"
     assert time_of(heard[-1]) > start_ns + 10**9
 
 
-def test_the_state_of_a_controller_comes_every_50_ms_while_somebody_listens(robot: Robot) -> None:
+def test_the_state_of_a_controller_comes_in_every_control_period_while_somebody_listens(robot: Robot) -> None:
     kind = "control_msgs/msg/JointTrajectoryControllerState"
     with robot.listening(kind, f"{ARM}/controller_state") as heard:
         robot.outcome(robot.send(goal(ARM, 0.5, arm_right_4_joint=-1.0)))
         robot.wait_until(lambda: bool(heard) and time_of(heard[-1]) >= 490_000_000, "the last state")
-    times = sorted({time_of(message) for message in heard if time_of(message) > 0})
-    assert times[:9] == [50_000_000 * number - STEP_NS for number in range(1, 10)]
+    times = [time_of(message) for message in heard if time_of(message) > 0]
+    assert times[:240] == [STEP_NS * number for number in range(1, 241)]
     last = heard[-1]
     assert tuple(last.joint_names) == CONTROLLERS[ARM]
     column = CONTROLLERS[ARM].index(ELBOW)

@@ -25,14 +25,15 @@ from tests.integration.robot import (
     swing,
     trajectory,
 )
-from throwcollect.interfaces import get_message, get_service
 from throwcollect.robots.talos import CONTROLLERS
+from throwcollect.ros import get_message, get_service
 
 SUCCEEDED, CANCELED, ABORTED = 4, 5, 6
 REACHED = (SUCCEEDED, 0, "Goal successfully reached!")
 PREEMPTED = (ABORTED, -1, "Current goal preempted by new incoming action.")
 START = [POSTURE[joint] for joint in CONTROLLERS[ARM]]
 UUID: Any = get_message("unique_identifier_msgs/msg/UUID")
+GoalInfo: Any = get_message("action_msgs/msg/GoalInfo")
 CancelGoal: Any = get_service("action_msgs/srv/CancelGoal").Response
 
 
@@ -194,8 +195,10 @@ def test_goals_that_are_over_or_unknown_are_not_cancelled(robot: Robot) -> None:
     handle = robot.send(goal(ARM, 0.2))
     robot.outcome(handle)
     assert robot.result(handle.cancel_goal_async()).return_code == CancelGoal.ERROR_GOAL_TERMINATED
-    handle.goal_id = UUID(uuid=uuid.uuid4().bytes)
-    assert robot.result(handle.cancel_goal_async()).return_code == CancelGoal.ERROR_UNKNOWN_GOAL_ID
+    request = GoalInfo(goal_id=UUID(uuid=list(uuid.uuid4().bytes)))
+    service = f"{ARM}/follow_joint_trajectory/_action/cancel_goal"
+    answer = robot.result(robot.ask("action_msgs/srv/CancelGoal", service, goal_info=request))
+    assert answer.return_code == CancelGoal.ERROR_UNKNOWN_GOAL_ID
 
 
 def test_a_new_goal_aborts_the_one_before(robot: Robot) -> None:

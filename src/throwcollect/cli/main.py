@@ -15,6 +15,7 @@ import typer
 from typer.exceptions import TyperException
 
 import throwcollect
+from throwcollect.cli.ros import ros_app
 from throwcollect.errors import Interrupted, ThrowcollectError
 
 app = typer.Typer(
@@ -28,6 +29,7 @@ dataset_app = typer.Typer(help="Look into datasets.", no_args_is_help=True)
 app.add_typer(dataset_app, name="dataset")
 image_app = typer.Typer(help="Make the image that containers are made from.", no_args_is_help=True)
 app.add_typer(image_app, name="image")
+app.add_typer(ros_app, name="ros")
 
 
 ConfigArgument = Annotated[

@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, Discriminator, Field, PositiveFloat, PositiveInt, Tag, model_validator
 
 from throwcollect.config.containers import ContainersConfig
+from throwcollect.config.controllers import ControllersConfig
 from throwcollect.config.kinds import Angle, ContradictionError, Joint, Name
 from throwcollect.config.run import RunConfig
 from throwcollect.config.section import Section
@@ -336,6 +337,8 @@ class Config(Section):
     """The rest of the world."""
     sim: SimConfig = SimConfig()
     """How the simulation computes."""
+    controllers: ControllersConfig = ControllersConfig()
+    """How the robot's controllers answer their clients."""
     task: ThrowConfig = ThrowConfig()
     """What the robot does."""
     sweep: SweepConfig = SweepConfig()

@@ -4,6 +4,7 @@ A `JointTrajectoryController` is driven by a clock and measured states; it knows
 """
 
 from throwcollect.control.controller import JointTrajectoryController
+from throwcollect.control.deviations import Deviations
 from throwcollect.control.goal import JointTolerance, Trajectory, TrajectoryGoal, TrajectoryPoint
 from throwcollect.control.outcome import (
     ControllerState,
@@ -11,14 +12,16 @@ from throwcollect.control.outcome import (
     GoalResult,
     GoalStatus,
     JointState,
+    Refusal,
     TrajectoryState,
 )
-from throwcollect.control.parameters import Constraints, ControllerParameters, JointConstraints
+from throwcollect.control.parameters import Constraints, ControllerParameters, JointConstraints, SpeedScaling
 
 __all__ = [
     "Constraints",
     "ControllerParameters",
     "ControllerState",
+    "Deviations",
     "ErrorCode",
     "GoalResult",
     "GoalStatus",
@@ -26,6 +29,8 @@ __all__ = [
     "JointState",
     "JointTolerance",
     "JointTrajectoryController",
+    "Refusal",
+    "SpeedScaling",
     "Trajectory",
     "TrajectoryGoal",
     "TrajectoryPoint",

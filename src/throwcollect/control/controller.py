@@ -9,16 +9,30 @@ from collections.abc import Hashable
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.control.decision import Decision, decided
-from throwcollect.control.goal import Trajectory, TrajectoryGoal, TrajectoryPoint
-from throwcollect.control.interpolation import Waypoints, arranged, interpolated
-from throwcollect.control.motion import Motion
-from throwcollect.control.outcome import ControllerState, ErrorCode, GoalResult, GoalStatus, JointState, TrajectoryState
+from throwcollect.control.decision import CANCELED, Decision, Judge
+from throwcollect.control.deviations import Deviations
+from throwcollect.control.goal import Trajectory, TrajectoryGoal
+from throwcollect.control.outcome import (
+    ControllerState,
+    ErrorCode,
+    GoalResult,
+    GoalStatus,
+    JointState,
+    Refusal,
+    TrajectoryState,
+)
 from throwcollect.control.parameters import ControllerParameters
-from throwcollect.control.tolerances import default_tolerances, goal_tolerances
+from throwcollect.control.stopping import braked
+from throwcollect.control.tolerances import Tolerances, default_tolerances, goal_tolerances
+from throwcollect.control.tracker import Tracker
 from throwcollect.control.validation import refusal
+from throwcollect.control.waypoints import Waypoints
 
-_LOGGER = logging.getLogger(__name__)
+_FAR_AHEAD_NS = 3600 * 10**9
+"""A trajectory that starts so much later was most likely stamped by another clock."""
+
+_MOST_SPEED = 1000.0
+"""Upstream has no limit; far above this one, a step of the trajectory's clock fits no number."""
 
 
 class JointTrajectoryController:
@@ -32,29 +46,26 @@ class JointTrajectoryController:
         name: Name of the controller, for texts.
         parameters: What it is set to.
         period_ns: Control period [ns]; a command is what is due one period after its update.
+        deviations: Where it differs from upstream.
 
     Raises:
         ValueError: If the period is not above 0.
     """
 
-    def __init__(self, name: str, parameters: ControllerParameters, *, period_ns: int) -> None:
-        if period_ns <= 0:
-            raise ValueError(f"{name}: period_ns must be above 0, got {period_ns}")
+    def __init__(
+        self, name: str, parameters: ControllerParameters, *, period_ns: int, deviations: Deviations | None = None
+    ) -> None:
         self.name = name
-        self.period_ns = period_ns
-        self._parameters = parameters
-        self._defaults = default_tolerances(parameters.constraints, parameters.joints)
-        self._tolerances = self._defaults
+        self.logger = logging.getLogger(f"throwcollect.control.{name}")
+        """Gets one line for each refusal and each stop."""
+        self._tracker = Tracker(name, parameters, period_ns=period_ns)
+        self._deviations = deviations or Deviations()
+        self._adopt(parameters)
+        self._judge = self._judge_with(self._defaults)
         self._active = False
         self._goal_id: Hashable | None = None
         self._results: list[GoalResult] = []
-        self._incoming: Trajectory | Waypoints | None = None
-        self._motion: Motion | None = None
         self._holding = True
-        self._time_ns = 0
-        self._measured: JointState | None = None
-        self._measures_velocity = "velocity" in parameters.state_interfaces
-        self._command = np.zeros(len(parameters.joints))
 
     @property
     def parameters(self) -> ControllerParameters:
@@ -64,8 +75,7 @@ class JointTrajectoryController:
     @parameters.setter
     def parameters(self, parameters: ControllerParameters) -> None:
         self._parameters.check_change(parameters, self.name)
-        self._parameters = parameters
-        self._defaults = default_tolerances(parameters.constraints, parameters.joints)
+        self._adopt(parameters)
 
     @property
     def active(self) -> bool:
@@ -80,13 +90,35 @@ class JointTrajectoryController:
     @property
     def at_rest(self) -> bool:
         """Whether, unless it is told something new, every further command equals the last and nothing is decided."""
-        idle = self._goal_id is None and self._incoming is None
-        return idle and (self._holding or (self._followed().past_end and self.next_decision() == sys.maxsize))
+        if self._goal_id is not None or self._tracker.incoming is not None:
+            return False
+        return self._tracker.motion.past_end and self.next_decision() == sys.maxsize
 
     @property
     def command(self) -> NDArray[np.float64]:
         """Last commanded positions [rad], shape ``(n_joints,)``, read-only."""
-        return self._command
+        return self._tracker.command
+
+    @property
+    def speed_scaling_factor(self) -> float:
+        """Speed of the trajectory's clock [-]."""
+        return self._tracker.scaling
+
+    def scale_speed(self, factor: float) -> bool:
+        """Let the trajectory's clock go at another speed [-]: slower below 1; 0 stops it.
+
+        Returns:
+            Whether it is taken over; the log says why not.
+        """
+        if len(self._parameters.command_interfaces) > 1:
+            self.logger.warning("%s: Speed scaling is only supported for position interfaces - Ignoring it!", self.name)
+            return False
+        if not 0 <= factor <= _MOST_SPEED:
+            rule = "Scaling factor has to be greater or equal to 0.0 - Ignoring input!"
+            self.logger.warning("%s: %s (got %g; at most %g)", self.name, rule, factor, _MOST_SPEED)
+            return False
+        self._tracker.scaling = factor
+        return True
 
     def activate(self, time_ns: int, measured: JointState, command: NDArray[np.float64] | None = None) -> None:
         """Start to command the joints, holding them where they are.
@@ -109,15 +141,15 @@ class JointTrajectoryController:
         self._active = True
 
     def deactivate(self) -> None:
-        """Stop to command the joints; a goal is aborted, the last command stays.
+        """Stop to command the joints; a goal is aborted, the last positions stay.
 
         Raises:
             ValueError: If the controller is not active.
         """
         self._require_active()
-        self._finish(_invalid("Current goal cancelled during deactivate transition."))
+        self._finish(Decision.invalid("Current goal cancelled during deactivate transition."))
         self._active = False
-        self._incoming = self._motion = None
+        self._tracker.halt()
 
     def reset(self, time_ns: int, measured: JointState) -> None:
         """Continue from a simulation that was reset: a goal is aborted, the measured positions are held.
@@ -130,10 +162,10 @@ class JointTrajectoryController:
             ValueError: If the controller is not active, or the state lacks what the interfaces promise.
         """
         self._require_active()
-        self._finish(_invalid("simulation was reset"))
+        self._finish(Decision.invalid("simulation was reset"))
         self._restart(time_ns, measured)
 
-    def submit(self, goal_id: Hashable, goal: TrajectoryGoal, now_ns: int) -> str | None:
+    def submit(self, goal_id: Hashable, goal: TrajectoryGoal, now_ns: int) -> Refusal | None:
         """Accept a goal, which aborts the one before, or refuse it.
 
         Args:
@@ -144,18 +176,21 @@ class JointTrajectoryController:
         Returns:
             None if the goal is accepted; otherwise the reason of the refusal, which the log has too.
         """
-        if text := self._refusal(goal.trajectory, now_ns, "action goals"):
-            return text
-        self._finish(_invalid("Current goal preempted by new incoming action."))
+        if reason := self._refusal(goal.trajectory, now_ns, "action goals"):
+            return reason
+        self._finish(Decision.invalid("Current goal preempted by new incoming action."))
         self._goal_id = goal_id
-        self._tolerances = goal_tolerances(goal, self._defaults, self._parameters.joints, self.name)
-        self._incoming, self._holding = goal.trajectory, False
+        velocities, logger = self._tracker.velocities_count, self.logger
+        tolerances = goal_tolerances(
+            goal, self._defaults, self._parameters.joints, velocities=velocities, logger=logger
+        )
+        self._follow(goal.trajectory, self._judge_with(tolerances))
         return None
 
-    def replace(self, trajectory: Trajectory, now_ns: int) -> str | None:
+    def replace(self, trajectory: Trajectory, now_ns: int) -> Refusal | None:
         """Follow a trajectory from the topic instead of the present one, or refuse it.
 
-        A goal that is being executed stays open and is judged on the new trajectory, with its own tolerances.
+        Unless `Deviations` say otherwise, a goal that is being executed stays open and is judged on it.
 
         Args:
             trajectory: What to follow.
@@ -164,15 +199,20 @@ class JointTrajectoryController:
         Returns:
             None if the trajectory is accepted; otherwise the reason of the refusal, which the log has too.
         """
-        if text := self._refusal(trajectory, now_ns, "trajectories"):
-            return text
-        if self._goal_id is None:
-            self._tolerances = self._defaults
-        self._incoming, self._holding = trajectory, False
+        if reason := self._refusal(trajectory, now_ns, "trajectories"):
+            return reason
+        if self._deviations.topic_aborts_goal:
+            self._finish(Decision.invalid("Current goal preempted by a trajectory on the topic."))
+        self._follow(trajectory, self._judge if self._goal_id is not None else self._judge_with(self._defaults))
         return None
 
+    def refuse(self, reason: Refusal) -> Refusal:
+        """Log a refusal that was decided elsewhere, and name the controller in it."""
+        self.logger.error("%s: %s", self.name, reason.text)
+        return Refusal(reason.error_code, f"{self.name}: {reason.text}")
+
     def cancel(self, goal_id: Hashable) -> bool:
-        """Cancel a goal and hold the positions measured in the last update.
+        """Cancel a goal and stop, from the state that was measured in the last update.
 
         Args:
             goal_id: Identity of the goal.
@@ -185,8 +225,8 @@ class JointTrajectoryController:
         """
         if self._goal_id is None or self._goal_id != goal_id:
             return False
-        self._hold(Waypoints.single(self._known_state().positions))
-        self._finish(Decision(GoalStatus.CANCELED, ErrorCode.SUCCESSFUL, ""))
+        self._stop()
+        self._finish(CANCELED)
         return True
 
     def update(self, time_ns: int, period_ns: int, measured: JointState) -> NDArray[np.float64]:
@@ -204,18 +244,12 @@ class JointTrajectoryController:
             ValueError: If the controller is not active, or the state lacks what the interfaces promise.
         """
         self._require_active()
-        self.observe(measured)
-        measured, incoming = self._known_state(), self._incoming
-        self._time_ns = time_ns
-        if incoming is not None:
-            motion = self._begin(incoming, time_ns, measured)
-        else:
-            motion = self._followed()
-            motion.advance(period_ns)
-        decision = None if self._holding else self._decided(motion, measured, first=incoming is not None)
+        tracker = self._tracker
+        first = tracker.advance(time_ns, period_ns, measured)
+        decision = None if self._holding else self._decided(first=first)
         if decision is None or decision.status is not GoalStatus.ABORTED:
-            self._command = motion.command
-        return self._command
+            tracker.send()
+        return tracker.command
 
     def next_decision(self) -> int:
         """Number of updates that can pass without the controller seeing the measured state.
@@ -230,16 +264,10 @@ class JointTrajectoryController:
         self._require_active()
         if self._holding:
             return sys.maxsize
-        if self._incoming is not None:
+        if self._tracker.incoming is not None:
             return 0
-        motion, tolerances = self._followed(), self._tolerances
-        if tolerances.checks_path and not motion.past_end:
-            return 0
-        if self._goal_id is not None:
-            return max(0, motion.updates_until_end())
-        if tolerances.checks_goal and tolerances.goal_time_ns:
-            return max(0, motion.updates_until_late(tolerances.goal_time_ns))
-        return sys.maxsize
+        updates = self._judge.updates_to_skip(self._tracker.motion, goal=self._goal_id is not None)
+        return sys.maxsize if updates is None else updates
 
     def take(self, n_updates: int) -> NDArray[np.float64]:
         """Make many updates at once, one control period after another, that need no measured state.
@@ -257,18 +285,8 @@ class JointTrajectoryController:
         if not 0 <= n_updates <= allowed:
             raise ValueError(f"{self.name}: cannot take {n_updates} updates; expected 0 to {allowed}")
         if n_updates == 0:
-            return np.empty((0, len(self._command)))
-        if self._incoming is None:
-            commands = self._followed().skip(n_updates)
-        else:
-            # Only a hold can be waiting here, and that does not depend on the measured state.
-            motion = self._begin(self._incoming, self._time_ns + self.period_ns, JointState(self._command))
-            motion.skip(n_updates - 1)
-            commands = np.broadcast_to(motion.command, (n_updates, len(self._command)))
-        self._time_ns += n_updates * self.period_ns
-        self._measured = None
-        self._command = commands[-1]
-        return commands
+            return np.empty((0, len(self._tracker.command)))
+        return self._tracker.take(n_updates)
 
     def observe(self, measured: JointState) -> None:
         """Tell what the last of the updates that were taken would have measured.
@@ -281,13 +299,7 @@ class JointTrajectoryController:
         Raises:
             ValueError: If the state lacks what the interfaces promise.
         """
-        fields = [measured.positions, measured.velocities] if self._measures_velocity else [measured.positions]
-        copies = [np.array(field, dtype=float) for field in fields]
-        for values in copies:
-            if values.shape != self._command.shape:
-                raise ValueError(f"{self.name}: measured shape {values.shape}; expected {self._command.shape}")
-            values.setflags(write=False)
-        self._measured = JointState(*copies)
+        self._tracker.observe(measured)
 
     def pop_results(self) -> tuple[GoalResult, ...]:
         """Results of the goals that have ended since the last call, oldest first."""
@@ -303,17 +315,7 @@ class JointTrajectoryController:
         Raises:
             ValueError: If there was no update yet, or `take` was not followed by `observe`.
         """
-        motion, measured = self._followed(), self._known_state()
-        position, velocity, acceleration = motion.curve.state(motion.clock_ns)
-        moving = () if measured.velocities is None else measured.velocities
-        return ControllerState(
-            stamp_ns=self._time_ns,
-            joint_names=self._parameters.joints,
-            desired=TrajectoryPoint(motion.clock_ns, position, velocity, acceleration, np.zeros_like(position)),
-            actual=TrajectoryPoint(self._time_ns - motion.start_ns, measured.positions, moving),
-            error=TrajectoryPoint(0, position - measured.positions, np.zeros(len(moving))),
-            output=TrajectoryPoint(0, self._command),
-        )
+        return self._tracker.state()
 
     def query(self, time_ns: int) -> TrajectoryState:
         """The trajectory that is being followed, at a given time.
@@ -327,74 +329,72 @@ class JointTrajectoryController:
         Raises:
             ValueError: If `take` was not followed by `observe`.
         """
-        if not self._active:
-            return TrajectoryState(False, np.empty(0))
-        motion = self._motion
-        if motion is None or time_ns < motion.first_ns:
-            return TrajectoryState(False, self._known_state().positions, self._known_state().velocities)
-        time_from_start_ns = time_ns - motion.start_ns
-        return TrajectoryState(time_from_start_ns < motion.curve.end_ns, *motion.curve.state(time_from_start_ns))
+        return self._tracker.query(time_ns) if self._active else TrajectoryState(False, np.empty(0))
 
-    def _begin(self, incoming: Trajectory | Waypoints, time_ns: int, measured: JointState) -> Motion:
-        start_ns, waypoints = time_ns, incoming
-        if isinstance(waypoints, Trajectory):
-            start_ns = waypoints.stamp_ns or time_ns
-            waypoints = arranged(waypoints, self._parameters.joints, self._command)
-        splines = self._parameters.interpolation_method == "splines"
-        curve = interpolated(waypoints, time_ns - start_ns, measured.positions, measured.velocities, splines=splines)
-        self._incoming = None
-        self._motion = Motion(curve, start_ns=start_ns, first_ns=time_ns, period_ns=self.period_ns)
-        return self._motion
-
-    def _decided(self, motion: Motion, measured: JointState, *, first: bool) -> Decision | None:
-        decision = decided(motion, measured.positions, self._tolerances, self._parameters.joints, first=first)
+    def _decided(self, *, first: bool) -> Decision | None:
+        motion = self._tracker.motion
+        decision = self._judge.decide(motion, self._tracker.measured, first=first)
         if decision is None:
             return None
         if decision.status is GoalStatus.ABORTED:
-            _LOGGER.warning("%s: %s", self.name, decision.text)
-            self._hold(Waypoints.single(measured.positions))
+            self.logger.warning("%s: %s", self.name, decision.text)
+            self._stop()
         elif self._goal_id is not None:
-            self._hold(Waypoints.single(*motion.curve.state(motion.curve.end_ns)))
+            end_ns = motion.curve.end_ns
+            self._hold(Waypoints.single(*motion.curve.state(end_ns), motion.curve.efforts(end_ns)))
         self._finish(decision)
         return decision
 
-    def _hold(self, waypoint: Waypoints) -> None:
-        self._incoming, self._holding = waypoint, True
+    def _follow(self, trajectory: Trajectory, judge: Judge) -> None:
+        self._tracker.incoming, self._judge, self._holding = trajectory, judge, False
+
+    def _hold(self, waypoints: Waypoints) -> None:
+        self._tracker.incoming, self._holding = waypoints, True
+
+    def _stop(self) -> None:
+        tracker, measured = self._tracker, self._tracker.measured
+        if self._parameters.brakes and measured.velocities is not None:
+            constraints = self._parameters.constraints
+            hardest = np.array([constraints.of(joint).max_deceleration_on_cancel for joint in self._parameters.joints])
+            self._hold(braked(measured.positions, measured.velocities, hardest, tracker.period_ns))
+        else:
+            self._hold(Waypoints.single(tracker.command if self._deviations.hold == "command" else measured.positions))
 
     def _finish(self, decision: Decision) -> None:
         if self._goal_id is not None:
-            result = GoalResult(self._goal_id, decision.status, decision.error_code, decision.text, self._time_ns)
+            stamp_ns = self._tracker.time_ns
+            result = GoalResult(self._goal_id, decision.status, decision.error_code, decision.text, stamp_ns)
             self._results.append(result)
             self._goal_id = None
 
     def _restart(self, time_ns: int, measured: JointState) -> None:
-        self.observe(measured)
-        self._time_ns, self._motion = time_ns, None
-        self._command = self._known_state().positions
-        self._hold(Waypoints.single(self._command))
+        self._tracker.restart(time_ns, measured)
+        self._hold(Waypoints.single(self._tracker.command))
 
-    def _refusal(self, trajectory: Trajectory, now_ns: int, what: str) -> str | None:
-        inactive = None if self._active else f"Can't accept new {what}. Controller is not running."
-        reason = inactive or refusal(trajectory, self._parameters, now_ns)
-        if reason is None:
-            return None
-        _LOGGER.error("%s: %s", self.name, reason)
-        return f"{self.name}: {reason}"
+    def _adopt(self, parameters: ControllerParameters) -> None:
+        self._parameters = parameters
+        velocities = self._tracker.velocities_count
+        self._defaults = default_tolerances(parameters.constraints, parameters.joints, velocities=velocities)
+        for warning in parameters.warnings():
+            self.logger.warning("%s: %s", self.name, warning)
+
+    def _judge_with(self, tolerances: Tolerances) -> Judge:
+        parameters, tracker = self._parameters, self._tracker
+        timeout_ns = round(parameters.timeout * 1e9)
+        return Judge(tolerances, timeout_ns, parameters.joints, tracker.velocities_count, tracker.continuous)
+
+    def _refusal(self, trajectory: Trajectory, now_ns: int, what: str) -> Refusal | None:
+        if not self._active:
+            text = f"Can't accept new {what}. Controller is not running."
+            return self.refuse(Refusal(ErrorCode.INVALID_GOAL, text))
+        if (reason := refusal(trajectory, self._parameters, now_ns)) is not None:
+            return self.refuse(reason)
+        ahead_ns = (trajectory.stamp_ns or now_ns) - now_ns
+        if ahead_ns > _FAR_AHEAD_NS:
+            doubt = "was it stamped by a clock that is not the simulation's?"
+            self.logger.warning("%s: the trajectory starts %.0f s from now; %s", self.name, ahead_ns / 1e9, doubt)
+        return None
 
     def _require_active(self) -> None:
         if not self._active:
             raise ValueError(f"{self.name}: the controller is not active")
-
-    def _followed(self) -> Motion:
-        if self._motion is None:
-            raise ValueError(f"{self.name}: there was no update yet")
-        return self._motion
-
-    def _known_state(self) -> JointState:
-        if self._measured is None:
-            raise ValueError(f"{self.name}: the measured state is unknown; call observe after take")
-        return self._measured
-
-
-def _invalid(text: str) -> Decision:
-    return Decision(GoalStatus.ABORTED, ErrorCode.INVALID_GOAL, text)

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from throwcollect.control.interpolation import shortest_turn
 from throwcollect.control.motion import Motion
-from throwcollect.control.outcome import ErrorCode, GoalStatus
-from throwcollect.control.tolerances import Tolerances, violations
+from throwcollect.control.outcome import ErrorCode, GoalStatus, JointState
+from throwcollect.control.tolerances import Limits, Tolerances, violations
 
 
 @dataclass(frozen=True)
@@ -27,34 +28,121 @@ class Decision:
     error_code: ErrorCode
     text: str
 
+    @classmethod
+    def invalid(cls, text: str) -> Decision:
+        """A goal is dropped, for a reason outside of the trajectory."""
+        return cls(GoalStatus.ABORTED, ErrorCode.INVALID_GOAL, text)
 
-def decided(
-    motion: Motion, measured: NDArray[np.float64], tolerances: Tolerances, joints: Sequence[str], *, first: bool
-) -> Decision | None:
-    """Judge one update.
+
+CANCELED = Decision(GoalStatus.CANCELED, ErrorCode.SUCCESSFUL, "")
+"""A goal was cancelled by its client."""
+
+
+@dataclass(frozen=True)
+class Errors:
+    """How far the joints are from where they should be.
+
+    Attributes:
+        position: Desired minus measured positions [rad], shape ``(n_joints,)``.
+        velocity: The same of velocities [rad/s]; None if they are not measured or do not count.
+    """
+
+    position: NDArray[np.float64]
+    velocity: NDArray[np.float64] | None
+
+
+def errors(
+    motion: Motion, measured: JointState, *, velocities: bool, continuous: NDArray[np.bool_] | None = None
+) -> Errors:
+    """Errors of one update.
 
     Args:
         motion: What is being followed.
-        measured: Measured positions [rad], shape ``(n_joints,)``.
-        tolerances: Those in force.
-        joints: Names of the joints.
-        first: Whether it is the motion's first update, in which the path is checked even if the end has come.
+        measured: Measured state.
+        velocities: Whether velocities count.
+        continuous: Joints that turn without end, whose errors are the short way; None if there is none.
 
     Returns:
-        The decision; None while the trajectory goes on, or its end waits for the joints.
+        The errors.
     """
-    if tolerances.checks_path and (first or not motion.past_end):
-        broken = violations(motion.desired - measured, tolerances.path, joints)
-        if broken:
-            text = f"Aborted due to path tolerance violation: {broken}"
-            return Decision(GoalStatus.ABORTED, ErrorCode.PATH_TOLERANCE_VIOLATED, text)
-    if not motion.past_end:
+    position = motion.desired - measured.positions
+    if continuous is not None:
+        position = np.where(continuous, shortest_turn(position), position)
+    velocity = None
+    if velocities and measured.velocities is not None:
+        velocity = motion.curve.state(motion.clock_ns)[1] - measured.velocities
+    return Errors(position, velocity)
+
+
+@dataclass(frozen=True)
+class Judge:
+    """Judges the updates of one trajectory.
+
+    Attributes:
+        tolerances: Those in force.
+        timeout_ns: How long after the end the joints are stopped [ns]; 0 never.
+        joints: Names of the joints.
+        velocities: Whether velocities count.
+        continuous: Joints that turn without end; None if there is none.
+    """
+
+    tolerances: Tolerances
+    timeout_ns: int
+    joints: Sequence[str]
+    velocities: bool
+    continuous: NDArray[np.bool_] | None
+
+    def decide(self, motion: Motion, measured: JointState, *, first: bool) -> Decision | None:
+        """Judge one update.
+
+        Args:
+            motion: What is being followed.
+            measured: Measured state.
+            first: Whether it is the motion's first update, in which the path is checked even if the end has come.
+
+        Returns:
+            The decision; None while the trajectory goes on, or its end waits for the joints.
+        """
+        past_end = motion.past_end
+        if self.tolerances.path.checked and (first or not past_end):
+            broken = self._broken(motion, measured, self.tolerances.path)
+            if broken:
+                text = f"Aborted due to path tolerance violation: {broken}"
+                return Decision(GoalStatus.ABORTED, ErrorCode.PATH_TOLERANCE_VIOLATED, text)
+        if not past_end:
+            return None
+        late_ns = motion.since_end_ns
+        if 0 < self.timeout_ns < late_ns:
+            text = f"Aborted due to command timeout: {late_ns / 1e9:f} seconds after the end"
+            return Decision(GoalStatus.ABORTED, ErrorCode.GOAL_TOLERANCE_VIOLATED, text)
+        goal = self.tolerances.goal
+        broken = self._broken(motion, measured, goal) if goal.checked else ""
+        if not broken:
+            return Decision(GoalStatus.SUCCEEDED, ErrorCode.SUCCESSFUL, "Goal successfully reached!")
+        if 0 < self.tolerances.goal_time_ns < late_ns:
+            text = f"Aborted due to goal_time_tolerance exceeding by {late_ns / 1e9:f} seconds: {broken}"
+            return Decision(GoalStatus.ABORTED, ErrorCode.GOAL_TOLERANCE_VIOLATED, text)
         return None
-    broken = violations(motion.desired - measured, tolerances.goal, joints) if tolerances.checks_goal else ""
-    if not broken:
-        return Decision(GoalStatus.SUCCEEDED, ErrorCode.SUCCESSFUL, "Goal successfully reached!")
-    late_ns = motion.since_end_ns
-    if 0 < tolerances.goal_time_ns < late_ns:
-        text = f"Aborted due to goal_time_tolerance exceeding by {late_ns / 1e9:f} seconds: {broken}"
-        return Decision(GoalStatus.ABORTED, ErrorCode.GOAL_TOLERANCE_VIOLATED, text)
-    return None
+
+    def updates_to_skip(self, motion: Motion, *, goal: bool) -> int | None:
+        """Number of updates that can pass without anything to decide.
+
+        Args:
+            motion: What is being followed.
+            goal: Whether a goal waits for the end of it.
+
+        Returns:
+            Number of updates; None if there will never be anything.
+        """
+        tolerances = self.tolerances
+        if tolerances.path.checked and not motion.past_end:
+            return 0
+        if goal:
+            return max(0, motion.updates_until_end())
+        limits = [self.timeout_ns, tolerances.goal_time_ns if tolerances.goal.checked else 0]
+        late = [motion.updates_until_late(limit_ns) for limit_ns in limits if limit_ns]
+        return max(0, min(late)) if late else None
+
+    def _broken(self, motion: Motion, measured: JointState, limits: Limits) -> str:
+        error = errors(motion, measured, velocities=self.velocities, continuous=self.continuous)
+        return violations(error.position, error.velocity, limits, self.joints)

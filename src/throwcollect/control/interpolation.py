@@ -1,90 +1,22 @@
 """Curves through the points of a trajectory, evaluated for many times at once.
 
 The degree of a segment follows from what both its ends have: positions give a line, velocities a cubic, accelerations
-a quintic. The first segment begins at the measured state, which counts as having whatever the first point has.
+a quintic. The first segment begins at the start state, which counts as having whatever the first point has. Efforts are
+always connected by lines.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.control.goal import Trajectory
+from throwcollect.control.waypoints import CUBIC, LINE, QUINTIC, StartState, Waypoints
 
-_LINE, _CUBIC, _QUINTIC = 0, 1, 2
-
-
-@dataclass(frozen=True)
-class Waypoints:
-    """Points of a trajectory in the controller's joint order.
-
-    Attributes:
-        times_ns: Time since the trajectory's start [ns], shape ``(n_points,)``, int64.
-        positions: [rad], shape ``(n_points, n_joints)``.
-        velocities: [rad/s], shape ``(n_points, n_joints)``; 0 where a point has none.
-        accelerations: [rad/s²], shape ``(n_points, n_joints)``; 0 where a point has none.
-        content: What a point has, shape ``(n_points,)``: 0 positions, 1 velocities too, 2 accelerations too.
-    """
-
-    times_ns: NDArray[np.int64]
-    positions: NDArray[np.float64]
-    velocities: NDArray[np.float64]
-    accelerations: NDArray[np.float64]
-    content: NDArray[np.int64]
-
-    @classmethod
-    def single(
-        cls,
-        positions: NDArray[np.float64],
-        velocities: NDArray[np.float64] | None = None,
-        accelerations: NDArray[np.float64] | None = None,
-    ) -> Waypoints:
-        """One point at the trajectory's start, to be held.
-
-        Args:
-            positions: [rad], shape ``(n_joints,)``.
-            velocities: [rad/s], shape ``(n_joints,)``; None for 0.
-            accelerations: [rad/s²], shape ``(n_joints,)``; None for 0.
-
-        Returns:
-            The point.
-        """
-        still = np.zeros(len(positions))
-        rows = [still if row is None else row for row in (positions, velocities, accelerations)]
-        p, v, a = (row[np.newaxis] for row in rows)
-        return cls(np.zeros(1, np.int64), p, v, a, np.zeros(1, np.int64))
-
-
-def arranged(trajectory: Trajectory, joints: Sequence[str], command: NDArray[np.float64]) -> Waypoints:
-    """Points of a valid trajectory in the controller's joint order.
-
-    Args:
-        trajectory: What has been asked for.
-        joints: Joints of the controller, in order.
-        command: Last commanded positions [rad], shape ``(n_joints,)``: joints that are left out stay there.
-
-    Returns:
-        The points for all joints of the controller.
-    """
-    points = trajectory.points
-    columns = [joints.index(name) for name in trajectory.joint_names]
-    positions = np.repeat(command[np.newaxis], len(points), axis=0)
-    positions[:, columns] = [point.positions for point in points]
-    velocities, accelerations = np.zeros_like(positions), np.zeros_like(positions)
-    moving = [index for index, point in enumerate(points) if len(point.velocities)]
-    accelerating = [index for index, point in enumerate(points) if len(point.accelerations)]
-    if moving:
-        velocities[np.ix_(moving, columns)] = [points[index].velocities for index in moving]
-    if accelerating:
-        accelerations[np.ix_(accelerating, columns)] = [points[index].accelerations for index in accelerating]
-    content = np.zeros(len(points), np.int64)
-    content[moving] = _CUBIC
-    content[[index for index in accelerating if content[index] == _CUBIC]] = _QUINTIC
-    times_ns = np.array([point.time_from_start_ns for point in points], dtype=np.int64)
-    return Waypoints(times_ns, positions, velocities, accelerations, content)
+_HALF_TURN_WIDTH = 1e-9
+"""Within which half a turn counts as such [rad]; that of ros2_controllers."""
 
 
 @dataclass(frozen=True)
@@ -101,6 +33,7 @@ class Curve:
         position: Coefficients [rad].
         velocity: Coefficients [rad/s].
         acceleration: Coefficients [rad/s²].
+        effort: Coefficients [Nm]; None for none.
     """
 
     knots_ns: NDArray[np.int64]
@@ -108,6 +41,7 @@ class Curve:
     position: NDArray[np.float64]
     velocity: NDArray[np.float64]
     acceleration: NDArray[np.float64]
+    effort: NDArray[np.float64] | None = None
 
     @property
     def end_ns(self) -> int:
@@ -141,6 +75,20 @@ class Curve:
         )
         return position, velocity, acceleration
 
+    def efforts(self, time_ns: int) -> NDArray[np.float64]:
+        """Efforts at one time.
+
+        Args:
+            time_ns: Time since the trajectory's start, not before the first knot [ns].
+
+        Returns:
+            [Nm], shape ``(n_joints,)``.
+        """
+        if self.effort is None:
+            return np.zeros(self.position.shape[2])
+        efforts: NDArray[np.float64] = self._evaluated(self.effort, np.array([time_ns], dtype=np.int64))[0]
+        return efforts
+
     def _evaluated(self, coefficients: NDArray[np.float64], times_ns: NDArray[np.int64]) -> NDArray[np.float64]:
         segment = np.searchsorted(self.knots_ns, times_ns, side="right") - 1
         share = ((times_ns - self.knots_ns[segment]) / self.durations_ns[segment])[:, np.newaxis]
@@ -152,56 +100,71 @@ class Curve:
 
 
 def interpolated(
-    waypoints: Waypoints,
-    start_ns: int,
-    start_position: NDArray[np.float64],
-    start_velocity: NDArray[np.float64] | None,
-    *,
-    splines: bool,
+    waypoints: Waypoints, start: StartState, *, splines: bool, continuous: NDArray[np.bool_] | None = None
 ) -> Curve:
-    """Curve from a measured state through the points.
+    """Curve from a start state through the points.
 
     Args:
         waypoints: The points.
-        start_ns: Time at which the state was measured, since the trajectory's start [ns]; points before it are over.
-        start_position: Measured positions [rad], shape ``(n_joints,)``.
-        start_velocity: Measured velocities [rad/s], shape ``(n_joints,)``; None if they are not measured.
+        start: Where to begin.
         splines: Whether to connect the points; otherwise the next point is output from the time of each.
+        continuous: Joints that turn without end, shape ``(n_joints,)``: they go the short way to the first point. None
+            if there is no such joint.
 
     Returns:
-        The curve; if the first point's time has come, it begins there and the measured state is not used.
+        The curve; if the first point's time has come, it begins there and the start state is not used.
     """
-    leads_in = start_ns < waypoints.times_ns[0]
+    leads_in = start.time_ns < waypoints.times_ns[0]
     if leads_in:
-        still = np.zeros_like(start_position)
-        velocity = still if start_velocity is None else start_velocity
-        waypoints = Waypoints(
-            np.concatenate(([start_ns], waypoints.times_ns)),
-            np.vstack((start_position, waypoints.positions)),
-            np.vstack((velocity, waypoints.velocities)),
-            np.vstack((still, waypoints.accelerations)),
-            np.concatenate((waypoints.content[:1], waypoints.content)),
-        )
+        waypoints = _led_in(waypoints, start, continuous)
     durations_ns = np.append(np.diff(waypoints.times_ns), 1)
     if splines and len(durations_ns) > 1:
         return _splines(waypoints, durations_ns)
     rows = np.minimum(np.arange(len(durations_ns)) + 1, len(durations_ns) - 1)
     if leads_in:
         rows[0] = 0
-    values = (waypoints.positions, waypoints.velocities, waypoints.accelerations)
-    return Curve(waypoints.times_ns, durations_ns, *(value[np.newaxis, rows] for value in values))
+    p, v, a = (
+        value[np.newaxis, rows] for value in (waypoints.positions, waypoints.velocities, waypoints.accelerations)
+    )
+    effort = None if waypoints.effort is None else waypoints.effort[np.newaxis, rows]
+    return Curve(waypoints.times_ns, durations_ns, p, v, a, effort)
+
+
+def shortest_turn(angle: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Angles brought into the interval from -π to π by whole turns [rad]."""
+    return angle - 2 * math.pi * np.round(angle / (2 * math.pi))
+
+
+def _led_in(waypoints: Waypoints, start: StartState, continuous: NDArray[np.bool_] | None) -> Waypoints:
+    still = np.zeros_like(start.positions)
+    position, target = start.positions, waypoints.positions[0]
+    if continuous is not None:
+        turn = shortest_turn(target - position)
+        # Half a turn goes either way: towards the greater angle if that is where the target is.
+        half = np.abs(np.abs(turn) - math.pi) < _HALF_TURN_WIDTH
+        turn = np.where(half, np.copysign(turn, target - position), turn)
+        position = np.where(continuous, target - turn, position)
+    velocity, acceleration = (still if value is None else value for value in (start.velocities, start.accelerations))
+    return Waypoints(
+        np.concatenate(([start.time_ns], waypoints.times_ns)),
+        np.vstack((position, waypoints.positions)),
+        np.vstack((velocity, waypoints.velocities)),
+        np.vstack((acceleration, waypoints.accelerations)),
+        np.concatenate((waypoints.content[:1], waypoints.content)),
+        None if waypoints.effort is None else np.vstack((still, waypoints.effort)),
+    )
 
 
 def _splines(waypoints: Waypoints, durations_ns: NDArray[np.int64]) -> Curve:
     content = np.minimum(waypoints.content[:-1], waypoints.content[1:])
     seconds = (durations_ns / 1e9)[:, np.newaxis]
-    degree = (1, 3, 5)[int(content.max(initial=_LINE))]
+    degree = (1, 3, 5)[int(content.max(initial=LINE))]
     position = np.zeros((degree + 1, *waypoints.positions.shape))
     position[0] = waypoints.positions
     step = np.diff(waypoints.positions, axis=0)
     v0, v1 = waypoints.velocities[:-1] * seconds[:-1], waypoints.velocities[1:] * seconds[:-1]
     a0, a1 = waypoints.accelerations[:-1] * seconds[:-1] ** 2, waypoints.accelerations[1:] * seconds[:-1] ** 2
-    lines, cubics, quintics = (np.flatnonzero(content == kind) for kind in (_LINE, _CUBIC, _QUINTIC))
+    lines, cubics, quintics = (np.flatnonzero(content == kind) for kind in (LINE, CUBIC, QUINTIC))
     position[1, lines] = step[lines]
     if len(cubics):
         d, v, w = step[cubics], v0[cubics], v1[cubics]
@@ -218,7 +181,10 @@ def _splines(waypoints: Waypoints, durations_ns: NDArray[np.int64]) -> Curve:
     velocity = _derivative(position, seconds)
     acceleration = _derivative(velocity, seconds)
     velocity[0, -1], acceleration[0, -1] = waypoints.velocities[-1], waypoints.accelerations[-1]
-    return Curve(waypoints.times_ns, durations_ns, position, velocity, acceleration)
+    effort = waypoints.effort
+    if effort is not None:
+        effort = np.stack((effort, np.vstack((np.diff(effort, axis=0), np.zeros_like(effort[:1])))))
+    return Curve(waypoints.times_ns, durations_ns, position, velocity, acceleration, effort)
 
 
 def _derivative(coefficients: NDArray[np.float64], seconds: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.control.interpolation import Curve
-
-_BLOCK = 4096
-"""Updates whose commands are computed at once: whole throws, yet bounded for trajectories that end in years."""
+from throwcollect.control.sampling import Grid, first_index_at
 
 
 class Motion:
@@ -22,24 +22,26 @@ class Motion:
         start_ns: Absolute time of the trajectory's start [ns].
         first_ns: Absolute time of the first update [ns].
         period_ns: Control period [ns].
+        scaling: Speed of the trajectory's clock [-].
     """
 
-    def __init__(self, curve: Curve, *, start_ns: int, first_ns: int, period_ns: int) -> None:
+    def __init__(self, curve: Curve, *, start_ns: int, first_ns: int, period_ns: int, scaling: float = 1.0) -> None:
         self.curve = curve
         self.start_ns = start_ns
         self.first_ns = first_ns
         self._period_ns = period_ns
+        self._scaling = scaling
         self._rebase(first_ns - start_ns)
 
     @property
     def clock_ns(self) -> int:
         """The trajectory's clock: time since its start [ns]."""
-        return self._origin_ns + self._index * self._period_ns
+        return self._desired.time_ns(self._index)
 
     @property
     def past_end(self) -> bool:
         """Whether the command of this update is that of the last point."""
-        return self._index + 1 >= self._end_index
+        return self.clock_ns + self._period_ns >= self.curve.end_ns
 
     @property
     def since_end_ns(self) -> int:
@@ -49,12 +51,17 @@ class Motion:
     @property
     def desired(self) -> NDArray[np.float64]:
         """Positions that are due in this update [rad], shape ``(n_joints,)``, read-only."""
-        return self._position(self._index)
+        return self._desired.position(self._index)
 
     @property
     def command(self) -> NDArray[np.float64]:
         """Positions to command in this update [rad], shape ``(n_joints,)``, read-only."""
-        return self._position(self._index + 1)
+        return self._commands.position(self._index + self._ahead)
+
+    def scale(self, scaling: float) -> None:
+        """Let the trajectory's clock go at another speed from now on; 0 stops it."""
+        self._scaling = scaling
+        self._rebase(self.clock_ns)
 
     def advance(self, period_ns: int) -> None:
         """Go to the next update.
@@ -65,7 +72,7 @@ class Motion:
         if period_ns == self._period_ns:
             self._index += 1
         else:
-            self._rebase(self.clock_ns + period_ns)
+            self._rebase(self.clock_ns + round(period_ns * self._scaling))
 
     def skip(self, n_updates: int) -> NDArray[np.float64]:
         """Go on by many control periods.
@@ -76,13 +83,15 @@ class Motion:
         Returns:
             Their commands [rad], shape ``(n_updates, n_joints)``, read-only.
         """
-        first = self._index + 2
+        first = self._index + 1 + self._ahead
         self._index += n_updates
-        return self._positions(first, first + n_updates)
+        return self._commands.positions(first, n_updates)
 
     def updates_until_end(self) -> int:
         """Updates that follow before the one in which `past_end` becomes true; negative when it is true."""
-        return self._end_index - self._index - 2
+        if self.past_end:
+            return -1
+        return first_index_at(self.curve.end_ns - self._period_ns - self.clock_ns, self._step_ns) - 1
 
     def updates_until_late(self, tolerance_ns: int) -> int:
         """Updates that follow before the one in which `since_end_ns` is above a tolerance.
@@ -93,36 +102,16 @@ class Motion:
         Returns:
             Number of updates; negative when this one is late.
         """
-        return (tolerance_ns - self.since_end_ns) // self._period_ns
+        left_ns = tolerance_ns - self.since_end_ns
+        if left_ns < 0:
+            return -1
+        return left_ns // self._step_ns if self._step_ns else sys.maxsize
 
     def _rebase(self, clock_ns: int) -> None:
-        self._origin_ns = clock_ns
         self._index = 0
-        self._end_index = max(0, -(-(self.curve.end_ns - clock_ns) // self._period_ns))
-        self._block_start = 0
-        self._block = np.empty((0, 0))
-        self._last = self._computed(self._end_index, self._end_index + 1)[0]
-
-    def _position(self, index: int) -> NDArray[np.float64]:
-        position: NDArray[np.float64] = self._positions(index, index + 1)[0]
-        return position
-
-    def _positions(self, first: int, stop: int) -> NDArray[np.float64]:
-        moving_stop = min(stop, self._end_index)
-        if first >= moving_stop:
-            return np.broadcast_to(self._last, (stop - first, len(self._last)))
-        if not self._block_start <= first or moving_stop > self._block_start + len(self._block):
-            self._block_start = first
-            self._block = self._computed(first, max(moving_stop, min(first + _BLOCK, self._end_index)))
-        moving = self._block[first - self._block_start : moving_stop - self._block_start]
-        if moving_stop == stop:
-            return moving
-        positions = np.vstack((moving, np.broadcast_to(self._last, (stop - moving_stop, len(self._last)))))
-        positions.setflags(write=False)
-        return positions
-
-    def _computed(self, first: int, stop: int) -> NDArray[np.float64]:
-        times_ns = self._origin_ns + np.arange(first, stop, dtype=np.int64) * self._period_ns
-        positions = self.curve.positions(times_ns)
-        positions.setflags(write=False)
-        return positions
+        self._step_ns = round(self._period_ns * self._scaling)
+        self._desired = Grid(self.curve, clock_ns, self._step_ns)
+        # At full speed a command is the desired position of the next update, so that one grid serves both.
+        full_speed = self._step_ns == self._period_ns
+        self._ahead = 1 if full_speed else 0
+        self._commands = self._desired if full_speed else Grid(self.curve, clock_ns + self._period_ns, self._step_ns)

@@ -25,8 +25,23 @@ class ErrorCode(IntEnum):
 
     SUCCESSFUL = 0
     INVALID_GOAL = -1
+    INVALID_JOINTS = -2
+    OLD_HEADER_TIMESTAMP = -3
     PATH_TOLERANCE_VIOLATED = -4
     GOAL_TOLERANCE_VIOLATED = -5
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """Why a trajectory cannot be executed.
+
+    Attributes:
+        error_code: The rule that is broken, where the action has a code for it.
+        text: One sentence.
+    """
+
+    error_code: ErrorCode
+    text: str
 
 
 @dataclass(frozen=True)
@@ -72,8 +87,9 @@ class ControllerState:
         joint_names: Joints of the controller.
         desired: What was due (``reference`` of the state topic), timed by the trajectory's clock.
         actual: What was measured (``feedback`` of the state topic), timed by the time that has really passed.
-        error: Desired minus actual positions; velocities are 0, as no velocity is commanded.
-        output: Commanded positions.
+        error: Desired minus actual; velocities are 0 unless velocities or efforts are commanded.
+        output: What is commanded.
+        speed_scaling_factor: Speed of the trajectory's clock [-].
     """
 
     stamp_ns: int
@@ -82,6 +98,7 @@ class ControllerState:
     actual: TrajectoryPoint
     error: TrajectoryPoint
     output: TrajectoryPoint
+    speed_scaling_factor: float
 
 
 @dataclass(frozen=True)

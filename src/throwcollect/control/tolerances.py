@@ -1,7 +1,8 @@
 """Which tolerances are in force for a goal, and which joints break them.
 
-A tolerance of 0 is not in force, here as in the parameters. A controller that commands positions alone has no velocity
-or acceleration error, so only position tolerances can take effect; the others are still checked for being legal.
+A tolerance of 0 is not in force, here as in the parameters. Those of velocities take effect in controllers that command
+velocities or efforts besides positions; those of accelerations never do, as accelerations are not measured. They are
+checked for being legal all the same.
 """
 
 from __future__ import annotations
@@ -14,11 +15,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.control.goal import JointTolerance, TrajectoryGoal
-from throwcollect.control.parameters import Constraints, JointConstraints
+from throwcollect.control.parameters import Constraints
 
-_LOGGER = logging.getLogger(__name__)
 _ERASE = -1.0
 _ERASE_WIDTH = float(np.finfo(np.float32).eps)
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Largest errors of the joints; 0 is not checked.
+
+    Attributes:
+        position: [rad], shape ``(n_joints,)``.
+        velocity: [rad/s], shape ``(n_joints,)``.
+    """
+
+    position: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+
+    @property
+    def checked(self) -> bool:
+        """Whether any error is checked."""
+        return bool(self.position.any() or self.velocity.any())
 
 
 @dataclass(frozen=True)
@@ -26,45 +44,40 @@ class Tolerances:
     """Tolerances in force.
 
     Attributes:
-        path: Largest position error while moving [rad], shape ``(n_joints,)``; 0 is not checked.
-        goal: Largest position error at the end [rad], shape ``(n_joints,)``; 0 is not checked.
+        path: Largest errors while moving.
+        goal: Largest errors at the end.
         goal_time_ns: How late the end may be reached [ns]; 0 waits for ever.
     """
 
-    path: NDArray[np.float64]
-    goal: NDArray[np.float64]
+    path: Limits
+    goal: Limits
     goal_time_ns: int
 
-    @property
-    def checks_path(self) -> bool:
-        """Whether any joint is checked while moving."""
-        return bool(self.path.any())
 
-    @property
-    def checks_goal(self) -> bool:
-        """Whether any joint is checked at the end."""
-        return bool(self.goal.any())
-
-
-def default_tolerances(constraints: Constraints, joints: Sequence[str]) -> Tolerances:
+def default_tolerances(constraints: Constraints, joints: Sequence[str], *, velocities: bool) -> Tolerances:
     """Tolerances of trajectories that bring none of their own.
 
     Args:
         constraints: Those of the controller.
         joints: Joints of the controller, in order.
+        velocities: Whether there is a velocity error to be checked.
 
     Returns:
         The parameters as arrays.
     """
-    limits = [constraints.joints.get(joint, JointConstraints()) for joint in joints]
+    limits = [constraints.of(joint) for joint in joints]
+    stopped = constraints.stopped_velocity_tolerance if velocities else 0.0
+    still = np.zeros(len(joints))
     return Tolerances(
-        path=np.array([limit.trajectory for limit in limits]),
-        goal=np.array([limit.goal for limit in limits]),
+        path=Limits(np.array([limit.trajectory for limit in limits]), still),
+        goal=Limits(np.array([limit.goal for limit in limits]), np.full(len(joints), stopped)),
         goal_time_ns=round(constraints.goal_time * 1e9),
     )
 
 
-def goal_tolerances(goal: TrajectoryGoal, defaults: Tolerances, joints: Sequence[str], controller: str) -> Tolerances:
+def goal_tolerances(
+    goal: TrajectoryGoal, defaults: Tolerances, joints: Sequence[str], *, velocities: bool, logger: logging.Logger
+) -> Tolerances:
     """Tolerances of one goal: its own where it has any, the defaults elsewhere.
 
     One illegal number or unknown joint makes the whole goal fall back to the defaults; the log says so.
@@ -73,59 +86,69 @@ def goal_tolerances(goal: TrajectoryGoal, defaults: Tolerances, joints: Sequence
         goal: The goal.
         defaults: Tolerances of the controller.
         joints: Joints of the controller, in order.
-        controller: Name of the controller, for the log.
+        velocities: Whether there is a velocity error to be checked.
+        logger: Log of the controller.
 
     Returns:
         The tolerances to put in force.
     """
     try:
-        return Tolerances(
-            path=_merged(goal.path_tolerance, defaults.path, joints, "path_tolerance"),
-            goal=_merged(goal.goal_tolerance, defaults.goal, joints, "goal_tolerance"),
-            goal_time_ns=_resolved_time(goal.goal_time_tolerance_ns, defaults.goal_time_ns),
-        )
+        path = _merged(goal.path_tolerance, defaults.path, joints, "path_tolerance")
+        end = _merged(goal.goal_tolerance, defaults.goal, joints, "goal_tolerance")
+        goal_time_ns = _resolved_time(goal.goal_time_tolerance_ns, defaults.goal_time_ns)
     except _IllegalToleranceError as error:
-        _LOGGER.error("%s: %s Using default tolerances.", controller, error)
+        logger.error("%s Using default tolerances.", error)
         return defaults
+    if not velocities:
+        path, end = (Limits(limits.position, np.zeros(len(joints))) for limits in (path, end))
+    return Tolerances(path, end, goal_time_ns)
 
 
-def violations(error: NDArray[np.float64], tolerance: NDArray[np.float64], joints: Sequence[str]) -> str:
+def violations(
+    position: NDArray[np.float64], velocity: NDArray[np.float64] | None, limits: Limits, joints: Sequence[str]
+) -> str:
     """Joints whose error is above their tolerance.
 
     Args:
-        error: Position error [rad], shape ``(n_joints,)``.
-        tolerance: Largest position error [rad], shape ``(n_joints,)``; 0 is not checked.
+        position: Position error [rad], shape ``(n_joints,)``.
+        velocity: Velocity error [rad/s], shape ``(n_joints,)``; None if there is none.
+        limits: Largest errors.
         joints: Names of the joints.
 
     Returns:
-        One phrase for each such joint with error and tolerance; empty if there is none.
+        One phrase for each error that is too large; empty if there is none.
     """
+    phrases = _violations("position", "rad", position, limits.position, joints)
+    if velocity is not None:
+        phrases += _violations("velocity", "rad/s", velocity, limits.velocity, joints)
+    return "; ".join(phrases)
+
+
+def _violations(
+    what: str, unit: str, error: NDArray[np.float64], tolerance: NDArray[np.float64], joints: Sequence[str]
+) -> list[str]:
     broken = np.flatnonzero((tolerance > 0) & (np.abs(error) > tolerance))
-    return "; ".join(
-        f"joint {joints[index]} has position error {error[index]:f} rad, tolerance {tolerance[index]:f} rad"
+    return [
+        f"joint {joints[index]} has {what} error {error[index]:f} {unit}, tolerance {tolerance[index]:f} {unit}"
         for index in broken.tolist()
-    )
+    ]
 
 
 class _IllegalToleranceError(Exception):
     """A goal's tolerance that has no meaning; never leaves this module."""
 
 
-def _merged(
-    asked: Sequence[JointTolerance], defaults: NDArray[np.float64], joints: Sequence[str], field: str
-) -> NDArray[np.float64]:
-    merged = defaults.copy()
+def _merged(asked: Sequence[JointTolerance], defaults: Limits, joints: Sequence[str], field: str) -> Limits:
+    position, velocity = defaults.position.copy(), defaults.velocity.copy()
     for tolerance in asked:
         if tolerance.name not in joints:
             raise _IllegalToleranceError(f"joint '{tolerance.name}' specified in goal.{field} does not exist.")
         index = joints.index(tolerance.name)
-        where = f"joint '{tolerance.name}' specified in goal.{field}"
-        merged[index] = _resolved(
-            tolerance.position, float(defaults[index]), f"{where} has a invalid position tolerance"
-        )
-        _resolved(tolerance.velocity, 0.0, f"{where} has a invalid velocity tolerance")
-        _resolved(tolerance.acceleration, 0.0, f"{where} has a invalid acceleration tolerance")
-    return merged
+        where = f"joint '{tolerance.name}' specified in goal.{field} has a invalid"
+        position[index] = _resolved(tolerance.position, float(defaults.position[index]), f"{where} position tolerance")
+        velocity[index] = _resolved(tolerance.velocity, float(defaults.velocity[index]), f"{where} velocity tolerance")
+        _resolved(tolerance.acceleration, 0.0, f"{where} acceleration tolerance")
+    return Limits(position, velocity)
 
 
 def _resolved_time(asked_ns: int, default_ns: int) -> int:

@@ -12,13 +12,14 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from throwcollect.control.goal import Trajectory, Values
+from throwcollect.control.outcome import ErrorCode, Refusal
 from throwcollect.control.parameters import ControllerParameters
 
 END_VELOCITY_LIMIT = float(np.finfo(np.float32).eps)
 """Largest magnitude of a last point's velocity that counts as zero [rad/s] (ros2_controllers)."""
 
 
-def refusal(trajectory: Trajectory, parameters: ControllerParameters, now_ns: int) -> str | None:
+def refusal(trajectory: Trajectory, parameters: ControllerParameters, now_ns: int) -> Refusal | None:
     """Reason for which a trajectory cannot be executed.
 
     Args:
@@ -29,26 +30,28 @@ def refusal(trajectory: Trajectory, parameters: ControllerParameters, now_ns: in
     Returns:
         One sentence for the first rule that is broken, or None if the trajectory can be executed.
     """
-    return (
-        _wrong_joints(trajectory, parameters)
-        or _wrong_sizes(trajectory)
-        or _not_finite(trajectory)
-        or _moving_end(trajectory, parameters)
-        or _over_already(trajectory, now_ns)
-        or _wrong_times(trajectory)
-        or _effort(trajectory)
-    )
+    for rule, code in _RULES:
+        if (text := rule(trajectory, parameters, now_ns)) is not None:
+            return Refusal(code, text)
+    return None
 
 
-def _wrong_joints(trajectory: Trajectory, parameters: ControllerParameters) -> str | None:
+def _too_few_joints(trajectory: Trajectory, parameters: ControllerParameters, _now_ns: int) -> str | None:
     names, joints = trajectory.joint_names, parameters.joints
     if not parameters.allow_partial_joints_goal and len(names) != len(joints):
         counts = f"expected all {len(joints)} of {_listed(joints)}; got {len(names)}: {_listed(names)}"
         return f"Joints on incoming trajectory don't match the controller joints. ({counts})"
     if not len(names):
         return f"Empty joint names on incoming trajectory. (expected some of {_listed(joints)})"
-    if not len(trajectory.points):
-        return "Empty trajectory received. (expected at least 1 point; got 0)"
+    return None
+
+
+def _no_points(trajectory: Trajectory, _parameters: ControllerParameters, _now_ns: int) -> str | None:
+    return None if len(trajectory.points) else "Empty trajectory received. (expected at least 1 point; got 0)"
+
+
+def _wrong_joints(trajectory: Trajectory, parameters: ControllerParameters, _now_ns: int) -> str | None:
+    names, joints = trajectory.joint_names, parameters.joints
     for name in names:
         if name not in joints:
             return f"Incoming joint {name} doesn't match the controller's joints. (expected {_listed(joints)})"
@@ -58,27 +61,34 @@ def _wrong_joints(trajectory: Trajectory, parameters: ControllerParameters) -> s
     return None
 
 
-def _wrong_sizes(trajectory: Trajectory) -> str | None:
+def _wrong_sizes(trajectory: Trajectory, parameters: ControllerParameters, _now_ns: int) -> str | None:
     expected = len(trajectory.joint_names)
+    integrates = parameters.allow_integration_in_goal_trajectories
     for index, point in enumerate(trajectory.points):
-        fields = (
+        fields = [
             ("positions", point.positions),
             ("velocities", point.velocities),
             ("accelerations", point.accelerations),
-        )
+        ]
+        if integrates and not any(len(values) for _, values in fields):
+            return f"The given trajectory has no position, velocity, or acceleration points. (point #{index})"
+        if "effort" in parameters.command_interfaces:
+            fields.append(("effort", point.effort))
         for field, values in fields:
             size = len(values)
-            if size != expected and (size or field == "positions"):
+            if size != expected and (size or (field == "positions" and not integrates)):
                 return f"Mismatch between joint_names size ({expected}) and {field} ({size}) at point #{index}."
     return None
 
 
-def _not_finite(trajectory: Trajectory) -> str | None:
-    fields: tuple[tuple[str, Callable[[int], Values]], ...] = (
+def _not_finite(trajectory: Trajectory, parameters: ControllerParameters, _now_ns: int) -> str | None:
+    fields: list[tuple[str, Callable[[int], Values]]] = [
         ("Position", lambda index: trajectory.points[index].positions),
         ("Velocity", lambda index: trajectory.points[index].velocities),
         ("Acceleration", lambda index: trajectory.points[index].accelerations),
-    )
+    ]
+    if "effort" in parameters.command_interfaces:
+        fields.append(("Effort", lambda index: trajectory.points[index].effort))
     for field, values_of in fields:
         present = [index for index in range(len(trajectory.points)) if len(values_of(index))]
         values = np.array([values_of(index) for index in present], dtype=np.float64)
@@ -89,7 +99,7 @@ def _not_finite(trajectory: Trajectory) -> str | None:
     return None
 
 
-def _moving_end(trajectory: Trajectory, parameters: ControllerParameters) -> str | None:
+def _moving_end(trajectory: Trajectory, parameters: ControllerParameters, _now_ns: int) -> str | None:
     if parameters.allow_nonzero_velocity_at_trajectory_end:
         return None
     velocities = trajectory.points[-1].velocities
@@ -100,7 +110,7 @@ def _moving_end(trajectory: Trajectory, parameters: ControllerParameters) -> str
     return None
 
 
-def _over_already(trajectory: Trajectory, now_ns: int) -> str | None:
+def _over_already(trajectory: Trajectory, _parameters: ControllerParameters, now_ns: int) -> str | None:
     if not trajectory.stamp_ns:
         return None
     end_ns = trajectory.stamp_ns + trajectory.points[-1].time_from_start_ns
@@ -110,7 +120,7 @@ def _over_already(trajectory: Trajectory, now_ns: int) -> str | None:
     return f"Received trajectory with {times} (expected an end at {now_ns / 1e9:f} or later)"
 
 
-def _wrong_times(trajectory: Trajectory) -> str | None:
+def _wrong_times(trajectory: Trajectory, _parameters: ControllerParameters, _now_ns: int) -> str | None:
     times_ns = [point.time_from_start_ns for point in trajectory.points]
     if times_ns[0] < 0:
         return f"Time of point 0 is negative, it is {times_ns[0] / 1e9:f} (expected 0 or more)"
@@ -121,7 +131,9 @@ def _wrong_times(trajectory: Trajectory) -> str | None:
     return None
 
 
-def _effort(trajectory: Trajectory) -> str | None:
+def _effort(trajectory: Trajectory, parameters: ControllerParameters, _now_ns: int) -> str | None:
+    if "effort" in parameters.command_interfaces:
+        return None
     for index, point in enumerate(trajectory.points):
         if len(point.effort):
             rule = "Trajectories with effort fields are only supported for controllers using the 'effort' command"
@@ -131,3 +143,16 @@ def _effort(trajectory: Trajectory) -> str | None:
 
 def _listed(names: Sequence[str]) -> str:
     return ", ".join(names) or "none"
+
+
+_RULES: tuple[tuple[Callable[[Trajectory, ControllerParameters, int], str | None], ErrorCode], ...] = (
+    (_too_few_joints, ErrorCode.INVALID_JOINTS),
+    (_no_points, ErrorCode.INVALID_GOAL),
+    (_wrong_joints, ErrorCode.INVALID_JOINTS),
+    (_wrong_sizes, ErrorCode.INVALID_GOAL),
+    (_not_finite, ErrorCode.INVALID_GOAL),
+    (_moving_end, ErrorCode.INVALID_GOAL),
+    (_over_already, ErrorCode.OLD_HEADER_TIMESTAMP),
+    (_wrong_times, ErrorCode.INVALID_GOAL),
+    (_effort, ErrorCode.INVALID_GOAL),
+)

@@ -19,7 +19,7 @@ from throwcollect.episode.message import Episode, unpack
 from throwcollect.errors import DatasetError
 from throwcollect.robots.description import start_posture
 from throwcollect.robots.model import joint_limits
-from throwcollect.robots.talos import CONTROLLERS, controller_of
+from throwcollect.robots.talos import CONTROLLERS, controller_of, graph_name
 from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.ros import Node, graph_changes
 from throwcollect.sweep.plan import Plan, Trial
@@ -69,7 +69,9 @@ class Coordinator(Node):
         slowed_s = self._config.sim.max_trial_s / (self._config.sim.real_time_factor or math.inf)
         self._patience_s = self._config.run.trial_timeout_s + slowed_s
         joints = self._config.task.end
-        self._controllers = tuple(name for name in CONTROLLERS if name in {controller_of(joint) for joint in joints})
+        naming = self._config.controllers.names
+        used = {controller_of(joint) for joint in joints}
+        self._controllers = {name: graph_name(name, naming) for name in CONTROLLERS if name in used}
         self._progress = self.create_publisher(String, PROGRESS_TOPIC, PROGRESS_QOS)
         self.create_timer(_DISCOVERY_PERIOD_S, self._discover)
         self.create_timer(_REPORT_PERIOD_S, self.report)

@@ -33,7 +33,7 @@ class SimulationClient:
     Args:
         node: The coordinator.
         namespace: Namespace of the simulation, such as ``/sim_0``.
-        controllers: Controllers that trials send goals to.
+        controllers: Controllers that trials send goals to, and their names in the ROS graph.
         action_type: The FollowJointTrajectory action.
         on_episode: Called with the serialised message of an episode.
         on_refusal: Called with the reason when the simulation refuses a trial.
@@ -44,7 +44,7 @@ class SimulationClient:
         node: Node,
         namespace: str,
         *,
-        controllers: tuple[str, ...],
+        controllers: Mapping[str, str],
         action_type: Any,
         on_episode: Callable[[str, bytes], None],
         on_refusal: Callable[[str, str], None],
@@ -61,8 +61,8 @@ class SimulationClient:
         self._parameters = node.create_client(SetParametersAtomically, f"{namespace}/{name}/set_parameters_atomically")
         self._reset = node.create_client(ResetSimulation, f"{namespace}/reset_simulation")
         self._actions = {
-            controller: ActionClient(node, action_type, f"{namespace}/{controller}/follow_joint_trajectory")
-            for controller in controllers
+            controller: ActionClient(node, action_type, f"{namespace}/{shown}/follow_joint_trajectory")
+            for controller, shown in controllers.items()
         }
         self._episodes = node.create_subscription(
             UInt8MultiArray,

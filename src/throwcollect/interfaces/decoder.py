@@ -51,7 +51,10 @@ def _strings(data: bytes, at: int, count: int, memory: list[tuple[bytes, tuple[s
         (length,) = struct.unpack_from("<I", data, at + 4)
         values.append(data[at + 8 : at + 7 + length].decode())
         at += 4 + length
-    memory[0] = (data[start + 4 : at + 4], tuple(values))
+    known = data[start + 4 : at + 4]
+    # Not of data that is cut off, which whole data may begin with.
+    if len(known) == at - start:
+        memory[0] = (known, tuple(values))
     return values, at
 
 

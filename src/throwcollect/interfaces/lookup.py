@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import cache
 from typing import ClassVar
 
+from throwcollect.interfaces.catalog import structure
 from throwcollect.interfaces.message import Message, message_class
 
 
@@ -66,6 +67,7 @@ def get_service(name: str) -> type[Service]:
         ValueError: If no such service is known, or the name is not one of a service.
     """
     _expect_kind(name, "srv")
+    structure(name)  # Refuses an unknown service by its own name, not by that of its request.
     return _service(name)
 
 
@@ -83,6 +85,7 @@ def get_action(name: str) -> type[Action]:
         ValueError: If no such action is known, or the name is not one of an action.
     """
     _expect_kind(name, "action")
+    structure(name)
     parts = {part: message_class(f"{name}_{part}") for part in ("Goal", "Result", "Feedback")}
     protocol = {
         "SendGoalService": _service(f"{name}_SendGoal"),

@@ -26,6 +26,19 @@ CONTROLLERS = MappingProxyType(
 )
 """Joint trajectory controller of each limb and its joints, in order."""
 
+_ROS1_NAMES = MappingProxyType(
+    {
+        "arm_left_controller": "left_arm_controller",
+        "arm_right_controller": "right_arm_controller",
+        "leg_left_controller": "left_leg_controller",
+        "leg_right_controller": "right_leg_controller",
+        "torso_controller": "torso_controller",
+        "head_controller": "head_controller",
+        "gripper_left_controller": "left_gripper_controller",
+        "gripper_right_controller": "right_gripper_controller",
+    }
+)
+
 JOINTS = tuple(joint for joints in CONTROLLERS.values() for joint in joints)
 """The 32 actuated joints, in the order of every joint state and joint array."""
 
@@ -46,3 +59,13 @@ def controller_of(joint: str) -> str:
         if joint in joints:
             return controller
     raise KeyError(joint)
+
+
+def graph_name(controller: str, naming: str) -> str:
+    """Name of a controller in the ROS graph.
+
+    Args:
+        controller: Name of one of `CONTROLLERS`.
+        naming: ``ros2`` or ``ros1``: of which of PAL's controller configurations.
+    """
+    return _ROS1_NAMES[controller] if naming == "ros1" else controller

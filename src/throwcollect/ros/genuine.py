@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import time
+import itertools
 
 import rclpy
 from rcl_interfaces.msg import IntegerRange, ParameterDescriptor, SetParametersResult
@@ -16,7 +16,15 @@ from rclpy import (
     spin_until_future_complete,
     try_shutdown,
 )
-from rclpy.action import ActionClient, ActionServer, CancelResponse, GoalResponse
+from rclpy.action import (
+    ActionClient,
+    ActionServer,
+    CancelResponse,
+    GoalResponse,
+    get_action_client_names_and_types_by_node,
+    get_action_names_and_types,
+    get_action_server_names_and_types_by_node,
+)
 from rclpy.clock import Clock, ClockType, ROSClock
 from rclpy.context import Context
 from rclpy.duration import Duration
@@ -34,7 +42,7 @@ from rosidl_runtime_py.utilities import get_action, get_message, get_service
 
 from throwcollect.errors import ThrowcollectError
 
-_GRAPH_PERIOD_S = 0.1
+_looks = itertools.count()
 
 
 def init(args: list[str] | None = None, *, context: Context | None = None, domain_id: int | None = None) -> None:
@@ -60,9 +68,9 @@ def init(args: list[str] | None = None, *, context: Context | None = None, domai
 def graph_changes(_node: Node) -> int:
     """A number that differs from what it was before whenever the ROS graph has changed in between.
 
-    rclpy does not tell of changes, so that they count as possible ten times a second.
+    rclpy does not tell of changes, so there may always have been one.
     """
-    return int(time.monotonic() / _GRAPH_PERIOD_S)
+    return next(_looks)
 
 
 def provide_time(node: Node) -> None:
@@ -99,6 +107,9 @@ __all__ = [
     "Time",
     "create_node",
     "get_action",
+    "get_action_client_names_and_types_by_node",
+    "get_action_names_and_types",
+    "get_action_server_names_and_types_by_node",
     "get_default_context",
     "get_global_executor",
     "get_message",

@@ -1,15 +1,13 @@
 """What is in a Bullet world, and how it is set up: ground, robot with spoon, ball.
 
-Only the ball collides, with everything. Talos' shapes overlap each other at rest, and with fewer pairs the order in
-which Bullet solves contacts cannot come to depend on what happened before.
+Only the ball collides, with everything, as long as nothing is spawned. Talos' shapes overlap each other at rest, and
+with fewer pairs the order in which Bullet solves contacts cannot come to depend on what happened before.
 """
 
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 
 import pybullet
 
@@ -17,11 +15,16 @@ from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.robots.description import SPOON, Description
 from throwcollect.sim.contacts import Surface
+from throwcollect.sim.recording import Vector
 
 BASE = -1
 """Link number of the first link of a body."""
 
-_GROUND_GROUP, _ROBOT_GROUP, _BALL_GROUP = 1, 2, 4
+Box = tuple[Vector, Vector]
+"""Lowest and highest corner [m]."""
+
+_GROUND_GROUP, _ROBOT_GROUP, _BALL_GROUP, _SPAWNED_GROUP, _FLOOR_GROUP = 1, 2, 4, 8, 16
+"""Bullet lets a pair collide if either side wants to: spawned bodies collide with all, the floor with them alone."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +41,7 @@ class Scenery:
     robot: int
     joints: list[int]
     spoon: int
-    names: Mapping[Surface, str]
+    names: dict[Surface, str]
 
 
 def connect() -> int:
@@ -72,11 +75,10 @@ def load_scenery(client: int, description: Description, *, base_height: float, s
     plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, planeNormal=[0, 0, 1], physicsClientId=client)
     ground = pybullet.createMultiBody(0, plane, physicsClientId=client)
     robot = _load_robot(client, description.urdf, base_height)
-    links = range(BASE, pybullet.getNumJoints(robot, physicsClientId=client))
     root = pybullet.getBodyInfo(robot, physicsClientId=client)[0].decode()
     joints = {}
     names = {(ground, BASE): "ground", (robot, BASE): root}
-    for number in links[1:]:
+    for number in links(client, robot)[1:]:
         info = pybullet.getJointInfo(robot, number, physicsClientId=client)
         joints[info[1].decode()] = number
         names[robot, number] = info[12].decode()
@@ -85,12 +87,9 @@ def load_scenery(client: int, description: Description, *, base_height: float, s
     for body, link in names:
         group, mask = _ROBOT_GROUP, _BALL_GROUP
         if body == ground:
-            # Without a group as well as without a mask: Bullet lets a pair collide if either side wants to.
-            group, mask = (_GROUND_GROUP, _BALL_GROUP) if solid_ground else (0, 0)
+            group, mask = (_GROUND_GROUP, _BALL_GROUP) if solid_ground else (_FLOOR_GROUP, _SPAWNED_GROUP)
         pybullet.setCollisionFilterGroupMask(body, link, group, mask, physicsClientId=client)
-    return Scenery(
-        robot=robot, joints=[joints[joint] for joint in description.moving], spoon=spoon, names=MappingProxyType(names)
-    )
+    return Scenery(robot=robot, joints=[joints[joint] for joint in description.moving], spoon=spoon, names=names)
 
 
 def _load_robot(client: int, urdf: str, base_height: float) -> int:
@@ -135,6 +134,32 @@ def renew_pairs(client: int, ball: int) -> None:
         ball: Body number of the ball.
     """
     pybullet.setCollisionFilterGroupMask(ball, BASE, _BALL_GROUP, _GROUND_GROUP | _ROBOT_GROUP, physicsClientId=client)
+
+
+def collide_with_everything(client: int, body: int) -> None:
+    """Let a spawned body collide with ground, robot, ball and other spawned bodies.
+
+    Args:
+        client: Physics client.
+        body: Its body number.
+    """
+    mask = _GROUND_GROUP | _ROBOT_GROUP | _BALL_GROUP | _SPAWNED_GROUP | _FLOOR_GROUP
+    for link in links(client, body):
+        pybullet.setCollisionFilterGroupMask(body, link, _SPAWNED_GROUP, mask, physicsClientId=client)
+
+
+def links(client: int, body: int) -> range:
+    """Link numbers of a body, that of its base included."""
+    return range(BASE, pybullet.getNumJoints(body, physicsClientId=client))
+
+
+def boxes(client: int, body: int) -> list[Box]:
+    """Boxes along the axes of the world that enclose the links of a body which have a shape."""
+    return [
+        pybullet.getAABB(body, link, physicsClientId=client)
+        for link in links(client, body)
+        if pybullet.getCollisionShapeData(body, link, physicsClientId=client)
+    ]
 
 
 def set_physics(client: int, scenery: Scenery, ball: int, config: Config) -> None:

@@ -7,15 +7,21 @@ from collections.abc import Hashable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from throwcollect.config.controllers import ControllersConfig
 from throwcollect.control import (
     ControllerParameters,
+    ControllerState,
+    Deviations,
+    ErrorCode,
     GoalResult,
     JointState,
     JointTrajectoryController,
+    Refusal,
     Trajectory,
     TrajectoryGoal,
 )
 from throwcollect.episode.record import ControllerSamples
+from throwcollect.robots.talos import graph_name
 
 _LOCKED_TOLERANCE_RAD = 1e-6
 
@@ -30,11 +36,28 @@ class Limb:
         joints: Its joints, in order.
         moving: The world's moving joints, in order.
         period_ns: Control period [ns].
+        config: How it answers its clients.
     """
 
-    def __init__(self, name: str, joints: Sequence[str], *, moving: Sequence[str], period_ns: int) -> None:
-        self.name = name
-        self._controller = JointTrajectoryController(name, ControllerParameters.talos(joints), period_ns=period_ns)
+    def __init__(
+        self, name: str, joints: Sequence[str], *, moving: Sequence[str], period_ns: int, config: ControllersConfig
+    ) -> None:
+        self.name = graph_name(name, config.names)
+        """Name of the controller in the ROS graph."""
+        brakes = config.hold == "decelerate"
+        self._controller = JointTrajectoryController(
+            self.name,
+            ControllerParameters.talos(joints, max_deceleration=config.max_deceleration_radps2 if brakes else None),
+            period_ns=period_ns,
+            deviations=Deviations(
+                hold="command" if config.hold == "command" else "measured", topic_aborts_goal=config.topic_aborts_goal
+            ),
+        )
+        self.measures_velocity = brakes
+        """Whether `measured` needs velocities."""
+        self.watched = False
+        """Whether the state of every update is kept for `pop_states`."""
+        self._states: list[ControllerState] = []
         self._start_ns: int | None = None
         self._joints = tuple(joints)
         self._own = [index for index, joint in enumerate(joints) if joint in moving]
@@ -65,7 +88,7 @@ class Limb:
         self._posture = np.array([posture[joint] for joint in self._joints])
         # Put off until somebody asks for the controller, as most limbs are idle in most trials.
         self._start_ns = time_ns
-        self._elapsed_ns, self._points = [], []
+        self._elapsed_ns, self._points, self._states = [], [], []
         if self._controller.goal_id is not None:
             self._wake()
 
@@ -73,7 +96,12 @@ class Limb:
         """Results of the goals that have ended since the last call, oldest first."""
         return self._controller.pop_results()
 
-    def submit(self, goal_id: Hashable, goal: TrajectoryGoal, now_ns: int) -> str | None:
+    def pop_states(self) -> list[ControllerState]:
+        """States of the updates since the last call, oldest first, while the limb is watched."""
+        states, self._states = self._states, []
+        return states
+
+    def submit(self, goal_id: Hashable, goal: TrajectoryGoal, now_ns: int) -> Refusal | None:
         """Give the controller a goal.
 
         Returns:
@@ -81,7 +109,7 @@ class Limb:
         """
         return self._locked_refusal(goal.trajectory) or self.controller.submit(goal_id, goal, now_ns)
 
-    def follow(self, trajectory: Trajectory, now_ns: int) -> str | None:
+    def follow(self, trajectory: Trajectory, now_ns: int) -> Refusal | None:
         """Let the controller follow a trajectory that is no goal.
 
         Returns:
@@ -89,27 +117,34 @@ class Limb:
         """
         return self._locked_refusal(trajectory) or self.controller.replace(trajectory, now_ns)
 
-    def measured(self, positions: Sequence[float]) -> JointState:
+    def measured(self, positions: Sequence[float], velocities: Sequence[float] | None) -> JointState:
         """State of this limb's joints.
 
         Args:
             positions: Position of each of the world's moving joints [rad].
+            velocities: Their velocities [rad/s]; None if nobody measures them.
         """
         state = self._posture.copy()
         state[self._own] = [positions[index] for index in self._worlds]
-        return JointState(state)
+        if not self.measures_velocity or velocities is None:
+            return JointState(state)
+        speeds = np.zeros(len(state))
+        speeds[self._own] = [velocities[index] for index in self._worlds]
+        return JointState(state, speeds)
 
-    def update(self, time_ns: int, period_ns: int, positions: Sequence[float], command: NDArray[np.float64]) -> None:
+    def update(self, time_ns: int, period_ns: int, measured: JointState, command: NDArray[np.float64]) -> None:
         """One control period with a look at the measured state.
 
         Args:
             time_ns: Time of this update [ns].
             period_ns: Time since the update before [ns].
-            positions: Position of each of the world's moving joints [rad].
+            measured: State of this limb's joints.
             command: Command of each of the world's moving joints, written in place [rad].
         """
-        row = self.controller.update(time_ns, period_ns, self.measured(positions))
+        row = self.controller.update(time_ns, period_ns, measured)
         command[self._worlds] = row[self._own]
+        if self.watched:
+            self._states.append(self._controller.state())
 
     def take(self, commands: NDArray[np.float64]) -> None:
         """Many control periods that need no look at the measured state.
@@ -133,7 +168,7 @@ class Limb:
         elapsed = np.array(self._elapsed_ns, dtype=np.int64)
         return ControllerSamples(elapsed, table[:, 0], table[:, 1], table[:, 2], table[:, 3])
 
-    def _locked_refusal(self, trajectory: Trajectory) -> str | None:
+    def _locked_refusal(self, trajectory: Trajectory) -> Refusal | None:
         for column, joint in enumerate(trajectory.joint_names):
             if joint not in self._joints or self._joints.index(joint) in self._own:
                 continue
@@ -141,17 +176,16 @@ class Limb:
             for point in trajectory.points:
                 wanted = point.positions[column] if column < len(point.positions) else held
                 if not abs(wanted - held) <= _LOCKED_TOLERANCE_RAD:
-                    return (
-                        f"{self.name}: {joint} is locked at {held:.6g} rad (robot.locked) and cannot go to "
-                        f"{wanted:.6g} rad"
-                    )
+                    text = f"{joint} is locked at {held:.6g} rad (robot.locked) and cannot go to {wanted:.6g} rad"
+                    return self._controller.refuse(Refusal(ErrorCode.INVALID_GOAL, text))
         return None
 
     def _wake(self) -> None:
         start_ns, self._start_ns = self._start_ns, None
         if start_ns is None:
             return
-        measured = JointState(self._posture.copy())
+        still = np.zeros(len(self._joints)) if self.measures_velocity else None
+        measured = JointState(self._posture.copy(), still)
         if self._controller.active:
             self._controller.reset(start_ns, measured)
         else:

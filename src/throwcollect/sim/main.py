@@ -12,8 +12,6 @@ from throwcollect.config.loader import load
 from throwcollect.sim.node import SimulationNode
 from throwcollect.sim.simulation import Simulation
 
-_IDLE_S = 1.0
-
 
 def _nothing() -> None:
     """Work that makes an executor return from waiting."""
@@ -36,7 +34,8 @@ def run(config: Path, *, name: str) -> None:
     ros.init()
     node = SimulationNode(name, simulation)
     executor = ros.SingleThreadedExecutor()
-    executor.add_node(node)
+    for each in (node, *node.companions):
+        executor.add_node(each)
     stopped = False
 
     def stop(_number: int, _frame: FrameType | None) -> None:
@@ -55,8 +54,9 @@ def run(config: Path, *, name: str) -> None:
                 simulation.advance(watched=node.watched)
                 executor.spin_once(timeout_sec=0.0)
             else:
-                executor.spin_once(timeout_sec=_IDLE_S)
+                executor.spin_once(timeout_sec=node.patience_s)
             node.follow_up()
     finally:
-        node.destroy_node()
+        for each in (*node.companions, node):
+            each.destroy_node()
         ros.shutdown()

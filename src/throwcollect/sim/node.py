@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from typing import Any
 
 from throwcollect.config.schema import Config
@@ -26,11 +27,14 @@ from throwcollect.ros import (
     graph_changes,
     provide_time,
 )
-from throwcollect.sim.limb_interface import LimbInterface
+from throwcollect.sim.controller_manager import ControllerManager
+from throwcollect.sim.controller_node import ControllerNode
 from throwcollect.sim.simulation import Simulation, State, TrialSetup
 from throwcollect.sim.simulation_control import SimulationControl
 
 SetParametersResult: Any = get_message("rcl_interfaces/msg/SetParametersResult")
+_CLOCK = "rosgraph_msgs/msg/Clock"
+Clock: Any = get_message(_CLOCK)
 UInt8MultiArray: Any = get_message("std_msgs/msg/UInt8MultiArray")
 
 _LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -38,8 +42,12 @@ _SAMPLED = QoSProfile(depth=100)
 _WHOLE = QoSProfile(history=HistoryPolicy.KEEP_ALL)
 """Every episode reaches every subscriber, however slow it is."""
 
+_IDLE_S = 1.0
+_REPEAT_S = 0.02
+"""Real time between two messages on a topic of samples while time stands still; that of the robot's joint states."""
+
 _NO_LIMIT = 0.0
-_SHOWN = ("robot.", "tool.", "sim.", "task.", "record.")
+_SHOWN = ("robot.", "tool.", "sim.", "controllers.", "task.", "record.")
 """Sections of the configuration that can be read as parameters, besides the physics, which can be set."""
 
 _MOST_TRIALS = 10_000_000
@@ -68,13 +76,26 @@ class SimulationNode(Node):
             (topic, self.create_publisher(get_message(topic.type_name), topic.name.lstrip("/"), _SAMPLED))
             for topic in Channels(_everything(config), description).recorded.values()
         ]
-        self._interfaces = {name: LimbInterface(self, simulation, name) for name in simulation.limbs}
+        self._controllers = {name: ControllerNode(self, simulation, name) for name in simulation.limbs}
+        self._manager = ControllerManager(self, simulation)
         self._listened: list[tuple[Topic, Publisher]] = []
-        self._heard: list[LimbInterface] = []
+        self._heard: list[ControllerNode] = []
         self._noticed_changes = -1
-        SimulationControl(self, simulation)
+        self._published_at = 0.0
+        self._told_ns = -1
+        self._control = SimulationControl(self, simulation)
         # Last, as coordinators take its presence for that of the whole simulation.
         self._episodes = self.create_publisher(UInt8MultiArray, "episode", _WHOLE)
+
+    @property
+    def companions(self) -> tuple[Node, ...]:
+        """The other nodes of the simulation: one for each controller, and that which lists them."""
+        return (*self._controllers.values(), self._manager)
+
+    @property
+    def patience_s(self) -> float:
+        """How long may be waited for inputs while time stands still [s]."""
+        return _REPEAT_S if self._listened else _IDLE_S
 
     @property
     def quitting(self) -> bool:
@@ -85,29 +106,56 @@ class SimulationNode(Node):
     def watched(self) -> bool:
         """Whether somebody listens to samples, states or feedback."""
         self._notice_listeners()
-        return bool(self._listened) or any(interface.watched for interface in self._heard)
+        return bool(self._listened) or any(controller.watched for controller in self._heard)
 
     def follow_up(self) -> None:
         """Tell the world what has happened since the last call: time, samples, feedback, results, the episode."""
         simulation = self._simulation
-        self.get_clock().set_ros_time_override(Time(nanoseconds=simulation.now_ns))
-        for controller, result in simulation.pop_results():
-            self._interfaces[controller].finish(result)
+        now = Time(nanoseconds=simulation.now_ns)
+        self.get_clock().set_ros_time_override(now)
+        for controller in self._controllers.values():
+            controller.set_time(now)
+        for name, result in simulation.pop_results():
+            self._controllers[name].finish(result)
         self._notice_listeners()
         self._publish_samples()
-        for interface in self._heard:
-            interface.publish_state()
+        for controller in self._heard:
+            controller.publish_state()
         if (episode := simulation.episode()) is not None:
             header, samples, states = episode
             self._episodes.publish(pack(Episode(header, *self._encoder.encode(samples, states))))
+        self._control.follow_up()
 
     def _publish_samples(self) -> None:
         if not self._listened:
             return
         samples: Samples = self._simulation.fresh_samples()
+        if not len(samples) and self._repeats():
+            samples = self._simulation.last_sample()
+        if len(samples):
+            self._published_at = time.monotonic()
         for index in range(len(samples)):
             for topic, publisher in self._listened:
                 publisher.publish(encode_message(topic, samples, index, {}))
+        self._publish_steps(samples)
+
+    def _repeats(self) -> bool:
+        """Whether it is time to say again what was said last, as robots go on to tell their state while they rest."""
+        resting = self._simulation.state == State.PLAYING and not self._simulation.running
+        return resting and time.monotonic() - self._published_at >= _REPEAT_S
+
+    def _publish_steps(self, samples: Samples) -> None:
+        """Publish the time that steps have led to, as they may end between two samples."""
+        simulation = self._simulation
+        self._told_ns = int(samples.stamps_ns[-1]) if len(samples) else self._told_ns
+        if simulation.state != State.PAUSED or simulation.now_ns == self._told_ns:
+            return
+        self._told_ns = simulation.now_ns
+        message = Clock()
+        message.clock.sec, message.clock.nanosec = divmod(simulation.now_ns, 10**9)
+        for topic, publisher in self._listened:
+            if topic.type_name == _CLOCK:
+                publisher.publish(message)
 
     def _notice_listeners(self) -> None:
         """Find out who listens, if the graph has changed since the last time."""
@@ -116,7 +164,8 @@ class SimulationNode(Node):
             return
         self._noticed_changes = changes
         self._listened = [(topic, publisher) for topic, publisher in self._live if publisher.get_subscription_count()]
-        self._heard = [interface for interface in self._interfaces.values() if interface.heard]
+        self._heard = [controller for controller in self._controllers.values() if controller.heard]
+        self._simulation.watch(controller.controller for controller in self._heard if controller.wants_states)
 
     def _publish_latched(self, channels: Channels) -> None:
         self._latched = []

@@ -18,12 +18,12 @@ Quaternion = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True)
-class BallState:
-    """The ball at one instant.
+class BodyState:
+    """A body at one instant.
 
     Attributes:
-        position: Centre in world [m].
-        orientation_xyzw: Unit quaternion, ball to world.
+        position: Its origin in world [m]; that of the ball is its centre.
+        orientation_xyzw: Unit quaternion, body to world.
         linear_velocity: In world [m/s].
         angular_velocity: In world [rad/s].
     """

@@ -9,17 +9,26 @@ from __future__ import annotations
 import time
 from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import dataclass
-from enum import IntEnum
+from enum import IntEnum, IntFlag
 
 import numpy as np
 
 from throwcollect.config.schema import Config
-from throwcollect.control import ControllerState, GoalResult, Trajectory, TrajectoryGoal
+from throwcollect.control import (
+    ControllerState,
+    GoalResult,
+    Refusal,
+    Trajectory,
+    TrajectoryGoal,
+    TrajectoryState,
+)
 from throwcollect.episode.record import ControllerSamples, EpisodeHeader, GoalOutcome, Samples
+from throwcollect.errors import RequestError
 from throwcollect.robots.description import start_posture
 from throwcollect.robots.talos import CONTROLLERS
+from throwcollect.sim.entities import Entities
 from throwcollect.sim.limb import Limb
-from throwcollect.sim.recording import BallState
+from throwcollect.sim.step_request import StepRequest
 from throwcollect.sim.world import World
 
 _NO_TRIAL = -1
@@ -40,6 +49,15 @@ class State(IntEnum):
     PLAYING = 1
     PAUSED = 2
     QUITTING = 3
+
+
+class Scope(IntFlag):
+    """What a reset resets, by the constants of simulation_interfaces/srv/ResetSimulation."""
+
+    TIME = 1
+    STATE = 2
+    SPAWNED = 4
+    ALL = TIME | STATE | SPAWNED
 
 
 @dataclass(frozen=True)
@@ -73,12 +91,16 @@ class Simulation:
         self.setup = TrialSetup(_NO_TRIAL, (), config)
         self.state = State.PLAYING
         self.world = World(config)
+        self.entities = Entities(self.world, config.robot.name)
+        self._steps: StepRequest | None = None
         self._period_ns = round(10**9 / config.sim.physics_hz)
         self._stride = config.sim.physics_hz // config.record.rate_hz
         self.limbs = {
-            name: Limb(name, joints, moving=self.world.moving, period_ns=self._period_ns)
+            name: Limb(name, joints, moving=self.world.moving, period_ns=self._period_ns, config=config.controllers)
             for name, joints in CONTROLLERS.items()
         }
+        self._measures_velocity = any(limb.measures_velocity for limb in self.limbs.values())
+        self._watched: list[Limb] = []
         self._keeps_states = "controller_state" in config.record.topics
         self.real_time_factor = config.sim.real_time_factor
         self._results: list[tuple[str, GoalResult]] = []
@@ -92,13 +114,8 @@ class Simulation:
 
     @property
     def running(self) -> bool:
-        """Whether the clock runs."""
-        return self._running and self.state == State.PLAYING
-
-    @property
-    def entities(self) -> tuple[str, ...]:
-        """Names of what is in the world."""
-        return ("ball", self.config.robot.name)
+        """Whether there is something to `advance`: the clock runs, or steps are left to be taken."""
+        return self._steps is not None or (self._running and self.state == State.PLAYING)
 
     def set_state(self, state: State) -> None:
         """Play, pause, stop or quit; stopping resets everything.
@@ -107,29 +124,49 @@ class Simulation:
             ConfigError: If there is no start state to go back to; the state is set all the same.
         """
         self.state = state
+        self._interrupt_steps(f"the simulation is {state.name} now")
         if state == State.STOPPED:
             self.reset()
 
-    def reset(self) -> None:
-        """Put world, controllers and clock into the start state of the trial that is set up; goals are aborted.
+    def reset(self, scope: Scope = Scope.ALL) -> None:
+        """Go back to the start, in whole or in part.
+
+        Args:
+            scope: ``STATE`` puts world and controllers into the start state of the trial that is set up, what was
+                spawned to where it was spawned. ``TIME`` puts the clock to the trial's start. Either aborts all goals;
+                only both together begin a trial. ``SPAWNED`` takes out of the world what was spawned.
 
         Raises:
             ConfigError: If there is no such state; the clock stands still until another reset succeeds.
         """
+        of_time, of_state, of_spawned = Scope.TIME in scope, Scope.STATE in scope, Scope.SPAWNED in scope
+        if of_spawned:
+            self.world.spawned.clear()
+            if of_time and of_state:
+                self.entities.forget_infos()
+        if not (of_time or of_state):
+            return
+        self._interrupt_steps("the simulation was reset")
         self._running = False
         setup = self.setup
-        start_ns = 0 if setup.number < 0 else setup.config.trial_start_ns(setup.number)
-        self.world.reset(setup.config, start_ns=start_ns)
-        posture = start_posture(setup.config)
+        start_ns = self.now_ns
+        if of_time:
+            start_ns = 0 if setup.number < 0 else setup.config.trial_start_ns(setup.number)
+        if of_state:
+            self.world.reset(setup.config, start_ns=start_ns)
+            posture = start_posture(setup.config)
+        else:
+            self.world.restart_clock(start_ns)
+            posture = self.world.posture()
         for limb in self.limbs.values():
             limb.reset(start_ns, posture)
         self._collect_results()
         self._command = np.array([posture[joint] for joint in self.world.moving])
         self._goals = {}
-        self._in_trial = setup.number >= 0
+        self._in_trial = setup.number >= 0 and of_time and of_state
         self._published = 0
 
-    def submit(self, controller: str, goal_id: Hashable, goal: TrajectoryGoal) -> str | None:
+    def submit(self, controller: str, goal_id: Hashable, goal: TrajectoryGoal) -> Refusal | None:
         """Give a goal to a controller; the run begins when the last awaited one has its goal.
 
         Returns:
@@ -148,19 +185,18 @@ class Simulation:
         Returns:
             Whether it was being executed.
         """
-        limb = self.limbs[controller]
-        limb.controller.observe(limb.measured(self.world.joint_positions()))
-        cancelled = limb.controller.cancel(goal_id)
+        cancelled = self._observed(controller).controller.cancel(goal_id)
         self._collect_results()
         return cancelled
 
-    def follow(self, controller: str, trajectory: Trajectory) -> str | None:
+    def follow(self, controller: str, trajectory: Trajectory) -> Refusal | None:
         """Let a controller follow a trajectory that is no goal.
 
         Returns:
             None if it is accepted, else the reason of the refusal.
         """
         refusal = self.limbs[controller].follow(trajectory, self.now_ns)
+        self._collect_results()
         self._running |= refusal is None
         return refusal
 
@@ -175,7 +211,11 @@ class Simulation:
         slice_s = _WATCHED_SLICE_S * min(1.0, self.real_time_factor or 1.0)
         if not watched and self.real_time_factor is None:
             slice_s = _SLICE_S
-        self.step(max(1, round(slice_s * self.config.sim.physics_hz)))
+        steps = max(1, round(slice_s * self.config.sim.physics_hz))
+        if self._steps is not None:
+            self._take_steps(self._steps, steps)
+            return
+        self.step(steps)
         if self._in_trial and self.world.end_reason is not None:
             self._running = False
         elif not self._in_trial and not any(limb.moves for limb in self.limbs.values()):
@@ -184,13 +224,50 @@ class Simulation:
             due = began + (self.now_ns - stamp) / 1e9 / self.real_time_factor
             time.sleep(max(0.0, due - time.monotonic()))
 
-    def step(self, steps: int) -> None:
-        """Take physics steps; fewer if the trial ends."""
+    def request_steps(self, steps: int) -> StepRequest:
+        """Have `advance` take physics steps while the clock stands still; trials may end on the way.
+
+        Args:
+            steps: How many.
+
+        Returns:
+            How far it has come, kept up to date.
+
+        Raises:
+            RequestError: ``RESULT_OPERATION_FAILED`` if the simulation is not paused, ``RESULT_INCORRECT_STATE`` if the
+                steps of another request are still being taken.
+        """
+        if self.state != State.PAUSED:
+            message = f"steps are taken while the simulation is paused only; it is {self.state.name}"
+            raise RequestError("RESULT_OPERATION_FAILED", message)
+        if self._steps is not None:
+            message = f"{self._steps.taken} of {self._steps.wanted} steps of another request have been taken"
+            raise RequestError("RESULT_INCORRECT_STATE", message, hint="wait for its end")
+        request = StepRequest(steps)
+        if not request.is_over:
+            self._steps = request
+        return request
+
+    def cancel_steps(self, request: StepRequest) -> None:
+        """Take no more steps of a request."""
+        if request is self._steps:
+            self._interrupt_steps("cancelled")
+
+    def step(self, steps: int) -> int:
+        """Take physics steps; fewer if the trial ends, or a goal outside of a trial.
+
+        Returns:
+            How many were taken.
+        """
         if not self._in_trial:
             self.world.forget_samples()
         left = steps
         while left > 0 and not (self._in_trial and self.world.end_reason is not None):
             left -= self._step_some(left)
+            if self._results and not self._in_trial:
+                # Whoever waits for the result shall have it before time goes on.
+                break
+        return steps - left
 
     def pop_results(self) -> list[tuple[str, GoalResult]]:
         """Controllers and results of the goals that have ended since the last call, oldest first."""
@@ -201,6 +278,10 @@ class Simulation:
         """Samples recorded since the last call."""
         first, self._published = self._published, self.world.recorded
         return self.world.samples(first)
+
+    def last_sample(self) -> Samples:
+        """The sample that was recorded last."""
+        return self.world.samples(self.world.recorded - 1)
 
     def episode(self) -> tuple[EpisodeHeader, Samples, Mapping[str, ControllerSamples]] | None:
         """What the trial yielded, once it has ended; then never again until the next reset."""
@@ -224,28 +305,27 @@ class Simulation:
 
     def controller_state(self, controller: str) -> ControllerState:
         """What a controller has seen and done last."""
-        limb = self.limbs[controller]
-        limb.controller.observe(limb.measured(self.world.joint_positions()))
-        return limb.controller.state()
+        return self._observed(controller).controller.state()
 
-    def entity_state(self, name: str) -> BallState | None:
-        """Where an entity is and how it moves; None if there is none of that name."""
-        if name == "ball":
-            return self.world.ball
-        if name == self.config.robot.name:
-            return BallState((0.0, 0.0, self.config.robot.base_height_m))
-        return None
+    def query(self, controller: str, time_ns: int) -> TrajectoryState:
+        """What a controller's trajectory is at a given time [ns]."""
+        return self._observed(controller).controller.query(time_ns)
 
-    def set_entity_state(self, name: str, state: BallState) -> bool:
-        """Put an entity somewhere.
+    def watch(self, controllers: Iterable[str]) -> None:
+        """Keep the states of these controllers, in every control period, for `Limb.pop_states`."""
+        self._watched = [self.limbs[name] for name in controllers]
+        for limb in self.limbs.values():
+            limb.watched = limb in self._watched
 
-        Returns:
-            Whether it can be moved; the robot is fixed.
-        """
-        if name != "ball":
-            return False
-        self.world.ball = state
-        return True
+    def _take_steps(self, request: StepRequest, most: int) -> None:
+        request.taken += self.step(min(most, request.wanted - request.taken))
+        if request.is_over:
+            self._steps = None
+
+    def _interrupt_steps(self, reason: str) -> None:
+        if self._steps is not None:
+            self._steps.interruption = reason
+            self._steps = None
 
     def _step_some(self, most: int) -> int:
         """Take at most `most` steps, so that a controller looks at the measured state when it has to."""
@@ -256,6 +336,9 @@ class Simulation:
             moving = list(self.limbs.values())
             phase = self.world.steps % self._stride
             free = min(free, self._stride - phase) if phase else 0
+        if self._watched:
+            moving += [limb for limb in self._watched if limb not in moving]
+            free = 0
         for limb in moving:
             free = min(free, limb.controller.next_decision())
         if free > 0:
@@ -266,18 +349,27 @@ class Simulation:
             self._look(moving)
             commands = self._command[np.newaxis].copy()
         self._command = commands[-1].copy()
-        self.world.run(commands, stop_at_end=self._in_trial)
+        taken = self.world.run(commands, stop_at_end=self._in_trial)
         self._collect_results()
-        return len(commands)
+        return taken
 
     def _look(self, limbs: Iterable[Limb]) -> None:
         """Let controllers see the measured state, for one control period."""
-        positions = self.world.joint_positions()
+        positions, velocities = self._joint_readings()
         keeps = self._keeps_states and self.world.steps % self._stride == 0
         for limb in limbs:
-            limb.update(self.now_ns, self._period_ns, positions, self._command)
+            limb.update(self.now_ns, self._period_ns, limb.measured(positions, velocities), self._command)
             if keeps:
                 limb.keep_state()
+
+    def _observed(self, controller: str) -> Limb:
+        """A limb whose controller knows the state of its joints."""
+        limb = self.limbs[controller]
+        limb.controller.observe(limb.measured(*self._joint_readings()))
+        return limb
+
+    def _joint_readings(self) -> tuple[list[float], list[float] | None]:
+        return self.world.joint_positions(), self.world.joint_velocities() if self._measures_velocity else None
 
     def _collect_results(self) -> None:
         for name, limb in self.limbs.items():

@@ -1,47 +1,55 @@
-"""The standard services of simulation_interfaces, on top of a `Simulation`."""
+"""The standard interfaces of simulators, simulation_interfaces 1.5, on top of a `Simulation`."""
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import throwcollect
-from throwcollect.errors import ConfigError
+from throwcollect.errors import ConfigError, RequestError
 from throwcollect.ros import Node, get_message, get_service
-from throwcollect.sim.recording import BallState
-from throwcollect.sim.simulation import Simulation, State
+from throwcollect.sim.answers import answering
+from throwcollect.sim.entity_services import EntityServices
+from throwcollect.sim.simulation import Scope, Simulation, State
+from throwcollect.sim.spawn_services import SpawnServices
+from throwcollect.sim.stepping import Stepping
 
 GetSimulatorFeatures: Any = get_service("simulation_interfaces/srv/GetSimulatorFeatures")
 GetSimulationState: Any = get_service("simulation_interfaces/srv/GetSimulationState")
 SetSimulationState: Any = get_service("simulation_interfaces/srv/SetSimulationState")
 ResetSimulation: Any = get_service("simulation_interfaces/srv/ResetSimulation")
-StepSimulation: Any = get_service("simulation_interfaces/srv/StepSimulation")
-GetEntityState: Any = get_service("simulation_interfaces/srv/GetEntityState")
-SetEntityState: Any = get_service("simulation_interfaces/srv/SetEntityState")
 Features: Any = get_message("simulation_interfaces/msg/SimulatorFeatures")
-Result: Any = get_message("simulation_interfaces/msg/Result")
-SimulationState: Any = get_message("simulation_interfaces/msg/SimulationState")
 
 _FEATURES = (
+    "SPAWNING",
+    "DELETING",
+    "ENTITY_TAGS",
+    "ENTITY_BOUNDS",
+    "ENTITY_BOUNDS_BOX",
+    "ENTITY_CATEGORIES",
+    "SPAWNING_RESOURCE_STRING",
     "ENTITY_STATE_GETTING",
     "ENTITY_STATE_SETTING",
+    "ENTITY_INFO_GETTING",
+    "ENTITY_INFO_SETTING",
+    "SPAWNABLES",
     "SIMULATION_RESET",
+    "SIMULATION_RESET_TIME",
+    "SIMULATION_RESET_STATE",
+    "SIMULATION_RESET_SPAWNED",
     "SIMULATION_STATE_GETTING",
     "SIMULATION_STATE_SETTING",
     "SIMULATION_STATE_PAUSE",
     "STEP_SIMULATION_SINGLE",
     "STEP_SIMULATION_MULTIPLE",
+    "STEP_SIMULATION_ACTION",
+    "SPAWNING_ENTITIES",
 )
-_SETTABLE_STATES = (State.STOPPED, State.PLAYING, State.PAUSED, State.QUITTING)
-_MOST_STEPS = 100_000
-"""In one call, during which nothing else is answered: some seconds."""
-
-_UNIT_QUATERNION_TOLERANCE = 1e-3
-_LARGEST_COORDINATE_M = 1e3
+_FORMATS = ("urdf",)
+_WHOLE_SCOPES = (ResetSimulation.Request.SCOPE_DEFAULT, ResetSimulation.Request.SCOPE_ALL)
 
 
 class SimulationControl:
-    """Offers the services under relative names, so that they stand in the simulation's namespace.
+    """Offers all services, and the action, under relative names, so that they stand in the simulation's namespace.
 
     Args:
         node: The simulation's node.
@@ -50,128 +58,53 @@ class SimulationControl:
 
     def __init__(self, node: Node, simulation: Simulation) -> None:
         self._simulation = simulation
-        for service, name, callback in (
-            (GetSimulatorFeatures, "get_simulator_features", self._get_features),
+        # The one service that has no result.
+        node.create_service(GetSimulatorFeatures, "get_simulator_features", self._get_features)
+        for service, name, fill in (
             (GetSimulationState, "get_simulation_state", self._get_state),
             (SetSimulationState, "set_simulation_state", self._set_state),
             (ResetSimulation, "reset_simulation", self._reset),
-            (StepSimulation, "step_simulation", self._step),
-            (GetEntityState, "get_entity_state", self._get_entity_state),
-            (SetEntityState, "set_entity_state", self._set_entity_state),
         ):
-            node.create_service(service, name, callback)
+            node.create_service(service, name, answering(service, fill))
+        EntityServices(node, simulation)
+        SpawnServices(node, simulation)
+        self._stepping = Stepping(node, simulation)
+
+    def follow_up(self) -> None:
+        """Tell those who wait for steps how far it has come; call it after each slice."""
+        self._stepping.follow_up()
 
     def _get_features(self, _request: Any, response: Any) -> Any:
         response.features.features = [getattr(Features, name) for name in _FEATURES]
+        response.features.spawn_formats = list(_FORMATS)
         response.features.custom_info = (
             f"throwcollect {throwcollect.__version__}; one step is one physics step of "
             f"{1.0 / self._simulation.config.sim.physics_hz:g} s; the clock runs while a trial runs"
         )
         return response
 
-    def _get_state(self, _request: Any, response: Any) -> Any:
+    def _get_state(self, _request: Any, response: Any) -> None:
         response.state.state = int(self._simulation.state)
-        response.result.result = Result.RESULT_OK
-        return response
 
-    def _set_state(self, request: Any, response: Any) -> Any:
+    def _set_state(self, request: Any, response: Any) -> None:
+        del response
         wanted = request.state.state
-        if wanted not in _SETTABLE_STATES:
-            return _refuse(response, SetSimulationState.Response.INCORRECT_TRANSITION, f"state {wanted} cannot be set")
+        if wanted not in list(State):
+            raise RequestError("INCORRECT_TRANSITION", f"state {wanted} cannot be set")
         if wanted == self._simulation.state:
-            return _refuse(
-                response,
-                SetSimulationState.Response.ALREADY_IN_TARGET_STATE,
-                f"the simulation is {State(wanted).name} already",
-            )
+            raise RequestError("ALREADY_IN_TARGET_STATE", f"the simulation is {State(wanted).name} already")
         try:
             self._simulation.set_state(State(wanted))
         except ConfigError as error:
-            return _refuse(response, SetSimulationState.Response.STATE_TRANSITION_ERROR, str(error))
-        response.result.result = Result.RESULT_OK
-        return response
+            raise RequestError("STATE_TRANSITION_ERROR", str(error)) from error
 
-    def _reset(self, request: Any, response: Any) -> Any:
-        if request.scope not in (ResetSimulation.Request.SCOPE_DEFAULT, ResetSimulation.Request.SCOPE_ALL):
-            return _refuse(
-                response,
-                Result.RESULT_FEATURE_UNSUPPORTED,
-                f"scope {request.scope}: only DEFAULT and ALL are supported",
-            )
-        try:
+    def _reset(self, request: Any, response: Any) -> None:
+        del response
+        if request.scope in _WHOLE_SCOPES:
             self._simulation.reset()
-        except ConfigError as error:
-            return _refuse(response, Result.RESULT_OPERATION_FAILED, str(error))
-        response.result.result = Result.RESULT_OK
-        return response
-
-    def _step(self, request: Any, response: Any) -> Any:
-        if self._simulation.state != State.PAUSED:
-            return _refuse(
-                response, Result.RESULT_INCORRECT_STATE, "steps are taken while the simulation is paused only"
-            )
-        if request.steps > _MOST_STEPS:
-            return _refuse(
-                response, Result.RESULT_OPERATION_FAILED, f"{request.steps} steps; at most {_MOST_STEPS} in one call"
-            )
-        self._simulation.step(request.steps)
-        response.result.result = Result.RESULT_OK
-        return response
-
-    def _get_entity_state(self, request: Any, response: Any) -> Any:
-        entity = self._simulation.entity_state(request.entity)
-        if entity is None:
-            return _refuse(response, Result.RESULT_NOT_FOUND, self._unknown(request.entity))
-        state = response.state
-        state.header.frame_id = "world"
-        state.header.stamp.sec, state.header.stamp.nanosec = divmod(self._simulation.now_ns, 10**9)
-        position, orientation = state.pose.position, state.pose.orientation
-        position.x, position.y, position.z = entity.position
-        orientation.x, orientation.y, orientation.z, orientation.w = entity.orientation_xyzw
-        linear, angular = state.twist.linear, state.twist.angular
-        linear.x, linear.y, linear.z = entity.linear_velocity
-        angular.x, angular.y, angular.z = entity.angular_velocity
-        response.result.result = Result.RESULT_OK
-        return response
-
-    def _set_entity_state(self, request: Any, response: Any) -> Any:
-        if self._simulation.entity_state(request.entity) is None:
-            return _refuse(response, Result.RESULT_NOT_FOUND, self._unknown(request.entity))
-        state = request.state
-        if state.header.frame_id not in ("", "world"):
-            return _refuse(
-                response, Result.RESULT_OPERATION_FAILED, f"frame {state.header.frame_id}: only world is known"
-            )
-        position, orientation = state.pose.position, state.pose.orientation
-        linear, angular = state.twist.linear, state.twist.angular
-        entity = BallState(
-            (position.x, position.y, position.z),
-            (orientation.x, orientation.y, orientation.z, orientation.w),
-            (linear.x, linear.y, linear.z),
-            (angular.x, angular.y, angular.z),
-        )
-        norm = sum(value * value for value in entity.orientation_xyzw) ** 0.5
-        outside = not all(abs(value) <= _LARGEST_COORDINATE_M for value in entity.position)
-        if outside or not abs(norm - 1.0) <= _UNIT_QUATERNION_TOLERANCE:
-            return _refuse(
-                response,
-                SetEntityState.Response.INVALID_POSE,
-                f"position {entity.position} m, quaternion of norm {norm:g}; wanted within "
-                f"{_LARGEST_COORDINATE_M:g} m and norm 1",
-            )
-        twist = (*entity.linear_velocity, *entity.angular_velocity)
-        if not all(map(math.isfinite, twist)):
-            return _refuse(response, Result.RESULT_OPERATION_FAILED, f"twist {twist}; wanted finite numbers")
-        if not self._simulation.set_entity_state(request.entity, entity):
-            return _refuse(response, Result.RESULT_OPERATION_FAILED, f"{request.entity} is fixed to the world")
-        response.result.result = Result.RESULT_OK
-        return response
-
-    def _unknown(self, name: str) -> str:
-        return f"no entity {name!r}; known: {', '.join(self._simulation.entities)}"
-
-
-def _refuse(response: Any, code: int, message: str) -> Any:
-    response.result.result = code
-    response.result.error_message = message
-    return response
+            return
+        if request.scope & ~int(Scope.ALL):
+            known = ", ".join(f"{scope.value} {scope.name}" for scope in (Scope.TIME, Scope.STATE, Scope.SPAWNED))
+            message = f"scope {request.scope} has bits that mean nothing"
+            raise RequestError("RESULT_FEATURE_UNSUPPORTED", message, expected=f"sums of {known}; 0 or 255 for all")
+        self._simulation.reset(Scope(request.scope))

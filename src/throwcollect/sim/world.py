@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,18 +14,19 @@ from throwcollect.config.schema import Config
 from throwcollect.episode.record import Contact, Samples
 from throwcollect.robots.description import locked_joints, physics_description, start_posture
 from throwcollect.robots.spoon import ball_seat
-from throwcollect.sim.bullet import BASE, connect, load_ball, load_scenery, renew_pairs, set_physics
+from throwcollect.sim.bullet import BASE, Box, boxes, connect, load_ball, load_scenery, renew_pairs, set_physics
 from throwcollect.sim.contacts import ContactLog, Surface
 from throwcollect.sim.motors import Motors
 from throwcollect.sim.recording import (
     BALL_HEIGHT,
     BALL_LINEAR_VELOCITY,
-    BallState,
+    BodyState,
     Row,
     Sample,
     to_sample,
     to_samples,
 )
+from throwcollect.sim.spawned import SpawnedBodies
 
 _NS_PER_S = 1_000_000_000
 _REST_S = 0.5
@@ -55,6 +56,9 @@ class World:
     """
 
     _ball: int
+    _steps: int
+    _contacts: ContactLog
+    _end_reason: str | None
     _settled: Row
     _settled_pressing: set[Surface]
     _pressing: set[Surface]
@@ -64,6 +68,8 @@ class World:
 
     def __init__(self, config: Config) -> None:
         self._client = connect()
+        self._names: dict[Surface, str] = {}
+        self.spawned = SpawnedBodies(self._client, self._names)
         self._scenery_key: object = None
         self._start_key: object = None
         self._radius = math.nan
@@ -108,29 +114,36 @@ class World:
                 the robot's files cannot be read.
         """
         key = (trial.robot, trial.tool, trial.ball, trial.scene, trial.sim, trial.task.start, tuple(trial.task.end))
-        if key != self._start_key:
+        self.spawned.friction = trial.scene.spoon_friction
+        if key != self._start_key or self.spawned.leaves_traces:
             self._start_key = None
-            self._load(trial)
-            self._settle(trial)
+            try:
+                self._load(trial)
+                self._settle(trial)
+            finally:
+                self.spawned.load()
             self._start_key = key
         self._place(self._settled)
         sim, ball = trial.sim, trial.ball
-        self._start_ns = start_ns
-        self._steps = 0
+        self._base_height = trial.robot.base_height_m
         self._hz = sim.physics_hz
         self._stride = sim.physics_hz // trial.record.rate_hz
         self._last_step = math.ceil(sim.max_trial_s * sim.physics_hz)
         self._landing_height = trial.scene.landing_height_m + ball.radius_m
         self._drag = ball.drag_coefficient * trial.scene.air_density_kgpm3 * math.pi * ball.radius_m**2 / 2
         self._motors = self._make_motors(trial)
-        self._contacts = ContactLog(self._scenery.names)
         self._pressing = self._settled_pressing
-        self._contacts.update(self._pressing, 0)
-        self._record_start()
-        self._sampled_target = self._motors.target
-        self._has_moved = False
-        self._resting_since = 0
-        self._end_reason: str | None = None
+        self._begin(start_ns, self._settled.joints)
+
+    def restart_clock(self, start_ns: int) -> None:
+        """Count time, steps, samples and contacts anew from the present state, which stays as it is.
+
+        Args:
+            start_ns: Simulated time of the present state [ns].
+        """
+        # What was taken out of the world since the last step presses no more.
+        self._pressing = {surface for surface in self._pressing if surface in self._names}
+        self._begin(start_ns, self._joint_states())
 
     @property
     def end_reason(self) -> str | None:
@@ -203,14 +216,35 @@ class World:
         """Position of each moving joint now [rad]."""
         return [state[0] for state in self._joint_states()]
 
+    def joint_velocities(self) -> list[float]:
+        """Velocity of each moving joint now [rad/s]."""
+        return [state[1] for state in self._joint_states()]
+
+    def posture(self) -> Mapping[str, float]:
+        """Position of each of the 32 joints now [rad]."""
+        return {**self._locked, **dict(zip(self._moving, self.joint_positions(), strict=True))}
+
     @property
-    def ball(self) -> BallState:
+    def robot_base(self) -> BodyState:
+        """The base of the robot, which never moves."""
+        return BodyState((0.0, 0.0, self._base_height))
+
+    def ball_boxes(self) -> list[Box]:
+        """A box along the axes of the world around the ball."""
+        return boxes(self._client, self._ball)
+
+    def robot_boxes(self) -> list[Box]:
+        """Boxes along the axes of the world around the links of the robot."""
+        return boxes(self._client, self._scenery.robot)
+
+    @property
+    def ball(self) -> BodyState:
         """The ball now; when set before the first step, the start state is recorded anew."""
         row = self._read()
-        return BallState(*row.pose, *row.twist)
+        return BodyState(*row.pose, *row.twist)
 
     @ball.setter
-    def ball(self, state: BallState) -> None:
+    def ball(self, state: BodyState) -> None:
         pybullet.resetBasePositionAndOrientation(
             self._ball, state.position, state.orientation_xyzw, physicsClientId=self._client
         )
@@ -220,18 +254,34 @@ class World:
         if self._steps == 0:
             self._record_start()
 
+    def _begin(self, start_ns: int, joints: Sequence[tuple[Any, ...]]) -> None:
+        """Begin to count from the present state, whose joints are recorded as given."""
+        self._start_ns = start_ns
+        self._steps = 0
+        self._start_joints = joints
+        self._record_start()
+        self._contacts = ContactLog(self._names)
+        self._contacts.update(self._pressing, 0)
+        self._sampled_target = self._motors.target
+        self._has_moved = False
+        self._resting_since = 0
+        self._end_reason = None
+
     def _load(self, trial: Config) -> None:
         """Load what differs from the trial before in shape: ground, robot and ball, or the ball alone."""
         solid_ground = trial.scene.landing_height_m > 0
         key = (trial.robot.base_height_m, trial.tool, locked_joints(trial), solid_ground)
-        if key != self._scenery_key:
+        if key != self._scenery_key or self.spawned.leaves_traces:
             self._scenery_key = None
             self._radius = math.nan
             description = physics_description(trial)
+            self.spawned.forget()
             self._scenery = load_scenery(
                 self._client, description, base_height=trial.robot.base_height_m, solid_ground=solid_ground
             )
             self._moving, self._locked = description.moving, description.locked
+            self._names.clear()
+            self._names.update(self._scenery.names)
             self._scenery_key = key
         if self._radius != trial.ball.radius_m:
             if not math.isnan(self._radius):
@@ -252,7 +302,7 @@ class World:
             scenery.robot, scenery.spoon, computeForwardKinematics=True, physicsClientId=client
         )
         centre, _ = pybullet.multiplyTransforms(spoon[4], spoon[5], seat, [0, 0, 0, 1])
-        at_rest = BallState(position=centre)
+        at_rest = BodyState(position=centre)
         self._place(
             Row(
                 joints=[(angle, 0.0) for angle in self._start],
@@ -283,9 +333,8 @@ class World:
         pybullet.resetBaseVelocity(self._ball, *row.twist, physicsClientId=self._client)
 
     def _record_start(self) -> None:
-        # Contact forces and motor torques of the settled state: Bullet has none before the first step.
-        now = self._read()
-        self._rows = [to_sample(now._replace(joints=self._settled.joints))]
+        # After a reset with the motor torques of the settled state: Bullet has none before the first step.
+        self._rows = [to_sample(self._read()._replace(joints=self._start_joints))]
         self._forgotten = 0
 
     def _make_motors(self, trial: Config) -> Motors:

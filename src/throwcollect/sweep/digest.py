@@ -6,6 +6,7 @@ import hashlib
 import json
 from collections.abc import Iterator, Sequence
 
+from throwcollect.config.controllers import ControllersConfig
 from throwcollect.config.schema import Config
 from throwcollect.config.values import leaves
 from throwcollect.sweep.points import Points
@@ -16,7 +17,12 @@ _FORMAT = "throwcollect trial 1"
 # are shown, and how samples are packed into files. The root seed acts through the values and the seed of each trial.
 _RUN = frozenset({"run", "containers"})
 _WITHOUT_EFFECT = _RUN | {"name", "trials", "sweep"}
-_WITHOUT_EFFECT_INSIDE = frozenset({"sim.real_time_factor", "record.zstd_level", "record.trials_per_shard"})
+_WITHOUT_EFFECT_INSIDE = frozenset(
+    {"sim.real_time_factor", "record.zstd_level", "record.trials_per_shard", "controllers.names"}
+)
+
+# Keys that came later count where they differ from their defaults, so that older trials keep their digests.
+_LATER = {f"controllers.{key}": value for key, value in ControllersConfig().model_dump().items()}
 
 
 def config_digest(config: Config) -> str:
@@ -38,7 +44,9 @@ def trial_digests(config: Config, points: Points, seeds: Sequence[int]) -> Itera
     lines = {
         key: _line(key, value)
         for key, value in sorted(leaves(config))
-        if key.partition(".")[0] not in _WITHOUT_EFFECT and key not in _WITHOUT_EFFECT_INSIDE
+        if key.partition(".")[0] not in _WITHOUT_EFFECT
+        and key not in _WITHOUT_EFFECT_INSIDE
+        and not (key in _LATER and value == _LATER[key])
     }
     for seed, row in zip(seeds, points.values.tolist(), strict=True):
         lines["seed"] = _line("seed", seed)

@@ -10,11 +10,13 @@ import numpy as np
 
 from throwcollect.control import (
     ControllerParameters,
+    Deviations,
     GoalResult,
     JointConstraints,
     JointState,
     JointTolerance,
     JointTrajectoryController,
+    Refusal,
     Trajectory,
     TrajectoryGoal,
     TrajectoryPoint,
@@ -67,7 +69,7 @@ class Plant:
 
     kind: str = "ideal"
     position: np.ndarray = field(default_factory=lambda: np.array(START))
-    velocity: float = 0.0
+    velocity: float | Sequence[float] = 0.0
     lag_s: float = 0.1
 
     def apply(self, command: np.ndarray) -> None:
@@ -80,22 +82,28 @@ class Plant:
             self.position = self.position + share * (command - self.position)
 
     def measured(self) -> JointState:
-        return JointState(self.position, np.full(len(self.position), self.velocity))
+        return JointState(self.position, np.broadcast_to(self.velocity, self.position.shape))
 
 
 class Bench:
     """A controller that is driven step by step; `k` counts the updates since the last goal."""
 
-    def __init__(self, parameters: ControllerParameters = SHIPPED, plant: Plant | None = None, now_s=1000.0) -> None:
+    def __init__(
+        self,
+        parameters: ControllerParameters = SHIPPED,
+        plant: Plant | None = None,
+        now_s=1000.0,
+        deviations: Deviations | None = None,
+    ) -> None:
         self.plant = plant or Plant()
-        self.controller = JointTrajectoryController("c", parameters, period_ns=PERIOD_NS)
+        self.controller = JointTrajectoryController("c", parameters, period_ns=PERIOD_NS, deviations=deviations)
         self.now_ns = seconds(now_s)
         self.controller.activate(self.now_ns, self.plant.measured(), self.plant.position)
         self.k = 0
         self.commands: dict[int, np.ndarray] = {}
         self.results: list[tuple[int, GoalResult]] = []
 
-    def send(self, request: TrajectoryGoal, goal_id="A") -> str | None:
+    def send(self, request: TrajectoryGoal, goal_id="A") -> Refusal | None:
         refusal = self.controller.submit(goal_id, request, self.now_ns)
         self.collect()
         if refusal is None:

@@ -3,13 +3,26 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from throwcollect.control import ControllerParameters, ErrorCode, GoalStatus, JointState, TrajectoryGoal
+from throwcollect.control import (
+    Constraints,
+    ControllerParameters,
+    Deviations,
+    ErrorCode,
+    GoalStatus,
+    JointConstraints,
+    JointState,
+    Refusal,
+    SpeedScaling,
+    TrajectoryGoal,
+)
 
 from .bench import JOINTS, SHIPPED, START, TALOS, Bench, Plant, constrained, goal, point, seconds, to
 
@@ -19,7 +32,12 @@ CANCELED = (GoalStatus.CANCELED, ErrorCode.SUCCESSFUL, "")
 OFF_PATH = "Aborted due to path tolerance violation"
 TOO_LATE = "Aborted due to goal_time_tolerance exceeding by "
 PARTIAL = dataclasses.replace(SHIPPED, allow_partial_joints_goal=True)
+PUSHING = dataclasses.replace(SHIPPED, command_interfaces=("position", "effort"))
+INTEGRATING = dataclasses.replace(
+    SHIPPED, allow_integration_in_goal_trajectories=True, allow_nonzero_velocity_at_trajectory_end=True
+)
 MOVING_END = dataclasses.replace(SHIPPED, allow_nonzero_velocity_at_trajectory_end=True)
+ZERO = (0.0, 0.0, 0.0)
 ONE_POINT = (point(1.0, (2.1, 2.1, 3.1)),)
 
 
@@ -54,6 +72,26 @@ ANSWERS = [
     Answer(
         "A9 effort", goal(point(1.0, START, (), (), (1, 1, 1))), ["only supported for controllers using the 'effort'"]
     ),
+    Answer("A9 effort interface", goal(point(1.0, START, (), (), (1, 1, 1))), (), PUSHING),
+    Answer(
+        "A9 effort of the wrong size",
+        goal(point(1.0, START, (), (), (1, 1))),
+        ["joint_names size (3) and effort (2) at point #0."],
+        PUSHING,
+    ),
+    Answer(
+        "A9 effort not finite",
+        goal(point(1.0, START, (), (), (1, np.inf, 1))),
+        ["Effort of joint j2 at point #0 is not finite: inf"],
+        PUSHING,
+    ),
+    Answer("A7 no positions, integrated", goal(point(1.0, (), ZERO)), (), INTEGRATING),
+    Answer(
+        "A7 nothing to integrate",
+        goal(to(0.5, 1), point(1.0, ())),
+        ["The given trajectory has no position, velocity, or acceleration points.", "#1"],
+        INTEGRATING,
+    ),
     Answer(
         "A10 0.1", last_velocity(0.1), ["last trajectory point of joint j2 is not zero: 0.100000000000000", "1.19e-07"]
     ),
@@ -80,8 +118,8 @@ def test_goals_are_answered_with_the_words_of_upstream(case: Answer) -> None:
     bench = Bench(case.parameters)
     refusal = bench.send(case.goal)
     assert (refusal is None) == (not case.refusal)
-    assert all(words in refusal for words in case.refusal)
-    assert refusal is None or refusal.startswith("c: ")
+    assert all(words in refusal.text for words in case.refusal)
+    assert refusal is None or refusal.text.startswith("c: ")
     bench.step(150)
     assert [result.status for _, result in bench.results] == ([] if case.refusal else [GoalStatus.SUCCEEDED])
 
@@ -96,6 +134,7 @@ class Course:
     decided: tuple[int, GoalStatus, ErrorCode, str] | None = None
     parameters: ControllerParameters = SHIPPED
     plant: Plant = field(default_factory=Plant)
+    deviations: Deviations | None = None
     start: Sequence[float] = START
     idle: int = 0
     updates: int = 150
@@ -103,15 +142,36 @@ class Course:
     final: Sequence[float] | None = None
 
 
+def braking(deceleration: float, *, trajectory: float = 0.0, j2: float | None = None) -> ControllerParameters:
+    hardest = dict.fromkeys(JOINTS, deceleration) | ({} if j2 is None else {"j2": j2})
+    limits = {joint: JointConstraints(trajectory, 0.0, hardest[joint]) for joint in JOINTS}
+    return dataclasses.replace(SHIPPED, constraints=Constraints(decelerate_on_cancel=True, joints=limits))
+
+
+def cancel(bench: Bench) -> None:
+    assert bench.controller.cancel("A")
+
+
+def scale(factor: float) -> Callable[[Bench], object]:
+    return lambda bench: bench.controller.scale_speed(factor)
+
+
 def put_on_target(bench: Bench) -> None:
     bench.plant.position = np.array((1.6, 2.1, 3.1))
 
 
-ZERO = (0.0, 0.0, 0.0)
 POSITION_ONLY = ControllerParameters(JOINTS)
 STEPS = dataclasses.replace(SHIPPED, interpolation_method="none")
 WITH_PATH = constrained(trajectory=0.05)
 FROZEN, OFFSET, LAG = Plant("frozen"), Plant("offset"), Plant("lag")
+TURNING = dataclasses.replace(SHIPPED, continuous_joints=("j1", "j2"))
+FROM_COMMAND = dataclasses.replace(SHIPPED, interpolate_from_desired_state=True)
+WITH_VELOCITY = dataclasses.replace(
+    SHIPPED,
+    command_interfaces=("position", "velocity"),
+    constraints=Constraints(goal_time=0.1, stopped_velocity_tolerance=0.01),
+)
+THREE_QUARTERS = (3 * math.pi / 2, 0, 0)
 QUINTIC = {1: 1.100010, 25: 1.203516, 50: 1.6, 75: 1.996484, 100: 2.1}
 BY_ERROR = "joint j1 has position error 0.5"
 
@@ -187,6 +247,68 @@ COURSES = [
         {1: 2.316},
         (99, *REACHED),
         idle=100,
+    ),
+    Course(
+        "B16 continuous joint, the short way",
+        goal(point(1.0, THREE_QUARTERS)),
+        {1: 6.267477, 50: 5.497787, 100: 4.712389},
+        (100, *REACHED),
+        parameters=TURNING,
+        start=ZERO,
+    ),
+    Course(
+        "B16 revolute joint",
+        goal(point(1.0, THREE_QUARTERS)),
+        {1: 0.047124, 50: 2.356194, 100: 4.712389},
+        (100, *REACHED),
+        start=ZERO,
+    ),
+    Course(
+        "B16 half a turn goes towards the target",
+        goal(point(1.0, (3 * math.pi, 0, 0))),
+        {1: 2.01 * math.pi, 50: 2.5 * math.pi, 100: 3 * math.pi},
+        (100, *REACHED),
+        parameters=TURNING,
+        start=ZERO,
+    ),
+    Course(
+        "B16 errors of continuous joints are the short way",
+        goal(point(0.5, (2 * math.pi - 0.01, 0, 0))),
+        {},
+        (50, *REACHED),
+        parameters=dataclasses.replace(TALOS, continuous_joints=("j1",)),
+        plant=FROZEN,
+        start=ZERO,
+    ),
+    Course(
+        "B17 velocities alone",
+        goal(*(point(time, (), (velocity, 0, 0)) for time, velocity in ((1.0, 1), (2.0, 2), (3.0, 1)))),
+        {50: 0.125, 100: 0.5, 150: 1.125, 200: 2.0, 250: 2.875, 300: 3.5},
+        (300, *REACHED),
+        parameters=INTEGRATING,
+        start=ZERO,
+        updates=310,
+    ),
+    Course(
+        "B17 accelerations alone",
+        goal(*(point(time, (), (), (2.0, 0, 0)) for time in (1.0, 2.0))),
+        {100: 0.5, 200: 2.5},
+        (200, *REACHED),
+        parameters=INTEGRATING,
+        start=ZERO,
+        updates=210,
+    ),
+    Course(
+        "from the last command instead of the measured state",
+        goal(to(1.0, 2.1)),
+        {1: 1.1 + 0.02 / 1.01, 100: 2.1},
+        (100, *REACHED),
+        parameters=FROM_COMMAND,
+        plant=OFFSET,
+        idle=5,
+    ),
+    Course(
+        "from the measured state, which lags", goal(to(1.0, 2.1)), {1: 0.813}, (100, *REACHED), plant=OFFSET, idle=5
     ),
     Course("C1 nothing moves after success", goal(to(1.0, 2.1)), {100: 2.1, 101: 2.1, 150: 2.1}, (100, *REACHED)),
     Course("C2 no tolerances", goal(to(0.5, 1.6)), {}, (50, *REACHED), plant=FROZEN),
@@ -276,11 +398,27 @@ COURSES = [
         plant=Plant(velocity=5.0),
     ),
     Course(
+        "C15 velocities count where they are commanded",
+        goal(to(1.0, 2.1)),
+        {},
+        (112, GoalStatus.ABORTED, ErrorCode.GOAL_TOLERANCE_VIOLATED, TOO_LATE + "0.11"),
+        parameters=WITH_VELOCITY,
+        plant=Plant(velocity=5.0),
+    ),
+    Course(
+        "C15 and are met",
+        goal(to(1.0, 2.1)),
+        {},
+        (101, *REACHED),
+        parameters=WITH_VELOCITY,
+        plant=Plant(velocity=0.005),
+    ),
+    Course(
         "D3 cancel",
         goal(to(1.0, 2.1)),
         {50: 1.6, 51: 1.59, 52: 1.59, 150: 1.59},
         (50, *CANCELED),
-        during={50: lambda bench: bench.controller.cancel("A")},
+        during={50: cancel},
     ),
     Course(
         "D4 cancel with an error",
@@ -288,8 +426,71 @@ COURSES = [
         {50: 1.6, 51: 1.29, 150: 1.29},
         (50, *CANCELED),
         plant=OFFSET,
-        during={50: lambda bench: bench.controller.cancel("A")},
+        during={50: cancel},
         final=(0.99, 1.5, 2.5),
+    ),
+    Course(
+        "D4 cancel with an error, holding the command",
+        goal(to(1.0, 2.1)),
+        {50: 1.6, 51: 1.6, 150: 1.6},
+        (50, *CANCELED),
+        plant=OFFSET,
+        deviations=Deviations(hold="command"),
+        during={50: cancel},
+        final=(1.3, 1.8, 2.8),
+    ),
+    Course(
+        "C8 off the path, holding the command",
+        goal(to(1.0, 2.1)),
+        {11: 1.21, 12: 1.21, 13: 1.21, 50: 1.21},
+        (12, GoalStatus.ABORTED, ErrorCode.PATH_TOLERANCE_VIOLATED, OFF_PATH),
+        parameters=constrained(trajectory=0.105),
+        plant=FROZEN,
+        deviations=Deviations(hold="command"),
+    ),
+    Course(
+        "D7 cancel by braking",
+        goal(to(2.0, 3.1)),
+        {100: 2.1, 101: 2.0999, 125: 2.2775, 150: 2.34, 170: 2.34},
+        (100, *CANCELED),
+        parameters=braking(2.0),
+        plant=Plant(velocity=(1.0, 0.0, 0.0)),
+        during={100: cancel},
+        updates=170,
+    ),
+    Course(
+        "D8 one joint cannot brake",
+        goal(to(1.0, 2.1)),
+        {50: 1.6, 51: 1.59, 150: 1.59},
+        (50, *CANCELED),
+        parameters=braking(2.0, j2=0.0),
+        plant=Plant(velocity=(1.0, 0.0, 0.0)),
+        during={50: cancel},
+    ),
+    Course(
+        "D8 velocities are not measured",
+        goal(to(1.0, 2.1)),
+        {50: 1.6, 51: 1.59, 150: 1.59},
+        (50, *CANCELED),
+        parameters=dataclasses.replace(braking(2.0), state_interfaces=("position",)),
+        plant=Plant(velocity=(1.0, 0.0, 0.0)),
+        during={50: cancel},
+    ),
+    Course(
+        "off the path, braking",
+        goal(to(1.0, 2.1)),
+        {12: 1.21, 13: 1.1099, 38: 1.2924, 63: 1.35, 100: 1.35},
+        (12, GoalStatus.ABORTED, ErrorCode.PATH_TOLERANCE_VIOLATED, OFF_PATH),
+        parameters=braking(2.0, trajectory=0.105),
+        plant=Plant("frozen", velocity=(1.0, 0.0, 0.0)),
+    ),
+    Course(
+        "a command timeout ends an open goal",
+        goal(to(0.5, 1.6), goal_time_tolerance_ns=seconds(-1)),
+        {120: 1.6, 124: 1.1},
+        (122, GoalStatus.ABORTED, ErrorCode.GOAL_TOLERANCE_VIOLATED, "Aborted due to command timeout"),
+        parameters=dataclasses.replace(TALOS, cmd_timeout=0.7),
+        plant=FROZEN,
     ),
     Course(
         "D5 cancel what is over",
@@ -306,11 +507,60 @@ COURSES = [
         during={30: lambda bench: bench.controller.replace(goal(to(0.5, 1.0)).trajectory, bench.now_ns)},
     ),
     Course(
+        "topic aborts the action, if asked to",
+        goal(to(1.0, 2.1)),
+        {30: 1.4, 31: 1.392, 80: 1.0},
+        (30, GoalStatus.ABORTED, ErrorCode.INVALID_GOAL, "Current goal preempted by a trajectory on the topic."),
+        deviations=Deviations(topic_aborts_goal=True),
+        during={30: lambda bench: bench.controller.replace(goal(to(0.5, 1.0)).trajectory, bench.now_ns)},
+    ),
+    Course(
         "D11 invalid topic message",
         goal(to(0.5, 1.5)),
         {31: 1.348, 50: 1.5},
         (50, *REACHED),
         during={30: lambda bench: bench.controller.replace(goal(to(-1, 1)).trajectory, bench.now_ns)},
+    ),
+    Course(
+        "half speed",
+        goal(to(1.0, 2.1)),
+        {1: 1.11, 2: 1.115, 199: 2.1},
+        (199, *REACHED),
+        parameters=dataclasses.replace(SHIPPED, speed_scaling=SpeedScaling(0.5)),
+        updates=210,
+    ),
+    Course(
+        "another speed on the way",
+        goal(to(1.0, 2.1)),
+        {50: 1.6, 51: 1.62, 75: 2.1},
+        (75, *REACHED),
+        during={50: scale(2.0)},
+    ),
+    Course(
+        "E8 stopped and started again",
+        goal(to(1.0, 2.1)),
+        {50: 1.6, 51: 1.6, 550: 1.6, 551: 1.61, 600: 2.1},
+        (600, *REACHED),
+        parameters=TALOS,
+        during={50: scale(0.0), 550: scale(1.0)},
+        updates=610,
+    ),
+    Course(
+        "E8 stopped while a late goal waits",
+        goal(to(0.5, 1.6)),
+        {400: 1.6},
+        (411, GoalStatus.ABORTED, ErrorCode.GOAL_TOLERANCE_VIOLATED, TOO_LATE + "0.6"),
+        parameters=TALOS,
+        plant=FROZEN,
+        during={100: scale(0.0), 400: scale(1.0)},
+        updates=420,
+    ),
+    Course(
+        "E9 speeds that make no sense",
+        goal(to(1.0, 2.1)),
+        {31: 1.355, 60: 1.5},
+        (120, *REACHED),
+        during={20: scale(0.5), 40: scale(-0.12), 50: scale(math.nan), 60: scale(1.0)},
     ),
     Course(
         "A13 refused goal during a motion",
@@ -325,7 +575,7 @@ COURSES = [
 @pytest.mark.parametrize("case", COURSES, ids=lambda case: case.id)
 def test_goals_take_the_course_they_take_upstream(case: Course) -> None:
     plant = dataclasses.replace(case.plant, position=np.array(case.start))
-    bench = Bench(case.parameters, plant)
+    bench = Bench(case.parameters, plant, deviations=case.deviations)
     bench.step(case.idle)
     assert bench.send(case.goal) is None
     for _ in range(case.updates):
@@ -367,7 +617,7 @@ def test_tolerance_texts_go_on_with_joint_error_and_tolerance() -> None:
 def test_inactive_controllers_refuse() -> None:
     bench = Bench()
     bench.controller.deactivate()
-    assert bench.send(goal(*ONE_POINT)) == "c: Can't accept new action goals. Controller is not running."
+    assert bench.send(goal(*ONE_POINT)).text == "c: Can't accept new action goals. Controller is not running."
 
 
 def test_desired_is_one_step_behind_the_command() -> None:
@@ -575,3 +825,175 @@ def test_a_goal_survives_a_clock_that_jumps_back() -> None:
     state = bench.controller.state()
     assert (state.desired.time_from_start_ns, state.actual.time_from_start_ns) == (seconds(0.99), seconds(0.09))
     assert bench.results[0][0] == 100
+
+
+def test_each_joint_brakes_from_its_own_speed() -> None:
+    bench = Bench(braking(10.0), Plant("frozen", velocity=(0.2, -0.1, 0.0)))
+    bench.send(goal(to(1.0, 2.1)))
+    bench.step(1)
+    bench.controller.cancel("A")
+    bench.step(30)
+    assert bench.commands[31] == pytest.approx([1.102, 2.0995, 3.1], abs=1e-6)
+    assert bench.controller.state().desired.velocities.tolist() == [0, 0, 0]
+
+
+def test_a_command_timeout_holds_what_came_by_the_topic() -> None:
+    bench = Bench(dataclasses.replace(SHIPPED, cmd_timeout=0.1), Plant("offset"))
+    bench.controller.replace(goal(to(0.25, 1.2), to(0.5, 1.3), to(0.75, 1.4)).trajectory, bench.now_ns)
+    bench.step(120)
+    held = [k for k in range(1, 120) if bench.commands[k + 1][0] < bench.commands[k][0] - 0.2]
+    assert held == [pytest.approx(86, abs=1)]
+    assert bench.commands[120][0] == pytest.approx(1.1)
+    assert bench.results == []
+
+
+def test_a_command_timeout_below_the_goal_time_is_off_and_warned_of(caplog: pytest.LogCaptureFixture) -> None:
+    bench = Bench(dataclasses.replace(TALOS, cmd_timeout=0.6), Plant("offset"))
+    assert "Command timeout must be higher than goal_time tolerance (0.600000 vs. 0.600000)" in caplog.text
+    caplog.clear()
+    bench.controller.parameters = dataclasses.replace(TALOS, cmd_timeout=0.61)
+    assert caplog.text == ""
+
+
+def test_missing_means_to_brake_are_warned_of(caplog: pytest.LogCaptureFixture) -> None:
+    Bench(braking(2.0))
+    assert caplog.text == ""
+    Bench(braking(2.0, j2=0.0))
+    assert "Falling back to hold position on cancel." in caplog.text
+
+
+def test_speeds_that_make_no_sense_are_warned_of(caplog: pytest.LogCaptureFixture) -> None:
+    controller = Bench(dataclasses.replace(SHIPPED, speed_scaling=SpeedScaling(0.765))).controller
+    assert [controller.scale_speed(factor) for factor in (-0.12, math.nan, math.inf, 1e300)] == [False] * 4
+    assert controller.speed_scaling_factor == 0.765
+    assert [record.levelname for record in caplog.records] == ["WARNING"] * 4
+    assert controller.scale_speed(0.0)
+    assert not Bench(WITH_VELOCITY).controller.scale_speed(0.5)
+    assert controller.speed_scaling_factor == 0.0
+
+
+def test_scaled_and_real_time_are_told_apart() -> None:
+    bench = Bench(dataclasses.replace(SHIPPED, speed_scaling=SpeedScaling(0.5)))
+    bench.send(goal(to(1.0, 2.1)))
+    bench.step(195)
+    state = bench.controller.state()
+    assert state.desired.time_from_start_ns == seconds(0.97)
+    assert state.actual.time_from_start_ns == seconds(1.94)
+    assert state.speed_scaling_factor == 0.5
+
+
+def test_a_reset_brings_the_initial_speed_back() -> None:
+    bench = Bench()
+    bench.controller.scale_speed(0.25)
+    bench.controller.reset(bench.now_ns, bench.plant.measured())
+    assert bench.controller.speed_scaling_factor == 1.0
+
+
+REFUSED = {
+    ErrorCode.INVALID_JOINTS: [
+        goal(*ONE_POINT, names=["j1", "j2"]),
+        goal(*ONE_POINT, names=["j1", "j2", "x"]),
+        goal(*ONE_POINT, names=["j1", "j1", "j2"]),
+    ],
+    ErrorCode.OLD_HEADER_TIMESTAMP: [goal(to(0.25, 2), stamp_s=999.0)],
+    ErrorCode.INVALID_GOAL: [goal(), goal(to(1.0, np.nan)), goal(to(1, 1), to(1, 1)), last_velocity(1.0)],
+}
+
+
+@pytest.mark.parametrize(
+    ("code", "request_"), [(code, request) for code, requests in REFUSED.items() for request in requests]
+)
+def test_refusals_have_the_codes_of_the_action(code: ErrorCode, request_: TrajectoryGoal) -> None:
+    refusal = Bench().send(request_)
+    assert isinstance(refusal, Refusal)
+    assert refusal.error_code == code
+
+
+def test_stamps_of_another_clock_are_warned_of(caplog: pytest.LogCaptureFixture) -> None:
+    bench = Bench()
+    assert bench.send(goal(to(1.0, 2.1), stamp_s=1003.0)) is None
+    assert caplog.text == ""
+    assert bench.send(goal(to(1.0, 2.1), stamp_s=1.7e9)) is None
+    assert "the trajectory starts 1699999000 s from now; was it stamped by a clock" in caplog.text
+
+
+def test_more_than_positions_may_be_commanded() -> None:
+    every = dataclasses.replace(MOVING_END, command_interfaces=("position", "velocity", "acceleration"))
+    bench = Bench(every)
+    bench.send(goal(point(1.0, (2.1, 2.1, 3.1), (1.0, 0, 0), ZERO)))
+    bench.step(150)
+    output = bench.controller.state().output
+    assert (output.positions[0], output.velocities[0], output.accelerations[0]) == pytest.approx((2.1, 1.0, 0.0))
+    assert len(output.effort) == 0
+    bench.controller.deactivate()
+    bench.controller.activate(bench.now_ns, bench.plant.measured())
+    bench.step(1)
+    output = bench.controller.state().output
+    assert (output.positions[0], output.velocities.tolist()) == (pytest.approx(2.1), [0, 0, 0])
+
+
+def test_a_stop_leaves_no_velocity_commanded() -> None:
+    bench = Bench(dataclasses.replace(MOVING_END, command_interfaces=("position", "velocity")))
+    bench.send(goal(point(1.0, (2.1, 2.1, 3.1), (1.0, 0, 0))))
+    bench.step(120)
+    assert bench.controller.state().output.velocities[0] == pytest.approx(1.0)
+    bench.send(goal(to(2.0, 3.0)), "B")
+    bench.step(5)
+    bench.controller.cancel("B")
+    bench.step(1)
+    assert bench.controller.state().output.velocities.tolist() == [0, 0, 0]
+
+
+def test_efforts_are_interpolated_in_lines() -> None:
+    bench = Bench(PUSHING)
+    bench.send(goal(point(0.5, START, (), (), (4, 0, 0)), point(1.0, START, (), (), (8, 2, 0))))
+    bench.step(25)
+    assert bench.controller.state().output.effort == pytest.approx([2, 0, 0])
+    bench.step(50)
+    assert bench.controller.state().output.effort == pytest.approx([6, 1, 0])
+    assert bench.controller.state().desired.effort == pytest.approx([5.92, 0.96, 0])
+
+
+HERE, TRAJECTORIES = "tests/unit/control/test_acceptance.py", "tests/integration/test_trajectories.py"
+CONTROLLERS, STEPPING = "tests/integration/test_controllers.py", "tests/integration/test_stepping.py"
+ELSEWHERE = {
+    "A12": (HERE, "test_inactive_controllers_refuse"),
+    "C13": (HERE, "test_parameters_that_change_during_a_goal_hold_for_the_next"),
+    "D1": (HERE, "test_new_goals_preempt_and_start_from_the_measured_state"),
+    "D2": (HERE, "test_results_outlive_the_next_goal"),
+    "D5": (TRAJECTORIES, "test_goals_that_are_over_or_unknown_are_not_cancelled"),
+    "D6": (HERE, "test_each_joint_brakes_from_its_own_speed"),
+    "D9": (HERE, "test_topic_trajectories_need_no_goal"),
+    "D12": (HERE, "test_a_command_timeout_holds_what_came_by_the_topic"),
+    "D13": (HERE, "test_a_command_timeout_below_the_goal_time_is_off_and_warned_of"),
+    "E1": (TRAJECTORIES, "test_feedback_comes_at_20_hz_of_simulated_time_from_the_start_on"),
+    "E2": (HERE, "test_state_has_the_fields_of_the_interfaces"),
+    "E3": (HERE, "test_state_of_an_update_tells_reference_feedback_output_and_times"),
+    "E5": (HERE, "test_activation_holds_the_last_command_or_the_measured_position"),
+    "E6": (HERE, "test_deactivation_aborts_the_goal_and_keeps_the_command"),
+    "F1": (TRAJECTORIES, "test_there_is_no_feedback_while_time_stands_still"),
+    "F2": (CONTROLLERS, "test_steps_advance_a_trajectory_by_as_many_periods"),
+    "F3": (TRAJECTORIES, "test_a_reset_aborts_a_goal_even_right_after_it"),
+    "F5": (CONTROLLERS, "test_after_a_reset_the_start_posture_is_held"),
+    "F6": ("tests/unit/sim/test_limb.py", "test_a_result_comes_before_time_goes_on"),
+    "G1": ("tests/integration/test_graph.py", "test_a_controller_offers_what_it_offers_on_the_robot"),
+    "G2": ("tests/integration/test_play_motion.py", "test_motions_of_the_real_robot_are_played"),
+    "G4": ("tests/integration/test_play_motion.py", "test_joint_states_have_velocity_and_effort_of_every_joint"),
+    "G5": (CONTROLLERS, "test_controllers_are_listed_as_the_controller_manager_does"),
+    "G6": (
+        "tests/integration/test_play_motion.py",
+        "test_the_head_nods_with_its_first_joint_and_turns_with_its_second",
+    ),
+}
+CASES = (
+    "A1 A2 A3 A4 A5 A6 A7 A8 A9 A10 A11 A12 A13 A14 B1 B2 B3 B5 B6 B7 B8 B9 B11 B12 B14 B16 B17 C1 C2 C3 C5 C6 C8 C9 "
+    "C10 C11 C13 C14 C15 D1 D2 D3 D4 D5 D6 D7 D8 D9 D11 D12 D13 E1 E2 E3 E5 E6 E8 E9 F1 F2 F3 F5 F6 G1 G2 G4 G5 G6"
+)
+
+
+@pytest.mark.parametrize("case", CASES.split())
+def test_every_case_is_tested_here_or_where_the_table_says(case: str) -> None:
+    if case in {each.id.split()[0] for each in (*ANSWERS, *COURSES)}:
+        return
+    path, name = ELSEWHERE[case]
+    assert f"def {name}(" in (Path(__file__).parents[3] / path).read_text(encoding="utf-8")

@@ -17,6 +17,7 @@ from throwcollect.control import (
     JointState,
     JointTolerance,
     JointTrajectoryController,
+    SpeedScaling,
     Trajectory,
     TrajectoryGoal,
     TrajectoryPoint,
@@ -37,7 +38,8 @@ def trajectories(draw: st.DrawFn) -> Trajectory:
     for _ in range(draw(st.integers(1, 4))):
         content = draw(st.integers(0, 2))
         velocities = draw(values) if content > 0 else ()
-        points.append(TrajectoryPoint(time_ns, draw(values), velocities, draw(values) if content > 1 else ()))
+        placed = draw(values) if content == 0 or draw(st.integers(0, 4)) else ()
+        points.append(TrajectoryPoint(time_ns, placed, velocities, draw(values) if content > 1 else ()))
         time_ns += draw(st.sampled_from([1, PERIOD_NS, 55_555_555, 200_000_000]))
     return Trajectory(names, points, draw(st.sampled_from([None, None, seconds(1000.3), seconds(1000.9)])))
 
@@ -51,18 +53,29 @@ def goals(draw: st.DrawFn) -> TrajectoryGoal:
 
 @st.composite
 def parameter_sets(draw: st.DrawFn) -> ControllerParameters:
-    limits = {joint: JointConstraints(draw(st.sampled_from([0.0, 0.0, 0.0, 0.3])), draw(tolerance)) for joint in JOINTS}
+    limits = {
+        joint: JointConstraints(draw(st.sampled_from([0.0, 0.0, 0.0, 0.3])), draw(tolerance), 2.0) for joint in JOINTS
+    }
     return ControllerParameters(
         JOINTS,
+        command_interfaces=draw(st.sampled_from([("position",), ("position",), ("position", "velocity")])),
         state_interfaces=draw(st.sampled_from([("position",), ("position", "velocity")])),
         allow_partial_joints_goal=True,
+        allow_integration_in_goal_trajectories=True,
         allow_nonzero_velocity_at_trajectory_end=True,
         interpolation_method=draw(st.sampled_from(["splines", "splines", "none"])),
-        constraints=Constraints(goal_time=draw(st.sampled_from([0.0, 0.1])), joints=limits),
+        interpolate_from_desired_state=draw(st.booleans()),
+        cmd_timeout=draw(st.sampled_from([0.0, 0.15])),
+        speed_scaling=SpeedScaling(draw(st.sampled_from([1.0, 1.0, 0.3]))),
+        constraints=Constraints(
+            goal_time=draw(st.sampled_from([0.0, 0.1])), decelerate_on_cancel=draw(st.booleans()), joints=limits
+        ),
+        continuous_joints=draw(st.sampled_from([(), (), ("j2",)])),
     )
 
 
-requests = st.one_of(goals(), trajectories(), st.just("cancel"), st.just("reset"))
+speeds = st.sampled_from([0.0, 0.25, 0.765, 1.0, 1.0, 2.0])
+requests = st.one_of(goals(), trajectories(), speeds, st.just("cancel"), st.just("reset"))
 schedules = st.dictionaries(st.integers(0, UPDATES - 1), requests, max_size=3)
 
 
@@ -79,6 +92,8 @@ class Side:
             controller.submit(goal_id, request, now_ns)
         elif isinstance(request, Trajectory):
             controller.replace(request, now_ns)
+        elif isinstance(request, float):
+            controller.scale_speed(request)
         elif request == "cancel":
             controller.cancel(controller.goal_id)
         else:

@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from throwcollect.control.goal import Trajectory, TrajectoryPoint
-from throwcollect.control.interpolation import Curve, Waypoints, arranged, interpolated
+from throwcollect.control.interpolation import Curve, interpolated
+from throwcollect.control.waypoints import StartState, Waypoints, arranged
 
 from .bench import seconds
 
@@ -31,8 +32,8 @@ def trajectories(draw: st.DrawFn) -> Trajectory:
 
 
 def curve_of(trajectory: Trajectory, start=(0.5, -0.5), velocity=(0.2, -0.2), *, splines=True) -> Curve:
-    waypoints = arranged(trajectory, JOINTS, np.zeros(2))
-    return interpolated(waypoints, 0, np.array(start), np.array(velocity), splines=splines)
+    state = StartState(0, np.array(start), np.array(velocity))
+    return interpolated(arranged(trajectory, JOINTS, np.zeros(2), state), state, splines=splines)
 
 
 @settings(max_examples=200, deadline=None)
@@ -121,22 +122,21 @@ def test_accelerations_without_velocities_make_no_curve() -> None:
 
 
 def test_points_that_are_over_are_not_blended() -> None:
-    waypoints = arranged(
-        Trajectory(JOINTS, [TrajectoryPoint(0, (1, 1)), TrajectoryPoint(seconds(1), (2, 2))]), JOINTS, np.zeros(2)
-    )
-    curve = interpolated(waypoints, seconds(0.5), np.array((9.0, 9.0)), None, splines=True)
+    state = StartState(seconds(0.5), np.array((9.0, 9.0)))
+    trajectory = Trajectory(JOINTS, [TrajectoryPoint(0, (1, 1)), TrajectoryPoint(seconds(1), (2, 2))])
+    curve = interpolated(arranged(trajectory, JOINTS, np.zeros(2), state), state, splines=True)
     assert curve.positions(np.array([seconds(0.5), seconds(0.75)]))[:, 0] == pytest.approx([1.5, 1.75])
 
 
 def test_a_single_point_is_held_from_the_start() -> None:
-    curve = interpolated(Waypoints.single(np.array((1.0, 2.0))), 0, np.array((9.0, 9.0)), None, splines=True)
+    curve = interpolated(Waypoints.single(np.array((1.0, 2.0))), StartState(0, np.array((9.0, 9.0))), splines=True)
     assert curve.end_ns == 0
     assert curve.positions(np.array([0, 10**18])).tolist() == [[1, 2], [1, 2]]
 
 
 def test_joints_that_are_left_out_keep_their_command() -> None:
     trajectory = Trajectory(("b",), [TrajectoryPoint(1, (5,), (6,), (7,)), TrajectoryPoint(2, (8,))])
-    waypoints = arranged(trajectory, JOINTS, np.array((0.25, 9.0)))
+    waypoints = arranged(trajectory, JOINTS, np.array((0.25, 9.0)), StartState(0, np.array((0.25, 9.0))))
     assert waypoints.positions.tolist() == [[0.25, 5], [0.25, 8]]
     assert waypoints.velocities.tolist() == [[0, 6], [0, 0]]
     assert waypoints.accelerations.tolist() == [[0, 7], [0, 0]]

@@ -2,22 +2,33 @@
 
 from __future__ import annotations
 
+import logging
+
 import numpy as np
 import pytest
 
 from throwcollect.control.goal import JointTolerance, Trajectory, TrajectoryGoal
 from throwcollect.control.parameters import Constraints, JointConstraints
-from throwcollect.control.tolerances import Tolerances, default_tolerances, goal_tolerances, violations
+from throwcollect.control.tolerances import Limits, Tolerances, default_tolerances, goal_tolerances, violations
 
 from .bench import JOINTS, seconds
 
 LIMITS = JointConstraints(trajectory=0.1, goal=0.1)
-DEFAULTS = default_tolerances(Constraints(goal_time=0.1, joints=dict.fromkeys(JOINTS, LIMITS)), JOINTS)
+CONSTRAINTS = Constraints(goal_time=0.1, stopped_velocity_tolerance=0.1, joints=dict.fromkeys(JOINTS, LIMITS))
+LOGGER = logging.getLogger("c")
+STILL = np.zeros(3)
+
+
+def tolerances(path=(), goal=(), late_ns: int = 0, *, velocities: bool = False) -> Tolerances:
+    asked = TrajectoryGoal(Trajectory((), ()), path, goal, late_ns)
+    defaults = default_tolerances(CONSTRAINTS, JOINTS, velocities=velocities)
+    return goal_tolerances(asked, defaults, JOINTS, velocities=velocities, logger=LOGGER)
 
 
 def resolved(path=(), goal=(), late_ns: int = 0) -> tuple[list[float], list[float], int]:
-    tolerances = goal_tolerances(TrajectoryGoal(Trajectory((), ()), path, goal, late_ns), DEFAULTS, JOINTS, "c")
-    return tolerances.path.tolist(), tolerances.goal.tolist(), tolerances.goal_time_ns
+    found = tolerances(path, goal, late_ns)
+    assert not np.any((found.path.velocity, found.goal.velocity))
+    return found.path.position.tolist(), found.goal.position.tolist(), found.goal_time_ns
 
 
 UNCHANGED = ([0.1, 0.1, 0.1], [0.1, 0.1, 0.1], seconds(0.1))
@@ -54,27 +65,37 @@ ILLEGAL = [
 def test_one_illegal_number_or_joint_brings_all_defaults_back(path, goal, late_ns, caplog) -> None:
     assert resolved(path, goal, late_ns) == UNCHANGED
     (record,) = caplog.records
-    assert record.getMessage().startswith("c: ")
     assert record.getMessage().endswith("Using default tolerances.")
 
 
 def test_joints_without_constraints_are_not_checked() -> None:
-    tolerances = default_tolerances(Constraints(joints={"j2": JointConstraints(goal=0.5)}), JOINTS)
-    assert (tolerances.checks_path, tolerances.checks_goal) == (False, True)
-    assert tolerances.goal.tolist() == [0, 0.5, 0]
+    found = default_tolerances(Constraints(joints={"j2": JointConstraints(goal=0.5)}), JOINTS, velocities=False)
+    assert (found.path.checked, found.goal.checked) == (False, True)
+    assert found.goal.position.tolist() == [0, 0.5, 0]
+
+
+def test_velocity_tolerances_count_where_there_is_a_velocity_error() -> None:
+    found = tolerances([JointTolerance("j1", 0, 0.3)], [JointTolerance("j2", 0, 0.7), JointTolerance("j3", 0, -1)])
+    assert (found.path.velocity.tolist(), found.goal.velocity.tolist()) == ([0, 0, 0], [0, 0, 0])
+    found = tolerances(
+        [JointTolerance("j1", 0, 0.3)], [JointTolerance("j2", 0, 0.7), JointTolerance("j3", 0, -1)], velocities=True
+    )
+    assert (found.path.velocity.tolist(), found.goal.velocity.tolist()) == ([0.3, 0, 0], [0.1, 0.7, 0])
 
 
 def test_an_error_equal_to_the_tolerance_is_within_it() -> None:
     error = np.array((0.5, -0.5000001, 7.0))
-    assert violations(error, np.array((0.5, 0.5, 0.0)), JOINTS) == (
+    assert violations(error, None, Limits(np.array((0.5, 0.5, 0.0)), STILL), JOINTS) == (
         "joint j2 has position error -0.500000 rad, tolerance 0.500000 rad"
     )
-    assert violations(error, Tolerances(np.ones(3), np.full(3, 8.0), 0).goal, JOINTS) == ""
+    assert violations(error, STILL, Limits(np.full(3, 8.0), np.ones(3)), JOINTS) == ""
 
 
 def test_all_joints_outside_are_named() -> None:
-    text = violations(np.array((1.0, 0.0, -2.0)), np.full(3, 0.25), JOINTS)
+    limits = Limits(np.full(3, 0.25), np.array((0.0, 0.125, 0.0)))
+    text = violations(np.array((1.0, 0.0, -2.0)), np.ones(3), limits, JOINTS)
     assert text == (
         "joint j1 has position error 1.000000 rad, tolerance 0.250000 rad; "
-        "joint j3 has position error -2.000000 rad, tolerance 0.250000 rad"
+        "joint j3 has position error -2.000000 rad, tolerance 0.250000 rad; "
+        "joint j2 has velocity error 1.000000 rad/s, tolerance 0.125000 rad/s"
     )

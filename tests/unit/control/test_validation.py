@@ -7,14 +7,19 @@ import dataclasses
 import numpy as np
 import pytest
 
-from throwcollect.control import Trajectory
-from throwcollect.control.validation import refusal
+from throwcollect.control import ControllerParameters, Trajectory, validation
 
 from .bench import SHIPPED, goal, point, seconds, to
 
 NOW_NS = seconds(1000)
 NAN, SLOW = (np.nan, 0, 0), (0.1, 0, 0)
 EFFORT = (1.0, 1.0, 1.0)
+
+
+def refusal(trajectory: Trajectory, parameters: ControllerParameters, now_ns: int) -> str | None:
+    reason = validation.refusal(trajectory, parameters, now_ns)
+    return None if reason is None else reason.text
+
 
 # Each trajectory breaks the rule it is named by and all that are checked later.
 ORDER = [

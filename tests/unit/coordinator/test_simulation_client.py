@@ -13,11 +13,13 @@ from throwcollect.coordinator.progress import Progress
 from throwcollect.coordinator.simulation_client import SimulationClient
 from throwcollect.interfaces import get_service
 from throwcollect.robots.description import start_posture
+from throwcollect.robots.talos import graph_name
 from throwcollect.ros import ActionServer, GoalResponse
 from throwcollect.ros.router import router
 from throwcollect.tasks.trajectory import throw_trajectory
 
 ResetSimulation = get_service("simulation_interfaces/srv/ResetSimulation")
+NAMING = "ros1"
 CONFIG = Config()
 GOALS = trial_goals(throw_trajectory(CONFIG), start_posture(CONFIG))
 
@@ -39,7 +41,7 @@ class Bench:
             ActionServer(
                 self.simulation,
                 FollowJointTrajectory,
-                f"{controller}/follow_joint_trajectory",
+                f"{graph_name(controller, NAMING)}/follow_joint_trajectory",
                 self._execute,
                 goal_callback=self._consider,
             )
@@ -49,7 +51,7 @@ class Bench:
         self.client = SimulationClient(
             self.node,
             "/sim_0",
-            controllers=GOALS.controllers,
+            controllers={name: graph_name(name, NAMING) for name in GOALS.controllers},
             action_type=FollowJointTrajectory,
             on_episode=lambda *_: None,
             on_refusal=lambda namespace, reason: self.refusals.append((namespace, reason)),

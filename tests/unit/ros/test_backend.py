@@ -62,10 +62,7 @@ def test_both_backends_offer_the_same_names():
     for name in ("embedded/__init__.py", "genuine.py"):
         tree = ast.parse((root / name).read_text())
         bound = {
-            alias.asname or alias.name
-            for node in tree.body
-            if isinstance(node, ast.ImportFrom)
-            for alias in node.names
+            alias.asname or alias.name for node in tree.body if isinstance(node, ast.ImportFrom) for alias in node.names
         } | {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
         (listed,) = [
             ast.literal_eval(node.value)

@@ -6,10 +6,10 @@ import pytest
 
 from throwcollect.config.schema import Config
 from throwcollect.control import GoalStatus, Trajectory, TrajectoryGoal, TrajectoryPoint
+from throwcollect.errors import RequestError
 from throwcollect.robots.description import start_posture
 from throwcollect.robots.talos import CONTROLLERS
-from throwcollect.sim.recording import BallState
-from throwcollect.sim.simulation import Simulation, State, TrialSetup
+from throwcollect.sim.simulation import Scope, Simulation, State, TrialSetup
 
 CONFIG = Config()
 POSTURE = start_posture(CONFIG)
@@ -109,7 +109,8 @@ def test_joints_are_at_the_trajectory_when_their_sample_is_taken(simulation: Sim
 
 def test_a_goal_that_moves_a_locked_joint_is_refused_by_name(simulation: Simulation) -> None:
     refusal = simulation.submit(HEAD, 1, goal(HEAD, head_1_joint=0.2))
-    assert refusal == f"{HEAD}: head_1_joint is locked at 0 rad (robot.locked) and cannot go to 0.2 rad"
+    assert refusal is not None
+    assert refusal.text == f"{HEAD}: head_1_joint is locked at 0 rad (robot.locked) and cannot go to 0.2 rad"
     assert not simulation.running
 
 
@@ -160,13 +161,90 @@ def test_while_paused_steps_advance_the_clock_exactly(simulation: Simulation) ->
     assert simulation.now_ns == 10 * 10**9 // CONFIG.sim.physics_hz
 
 
-def test_the_ball_can_be_put_somewhere_and_the_robot_cannot(simulation: Simulation) -> None:
-    assert simulation.set_entity_state("ball", BallState((1.0, 0.0, 1.0)))
-    ball = simulation.entity_state("ball")
-    assert ball is not None
-    assert ball.position == (1.0, 0.0, 1.0)
-    assert not simulation.set_entity_state("talos", BallState((0.0, 0.0, 1.0)))
-    assert simulation.entity_state("table") is None
+def test_steps_that_are_asked_for_are_taken_slice_by_slice(simulation: Simulation) -> None:
+    simulation.set_state(State.PAUSED)
+    request = simulation.request_steps(60)
+    assert simulation.running
+    simulation.advance(watched=True)
+    assert (request.taken, request.is_over) == (25, False)
+    with pytest.raises(RequestError, match="25 of 60 steps of another request") as refused:
+        simulation.request_steps(1)
+    assert refused.value.reason == "RESULT_INCORRECT_STATE"
+    simulation.advance(watched=False)
+    assert (request.taken, request.is_over, request.interruption) == (60, True, None)
+    assert not simulation.running
+    assert simulation.now_ns == 60 * 10**9 // CONFIG.sim.physics_hz
+
+
+def test_steps_are_refused_unless_it_is_paused(simulation: Simulation) -> None:
+    with pytest.raises(RequestError, match="paused only; it is PLAYING") as refused:
+        simulation.request_steps(1)
+    assert refused.value.reason == "RESULT_OPERATION_FAILED"
+
+
+def test_no_steps_need_no_time(simulation: Simulation) -> None:
+    simulation.set_state(State.PAUSED)
+    assert simulation.request_steps(0).is_over
+    assert not simulation.running
+
+
+@pytest.mark.parametrize(
+    ("interrupt", "reason"),
+    [
+        (lambda simulation: simulation.reset(Scope.TIME), "the simulation was reset"),
+        (lambda simulation: simulation.reset(Scope.STATE), "the simulation was reset"),
+        (lambda simulation: simulation.set_state(State.QUITTING), "the simulation is QUITTING now"),
+    ],
+)
+def test_steps_end_when_something_comes_in_between(interrupt, reason: str, simulation: Simulation) -> None:
+    simulation.set_state(State.PAUSED)
+    request = simulation.request_steps(10**9)
+    simulation.advance(watched=True)
+    interrupt(simulation)
+    assert (request.is_over, request.interruption) == (True, reason)
+    assert not simulation.running
+
+
+def test_taking_away_what_was_spawned_does_not_end_steps(simulation: Simulation) -> None:
+    simulation.set_state(State.PAUSED)
+    request = simulation.request_steps(30)
+    simulation.reset(Scope.SPAWNED)
+    assert not request.is_over
+    simulation.advance(watched=False)
+    assert request.taken == 30
+
+
+@pytest.mark.parametrize("scope", [Scope.TIME, Scope.STATE, Scope.STATE | Scope.SPAWNED])
+def test_only_time_and_state_together_begin_a_trial(scope: Scope, simulation: Simulation) -> None:
+    trial(simulation)
+    simulation.advance(watched=True)
+    simulation.reset(scope)
+    assert simulation.now_ns == CONFIG.trial_start_ns(0) + (0 if Scope.TIME in scope else 50_000_000)
+    assert [result.error_string for _, result in simulation.pop_results()] == ["simulation was reset"] * 2
+    assert simulation.submit(ARM, 3, swing()) is None
+    assert simulation.submit(TORSO, 4, goal(TORSO)) is None
+    run(simulation)
+    assert simulation.episode() is None
+    simulation.reset(Scope.TIME | Scope.STATE)
+    assert simulation.submit(ARM, 5, swing()) is None
+    assert simulation.submit(TORSO, 6, goal(TORSO)) is None
+    run(simulation)
+    assert simulation.episode() is not None
+
+
+def test_a_reset_of_time_leaves_the_robot_where_it_is(simulation: Simulation) -> None:
+    simulation.set_state(State.PAUSED)
+    assert simulation.submit(ARM, 1, swing()) is None
+    simulation.step(250)
+    simulation.reset(Scope.TIME)
+    before = simulation.world.joint_positions()
+    ball = simulation.world.ball
+    assert simulation.now_ns == 0
+    assert simulation.world.recorded == 1
+    assert simulation.world.samples().ball_position[0].tolist() == list(ball.position)
+    # Stopped at full speed, joints whose effort is limited give way for a moment.
+    simulation.step(500)
+    assert simulation.world.joint_positions() == pytest.approx(before, abs=2e-3)
 
 
 def test_set_points_are_kept_with_each_sample_when_they_are_recorded() -> None:

@@ -7,7 +7,7 @@ from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError
 from throwcollect.robots.description import start_posture
 from throwcollect.robots.talos import JOINTS
-from throwcollect.sim.recording import BallState
+from throwcollect.sim.recording import BodyState
 from throwcollect.sim.world import World
 
 
@@ -141,7 +141,7 @@ def test_a_ball_that_never_rises_above_the_landing_plane_comes_to_rest_on_the_gr
     world = World(trial)
     commands = motion(trial, world.moving, seconds=5)
     world.run(commands[:50])
-    world.ball = BallState((1.0, 0.0, 0.2))
+    world.ball = BodyState((1.0, 0.0, 0.2))
     world.run(commands[50:])
     assert world.end_reason == "rest"
     assert [contact.body for contact in world.contacts()] == ["spoon", "ground"]
@@ -198,7 +198,7 @@ def test_effort_is_limited(world):
 
 def test_the_ball_can_be_put_anywhere(world):
     world.reset(CONFIG)
-    state = BallState((1.0, 2.0, 3.0), (0.0, 0.6, 0.0, 0.8), (0.1, 0.2, 0.3), (1.0, 2.0, 3.0))
+    state = BodyState((1.0, 2.0, 3.0), (0.0, 0.6, 0.0, 0.8), (0.1, 0.2, 0.3), (1.0, 2.0, 3.0))
     world.ball = state
     assert world.ball == state
     assert world.recorded == 1
@@ -212,7 +212,7 @@ def test_the_ball_can_be_put_anywhere(world):
 
 def test_a_ball_on_the_robot_touches_the_link_by_name(world):
     world.reset(CONFIG)
-    world.ball = BallState((0.0, 0.05, 2.2))
+    world.ball = BodyState((0.0, 0.05, 2.2))
     world.run(still(CONFIG, world, 300))
     assert "torso_2_link" not in world.moving
     assert {contact.body for contact in world.contacts()} >= {"spoon", "torso_1_link"}
@@ -222,7 +222,7 @@ def test_a_ball_on_the_robot_touches_the_link_by_name(world):
 def test_the_ball_bounces_as_its_own_restitution_says(restitution, least, most):
     trial = config(scene={"landing_height_m": 1.9}, ball={"restitution": restitution})
     world = World(trial)
-    world.ball = BallState((1.0, 0.0, 0.5))
+    world.ball = BodyState((1.0, 0.0, 0.5))
     world.run(still(trial, world, 200))
     # Bullet takes from the bounce what the ball still has to fall when the step of the impact begins.
     assert least <= world.samples().ball_linear_velocity[:, 2].max() / np.sqrt(2 * 9.81 * 0.475) <= most

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from throwcollect.config.containers import ContainersConfig, NodeContainerConfig
+from throwcollect.config.controllers import ControllersConfig
 from throwcollect.config.run import RunConfig
 from throwcollect.config.schema import Config, Range, SweepConfig
 from throwcollect.config.values import leaves, with_values
@@ -22,7 +23,7 @@ def digests(config: Config, points: Points = POINTS, seeds: tuple[int, ...] = (5
 def test_digests_are_sha_256_over_the_effective_keys_in_order():
     kept = dict(leaves(with_values(Config(), {"ball.mass_kg": 0.1, "task.duration_s": 1.0}))) | {"seed": 5}
     for key in list(kept):
-        if key.startswith(("sweep", "run.", "containers.")) or key in WITHOUT_EFFECT:
+        if key.startswith(("sweep", "run.", "containers.", "controllers.")) or key in WITHOUT_EFFECT:
             del kept[key]
     text = "\n".join(["throwcollect trial 1", *(f"{key}={json.dumps(kept[key])}" for key in sorted(kept))])
     assert digests(Config())[0] == hashlib.sha256(text.encode()).hexdigest()
@@ -45,6 +46,7 @@ def test_it_does_not_matter_whether_a_value_was_swept_or_fixed():
         {"containers": ContainersConfig(volume="throws", sim=NodeContainerConfig(memory="512m"))},
         {"sim": Config().sim.model_copy(update={"real_time_factor": 1.0})},
         {"record": Config().record.model_copy(update={"zstd_level": 9, "trials_per_shard": 9})},
+        {"controllers": ControllersConfig(names="ros1")},
     ],
 )
 def test_what_does_not_change_samples_does_not_change_digests(changes):
@@ -61,6 +63,7 @@ def test_what_does_not_change_samples_does_not_change_digests(changes):
         {"sim": Config().sim.model_copy(update={"physics_hz": 1000})},
         {"task": Config().task.model_copy(update={"points_hz": 40.0})},
         {"record": Config().record.model_copy(update={"rate_hz": 500})},
+        {"controllers": ControllersConfig(hold="command")},
     ],
 )
 def test_what_changes_samples_changes_all_digests(changes):

@@ -1,7 +1,15 @@
 """The API of rclpy over Zenoh, as rmw_zenoh_cpp speaks it, without a ROS installation."""
 
 from throwcollect.interfaces import get_action, get_message, get_service
-from throwcollect.ros.embedded.action import ActionClient, ActionServer, CancelResponse, GoalResponse
+from throwcollect.ros.embedded.action import (
+    ActionClient,
+    ActionServer,
+    CancelResponse,
+    GoalResponse,
+    get_action_client_names_and_types_by_node,
+    get_action_names_and_types,
+    get_action_server_names_and_types_by_node,
+)
 from throwcollect.ros.embedded.beyond import graph_changes, provide_time
 from throwcollect.ros.embedded.clock import Clock, ROSClock
 from throwcollect.ros.embedded.context import Context, get_default_context, init, ok, shutdown, try_shutdown
@@ -44,6 +52,9 @@ __all__ = [
     "Time",
     "create_node",
     "get_action",
+    "get_action_client_names_and_types_by_node",
+    "get_action_names_and_types",
+    "get_action_server_names_and_types_by_node",
     "get_default_context",
     "get_global_executor",
     "get_message",

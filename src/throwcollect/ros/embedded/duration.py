@@ -33,6 +33,9 @@ class Duration:
     def __repr__(self) -> str:
         return f"Duration(nanoseconds={self.nanoseconds})"
 
+    def __str__(self) -> str:
+        return "Infinite" if self == Infinite else f"{self.nanoseconds} nanoseconds"
+
     def __eq__(self, other: object) -> bool:
         return self.nanoseconds == other.nanoseconds if isinstance(other, Duration) else NotImplemented
 

@@ -13,6 +13,8 @@ PREFIX = "@ros2_lv"
 """First chunk of all tokens."""
 
 _NODE_CHUNKS, _ENDPOINT_CHUNKS = 9, 13
+_MOST_DIGITS = 20
+"""Of a number of 64 bits."""
 
 
 class EntityKind(str, Enum):
@@ -41,6 +43,7 @@ class Token:
         type: DDS name of the type; empty for a node.
         type_hash: Type hash; empty for a node.
         qos: Quality of service as rmw_zenoh_cpp writes it; empty for a node.
+        enclave: Enclave of the node's context.
     """
 
     domain: int
@@ -54,11 +57,12 @@ class Token:
     type: str = ""
     type_hash: str = ""
     qos: str = ""
+    enclave: str = "/"
 
     def key(self) -> str:
         """Key expression of the token."""
-        chunks = [PREFIX, str(self.domain), self.session, str(self.node_id), str(self.entity_id), self.kind.value, "%"]
-        chunks += [self.namespace.replace("/", "%"), self.node]
+        chunks = [PREFIX, str(self.domain), self.session, str(self.node_id), str(self.entity_id), self.kind.value]
+        chunks += [self.enclave.replace("/", "%"), self.namespace.replace("/", "%"), self.node]
         if self.kind is not EntityKind.NODE:
             chunks += [self.name.replace("/", "%"), self.type, self.type_hash, self.qos]
         return "/".join(chunks)
@@ -81,8 +85,8 @@ def parse_token(key: str) -> Token | None:
     chunks = key.split("/")
     if len(chunks) < _NODE_CHUNKS or chunks[0] != PREFIX or not all(chunks):
         return None
-    domain, session, node_id, entity_id, kind, _, namespace, node = chunks[1:_NODE_CHUNKS]
-    if not (domain.isdecimal() and node_id.isdecimal() and entity_id.isdecimal()):
+    domain, session, node_id, entity_id, kind, enclave, namespace, node = chunks[1:_NODE_CHUNKS]
+    if not all(number.isdecimal() and len(number) <= _MOST_DIGITS for number in (domain, node_id, entity_id)):
         return None
     if kind not in EntityKind._value2member_map_ or (kind != "NN" and len(chunks) < _ENDPOINT_CHUNKS):
         return None
@@ -100,6 +104,7 @@ def parse_token(key: str) -> Token | None:
         type=dds,
         type_hash=type_hash,
         qos=qos,
+        enclave=enclave.replace("%", "/"),
     )
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from enum import IntEnum
 
 from throwcollect.ros.embedded.duration import S_TO_NS
@@ -22,8 +24,31 @@ class LoggingSeverity(IntEnum):
     FATAL = 50
 
 
-Sink = Callable[[LoggingSeverity, str, str, int], None]
-"""Takes severity, name of the logger, message and system time [ns]."""
+@dataclass(frozen=True)
+class LogRecord:
+    """One message of a logger.
+
+    Attributes:
+        severity: How severe it is.
+        name: Name of the logger.
+        text: The message.
+        stamp_ns: System time [ns].
+        file: Absolute path of the source that logged it.
+        function: Function that logged it.
+        line: Line in the source.
+    """
+
+    severity: LoggingSeverity
+    name: str
+    text: str
+    stamp_ns: int
+    file: str
+    function: str
+    line: int
+
+
+Sink = Callable[[LogRecord], None]
+"""Takes what is logged."""
 
 _levels: dict[str, LoggingSeverity] = {"": LoggingSeverity.INFO}
 _writing = threading.Lock()
@@ -94,7 +119,12 @@ class Logger:
             sys.stderr.write(line)
             sys.stderr.flush()
         if self._sink is not None:
-            self._sink(severity, self.name, text, stamp)
+            caller = sys._getframe(1)
+            while caller.f_back is not None and caller.f_code.co_filename == __file__:
+                caller = caller.f_back
+            code = caller.f_code
+            file = os.path.abspath(code.co_filename)
+            self._sink(LogRecord(severity, self.name, text, stamp, file, code.co_name, caller.f_lineno))
         return True
 
     def debug(self, message: object, *, once: bool = False, throttle_duration_sec: float | None = None) -> bool:

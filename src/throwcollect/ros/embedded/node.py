@@ -14,7 +14,7 @@ from throwcollect.ros.embedded.duration import S_TO_NS
 from throwcollect.ros.embedded.exceptions import InvalidHandle, NotInitializedException
 from throwcollect.ros.embedded.executors import Executor
 from throwcollect.ros.embedded.keys import EntityKind, Token
-from throwcollect.ros.embedded.logging import Logger, LoggingSeverity
+from throwcollect.ros.embedded.logging import Logger, LogRecord
 from throwcollect.ros.embedded.mailbox import Mailbox
 from throwcollect.ros.embedded.names import absolute_namespace, check_node_name, join, resolve
 from throwcollect.ros.embedded.node_graph import NodeGraph
@@ -33,6 +33,7 @@ from throwcollect.ros.embedded.subscription import Subscription
 from throwcollect.ros.embedded.time import ClockType, Time
 from throwcollect.ros.embedded.time_source import TimeSource
 from throwcollect.ros.embedded.timer import Timer
+from throwcollect.ros.embedded.type_description_service import TypeDescriptionService
 
 _ParameterEvent = get_message("rcl_interfaces/msg/ParameterEvent")
 _Log = get_message("rcl_interfaces/msg/Log")
@@ -80,6 +81,7 @@ class Node(NodeParameters, NodeGraph):
         self.timers: list[Timer] = []
         self._entities: list[Publisher | Subscription | Service | Client] = []
         self._clock = ROSClock()
+        is_taken = (node_name, self._namespace) in self.get_node_names_and_namespaces()
         self.token, self._declared_token = self._declare_token()
         rosout = self.create_publisher(_Log, "/rosout", qos_profile_rosout) if enable_rosout else None
         self._rosout = rosout
@@ -93,7 +95,13 @@ class Node(NodeParameters, NodeGraph):
                 self.declare_parameter(parameter.name, parameter.value)
         self._time_source = TimeSource(self, self._clock)
         if start_parameter_services:
-            self._parameter_service = ParameterService(self)
+            ParameterService(self)
+        TypeDescriptionService(self)
+        if is_taken:
+            self._logger.warning(
+                f"there is another node {self.get_fully_qualified_name()}: both work, but whoever calls one by its "
+                "name, to set a parameter for example, calls both"
+            )
 
     def _declare_token(self) -> tuple[Token, Any]:
         number = self.context.next_id()
@@ -312,12 +320,20 @@ class Node(NodeParameters, NodeGraph):
         event.stamp = self._clock.now().to_msg()
         self._parameter_events.publish(event)
 
-    def _publish_log(self, severity: LoggingSeverity, name: str, text: str, stamp_ns: int) -> None:
+    def _publish_log(self, record: LogRecord) -> None:
         if self._rosout is None:
             return
-        stamp = Time(nanoseconds=stamp_ns, clock_type=ClockType.SYSTEM_TIME).to_msg()
+        message = _Log(
+            stamp=Time(nanoseconds=record.stamp_ns, clock_type=ClockType.SYSTEM_TIME).to_msg(),
+            level=int(record.severity),
+            name=record.name,
+            msg=record.text,
+            file=record.file,
+            function=record.function,
+            line=record.line,
+        )
         try:
-            self._rosout.publish(_Log(stamp=stamp, level=int(severity), name=name, msg=text))
+            self._rosout.publish(message)
         except InvalidHandle:
             self._rosout = None  # The node or its session ended; standard error has the message.
 

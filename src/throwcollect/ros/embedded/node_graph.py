@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from throwcollect.ros.embedded.context import Context
 from throwcollect.ros.embedded.keys import EntityKind
+from throwcollect.ros.embedded.topic_endpoint_info import TopicEndpointInfo, endpoint_info
 
 NamesAndTypes = list[tuple[str, list[str]]]
 """Names of topics or services, each with its types."""
@@ -58,6 +59,19 @@ class NodeGraph:
     def count_subscribers(self, topic_name: str) -> int:
         """Subscriptions to a topic, given by its absolute, relative or private name."""
         return self.context.graph.count(EntityKind.SUBSCRIPTION, self.resolve_topic_name(topic_name))
+
+    def get_publishers_info_by_topic(self, topic_name: str) -> list[TopicEndpointInfo]:
+        """What the graph tells about each publisher of a topic, given by its absolute, relative or private name."""
+        return self._endpoints_info(EntityKind.PUBLISHER, topic_name)
+
+    def get_subscriptions_info_by_topic(self, topic_name: str) -> list[TopicEndpointInfo]:
+        """What the graph tells about each subscription to a topic, given by its absolute, relative or private name."""
+        return self._endpoints_info(EntityKind.SUBSCRIPTION, topic_name)
+
+    def _endpoints_info(self, kind: EntityKind, topic_name: str) -> list[TopicEndpointInfo]:
+        name = self.resolve_topic_name(topic_name)
+        found = (endpoint_info(token) for token in self.context.graph.tokens(kind) if token.name == name)
+        return [info for info in found if info is not None]
 
     def resolve_topic_name(self, topic: str) -> str:
         """Absolute name of a topic."""

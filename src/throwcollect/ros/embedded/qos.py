@@ -118,6 +118,57 @@ def encode(profile: QoSProfile) -> str:
     return f"{reliability}:{durability}:{history},{depth}:{deadline}:{lifespan}:{liveliness},{lease}"
 
 
+def decode(text: str) -> QoSProfile | None:
+    """Profile from the last chunk of a liveliness token; the inverse of `encode`.
+
+    Args:
+        text: The chunk.
+
+    Returns:
+        The profile with the middleware's defaults filled in; None if the text is malformed.
+    """
+    groups = [group.split(",") for group in text.split(":")]
+    if len(groups) < len(_SIZES) or any(len(group) < size for group, size in zip(groups, _SIZES, strict=False)):
+        return None
+    (reliability, *_), (durability, *_), (history, depth, *_), deadline, lifespan, (liveliness, *lease) = groups[:6]
+    try:
+        return QoSProfile(
+            depth=_natural(depth or str(_MIDDLEWARE_DEPTH)),
+            history=HistoryPolicy(_natural(history or "1")),
+            reliability=ReliabilityPolicy(_natural(reliability or "1")),
+            durability=DurabilityPolicy(_natural(durability or "2")),
+            lifespan=_duration(lifespan),
+            deadline=_duration(deadline),
+            liveliness=LivelinessPolicy(_natural(liveliness or "1")),
+            liveliness_lease_duration=_duration(lease),
+        )
+    except ValueError:
+        return None
+
+
+_SIZES = (1, 1, 2, 2, 2, 3)
+"""Least number of values in each group."""
+
+
+def _natural(text: str) -> int:
+    # Not `int` alone, which takes signs, blanks and underscores, too.
+    if not (text.isascii() and text.isdecimal() and len(text) <= _MOST_DIGITS):
+        raise ValueError(f"{text!r:.40} is no number")
+    return int(text)
+
+
+_MOST_DIGITS = 20
+"""Of a number of 64 bits."""
+
+
+def _duration(chunk: list[str]) -> Duration:
+    seconds, nanoseconds = chunk[:2]
+    if not seconds and not nanoseconds:
+        return Infinite
+    total = _natural(seconds or "0") * S_TO_NS + _natural(nanoseconds or "0")
+    return Duration(nanoseconds=min(total, Infinite.nanoseconds))
+
+
 def _number(policy: IntEnum, default: IntEnum) -> str:
     return "" if policy in (0, default) else str(int(policy))
 

@@ -5,7 +5,8 @@ import time
 
 import zenoh
 
-from throwcollect.interfaces import get_message, get_service
+from throwcollect.interfaces import get_message, get_service, type_hash
+from throwcollect.ros import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from throwcollect.ros.embedded.keys import parse_token
 from throwcollect.ros.embedded.session import open_session
 
@@ -35,6 +36,34 @@ def test_nodes_see_what_others_have_as_soon_as_they_exist(rig):
     node.destroy_node()
     assert rig.spin(lambda: seen.get_node_names() == ["b"])
     assert seen.count_publishers("/ns/topic") == 0
+
+
+def test_each_endpoint_of_a_topic_is_known_as_a_genuine_node_shows_it(rig):
+    node = rig.node("a", namespace="/ns")
+    qos = QoSProfile(depth=3, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    publisher = node.create_publisher(String, "t", qos)
+    node.create_subscription(String, "t", print, QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT))
+    seen = rig.node("b", namespace="/ns")
+    (info,) = seen.get_publishers_info_by_topic("t")
+    assert bytes(info.endpoint_gid) == publisher.gid
+    assert str(info).splitlines() == [
+        "Node name: a",
+        "Node namespace: /ns",
+        "Topic type: std_msgs/msg/String",
+        f"Topic type hash: {type_hash(String.TYPE)}",
+        "Endpoint type: PUBLISHER",
+        f"GID: {publisher.gid.hex('.')}",
+        "QoS profile:",
+        "  Reliability: RELIABLE",
+        "  History (Depth): KEEP_LAST (3)",
+        "  Durability: TRANSIENT_LOCAL",
+        "  Lifespan: Infinite",
+        "  Deadline: Infinite",
+        "  Liveliness: AUTOMATIC",
+        "  Liveliness lease duration: Infinite",
+    ]
+    (info,) = seen.get_subscriptions_info_by_topic("/ns/t")
+    assert (info.endpoint_type.name, info.qos_profile.reliability.name) == ("SUBSCRIPTION", "BEST_EFFORT")
 
 
 def test_the_graph_is_complete_when_a_node_begins(rig):

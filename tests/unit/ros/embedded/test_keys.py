@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -35,6 +37,12 @@ def test_tokens_survive_writing_and_parsing(token):
     assert parse_token(token.key()) == token
 
 
+def test_an_enclave_is_part_of_the_token():
+    token = replace(NODE, enclave="/a/b")
+    assert "/NN/%a%b/" in token.key()
+    assert parse_token(token.key()) == token
+
+
 def test_chunks_that_later_versions_append_are_ignored():
     assert parse_token(PUBLISHER.key() + "/more") == PUBLISHER
 
@@ -50,6 +58,7 @@ def test_chunks_that_later_versions_append_are_ignored():
         "@ros2_lv/0/1a/0/0/MP/%/%/n",
         "@ros2_lv/0/1a/0/0/NN//%/n",
         "other/0/1a/0/0/NN/%/%/n",
+        "@ros2_lv/0/1a/0/" + 5000 * "9" + "/NN/%/%/n",
     ],
 )
 def test_malformed_tokens_are_ignored(key):

@@ -1,3 +1,5 @@
+from pathlib import Path
+
 import pytest
 
 from throwcollect.interfaces import get_message
@@ -34,10 +36,28 @@ def test_what_a_node_logs_goes_to_standard_error_and_rosout(rig, capsys):
         Log.WARN[0] if isinstance(Log.WARN, bytes) else Log.WARN,
         "careful",
     )
+    assert (heard[0].file, heard[0].function) == (__file__, "test_what_a_node_logs_goes_to_standard_error_and_rosout")
+    assert "careful" in Path(__file__).read_text(encoding="utf-8").splitlines()[heard[0].line - 1]
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 1
     assert lines[0].startswith("[WARN] [")
     assert lines[0].endswith("[talos.sim]: careful")
+
+
+@pytest.mark.parametrize("same_session", [True, False])
+def test_a_second_node_of_one_name_works_and_warns(rig, capsys, same_session):
+    first = rig.node("twin", namespace="ns")
+    rig.node("twin", namespace="other")
+    assert "twin" not in capsys.readouterr().err
+    second = rig.node("twin", namespace="ns", context=first.context if same_session else None)
+    assert "there is another node /ns/twin" in capsys.readouterr().err
+    heard = []
+    for node in (first, second):
+        node.create_subscription(Log, "t", lambda _, node=node: heard.append(node), 10)
+    publisher = rig.node("talker").create_publisher(Log, "/ns/t", 10)
+    assert rig.spin(lambda: publisher.get_subscription_count() == 2)
+    publisher.publish(Log())
+    assert rig.spin(lambda: set(map(id, heard)) == {id(first), id(second)})
 
 
 def test_logging_goes_on_after_the_node_ended(rig, capsys):

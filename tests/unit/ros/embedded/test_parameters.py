@@ -152,11 +152,12 @@ def test_the_last_callback_that_was_added_is_asked_first(node):
 
 def test_names_are_listed_by_prefix_and_depth(node):
     node.declare_parameters("", [("x", 1), ("a.b", 1), ("a.c.d", 1)])
-    assert node.list_parameters([], 0).names == ["use_sim_time", "x", "a.b", "a.c.d"]
+    own = ["use_sim_time", "start_type_description_service"]
+    assert node.list_parameters([], 0).names == [*own, "x", "a.b", "a.c.d"]
     assert node.list_parameters([], 0).prefixes == ["a", "a.c"]
     assert node.list_parameters(["a"], 0).names == ["a.b", "a.c.d"]
     assert node.list_parameters(["a"], 1).names == ["a.b"]
-    assert node.list_parameters([], 1).names == ["use_sim_time", "x"]
+    assert node.list_parameters([], 1).names == [*own, "x"]
     assert sorted(node.get_parameters_by_prefix("a")) == ["b", "c.d"]
 
 

@@ -1,4 +1,6 @@
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from throwcollect.ros.embedded import qos
 from throwcollect.ros.embedded.duration import Duration, Infinite
@@ -8,6 +10,7 @@ from throwcollect.ros.embedded.qos import (
     LivelinessPolicy,
     QoSProfile,
     ReliabilityPolicy,
+    decode,
     encode,
 )
 
@@ -41,6 +44,38 @@ from throwcollect.ros.embedded.qos import (
 )
 def test_profiles_are_written_as_rmw_zenoh_does(profile, text):
     assert encode(profile) == text
+    assert encode(decode(text)) == text
+
+
+def test_a_profile_is_read_with_the_defaults_of_the_middleware():
+    profile = decode(":1:,:,:10,0:3,2,5")
+    assert (profile.reliability, profile.durability) == (ReliabilityPolicy.RELIABLE, DurabilityPolicy.TRANSIENT_LOCAL)
+    assert (profile.history, profile.depth) == (HistoryPolicy.KEEP_LAST, 42)
+    assert (profile.deadline, profile.lifespan) == (Infinite, Duration(seconds=10))
+    assert profile.liveliness is LivelinessPolicy.MANUAL_BY_TOPIC
+    assert profile.liveliness_lease_duration == Duration(seconds=2, nanoseconds=5)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        ":",
+        "::,10:,:,:,",
+        "::10:,:,:,,",
+        "9:,:,10:,:,:,,",
+        "::,x:,:,:,,",
+        "::,-1:,:,:,,",
+        "::,1" + 99 * "0" + ":,:,:,,",
+    ],
+)
+def test_a_malformed_profile_is_none(text):
+    assert decode(text) is None
+
+
+@given(st.text(alphabet="0129:,x-", max_size=40))
+def test_reading_a_profile_never_fails(text):
+    decode(text)
 
 
 def test_history_or_depth_is_required():

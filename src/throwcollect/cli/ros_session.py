@@ -1,0 +1,176 @@
+"""A moment in the ROS graph: how `throwcollect ros` joins it, waits in it and leaves it."""
+
+from __future__ import annotations
+
+import difflib
+import os
+import re
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from throwcollect import ros
+from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError, WorkerError
+from throwcollect.runtime.nodes import node_environment
+from throwcollect.runtime.records import Records
+from throwcollect.runtime.runs import find, living
+
+_SLICE_S = 0.2
+"""rclpy looks at signals between two waits only."""
+_MOST_NAMES = 8
+_ABSOLUTE = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
+
+
+class Session:
+    """A hidden node, and the executor that it spins in.
+
+    Attributes:
+        node: The node.
+    """
+
+    def __init__(self) -> None:
+        self.node = ros.create_node(f"_throwcollect_{os.getpid()}", enable_rosout=False, start_parameter_services=False)
+        self._executor = ros.SingleThreadedExecutor()
+        self._executor.add_node(self.node)
+
+    def spin_until(self, done: Callable[[], bool]) -> None:
+        """Call back until something is true."""
+        while not done():
+            self._executor.spin_once(timeout_sec=_SLICE_S)
+
+    def answer(self, future: ros.Future, *, alive: Callable[[], bool], who: str) -> Any:
+        """Wait for an answer.
+
+        Args:
+            future: What is waited for.
+            alive: Whether somebody is there who may answer.
+            who: Who that is.
+
+        Returns:
+            The answer.
+
+        Raises:
+            WorkerError: If nobody is there any more.
+        """
+        self.spin_until(lambda: future.done() or not alive())
+        if not future.done():
+            raise WorkerError(f"{who} is gone and has not answered")
+        return future.result()
+
+    def close(self) -> None:
+        """Leave."""
+        self.node.destroy_node()
+        ros.shutdown()
+
+
+@contextmanager
+def joined(run: str | None) -> Iterator[Session]:
+    """Join the graph of a run, or of the router that the environment names.
+
+    Args:
+        run: Id of a run, unique beginning of one, or directory of the dataset; None for the environment's router.
+
+    Yields:
+        The session.
+
+    Raises:
+        ConfigError: If there is no such run or no router.
+        WorkerError: If the run has no router (any more).
+        Interrupted: If the user leaves; the message is empty, as that is how one leaves.
+    """
+    if run is not None:
+        record = living(find(Records(), run))
+        if record.endpoint is None:
+            raise WorkerError(f"run {record.run} has no router yet", hint="try once more")
+        os.environ.update(node_environment(record.endpoint, record.domain_id))
+    try:
+        _init()
+        session = Session()
+        try:
+            yield session
+        finally:
+            session.close()
+    except KeyboardInterrupt:
+        raise Interrupted("") from None
+
+
+def _init() -> None:
+    try:
+        ros.init()
+    except ConfigError:
+        raise
+    except ThrowcollectError as error:
+        raise ConfigError(
+            error.message,
+            expected="a router there, or another one named in ZENOH_CONFIG_OVERRIDE",
+            hint="--run RUN joins a run; throwcollect ps lists them",
+        ) from error
+
+
+def absolute(name: str) -> str:
+    """Absolute name of a node, topic, service or action that a user names with or without its leading slash.
+
+    Raises:
+        ConfigError: If ROS does not allow such names.
+    """
+    whole = name if name.startswith("/") else f"/{name}"
+    if not _ABSOLUTE.fullmatch(whole):
+        raise ConfigError(
+            f"{name!r} is no name in ROS", expected="letters, digits and underscores between single slashes"
+        )
+    return whole
+
+
+def is_hidden(name: str) -> bool:
+    """Whether ROS hides a name, because a part of it begins with an underscore."""
+    return any(part.startswith("_") for part in name.split("/"))
+
+
+def known(what: str, name: str, names: Iterable[str], *, of: str = "") -> None:
+    """Refuse a name that is not there.
+
+    Args:
+        what: What it names, such as ``topic``.
+        name: The name.
+        names: All names that there are.
+        of: Whose it would be; empty for the graph's.
+
+    Raises:
+        ConfigError: If it is none of them.
+    """
+    there = sorted(set(names))
+    if name in there:
+        return
+    near = difflib.get_close_matches(name, there, n=3) or [each for each in there if not is_hidden(each)]
+    listed = ", ".join(near[:_MOST_NAMES]) + (", ..." if len(near) > _MOST_NAMES else "")
+    owner = f" of {of}" if of else ""
+    raise ConfigError(f"no {what} {name}{owner}" + ("" if there else "; there is none"), expected=listed or None)
+
+
+def full_name(kind: str, name: str) -> str:
+    """Full name of a type that may be named without its kind, as ``std_msgs/String`` for ``std_msgs/msg/String``."""
+    return name.replace("/", f"/{kind}/") if name.count("/") == 1 else name
+
+
+def interface(kind: str, get: Callable[[str], Any], name: str) -> Any:
+    """Class of a message, service or action that a user names.
+
+    Args:
+        kind: ``msg``, ``srv`` or ``action``.
+        get: Finds the class by its full name.
+        name: Full name, or without the kind: ``std_msgs/String``.
+
+    Raises:
+        ConfigError: If there is no such type.
+    """
+    try:
+        return get(full_name(kind, name))
+    except (ValueError, AttributeError, ModuleNotFoundError) as error:
+        raise ConfigError(f"{name}: {error}") from error
+
+
+def print_names(names_and_types: Iterable[tuple[str, list[str]]], *, types: bool, hidden: bool) -> None:
+    """Print names, one a line, with their types if wanted, without hidden ones if wanted."""
+    for name, kinds in names_and_types:
+        if hidden or not is_hidden(name):
+            print(f"{name} [{', '.join(kinds)}]" if types else name)

@@ -1,0 +1,141 @@
+"""Points of a trajectory in a controller's joint order, with all that they leave out filled in."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from throwcollect.control.goal import Trajectory, TrajectoryPoint, Values
+
+LINE, CUBIC, QUINTIC = 0, 1, 2
+"""What a point has besides positions: nothing, velocities, accelerations too."""
+
+
+@dataclass(frozen=True)
+class Waypoints:
+    """Points of a trajectory in the controller's joint order.
+
+    Attributes:
+        times_ns: Time since the trajectory's start [ns], shape ``(n_points,)``, int64.
+        positions: [rad], shape ``(n_points, n_joints)``.
+        velocities: [rad/s], shape ``(n_points, n_joints)``; 0 where a point has none.
+        accelerations: [rad/s²], shape ``(n_points, n_joints)``; 0 where a point has none.
+        content: What a point has, shape ``(n_points,)``: `LINE`, `CUBIC` or `QUINTIC`.
+        effort: [Nm], shape ``(n_points, n_joints)``, 0 where a point has none; None if no point has any.
+    """
+
+    times_ns: NDArray[np.int64]
+    positions: NDArray[np.float64]
+    velocities: NDArray[np.float64]
+    accelerations: NDArray[np.float64]
+    content: NDArray[np.int64]
+    effort: NDArray[np.float64] | None = None
+
+    @classmethod
+    def single(
+        cls,
+        positions: NDArray[np.float64],
+        velocities: NDArray[np.float64] | None = None,
+        accelerations: NDArray[np.float64] | None = None,
+        effort: NDArray[np.float64] | None = None,
+    ) -> Waypoints:
+        """One point at the trajectory's start, to be held.
+
+        Args:
+            positions: [rad], shape ``(n_joints,)``.
+            velocities: [rad/s], shape ``(n_joints,)``; None for 0.
+            accelerations: [rad/s²], shape ``(n_joints,)``; None for 0.
+            effort: [Nm], shape ``(n_joints,)``; None for none.
+
+        Returns:
+            The point.
+        """
+        still = np.zeros(len(positions))
+        rows = [still if row is None else row for row in (positions, velocities, accelerations)]
+        p, v, a = (row[np.newaxis] for row in rows)
+        return cls(
+            np.zeros(1, np.int64), p, v, a, np.zeros(1, np.int64), None if effort is None else effort[np.newaxis]
+        )
+
+
+@dataclass(frozen=True)
+class StartState:
+    """Where a trajectory begins.
+
+    Attributes:
+        time_ns: When, since the trajectory's start [ns]; points before it are over.
+        positions: [rad], shape ``(n_joints,)``.
+        velocities: [rad/s], shape ``(n_joints,)``; None for 0.
+        accelerations: [rad/s²], shape ``(n_joints,)``; None for 0.
+    """
+
+    time_ns: int
+    positions: NDArray[np.float64]
+    velocities: NDArray[np.float64] | None = None
+    accelerations: NDArray[np.float64] | None = None
+
+
+def arranged(
+    trajectory: Trajectory, joints: Sequence[str], command: NDArray[np.float64], start: StartState
+) -> Waypoints:
+    """Points of a valid trajectory in the controller's joint order.
+
+    Args:
+        trajectory: What has been asked for.
+        joints: Joints of the controller, in order.
+        command: Last commanded positions [rad], shape ``(n_joints,)``: joints that are left out stay there.
+        start: Where the trajectory begins: points without positions are integrated from there.
+
+    Returns:
+        The points for all joints of the controller.
+    """
+    points = trajectory.points
+    columns = [joints.index(name) for name in trajectory.joint_names]
+    times_ns = np.array([point.time_from_start_ns for point in points], dtype=np.int64)
+    positions = np.repeat(command[np.newaxis], len(points), axis=0)
+    placed = [index for index, point in enumerate(points) if len(point.positions)]
+    if placed:
+        positions[np.ix_(placed, columns)] = [points[index].positions for index in placed]
+    velocities, moving = _table([point.velocities for point in points], positions.shape, columns)
+    accelerations, accelerating = _table([point.accelerations for point in points], positions.shape, columns)
+    effort, pushing = _table([point.effort for point in points], positions.shape, columns)
+    content = np.zeros(len(points), np.int64)
+    content[moving] = CUBIC
+    content[[index for index in accelerating if content[index] == CUBIC]] = QUINTIC
+    waypoints = Waypoints(times_ns, positions, velocities, accelerations, content, effort if pushing else None)
+    return waypoints if len(placed) == len(points) else _integrated(waypoints, points, columns, start)
+
+
+def _table(
+    fields: Sequence[Values], shape: tuple[int, ...], columns: list[int]
+) -> tuple[NDArray[np.float64], list[int]]:
+    table = np.zeros(shape)
+    present = [index for index, values in enumerate(fields) if len(values)]
+    if present:
+        table[np.ix_(present, columns)] = [fields[index] for index in present]
+    return table, present
+
+
+def _integrated(
+    waypoints: Waypoints, points: Sequence[TrajectoryPoint], columns: list[int], start: StartState
+) -> Waypoints:
+    """Fill in positions, and velocities too where a point has accelerations alone, by the trapezoidal rule."""
+    positions, velocities, content = waypoints.positions.copy(), waypoints.velocities.copy(), waypoints.content.copy()
+    still = np.zeros(positions.shape[1])
+    time_ns = min(start.time_ns, int(waypoints.times_ns[0]))
+    p = start.positions
+    v, a = (still if values is None else values for values in (start.velocities, start.accelerations))
+    for index, point in enumerate(points):
+        seconds = (int(waypoints.times_ns[index]) - time_ns) / 1e9
+        if not len(point.positions):
+            if not len(point.velocities):
+                gained = (a + waypoints.accelerations[index]) / 2 * seconds
+                velocities[index, columns] = (v + gained)[columns]
+            content[index] = QUINTIC if len(point.accelerations) else CUBIC
+            positions[index, columns] = (p + (v + velocities[index]) / 2 * seconds)[columns]
+        time_ns = int(waypoints.times_ns[index])
+        p, v, a = positions[index], velocities[index], waypoints.accelerations[index]
+    return replace(waypoints, positions=positions, velocities=velocities, content=content)

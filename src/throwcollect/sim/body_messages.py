@@ -1,0 +1,46 @@
+"""States of bodies in ROS messages."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from throwcollect.ros import get_message
+from throwcollect.sim.entities import WORLD_FRAME
+from throwcollect.sim.recording import BodyState
+
+EntityState: Any = get_message("simulation_interfaces/msg/EntityState")
+
+
+def body_state(pose: Any, twist: Any | None = None) -> BodyState:
+    """State that is given as messages.
+
+    Args:
+        pose: geometry_msgs/msg/Pose.
+        twist: geometry_msgs/msg/Twist; None if it stands still.
+    """
+    position, orientation = pose.position, pose.orientation
+    place = (position.x, position.y, position.z)
+    turn = (orientation.x, orientation.y, orientation.z, orientation.w)
+    if twist is None:
+        return BodyState(place, turn)
+    linear, angular = twist.linear, twist.angular
+    return BodyState(place, turn, (linear.x, linear.y, linear.z), (angular.x, angular.y, angular.z))
+
+
+def entity_state(state: BodyState, now_ns: int) -> Any:
+    """simulation_interfaces/msg/EntityState of a state in the world; accelerations are not measured.
+
+    Args:
+        state: The state.
+        now_ns: Simulated time [ns].
+    """
+    message = EntityState()
+    message.header.frame_id = WORLD_FRAME
+    message.header.stamp.sec, message.header.stamp.nanosec = divmod(now_ns, 10**9)
+    position, orientation = message.pose.position, message.pose.orientation
+    position.x, position.y, position.z = state.position
+    orientation.x, orientation.y, orientation.z, orientation.w = state.orientation_xyzw
+    linear, angular = message.twist.linear, message.twist.angular
+    linear.x, linear.y, linear.z = state.linear_velocity
+    angular.x, angular.y, angular.z = state.angular_velocity
+    return message

@@ -1,0 +1,124 @@
+"""The FollowJointTrajectory action of one controller."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Hashable
+from typing import Any
+
+from throwcollect.control import ControllerState, GoalResult, GoalStatus, Refusal
+from throwcollect.ros import ActionServer, CancelResponse, Future, GoalResponse, Node
+from throwcollect.sim.controller_messages import FollowJointTrajectory, feedback_message, read_goal
+from throwcollect.sim.simulation import Simulation
+
+_RESULT_TIMEOUT_S = 10
+"""How long a result can be asked for, on the simulation's clock; rcl's default."""
+
+
+class ControllerAction:
+    """Takes goals for a controller, and tells what becomes of them.
+
+    Args:
+        node: Node of the controller.
+        simulation: The simulation.
+        controller: The controller, by its name in the simulation.
+        aborts_refused: Whether goals that cannot be executed are accepted and then aborted with the reason, instead of
+            being rejected.
+    """
+
+    def __init__(self, node: Node, simulation: Simulation, controller: str, *, aborts_refused: bool) -> None:
+        self._node = node
+        self._simulation = simulation
+        self._controller = controller
+        self._aborts_refused = aborts_refused
+        self._count = 0
+        self._told_ns = 0
+        self._considered: deque[int] = deque()
+        self._keys: dict[bytes, int] = {}
+        self._handles: dict[Hashable, Any] = {}
+        self._results: dict[Hashable, Future] = {}
+        name = f"{node.get_name()}/follow_joint_trajectory"
+        self._feedback_topic = f"{name}/_action/feedback"
+        self._server = ActionServer(
+            node,
+            FollowJointTrajectory,
+            name,
+            execute_callback=self._execute,
+            goal_callback=self._consider,
+            handle_accepted_callback=self._accept,
+            cancel_callback=self._cancel,
+            result_timeout=_RESULT_TIMEOUT_S,
+        )
+
+    def finish(self, result: GoalResult) -> None:
+        """Answer whoever waits for the result of a goal."""
+        if (future := self._results.get(result.goal_id)) is not None:
+            future.set_result(result)
+            # No feedback after the end, which may lie within the slice of time that has just passed.
+            self._handles.pop(result.goal_id, None)
+
+    @property
+    def heard(self) -> bool:
+        """Whether somebody listens to feedback."""
+        return self._node.count_subscribers(self._feedback_topic) > 0
+
+    @property
+    def watched(self) -> bool:
+        """Whether somebody listens to feedback that there is."""
+        return bool(self._results) and self.heard
+
+    def publish_feedback(self, state: ControllerState) -> None:
+        """Tell how far the goals have come, unless no time has passed since the last time."""
+        if self._simulation.now_ns == self._told_ns:
+            return
+        self._told_ns = self._simulation.now_ns
+        feedback = feedback_message(state)
+        for handle in self._handles.values():
+            handle.publish_feedback(feedback)
+
+    def _consider(self, request: Any) -> GoalResponse:
+        # The controller takes the goal here, as it alone can tell whether it is acceptable. Its handle follows in the
+        # same order, but perhaps after the next goal, or after its own end.
+        refusal = self._simulation.submit(self._controller, self._count + 1, read_goal(request))
+        if refusal is not None and not self._aborts_refused:
+            return GoalResponse.REJECT
+        self._count += 1
+        # There is nothing to tell of a goal before time has passed.
+        self._told_ns = self._simulation.now_ns
+        self._considered.append(self._count)
+        self._results[self._count] = Future()
+        if refusal is not None:
+            self.finish(self._aborted(self._count, refusal))
+        return GoalResponse.ACCEPT
+
+    def _aborted(self, key: int, refusal: Refusal) -> GoalResult:
+        return GoalResult(key, GoalStatus.ABORTED, refusal.error_code, refusal.text, self._simulation.now_ns)
+
+    def _accept(self, handle: Any) -> None:
+        key = self._considered.popleft()
+        self._keys[_uuid(handle)] = key
+        self._handles[key] = handle
+        handle.execute()
+
+    def _cancel(self, handle: Any) -> CancelResponse:
+        # Its result reaches the client when the goal's execution goes on, after this answer.
+        key = self._keys.get(_uuid(handle))
+        cancelled = key is not None and self._simulation.cancel(self._controller, key)
+        return CancelResponse.ACCEPT if cancelled else CancelResponse.REJECT
+
+    async def _execute(self, handle: Any) -> Any:
+        key = self._keys[_uuid(handle)]
+        result: GoalResult = await self._results[key]
+        del self._keys[_uuid(handle)], self._results[key]
+        self._handles.pop(key, None)
+        if result.status == GoalStatus.SUCCEEDED:
+            handle.succeed()
+        elif result.status == GoalStatus.CANCELED:
+            handle.canceled()
+        else:
+            handle.abort()
+        return FollowJointTrajectory.Result(error_code=int(result.error_code), error_string=result.error_string)
+
+
+def _uuid(handle: Any) -> bytes:
+    return bytes(bytearray(handle.goal_id.uuid))

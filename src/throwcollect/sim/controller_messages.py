@@ -1,0 +1,93 @@
+"""Messages of controllers, to and from the terms of `throwcollect.control`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from throwcollect.control import ControllerState, JointTolerance, Trajectory, TrajectoryGoal, TrajectoryPoint
+from throwcollect.ros import get_action, get_message
+
+FollowJointTrajectory: Any = get_action("control_msgs/action/FollowJointTrajectory")
+JointTrajectory: Any = get_message("trajectory_msgs/msg/JointTrajectory")
+JointTrajectoryPoint: Any = get_message("trajectory_msgs/msg/JointTrajectoryPoint")
+JointTrajectoryControllerState: Any = get_message("control_msgs/msg/JointTrajectoryControllerState")
+
+_NS = 10**9
+
+
+def nanoseconds(time: Any) -> int:
+    """A builtin_interfaces Time or Duration in nanoseconds."""
+    return int(time.sec) * _NS + int(time.nanosec)
+
+
+def read_trajectory(message: Any) -> Trajectory:
+    """Contents of a trajectory_msgs/msg/JointTrajectory."""
+    stamp_ns = nanoseconds(message.header.stamp)
+    return Trajectory(
+        joint_names=tuple(message.joint_names),
+        points=tuple(
+            TrajectoryPoint(
+                nanoseconds(point.time_from_start),
+                point.positions,
+                point.velocities,
+                point.accelerations,
+                point.effort,
+            )
+            for point in message.points
+        ),
+        # A stamp of zero is ROS' way of leaving it out.
+        stamp_ns=stamp_ns or None,
+    )
+
+
+def read_goal(message: Any) -> TrajectoryGoal:
+    """Contents of a FollowJointTrajectory goal; those that ros2_controllers ignores are ignored here too."""
+    return TrajectoryGoal(
+        trajectory=read_trajectory(message.trajectory),
+        path_tolerance=_read_tolerances(message.path_tolerance),
+        goal_tolerance=_read_tolerances(message.goal_tolerance),
+        goal_time_tolerance_ns=nanoseconds(message.goal_time_tolerance),
+    )
+
+
+def state_message(state: ControllerState) -> Any:
+    """A control_msgs/msg/JointTrajectoryControllerState."""
+    message = JointTrajectoryControllerState(
+        joint_names=list(state.joint_names),
+        reference=_point_message(state.desired),
+        feedback=_point_message(state.actual),
+        error=_point_message(state.error),
+        output=_point_message(state.output),
+        speed_scaling_factor=float(state.speed_scaling_factor),
+    )
+    message.header.stamp.sec, message.header.stamp.nanosec = divmod(state.stamp_ns, _NS)
+    return message
+
+
+def feedback_message(state: ControllerState) -> Any:
+    """Feedback of FollowJointTrajectory."""
+    message = FollowJointTrajectory.Feedback(
+        joint_names=list(state.joint_names),
+        desired=_point_message(state.desired),
+        actual=_point_message(state.actual),
+        error=_point_message(state.error),
+    )
+    message.header.stamp.sec, message.header.stamp.nanosec = divmod(state.stamp_ns, _NS)
+    return message
+
+
+def _read_tolerances(messages: Any) -> tuple[JointTolerance, ...]:
+    return tuple(
+        JointTolerance(message.name, message.position, message.velocity, message.acceleration) for message in messages
+    )
+
+
+def _point_message(point: TrajectoryPoint) -> Any:
+    message = JointTrajectoryPoint(
+        positions=point.positions,
+        velocities=point.velocities,
+        accelerations=point.accelerations,
+        effort=point.effort,
+    )
+    message.time_from_start.sec, message.time_from_start.nanosec = divmod(point.time_from_start_ns, _NS)
+    return message

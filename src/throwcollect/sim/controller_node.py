@@ -1,0 +1,124 @@
+"""The ROS 2 node of one controller, with the names that it has on the real robot."""
+
+from __future__ import annotations
+
+import logging
+from typing import Any
+
+from throwcollect.control import GoalResult
+from throwcollect.ros import DurabilityPolicy, Node, QoSProfile, Time, get_message, get_service, provide_time
+from throwcollect.sim.controller_action import ControllerAction
+from throwcollect.sim.controller_messages import (
+    JointTrajectory,
+    JointTrajectoryControllerState,
+    nanoseconds,
+    read_trajectory,
+    state_message,
+)
+from throwcollect.sim.controller_parameters import ParameterFace
+from throwcollect.sim.simulation import Simulation
+
+QueryTrajectoryState: Any = get_service("control_msgs/srv/QueryTrajectoryState")
+SpeedScalingFactor: Any = get_message("control_msgs/msg/SpeedScalingFactor")
+
+_SPEED = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+_STATES = QoSProfile(depth=100)
+"""The states of one slice of time leave together."""
+
+
+class ControllerNode(Node):
+    """Offers one controller in the namespace of its simulation.
+
+    Args:
+        parent: The simulation's node.
+        simulation: The simulation.
+        controller: The controller, by its name in the simulation.
+    """
+
+    def __init__(self, parent: Node, simulation: Simulation, controller: str) -> None:
+        limb = simulation.limbs[controller]
+        super().__init__(limb.name, namespace=parent.get_namespace(), context=parent.context)
+        provide_time(self)
+        self.controller = controller
+        self._simulation = simulation
+        self._limb = limb
+        self._log = _LogHandler(self)
+        limb.controller.logger.addHandler(self._log)
+        ParameterFace(self, limb)
+        self._action = ControllerAction(
+            self, simulation, controller, aborts_refused=simulation.config.controllers.refused_goals == "abort"
+        )
+        self.create_subscription(JointTrajectory, "~/joint_trajectory", self._follow, 10)
+        self.create_subscription(SpeedScalingFactor, "~/speed_scaling_input", self._scale_speed, _SPEED)
+        self.create_service(QueryTrajectoryState, "~/query_state", self._query)
+        self._states = self.create_publisher(JointTrajectoryControllerState, "~/controller_state", _STATES)
+
+    def finish(self, result: GoalResult) -> None:
+        """Answer whoever waits for the result of a goal."""
+        self._action.finish(result)
+
+    @property
+    def heard(self) -> bool:
+        """Whether somebody listens to the controller's state or to its feedback."""
+        return self.wants_states or self._action.heard
+
+    @property
+    def watched(self) -> bool:
+        """Whether somebody listens to the controller's state, or to feedback that there is."""
+        return self.wants_states or self._action.watched
+
+    @property
+    def wants_states(self) -> bool:
+        """Whether somebody listens to the controller's state."""
+        return bool(self._states.get_subscription_count())
+
+    def publish_state(self) -> None:
+        """Publish the controller's states since the last time, and the feedback of its goal, to whoever listens."""
+        states = self._limb.pop_states()
+        if not self.watched:
+            return
+        if self.wants_states and not (states or self._simulation.running):
+            # Time stands still, but whoever has just come wants to know.
+            states = [self._simulation.controller_state(self.controller)]
+        for state in states:
+            self._states.publish(state_message(state))
+        if self._action.watched:
+            self._action.publish_feedback(states[-1] if states else self._simulation.controller_state(self.controller))
+
+    def set_time(self, time: Time) -> None:
+        """Set the node's clock."""
+        self.get_clock().set_ros_time_override(time)
+
+    def destroy_node(self) -> None:
+        """Withdraw the node."""
+        self._limb.controller.logger.removeHandler(self._log)
+        super().destroy_node()
+
+    def _follow(self, message: Any) -> None:
+        self._simulation.follow(self.controller, read_trajectory(message))
+
+    def _scale_speed(self, message: Any) -> None:
+        self._limb.controller.scale_speed(message.factor)
+
+    def _query(self, request: Any, response: Any) -> Any:
+        state = self._simulation.query(self.controller, nanoseconds(request.time))
+        response.success = state.success
+        response.name = list(self._limb.controller.parameters.joints)
+        response.position = state.positions
+        response.velocity = [] if state.velocities is None else state.velocities
+        response.acceleration = [] if state.accelerations is None else state.accelerations
+        return response
+
+
+class _LogHandler(logging.Handler):
+    """Passes on what a controller logs to the log of its node."""
+
+    def __init__(self, node: Node) -> None:
+        super().__init__()
+        self._logger = node.get_logger()
+
+    def emit(self, record: logging.LogRecord) -> None:
+        if record.levelno >= logging.ERROR:
+            self._logger.error(record.getMessage())
+        else:
+            self._logger.warning(record.getMessage())

@@ -1,0 +1,108 @@
+"""The ROS parameters of a joint trajectory controller, by the names that ros2_controllers gives them."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from throwcollect.control import ControllerParameters
+from throwcollect.errors import ConfigError
+from throwcollect.ros import Node, Parameter, ParameterDescriptor, SetParametersResult
+from throwcollect.sim.limb import Limb
+
+_READ_ONLY = {
+    "joints": "Joint names of the system",
+    "command_interfaces": "What is commanded to all joints",
+    "state_interfaces": "What is measured of all joints",
+    "interpolation_method": "How points are connected",
+    "interpolate_from_desired_state": "Whether trajectories begin at the last command",
+    "action_monitor_rate": "Feedback messages of a goal per simulated second",
+}
+_CHANGEABLE = {
+    "allow_partial_joints_goal": "Whether goals may leave joints out",
+    "allow_integration_in_goal_trajectories": "Whether points may lack positions, which are then integrated",
+    "allow_nonzero_velocity_at_trajectory_end": "Whether the last point may have a velocity",
+    "set_last_command_interface_value_as_state_on_activation": "Whether activation holds the last command",
+    "cmd_timeout": "How long after the end of a trajectory the joints are stopped [s]; 0 never",
+}
+
+
+class ParameterFace:
+    """Declares the parameters of a limb's controller on its node, and hands changes on.
+
+    What is changed holds for the next goal. The gains of ros2_controllers are left out, as controllers that command
+    positions have none.
+
+    Args:
+        node: Node of the controller.
+        limb: The limb.
+    """
+
+    def __init__(self, node: Node, limb: Limb) -> None:
+        self._limb = limb
+        for name, value, description, read_only in _declared(limb.controller.parameters):
+            node.declare_parameter(name, value, ParameterDescriptor(description=description, read_only=read_only))
+        node.add_on_set_parameters_callback(self._check)
+        node.add_post_set_parameters_callback(self._apply)
+
+    def _check(self, parameters: list[Parameter]) -> Any:
+        try:
+            _changed(self._limb.controller.parameters, _values(parameters))
+        except ConfigError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    def _apply(self, parameters: list[Parameter]) -> None:
+        controller = self._limb.controller
+        controller.parameters = _changed(controller.parameters, _values(parameters))
+
+
+def _values(parameters: list[Parameter]) -> dict[str, Any]:
+    return {parameter.name: parameter.value for parameter in parameters}
+
+
+def _declared(parameters: ControllerParameters) -> Iterator[tuple[str, Any, str, bool]]:
+    """Name, value and description of each parameter, and whether it is read-only."""
+    for names, read_only in ((_READ_ONLY, True), (_CHANGEABLE, False)):
+        for name, description in names.items():
+            value = getattr(parameters, name)
+            yield name, list(value) if isinstance(value, tuple) else value, description, read_only
+    constraints, scaling = parameters.constraints, parameters.speed_scaling
+    yield "command_joints", list(parameters.joints), "Joint names to control", True
+    yield "open_loop_control", parameters.interpolate_from_desired_state, "Old name", True
+    yield "speed_scaling.initial_scaling_factor", scaling.initial_scaling_factor, "Speed at the start", True
+    yield "speed_scaling.state_interface", "", "Where the hardware tells its speed", True
+    yield "speed_scaling.command_interface", "", "Where the hardware is told its speed", True
+    yield "constraints.goal_time", constraints.goal_time, "How late a goal may be reached [s]; 0 for any time", False
+    stopped = "Largest velocity at the end [rad/s]; without effect where positions alone are commanded"
+    yield "constraints.stopped_velocity_tolerance", constraints.stopped_velocity_tolerance, stopped, False
+    yield "constraints.decelerate_on_cancel", constraints.decelerate_on_cancel, "Whether joints brake", True
+    for joint in parameters.joints:
+        limits = constraints.of(joint)
+        path, key = "Largest position error while moving [rad]; 0 is not checked", f"constraints.{joint}"
+        yield f"{key}.trajectory", limits.trajectory, path, False
+        yield f"{key}.goal", limits.goal, "Largest position error at the end [rad]; 0 is not checked", False
+        yield f"{key}.max_deceleration_on_cancel", limits.max_deceleration_on_cancel, "How hard it brakes", True
+
+
+def _changed(parameters: ControllerParameters, values: Mapping[str, Any]) -> ControllerParameters:
+    """Parameters with new values for some ROS parameters that are declared.
+
+    Raises:
+        ConfigError: If the values are not valid.
+    """
+    constraints = parameters.constraints
+    joints = dict(constraints.joints)
+    own: dict[str, Any] = {}
+    common: dict[str, Any] = {}
+    for name, value in values.items():
+        section, _, rest = name.partition(".")
+        joint, _, key = rest.rpartition(".")
+        if section == "constraints" and joint:
+            joints[joint] = dataclasses.replace(joints.get(joint, constraints.of(joint)), **{key: value})
+        elif section == "constraints":
+            common[key] = value
+        elif name in _CHANGEABLE:
+            own[name] = value
+    return dataclasses.replace(parameters, **own, constraints=dataclasses.replace(constraints, joints=joints, **common))

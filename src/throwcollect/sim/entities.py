@@ -1,0 +1,255 @@
+"""What is in the world, by name: ball, robot, and what clients have spawned."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import IntEnum
+
+import pybullet
+
+from throwcollect.errors import RequestError
+from throwcollect.sim.bullet import Box
+from throwcollect.sim.recording import BodyState, Vector
+from throwcollect.sim.urdf import Model
+from throwcollect.sim.world import World
+
+BALL = "ball"
+WORLD_FRAME = "world"
+_LARGEST_COORDINATE_M = 1e3
+_LARGEST_SPEED = 1e3
+"""In m/s and rad/s: what is faster soon leaves the range of numbers."""
+
+_NORM_TOLERANCE = 1e-3
+_MOST_SPAWNED = 200
+_LONGEST_INFO = 65_536
+
+
+class Category(IntEnum):
+    """Constants of simulation_interfaces/msg/EntityCategory."""
+
+    OBJECT = 0
+    ROBOT = 1
+    HUMAN = 2
+    DYNAMIC_OBJECT = 4
+    STATIC_OBJECT = 5
+
+
+@dataclass(frozen=True)
+class EntityInfo:
+    """What is said about an entity.
+
+    Attributes:
+        category: Constant of `Category`.
+        description: For people.
+        tags: For filters.
+    """
+
+    category: int
+    description: str = ""
+    tags: tuple[str, ...] = ()
+
+
+class Entities:
+    """The entities of one world.
+
+    Args:
+        world: The world.
+        robot: Name of the robot.
+    """
+
+    def __init__(self, world: World, robot: str) -> None:
+        self._world = world
+        self._robot = robot
+        self._first_infos = {
+            BALL: EntityInfo(Category.DYNAMIC_OBJECT, "what is thrown"),
+            robot: EntityInfo(Category.ROBOT, "the robot that throws; its base is fixed"),
+        }
+        self._infos: dict[str, EntityInfo] = {}
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of all entities: ball, robot, then what was spawned, in order."""
+        return (BALL, self._robot, *self._world.spawned.entities)
+
+    def forget_infos(self) -> None:
+        """Go back to what is said about ball and robot at the start; forget what was said about what is gone."""
+        for name in [name for name in self._infos if name not in self._world.spawned]:
+            del self._infos[name]
+
+    def info(self, name: str) -> EntityInfo:
+        """What is said about an entity.
+
+        Raises:
+            RequestError: ``RESULT_NOT_FOUND`` if there is none of that name.
+        """
+        self._require(name)
+        return self._infos.get(name) or self._first_infos[name]
+
+    def set_info(self, name: str, info: EntityInfo) -> None:
+        """Say something else about an entity.
+
+        Raises:
+            RequestError: ``RESULT_NOT_FOUND`` if there is none of that name, ``RESULT_OPERATION_FAILED`` if there is no
+                such category or the text is too long.
+        """
+        self._require(name)
+        if info.category not in list(Category):
+            known = ", ".join(f"{category} {category.name}" for category in Category)
+            raise RequestError("RESULT_OPERATION_FAILED", f"no category {info.category}", expected=known)
+        length = len(info.description) + sum(len(tag) + 1 for tag in info.tags)
+        if length > _LONGEST_INFO:
+            message = f"description and tags have {length} characters; at most {_LONGEST_INFO}"
+            raise RequestError("RESULT_OPERATION_FAILED", message)
+        self._infos[name] = info
+
+    def state(self, name: str) -> BodyState:
+        """Where an entity is and how it moves, in the world.
+
+        Raises:
+            RequestError: ``RESULT_NOT_FOUND`` if there is none of that name.
+        """
+        self._require(name)
+        if name == BALL:
+            return self._world.ball
+        if name == self._robot:
+            return self._world.robot_base
+        return self._world.spawned.state(name)
+
+    def place(self, name: str, state: BodyState, *, frame: str, accelerates: bool) -> None:
+        """Put an entity somewhere.
+
+        Args:
+            name: The entity.
+            state: Its state in the frame.
+            frame: The world, or an entity; empty for the world.
+            accelerates: Whether an acceleration was asked for as well.
+
+        Raises:
+            RequestError: ``RESULT_NOT_FOUND`` if there is none of that name, ``INVALID_POSE`` if the pose makes no
+                sense, ``RESULT_OPERATION_FAILED`` if it cannot be moved, or not like that.
+        """
+        self._require(name)
+        if name == self._robot:
+            raise RequestError("RESULT_OPERATION_FAILED", f"{name} is fixed to the world")
+        state = self.in_world(state, frame)
+        speeds = (*state.linear_velocity, *state.angular_velocity)
+        if not all(abs(speed) <= _LARGEST_SPEED for speed in speeds):
+            expected = f"numbers up to {_LARGEST_SPEED:g} m/s and rad/s"
+            raise RequestError("RESULT_OPERATION_FAILED", f"{name}: twist {speeds}", expected=expected)
+        if name == BALL:
+            self._world.ball = state
+            return
+        if self._world.spawned.model(name).is_fixed and (any(speeds) or accelerates):
+            raise RequestError("RESULT_OPERATION_FAILED", f"{name} is fixed and can have no twist or acceleration")
+        self._world.spawned.place(name, state)
+
+    def in_world(self, state: BodyState, frame: str) -> BodyState:
+        """A state that is given in some frame.
+
+        Args:
+            state: The state; velocities are along the axes of the frame, as seen from the world.
+            frame: The world, or an entity; empty for the world.
+
+        Raises:
+            RequestError: ``INVALID_POSE`` if the frame is not known or the pose makes no sense.
+        """
+        norm = math.hypot(*state.orientation_xyzw)
+        if not abs(norm - 1.0) <= _NORM_TOLERANCE:
+            message = f"orientation {state.orientation_xyzw}: a quaternion of norm {norm:g}"
+            raise RequestError("INVALID_POSE", message, expected="norm 1")
+        if frame not in ("", WORLD_FRAME):
+            if frame not in self.names:
+                known = ", ".join((WORLD_FRAME, *self.names))
+                raise RequestError("INVALID_POSE", f"no frame {frame!r:.80}", expected=known)
+            base = self.state(frame)
+            turn = base.orientation_xyzw
+            position, orientation = pybullet.multiplyTransforms(
+                base.position, turn, state.position, state.orientation_xyzw
+            )
+            state = BodyState(
+                position,
+                orientation,
+                pybullet.rotateVector(turn, state.linear_velocity),
+                pybullet.rotateVector(turn, state.angular_velocity),
+            )
+        if not all(abs(value) <= _LARGEST_COORDINATE_M for value in state.position):
+            expected = f"within {_LARGEST_COORDINATE_M:g} m of the world's origin"
+            raise RequestError("INVALID_POSE", f"position {state.position} m", expected=expected)
+        return state
+
+    def boxes(self, name: str) -> list[Box]:
+        """Boxes along the axes of the world that enclose an entity, one for each of its links.
+
+        Raises:
+            RequestError: ``RESULT_NOT_FOUND`` if there is none of that name.
+        """
+        self._require(name)
+        if name == BALL:
+            return self._world.ball_boxes()
+        if name == self._robot:
+            return self._world.robot_boxes()
+        return self._world.spawned.boxes(name)
+
+    def bounds(self, name: str) -> Box | None:
+        """Box along the axes of an entity's own frame that encloses it; None if it has no shape.
+
+        Raises:
+            RequestError: ``RESULT_NOT_FOUND`` if there is none of that name.
+        """
+        if name in self._world.spawned:
+            return _union(self._world.spawned.bounds(name))
+        # The robot's axes are those of the world, and the ball looks the same from everywhere.
+        box = _union(self.boxes(name))
+        origin = self.state(name).position
+        return box and (_minus(box[0], origin), _minus(box[1], origin))
+
+    def add(self, name: str, model: Model, start: BodyState, description: str) -> None:
+        """Put a new entity into the world.
+
+        Args:
+            name: Its name, which is free.
+            model: What it is.
+            start: Its state in the world.
+            description: For people.
+
+        Raises:
+            RequestError: ``RESULT_OPERATION_FAILED`` if the world is full, ``RESOURCE_PARSE_ERROR`` if the engine does
+                not take the model.
+        """
+        if len(self._world.spawned) >= _MOST_SPAWNED:
+            raise RequestError("RESULT_OPERATION_FAILED", f"{_MOST_SPAWNED} entities were spawned; there is no room")
+        self._world.spawned.add(name, model, start)
+        kind = Category.ROBOT if model.joints else Category.STATIC_OBJECT if model.is_fixed else Category.DYNAMIC_OBJECT
+        self._infos[name] = EntityInfo(kind, description)
+
+    def remove(self, name: str) -> None:
+        """Take an entity out of the world.
+
+        Raises:
+            RequestError: ``RESULT_NOT_FOUND`` if there is none of that name, ``RESULT_OPERATION_FAILED`` if it was not
+                spawned.
+        """
+        self._require(name)
+        if name not in self._world.spawned:
+            raise RequestError("RESULT_OPERATION_FAILED", f"{name} is part of every trial and cannot be deleted")
+        self._world.spawned.remove(name)
+        del self._infos[name]
+
+    def _require(self, name: str) -> None:
+        if name not in self.names:
+            known = ", ".join(self.names)
+            raise RequestError("RESULT_NOT_FOUND", f"no entity {name!r:.80}; known: {known:.1000}")
+
+
+def _union(boxes: list[Box]) -> Box | None:
+    if not boxes:
+        return None
+    lows, highs = zip(*boxes, strict=True)
+    lowest: Vector = tuple(map(min, zip(*lows, strict=True)))
+    highest: Vector = tuple(map(max, zip(*highs, strict=True)))
+    return lowest, highest
+
+
+def _minus(point: Vector, origin: Vector) -> Vector:
+    return (point[0] - origin[0], point[1] - origin[1], point[2] - origin[2])

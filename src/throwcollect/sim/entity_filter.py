@@ -1,0 +1,96 @@
+"""Which entities a client means: by name, category, tags and place."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+from throwcollect.errors import RequestError
+from throwcollect.sim.bullet import Box
+from throwcollect.sim.entities import Entities
+from throwcollect.sim.extended_regex import ExtendedRegex
+from throwcollect.sim.recording import Vector
+
+
+@dataclass(frozen=True)
+class BoxRegion:
+    """A box along the axes of the world.
+
+    Attributes:
+        lowest: One corner [m].
+        highest: The opposite one [m].
+    """
+
+    lowest: Vector
+    highest: Vector
+
+    def overlaps(self, box: Box) -> bool:
+        """Whether a box reaches into the region."""
+        return all(
+            low <= upper and lower <= high
+            for lower, upper, low, high in zip(*box, self.lowest, self.highest, strict=True)
+        )
+
+
+@dataclass(frozen=True)
+class SphereRegion:
+    """A sphere.
+
+    Attributes:
+        centre: Its centre in the world [m].
+        radius: Its radius [m].
+    """
+
+    centre: Vector
+    radius: float
+
+    def overlaps(self, box: Box) -> bool:
+        """Whether a box reaches into the region."""
+        outside = (max(lower - x, 0.0, x - upper) for x, lower, upper in zip(self.centre, *box, strict=True))
+        return sum(distance * distance for distance in outside) <= self.radius**2
+
+
+@dataclass(frozen=True)
+class EntityFilter:
+    """What an entity must be like; what is empty does not matter.
+
+    Attributes:
+        name: POSIX extended regular expression that is found in its name.
+        categories: Its category is one of these.
+        tags: It has these tags.
+        needs_all_tags: Whether it must have all of them; otherwise one will do.
+        region: It reaches into this region.
+    """
+
+    name: str = ""
+    categories: Collection[int] = ()
+    tags: Collection[str] = ()
+    needs_all_tags: bool = False
+    region: BoxRegion | SphereRegion | None = None
+
+    def select(self, entities: Entities) -> list[str]:
+        """Names of the entities that are meant, in order.
+
+        Raises:
+            RequestError: ``RESULT_OPERATION_FAILED`` if the regular expression is malformed.
+        """
+        try:
+            pattern = ExtendedRegex(self.name)
+        except ValueError as error:
+            message = f"filter {self.name!r:.80} is no extended regular expression: {error}"
+            raise RequestError("RESULT_OPERATION_FAILED", message) from error
+        return [
+            name
+            for name in entities.names
+            if pattern.search(name) and self._fits_info(entities, name) and self._fits_place(entities, name)
+        ]
+
+    def _fits_info(self, entities: Entities, name: str) -> bool:
+        info = entities.info(name)
+        found = [tag in info.tags for tag in self.tags]
+        has_tags = all(found) if self.needs_all_tags else any(found)
+        return (not self.categories or info.category in self.categories) and (not found or has_tags)
+
+    def _fits_place(self, entities: Entities, name: str) -> bool:
+        region = self.region
+        return region is None or any(region.overlaps(box) for box in entities.boxes(name))

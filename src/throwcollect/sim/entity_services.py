@@ -1,0 +1,144 @@
+"""Services about the entities that are there: which, where, how large, what is said about them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from throwcollect.errors import RequestError
+from throwcollect.ros import Node, get_message, get_service
+from throwcollect.sim.answers import answering
+from throwcollect.sim.body_messages import body_state, entity_state
+from throwcollect.sim.entities import EntityInfo
+from throwcollect.sim.entity_filter import BoxRegion, EntityFilter, SphereRegion
+from throwcollect.sim.simulation import Simulation
+
+GetEntities: Any = get_service("simulation_interfaces/srv/GetEntities")
+GetEntitiesStates: Any = get_service("simulation_interfaces/srv/GetEntitiesStates")
+GetEntityState: Any = get_service("simulation_interfaces/srv/GetEntityState")
+SetEntityState: Any = get_service("simulation_interfaces/srv/SetEntityState")
+GetEntityInfo: Any = get_service("simulation_interfaces/srv/GetEntityInfo")
+SetEntityInfo: Any = get_service("simulation_interfaces/srv/SetEntityInfo")
+GetEntityBounds: Any = get_service("simulation_interfaces/srv/GetEntityBounds")
+DeleteEntity: Any = get_service("simulation_interfaces/srv/DeleteEntity")
+Bounds: Any = get_message("simulation_interfaces/msg/Bounds")
+TagsFilter: Any = get_message("simulation_interfaces/msg/TagsFilter")
+Vector3: Any = get_message("geometry_msgs/msg/Vector3")
+
+_CORNERS = 2
+_MOST_WANTED = 1000
+"""Of categories or tags in one filter."""
+
+
+class EntityServices:
+    """Offers the services under relative names, so that they stand in the simulation's namespace.
+
+    Args:
+        node: The simulation's node.
+        simulation: Whose entities they are.
+    """
+
+    def __init__(self, node: Node, simulation: Simulation) -> None:
+        self._simulation = simulation
+        self._entities = simulation.entities
+        for service, name, fill in (
+            (GetEntities, "get_entities", self._list),
+            (GetEntitiesStates, "get_entities_states", self._list_states),
+            (GetEntityState, "get_entity_state", self._get_state),
+            (SetEntityState, "set_entity_state", self._set_state),
+            (GetEntityInfo, "get_entity_info", self._get_info),
+            (SetEntityInfo, "set_entity_info", self._set_info),
+            (GetEntityBounds, "get_entity_bounds", self._get_bounds),
+            (DeleteEntity, "delete_entity", self._delete),
+        ):
+            node.create_service(service, name, answering(service, fill))
+
+    def _list(self, request: Any, response: Any) -> None:
+        response.entities = _filter(request.filters).select(self._entities)
+
+    def _list_states(self, request: Any, response: Any) -> None:
+        response.entities = _filter(request.filters).select(self._entities)
+        response.states = [self._state(name) for name in response.entities]
+
+    def _get_state(self, request: Any, response: Any) -> None:
+        response.state = self._state(request.entity)
+
+    def _state(self, name: str) -> Any:
+        return entity_state(self._entities.state(name), self._simulation.now_ns)
+
+    def _set_state(self, request: Any, response: Any) -> None:
+        del response
+        state, acceleration = request.state, request.state.acceleration
+        accelerations = (acceleration.linear, acceleration.angular)
+        self._entities.place(
+            request.entity,
+            body_state(state.pose, state.twist),
+            frame=state.header.frame_id,
+            accelerates=any((vector.x, vector.y, vector.z) != (0.0, 0.0, 0.0) for vector in accelerations),
+        )
+
+    def _get_info(self, request: Any, response: Any) -> None:
+        info = self._entities.info(request.entity)
+        response.info.category.category = info.category
+        response.info.description = info.description
+        response.info.tags = list(info.tags)
+
+    def _set_info(self, request: Any, response: Any) -> None:
+        del response
+        info = request.info
+        self._entities.set_info(
+            request.entity, EntityInfo(int(info.category.category), info.description, tuple(info.tags))
+        )
+
+    def _get_bounds(self, request: Any, response: Any) -> None:
+        box = self._entities.bounds(request.entity)
+        if box is not None:
+            response.bounds.type = Bounds.TYPE_BOX
+            response.bounds.points = [Vector3(x=x, y=y, z=z) for x, y, z in reversed(box)]
+
+    def _delete(self, request: Any, response: Any) -> None:
+        del response
+        self._entities.remove(request.entity)
+
+
+def _filter(filters: Any) -> EntityFilter:
+    """What simulation_interfaces/msg/EntityFilters means.
+
+    Raises:
+        RequestError: ``RESULT_FEATURE_UNSUPPORTED`` for a kind of bounds that is not known here,
+            ``RESULT_OPERATION_FAILED`` for what makes no sense.
+    """
+    tags = filters.tags
+    if len(tags.tags) > _MOST_WANTED or len(filters.categories) > _MOST_WANTED:
+        raise _senseless(f"more than {_MOST_WANTED} tags or categories")
+    if tags.filter_mode not in (TagsFilter.FILTER_MODE_ANY, TagsFilter.FILTER_MODE_ALL):
+        raise _senseless(f"no tags filter mode {tags.filter_mode}")
+    return EntityFilter(
+        name=filters.filter,
+        categories={int(category.category) for category in filters.categories},
+        tags=tuple(tags.tags),
+        needs_all_tags=tags.filter_mode == TagsFilter.FILTER_MODE_ALL,
+        region=_region(filters.bounds),
+    )
+
+
+def _region(bounds: Any) -> BoxRegion | SphereRegion | None:
+    if bounds.type == Bounds.TYPE_EMPTY:
+        return None
+    if bounds.type not in (Bounds.TYPE_BOX, Bounds.TYPE_SPHERE):
+        message = f"bounds of type {bounds.type}; boxes and spheres are supported"
+        raise RequestError("RESULT_FEATURE_UNSUPPORTED", message)
+    if len(bounds.points) != _CORNERS:
+        raise _senseless(f"bounds with {len(bounds.points)} points; a box and a sphere have {_CORNERS}")
+    first, second = ((float(point.x), float(point.y), float(point.z)) for point in bounds.points)
+    if bounds.type == Bounds.TYPE_SPHERE:
+        radius = second[0]
+        if not radius >= 0:
+            raise _senseless(f"a sphere of radius {radius:g} m")
+        return SphereRegion(first, radius)
+    if not all(low <= high for high, low in zip(first, second, strict=True)):
+        raise _senseless(f"a box whose upper corner {first} is not above its lower one {second}")
+    return BoxRegion(second, first)
+
+
+def _senseless(message: str) -> RequestError:
+    return RequestError("RESULT_OPERATION_FAILED", message)

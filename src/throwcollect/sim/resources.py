@@ -1,0 +1,156 @@
+"""What can be spawned: descriptions found by URI, and the files that they refer to."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from urllib.parse import quote, unquote, urlsplit
+
+import numpy as np
+
+from throwcollect.errors import RequestError
+from throwcollect.robots.model import share_directory
+from throwcollect.sim.mesh import Triangles, check_mesh, read_mesh
+from throwcollect.sim.urdf import Model, read_model
+
+_LARGEST_FILE = 4 * 2**20
+_MOST_ENTRIES = 20_000
+_DATA = "example-robot-data"
+
+
+@dataclass(frozen=True)
+class Resource:
+    """A description that lies ready to be spawned.
+
+    Attributes:
+        uri: What to ask for.
+        name: The name that it gives itself.
+    """
+
+    uri: str
+    name: str
+
+
+def load_model(uri: str, text: str) -> Model:
+    """Read the description that a client means.
+
+    Args:
+        uri: ``file://`` or ``package://`` URI of a URDF file.
+        text: URDF text; what counts if there is no URI.
+
+    Raises:
+        RequestError: ``NO_RESOURCE`` if both are empty, ``RESULT_NOT_FOUND`` if there is no such file,
+            ``UNSUPPORTED_FORMAT`` if it is not URDF; otherwise as `read_model` does.
+    """
+    if not uri:
+        if not text:
+            raise RequestError("NO_RESOURCE", "neither a URI nor a description was given")
+        return read_model(text, lambda filename: read_mesh(_locate(filename, None)))
+    path = _path(uri, missing="RESULT_NOT_FOUND")
+    if path.suffix.lower() != ".urdf":
+        raise RequestError("UNSUPPORTED_FORMAT", f"{uri:.255}: a file of type {path.suffix!r:.20}", expected="*.urdf")
+    try:
+        if not path.is_file():
+            raise RequestError("RESULT_NOT_FOUND", f"{path!s:.255}: no such file")
+        if path.stat().st_size > _LARGEST_FILE:
+            raise RequestError("RESOURCE_PARSE_ERROR", f"{path}: more than {_LARGEST_FILE} bytes")
+        content = path.read_bytes()
+    except (OSError, ValueError) as error:
+        raise RequestError("RESULT_NOT_FOUND", f"{path!s:.255}: cannot be read: {error}") from error
+    return read_model(content, lambda filename: read_mesh(_locate(filename, path.parent)))
+
+
+def find_resources(sources: Sequence[str]) -> tuple[list[Resource], list[str]]:
+    """Look for descriptions that can be spawned.
+
+    Args:
+        sources: URIs of directories to search besides the robots that are installed.
+
+    Returns:
+        What was found, in order of the URIs, and what is wrong with each source that cannot be searched.
+    """
+    found = list(_installed())
+    useless = []
+    for source in sources:
+        try:
+            directory = _path(source, missing="RESULT_NOT_FOUND")
+            if not directory.is_dir():
+                raise RequestError("RESULT_NOT_FOUND", f"{source!r:.255}: no such directory")
+            found += _search(directory, Path.as_uri)
+        except (OSError, ValueError) as error:
+            useless.append(f"{source!r:.255}: cannot be searched: {error}")
+        except RequestError as error:
+            useless.append(str(error))
+    return sorted(set(found), key=lambda resource: resource.uri), useless
+
+
+@cache
+def _installed() -> tuple[Resource, ...]:
+    share = share_directory()
+    return tuple(_search(share / _DATA, lambda path: f"package://{quote(path.relative_to(share).as_posix())}"))
+
+
+def _search(directory: Path, uri_of: Callable[[Path], str]) -> list[Resource]:
+    """Descriptions below a directory whose collision shapes are all there."""
+    found = []
+    seen = 0
+    for parent, directories, files in os.walk(directory):
+        directories.sort()
+        seen += len(files) + len(directories)
+        if seen > _MOST_ENTRIES:
+            raise RequestError("RESULT_NOT_FOUND", f"{directory}: more than {_MOST_ENTRIES} files; name a part of it")
+        for path in (Path(parent, name) for name in sorted(files) if name.endswith(".urdf")):
+            try:
+                if path.is_file() and path.stat().st_size <= _LARGEST_FILE:
+                    found.append(Resource(uri_of(path), _spawnable_name(path)))
+            except (RequestError, OSError):
+                continue
+    return found
+
+
+def _spawnable_name(path: Path) -> str:
+    def check(filename: str) -> Triangles:
+        check_mesh(_locate(filename, path.parent))
+        return np.empty((0, 3, 3), np.float32)
+
+    return read_model(path.read_bytes(), check).name or path.stem
+
+
+def _locate(filename: str, directory: Path | None) -> Path:
+    """File of a mesh, which may be relative to the directory of its description."""
+    if "://" in filename:
+        return _path(filename, missing="MISSING_ASSETS")
+    if directory is None and not filename.startswith("/"):
+        message = f"mesh {filename!r:.255}: a relative path means nothing in a description without a file"
+        raise RequestError("MISSING_ASSETS", message, expected="package:// or file://")
+    return (directory or Path("/")) / filename
+
+
+def _path(uri: str, *, missing: str) -> Path:
+    """File that a URI means.
+
+    Args:
+        uri: The URI.
+        missing: Reason to give if there is no such package.
+
+    Raises:
+        RequestError: ``UNSUPPORTED_FORMAT`` if it has another scheme, `missing` if its package is not known.
+    """
+    try:
+        parts = urlsplit(uri)
+    except ValueError as error:
+        raise RequestError(missing, f"{uri!r:.255}: not a URI: {error}") from error
+    if parts.scheme == "file" and parts.netloc in ("", "localhost"):
+        return Path(unquote(parts.path))
+    if parts.scheme == "package":
+        # With three slashes the package is the first part of the path.
+        package, *rest = unquote(parts.netloc + parts.path).lstrip("/").split("/")
+        if not package or not (share_directory() / package).is_dir():
+            raise RequestError(missing, f"{uri!r:.255}: no such package", expected=f"package://{_DATA}/...")
+        return share_directory().joinpath(package, *rest)
+    raise RequestError(
+        "UNSUPPORTED_FORMAT", f"{uri!r:.255}: unknown kind of URI", expected="file:///... or package://..."
+    )

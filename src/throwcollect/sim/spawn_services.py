@@ -1,0 +1,84 @@
+"""Services that put new entities into the world, and that tell what there is to put."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from throwcollect.errors import RequestError
+from throwcollect.ros import Node, get_message, get_service
+from throwcollect.sim.answers import Result, answering, refusal
+from throwcollect.sim.body_messages import body_state
+from throwcollect.sim.resources import find_resources
+from throwcollect.sim.simulation import Simulation
+from throwcollect.sim.spawning import SpawnRequest, spawn
+
+SpawnEntity: Any = get_service("simulation_interfaces/srv/SpawnEntity")
+SpawnEntities: Any = get_service("simulation_interfaces/srv/SpawnEntities")
+GetSpawnables: Any = get_service("simulation_interfaces/srv/GetSpawnables")
+SpawnResult: Any = get_message("simulation_interfaces/msg/SpawnResult")
+Spawnable: Any = get_message("simulation_interfaces/msg/Spawnable")
+
+_MOST_REQUESTS = 200
+_MOST_SOURCES = 100
+
+
+class SpawnServices:
+    """Offers the services under relative names, so that they stand in the simulation's namespace.
+
+    Args:
+        node: The simulation's node.
+        simulation: Where to put entities.
+    """
+
+    def __init__(self, node: Node, simulation: Simulation) -> None:
+        self._entities = simulation.entities
+        for service, name, fill in (
+            (SpawnEntity, "spawn_entity", self._spawn_one),
+            (SpawnEntities, "spawn_entities", self._spawn_all),
+            (GetSpawnables, "get_spawnables", self._list_spawnables),
+        ):
+            node.create_service(service, name, answering(service, fill))
+
+    def _spawn_one(self, request: Any, response: Any) -> None:
+        response.entity_name = self._spawn(request, request)
+
+    def _spawn_all(self, request: Any, response: Any) -> None:
+        if len(request.spawn_requests) > _MOST_REQUESTS:
+            message = f"{len(request.spawn_requests)} requests in one call; at most {_MOST_REQUESTS}"
+            raise RequestError("RESULT_OPERATION_FAILED", message)
+        results = []
+        for wish in request.spawn_requests:
+            try:
+                result = SpawnResult(entity_name=self._spawn(wish, wish.entity_resource))
+                result.result.result = Result.RESULT_OK
+            except RequestError as error:
+                result = refusal(SpawnResult, error)
+            results.append(result)
+        response.results = results
+        failed = sum(result.result.result != Result.RESULT_OK for result in results)
+        if failed:
+            response.result.result = SpawnEntities.Response.ENTITIES_SPAWN_FAILED
+            response.result.error_message = f"{failed} of {len(results)} entities were not spawned; see their results"
+
+    def _spawn(self, wish: Any, resource: Any) -> str:
+        pose = wish.initial_pose
+        return spawn(
+            self._entities,
+            SpawnRequest(
+                name=wish.name,
+                allow_renaming=bool(wish.allow_renaming),
+                uri=resource.uri,
+                text=resource.resource_string,
+                namespace=wish.entity_namespace,
+                start=body_state(pose.pose),
+                frame=pose.header.frame_id,
+            ),
+        )
+
+    def _list_spawnables(self, request: Any, response: Any) -> None:
+        if len(request.sources) > _MOST_SOURCES:
+            message = f"{len(request.sources)} sources in one call; at most {_MOST_SOURCES}"
+            raise RequestError("RESULT_OPERATION_FAILED", message)
+        resources, useless = find_resources(request.sources)
+        response.spawnables = [Spawnable(uri=resource.uri, description=resource.name) for resource in resources]
+        response.result.error_message = "\n".join(useless)

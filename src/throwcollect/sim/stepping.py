@@ -1,0 +1,106 @@
+"""Stepping through a paused simulation: a service that answers when it is done, an action that tells how far it is."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from throwcollect.errors import RequestError
+from throwcollect.ros import ActionServer, CancelResponse, Future, Node, get_action, get_service
+from throwcollect.sim.answers import Result, refusal
+from throwcollect.sim.simulation import Simulation
+from throwcollect.sim.step_request import StepRequest
+
+StepSimulation: Any = get_service("simulation_interfaces/srv/StepSimulation")
+SimulateSteps: Any = get_action("simulation_interfaces/action/SimulateSteps")
+
+_ACTION = "simulate_steps"
+_MOST_STEPS = 100_000
+"""In one call of the service, which cannot be cancelled: some seconds."""
+
+
+class Stepping:
+    """Offers service and action under relative names, so that they stand in the simulation's namespace.
+
+    Steps are taken by the loop of the simulation's process, slice by slice, so that other requests are answered
+    meanwhile.
+
+    Args:
+        node: The simulation's node.
+        simulation: What is stepped through.
+    """
+
+    def __init__(self, node: Node, simulation: Simulation) -> None:
+        self._node = node
+        self._simulation = simulation
+        self._awaited: list[tuple[StepRequest, Future, Any | None]] = []
+        self._told = 0
+        node.create_service(StepSimulation, "step_simulation", self._step)
+        self._server = ActionServer(
+            node,
+            SimulateSteps,
+            _ACTION,
+            execute_callback=self._execute,
+            cancel_callback=lambda _: CancelResponse.ACCEPT,
+        )
+
+    def follow_up(self) -> None:
+        """Tell those who wait how far it has come; call it after each slice."""
+        for awaited in list(self._awaited):
+            request, future, handle = awaited
+            if handle is not None:
+                self._publish_feedback(request, handle)
+                if handle.is_cancel_requested:
+                    self._simulation.cancel_steps(request)
+            if request.is_over:
+                self._awaited.remove(awaited)
+                future.set_result(None)
+
+    async def _step(self, request: Any, response: Any) -> Any:
+        try:
+            if request.steps > _MOST_STEPS:
+                message = f"{request.steps} steps in one call; at most {_MOST_STEPS}"
+                raise RequestError("RESULT_OPERATION_FAILED", message, hint=f"the action {_ACTION}")
+            await self._take(request.steps, None)
+        except RequestError as error:
+            return refusal(StepSimulation.Response, error)
+        response.result.result = Result.RESULT_OK
+        return response
+
+    async def _execute(self, handle: Any) -> Any:
+        try:
+            await self._take(handle.request.steps, handle)
+        except RequestError as error:
+            if handle.is_cancel_requested:
+                handle.canceled()
+            else:
+                handle.abort()
+            return refusal(SimulateSteps.Result, error)
+        handle.succeed()
+        result = SimulateSteps.Result()
+        result.result.result = Result.RESULT_OK
+        return result
+
+    async def _take(self, steps: int, handle: Any | None) -> None:
+        """Wait until steps have been taken.
+
+        Raises:
+            RequestError: If they cannot be taken, or not all of them.
+        """
+        request = self._simulation.request_steps(int(steps))
+        if request.is_over:
+            return
+        self._told = 0
+        future = Future()
+        self._awaited.append((request, future, handle))
+        await future
+        if request.interruption is not None:
+            message = f"{request.interruption}, after {request.taken} of {request.wanted} steps"
+            raise RequestError("RESULT_OPERATION_FAILED", message)
+
+    def _publish_feedback(self, request: StepRequest, handle: Any) -> None:
+        """Tell of every step, as the action promises, if somebody listens."""
+        first, self._told = self._told + 1, request.taken
+        if self._node.count_subscribers(f"{_ACTION}/_action/feedback"):
+            for completed in range(first, request.taken + 1):
+                left = request.wanted - completed
+                handle.publish_feedback(SimulateSteps.Feedback(completed_steps=completed, remaining_steps=left))

@@ -1,0 +1,295 @@
+"""Robots and objects in URDF, as strangers write them: checked, and written anew for the physics engine.
+
+Bullet ends its process on some descriptions and guesses on others, so it gets to see only what was understood here:
+links with mass and inertia, collision shapes, joints that form a tree.
+"""
+
+from __future__ import annotations
+
+import math
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from throwcollect.errors import RequestError
+from throwcollect.sim.mesh import Triangles
+from throwcollect.sim.urdf_tree import Joint, check_tree, rigid_root
+
+_MOST_LINKS = 128
+"""As many as Bullet takes."""
+
+_MOST_TRIANGLES = 400_000
+_LONGEST_TEXT = 4 * 2**20
+_LONGEST_NAME = 255
+_LARGEST_NUMBER = 1e6
+_LEAST_MASS_KG = 1e-3
+"""Mass of links that have none, such as frames of sensors: Bullet would take one kilogram."""
+
+_LEAST_RADIUS_OF_GYRATION_M = 1e-3
+_LEAST_AXIS = 1e-3
+_ROUNDING = 0.1
+"""Share of the largest principal moment by which another one may be negative; descriptions are rounded like that."""
+
+_LARGEST_SHARE = 0.999
+
+_SIZES = {"box": ("size",), "sphere": ("radius",), "cylinder": ("radius", "length"), "capsule": ("radius", "length")}
+_OTHER_FORMATS = {"sdf": "SDFormat", "mujoco": "MJCF", "COLLADA": "COLLADA", "usd": "USD"}
+
+
+@dataclass(frozen=True)
+class Model:
+    """What can be put into a world.
+
+    Attributes:
+        name: Name that the description gives itself.
+        urdf: URDF text for the physics engine; its meshes are called ``0.stl``, ``1.stl`` …
+        meshes: The triangles of these meshes.
+        joints: Number of joints that can move.
+        is_fixed: Whether it is attached to the world: its root is called ``world`` or has no mass.
+    """
+
+    name: str
+    urdf: str
+    meshes: tuple[Triangles, ...]
+    joints: int
+    is_fixed: bool
+
+    @property
+    def is_static(self) -> bool:
+        """Whether no part of it ever moves on its own."""
+        return self.is_fixed and not self.joints
+
+
+def read_model(content: str | bytes, read_mesh: Callable[[str], Triangles]) -> Model:
+    """Read and check a description.
+
+    Args:
+        content: URDF text, or the bytes of a file.
+        read_mesh: Triangles of a mesh by its ``filename``; may raise a `RequestError`.
+
+    Raises:
+        RequestError: ``RESOURCE_PARSE_ERROR`` if it is malformed, ``UNSUPPORTED_FORMAT`` if it is no URDF,
+            ``UNSUPPORTED_ASSETS`` if its meshes are too large; whatever `read_mesh` raises.
+    """
+    return _Reader(_parse(content), read_mesh).read()
+
+
+class _NoDoctype(ElementTree.TreeBuilder):
+    """Builds trees of documents that define no entities, which a few lines can blow up to gigabytes."""
+
+    def doctype(self, name: str, pubid: str | None, system: str | None) -> None:
+        """Refuse a document type declaration."""
+        del pubid, system
+        raise _malformed(f"document type {name!r:.40} is declared; descriptions have none")
+
+
+def _malformed(message: str) -> RequestError:
+    return RequestError("RESOURCE_PARSE_ERROR", message)
+
+
+def _parse(content: str | bytes) -> ElementTree.Element:
+    if len(content) > _LONGEST_TEXT:
+        raise _malformed(f"a description of {len(content)} characters; at most {_LONGEST_TEXT}")
+    parser = ElementTree.XMLParser(target=_NoDoctype())  # noqa: S314 - entities cannot be defined
+    try:
+        parser.feed(content)
+        root: ElementTree.Element = parser.close()
+    except (ElementTree.ParseError, LookupError, ValueError) as error:
+        raise _malformed(f"not well-formed XML: {error}") from error
+    if root.tag != "robot":
+        kind = _OTHER_FORMATS.get(root.tag, f"<{root.tag:.40}>")
+        raise RequestError("UNSUPPORTED_FORMAT", f"the description is {kind}", expected="URDF, whose root is <robot>")
+    return root
+
+
+class _Reader:
+    """Reads one description."""
+
+    def __init__(self, root: ElementTree.Element, read_mesh: Callable[[str], Triangles]) -> None:
+        self._root = root
+        self._read_mesh = read_mesh
+        self._meshes: dict[str, int] = {}
+        self._triangles: list[Triangles] = []
+
+    def read(self) -> Model:
+        masses = {}
+        robot = ElementTree.Element("robot", name="entity")
+        for link in self._root.findall("link"):
+            name = _name(link)
+            if name in masses:
+                raise _malformed(f"link {name} is there twice")
+            masses[name] = self._mass(link)
+        if not 1 <= len(masses) <= _MOST_LINKS:
+            raise _malformed(f"{len(masses)} links; 1 to {_MOST_LINKS} can be simulated")
+        joints = [self._joint(joint) for joint in self._root.findall("joint")]
+        root = check_tree(list(masses), joints)
+        group = rigid_root(root, joints)
+        is_fixed = root == "world" or sum(masses[link] for link in group) == 0
+        movable = [joint for joint in joints if joint.kind != "fixed"]
+        for link in self._root.findall("link"):
+            robot.append(self._link(link, masses[_name(link)], exact=is_fixed and _name(link) in group))
+        robot.extend(joint.element for joint in joints)
+        # Bullet reads lines of bounded length.
+        ElementTree.indent(robot)
+        text = ElementTree.tostring(robot, encoding="unicode") + "\n"
+        own_name = self._root.get("name", "")
+        return Model(own_name, text, tuple(self._triangles), joints=len(movable), is_fixed=is_fixed)
+
+    def _mass(self, link: ElementTree.Element) -> float:
+        mass = link.find("inertial/mass")
+        if mass is None:
+            return 0.0
+        (value,) = _numbers(mass, "value", 1, of=link)
+        if value < 0:
+            raise _malformed(f"link {_name(link)}: mass should not be negative, got {value:g} kg")
+        return value
+
+    def _link(self, link: ElementTree.Element, mass: float, *, exact: bool) -> ElementTree.Element:
+        clean = ElementTree.Element("link", name=_name(link))
+        inertial = ElementTree.SubElement(clean, "inertial")
+        if (given := link.find("inertial")) is not None:
+            inertial.append(_origin(given, of=link))
+        ElementTree.SubElement(inertial, "mass", value=repr(max(mass, _LEAST_MASS_KG)))
+        ElementTree.SubElement(inertial, "inertia", _inertia(link, max(mass, _LEAST_MASS_KG)))
+        for collision in link.findall("collision"):
+            # Meshes that never move are taken as they are, all others as their convex hulls.
+            shape = ElementTree.SubElement(clean, "collision", {"concave": "yes"} if exact else {})
+            shape.append(_origin(collision, of=link))
+            ElementTree.SubElement(shape, "geometry").append(self._geometry(collision, link))
+        return clean
+
+    def _geometry(self, collision: ElementTree.Element, link: ElementTree.Element) -> ElementTree.Element:
+        shape = next(iter(collision.findall("geometry/*")), None)
+        if shape is None:
+            raise _malformed(f"link {_name(link)}: a collision without geometry")
+        if shape.tag == "mesh":
+            number = self._mesh(shape.get("filename", ""))
+            scale = _numbers(shape, "scale", 3, of=link, default=[1.0] * 3)
+            if not all(scale):
+                raise _malformed(f"link {_name(link)}: the scale of a mesh should not be 0")
+            return ElementTree.Element("mesh", filename=f"{number}.stl", scale=_text(scale))
+        if shape.tag not in _SIZES:
+            raise _malformed(f"link {_name(link)}: unknown shape {shape.tag:.40}; known: {', '.join(_SIZES)}, mesh")
+        sizes = {key: _numbers(shape, key, 3 if key == "size" else 1, of=link) for key in _SIZES[shape.tag]}
+        if any(size <= 0 for values in sizes.values() for size in values):
+            raise _malformed(f"link {_name(link)}: sizes of a {shape.tag} should be above 0")
+        return ElementTree.Element(shape.tag, {key: _text(values) for key, values in sizes.items()})
+
+    def _mesh(self, filename: str) -> int:
+        if filename not in self._meshes:
+            self._triangles.append(self._read_mesh(filename))
+            self._meshes[filename] = len(self._triangles) - 1
+            if (count := sum(map(len, self._triangles))) > _MOST_TRIANGLES:
+                raise RequestError("UNSUPPORTED_ASSETS", f"{count} triangles in all; at most {_MOST_TRIANGLES}")
+        return self._meshes[filename]
+
+    def _joint(self, joint: ElementTree.Element) -> Joint:
+        name = _name(joint)
+        kind = joint.get("type", "")
+        if kind not in ("fixed", "revolute", "continuous", "prismatic"):
+            raise _malformed(f"joint {name}: joints of type {kind!r:.40} are not simulated")
+        parent, child = _link_of(joint, "parent"), _link_of(joint, "child")
+        clean = ElementTree.Element("joint", name=name, type=kind)
+        ElementTree.SubElement(clean, "parent", link=parent)
+        ElementTree.SubElement(clean, "child", link=child)
+        clean.append(_origin(joint, of=joint))
+        if kind != "fixed":
+            _add_motion(clean, joint)
+        return Joint(name, kind, parent, child, clean)
+
+
+def _add_motion(clean: ElementTree.Element, joint: ElementTree.Element) -> None:
+    """Add axis, limits and damping of a joint that moves."""
+    name = clean.get("name")
+    axis_element, limit = joint.find("axis"), joint.find("limit")
+    axis = [1.0, 0.0, 0.0] if axis_element is None else _numbers(axis_element, "xyz", 3, of=joint)
+    if (length := float(np.linalg.norm(axis))) < _LEAST_AXIS:
+        raise _malformed(f"joint {name}: its axis {axis} has no direction")
+    ElementTree.SubElement(clean, "axis", xyz=_text([value / length for value in axis]))
+    if limit is None and clean.get("type") != "continuous":
+        raise _malformed(f"joint {name}: it has no limit")
+    if limit is not None:
+        values = {key: _numbers(limit, key, 1, of=joint, default=[0.0], largest=math.inf)[0] for key in _LIMITS}
+        if values["lower"] > values["upper"] or values["effort"] < 0 or values["velocity"] < 0:
+            raise _malformed(f"joint {name}: its limits contradict each other: {values}")
+        ElementTree.SubElement(clean, "limit", {key: _text([value]) for key, value in values.items()})
+    if (dynamics := joint.find("dynamics")) is not None:
+        (damping,) = _numbers(dynamics, "damping", 1, of=joint, default=[0.0])
+        ElementTree.SubElement(clean, "dynamics", damping=repr(max(damping, 0.0)))
+
+
+_LIMITS = ("lower", "upper", "effort", "velocity")
+
+
+def _name(element: ElementTree.Element) -> str:
+    name = element.get("name", "")
+    if not (1 <= len(name) <= _LONGEST_NAME and name.isprintable()):
+        raise _malformed(
+            f"a {element.tag} is called {name!r:.80}; wanted a printable name of at most {_LONGEST_NAME} characters"
+        )
+    return name
+
+
+def _link_of(joint: ElementTree.Element, end: str) -> str:
+    element = joint.find(end)
+    if element is None or not element.get("link"):
+        raise _malformed(f"joint {_name(joint)}: it has no {end}")
+    return element.get("link", "")
+
+
+def _numbers(
+    element: ElementTree.Element,
+    key: str,
+    count: int,
+    *,
+    of: ElementTree.Element,
+    default: list[float] | None = None,
+    largest: float = _LARGEST_NUMBER,
+) -> list[float]:
+    text = element.get(key)
+    if text is None and default is not None:
+        return default
+    try:
+        values = [float(word) for word in (text or "").split()]
+    except ValueError:
+        values = []
+    if len(values) != count or not all(abs(value) <= largest for value in values):
+        wanted = "a number" if count == 1 else f"{count} numbers"
+        raise _malformed(f"{of.tag} {_name(of)}: {element.tag} {key} should be {wanted}, got {text!r:.80}")
+    return values
+
+
+def _origin(element: ElementTree.Element, *, of: ElementTree.Element) -> ElementTree.Element:
+    origin = element.find("origin")
+    clean = ElementTree.Element("origin")
+    for key in ("xyz", "rpy"):
+        values = [0.0] * 3 if origin is None else _numbers(origin, key, 3, of=of, default=[0.0] * 3)
+        clean.set(key, _text(values))
+    return clean
+
+
+def _inertia(link: ElementTree.Element, mass: float) -> dict[str, str]:
+    least = mass * _LEAST_RADIUS_OF_GYRATION_M**2
+    matrix: NDArray[np.float64] = np.zeros((3, 3))
+    if (given := link.find("inertial/inertia")) is not None:
+        for key, (row, column) in _INERTIA.items():
+            (matrix[row, column],) = (matrix[column, row],) = _numbers(given, key, 1, of=link, default=[0.0])
+    moments, axes = np.linalg.eigh(matrix)
+    if moments[0] < -max(least, _ROUNDING * moments[2]):
+        raise _malformed(f"link {_name(link)}: its inertia is not positive: principal moment {moments[0]:g} kg m²")
+    possible = np.maximum(moments, least)
+    # No body has a moment larger than the other two together; Bullet would drop the inertia altogether.
+    possible[2] = min(possible[2], _LARGEST_SHARE * (possible[0] + possible[1]))
+    if (possible != moments).any():
+        matrix = axes * possible @ axes.T
+    return {key: repr(float(matrix[place])) for key, place in _INERTIA.items()}
+
+
+_INERTIA = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
+
+
+def _text(values: list[float]) -> str:
+    return " ".join(repr(min(max(value, -_LARGEST_NUMBER), _LARGEST_NUMBER)) for value in values)

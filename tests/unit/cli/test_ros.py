@@ -1,0 +1,387 @@
+"""`throwcollect ros` beside a node that has one of everything."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pytest
+from ruamel.yaml import YAML
+
+from throwcollect.cli.main import main
+from throwcollect.interfaces import get_action, get_message, get_service, type_hash
+from throwcollect.ros.embedded import (
+    ActionServer,
+    CancelResponse,
+    Context,
+    DurabilityPolicy,
+    ExternalShutdownException,
+    Future,
+    GoalResponse,
+    IntegerRange,
+    Node,
+    ParameterDescriptor,
+    QoSProfile,
+    SingleThreadedExecutor,
+)
+from throwcollect.ros.router import router
+from throwcollect.runtime.nodes import node_environment
+from throwcollect.runtime.records import Record, Records
+from throwcollect.session_config import OVERRIDE_VARIABLE
+
+String: Any = get_message("std_msgs/msg/String")
+JointState: Any = get_message("sensor_msgs/msg/JointState")
+SetBool: Any = get_service("std_srvs/srv/SetBool")
+FJT: Any = get_action("control_msgs/action/FollowJointTrajectory")
+FOLLOW = "/robot/follow"
+
+
+class Robot(Node):
+    """Has a latched topic, a topic that ticks, a service, an action and parameters."""
+
+    def __init__(self, context: Context) -> None:
+        super().__init__("driver", namespace="/robot", context=context)
+        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        self.description = self.create_publisher(String, "description", latched)
+        self.description.publish(String(data="x" * 200))
+        self.states = self.create_publisher(JointState, "states", 10)
+        self.create_timer(0.02, lambda: self.states.publish(JointState(name=["a"], position=[1.5])))
+        self.create_service(SetBool, "switch", self.switch)
+        self.create_service(SetBool, "slow", self.wait)
+        self.declare_parameter("limit", 3, ParameterDescriptor(integer_range=[IntegerRange(from_value=0, to_value=9)]))
+        self.declare_parameter("names", ["a", "b"])
+        ActionServer(self, FJT, "follow", self.execute, goal_callback=self.consider, cancel_callback=self.cancel)
+        self.ends: Future = Future()
+
+    def switch(self, request: Any, response: Any) -> Any:
+        response.success, response.message = request.data, "switched"
+        return response
+
+    async def wait(self, _request: Any, _response: Any) -> Any:
+        return await Future()
+
+    def consider(self, goal: Any) -> GoalResponse:
+        return GoalResponse.ACCEPT if goal.trajectory.joint_names else GoalResponse.REJECT
+
+    def cancel(self, _handle: Any) -> CancelResponse:
+        self.ends.set_result("canceled")
+        return CancelResponse.ACCEPT
+
+    async def execute(self, handle: Any) -> Any:
+        handle.publish_feedback(FJT.Feedback(joint_names=["moving"]))
+        how = handle.request.trajectory.joint_names[0]
+        if how == "wait":
+            how = await self.ends
+        getattr(handle, how)()
+        return FJT.Result(error_string=f"it {how}")
+
+
+@pytest.fixture(scope="module")
+def endpoint() -> Iterator[str]:
+    """A router with the robot behind it, which spins in a thread."""
+    with router("tcp/127.0.0.1:0") as endpoint, pytest.MonkeyPatch.context() as patch:
+        patch.setenv(OVERRIDE_VARIABLE, f"connect/endpoints={json.dumps([endpoint])}")
+        patch.delenv("ZENOH_SESSION_CONFIG_URI", raising=False)
+        patch.setenv("ROS_DOMAIN_ID", "0")
+        context = Context()
+        context.init()
+        executor = SingleThreadedExecutor(context=context)
+        executor.add_node(Robot(context))
+
+        def spin() -> None:
+            with pytest.raises(ExternalShutdownException, match="shut down"):
+                executor.spin()
+
+        thread = threading.Thread(target=spin)
+        thread.start()
+        yield endpoint
+        context.request_shutdown()
+        thread.join()
+        context.try_shutdown()
+
+
+class Said(NamedTuple):
+    code: object
+    out: str
+    err: str
+
+
+@pytest.fixture
+def say(
+    endpoint: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Iterator[Callable[..., Said]]:
+    before = signal.getsignal(signal.SIGTERM)
+
+    def run(*arguments: str) -> Said:
+        monkeypatch.setattr(sys, "argv", ["throwcollect", "ros", *arguments])
+        try:
+            main()
+        except SystemExit as end:
+            return Said(end.code, *capsys.readouterr())
+        raise AssertionError("the command did not exit")
+
+    yield run
+    signal.signal(signal.SIGTERM, before)
+
+
+def start(*arguments: str) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-m", "throwcollect", "ros", *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        stdin=subprocess.DEVNULL,
+        text=True,
+    )
+
+
+def test_nodes_topics_services_and_actions_are_listed_without_what_is_hidden(say: Callable[..., Said]) -> None:
+    assert say("node", "list") == (0, "/robot/driver\n", "")
+    assert say("action", "list", "-t") == (0, f"{FOLLOW} [{FJT.TYPE}]\n", "")
+    topics = say("topic", "list", "-t").out.splitlines()
+    assert "/robot/states [sensor_msgs/msg/JointState]" in topics
+    assert not any("_action" in topic for topic in topics)
+    assert f"{FOLLOW}/_action/status" in say("topic", "list", "-a").out.splitlines()
+    services = say("service", "list").out.splitlines()
+    assert "/robot/switch" in services
+    assert all(service.startswith("/robot/") for service in services)
+
+
+def test_a_node_is_told_with_all_that_it_has(say: Callable[..., Said]) -> None:
+    lines = say("node", "info", "robot/driver").out.splitlines()
+    assert lines[0] == "/robot/driver"
+    sections = [line.strip(" :") for line in lines if line.startswith("  ") and not line.startswith("    ")]
+    assert sections == [
+        "Subscribers", "Publishers", "Service Servers", "Service Clients", "Action Servers", "Action Clients",
+    ]  # fmt: skip
+    assert "    /robot/states: sensor_msgs/msg/JointState" in lines
+    assert lines[lines.index("  Action Servers:") + 1] == f"    {FOLLOW}: {FJT.TYPE}"
+
+
+def test_a_topic_is_told_with_its_publishers(say: Callable[..., Said]) -> None:
+    assert say("topic", "info", "robot/states").out == (
+        "Type: sensor_msgs/msg/JointState\nPublisher count: 1\nSubscription count: 0\n"
+    )
+    lines = say("topic", "info", "-v", "/robot/description").out.splitlines()
+    assert f"Topic type hash: {type_hash(String.TYPE)}" in lines
+    assert "  Durability: TRANSIENT_LOCAL" in lines
+
+
+def test_a_latched_message_is_echoed_to_who_comes_late_and_cut_off_unless_wanted_in_full(
+    say: Callable[..., Said],
+) -> None:
+    assert say("topic", "echo", "/robot/description", "--once").out == f"data: {'x' * 128}...\n---\n"
+    assert say("topic", "echo", "/robot/description", "--once", "-f").out == f"data: {'x' * 200}\n---\n"
+
+
+def test_a_message_or_one_of_its_fields_is_echoed_as_yaml(say: Callable[..., Said]) -> None:
+    text = say("topic", "echo", "/robot/states", "sensor_msgs/JointState", "--once").out.removesuffix("---\n")
+    assert YAML(typ="safe").load(text) == {
+        "header": {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""},
+        "name": ["a"],
+        "position": [1.5],
+        "velocity": [],
+        "effort": [],
+    }
+    assert list(YAML(typ="safe").load(text)) == ["header", "name", "position", "velocity", "effort"]
+    assert say("topic", "echo", "/robot/states", "--once", "--field", "header.stamp").out == "sec: 0\nnanosec: 0\n---\n"
+    assert say("topic", "echo", "/robot/description", "--once", "--field", "data").out == f"{'x' * 128}...\n---\n"
+    assert say("topic", "echo", "/robot/states", "--once", "--field", "position").out == "- 1.5\n---\n"
+
+
+def test_a_service_is_called_with_values_in_yaml(say: Callable[..., Said]) -> None:
+    said = say("service", "call", "/robot/switch", "std_srvs/SetBool", "{data: true}")
+    assert said.code == 0
+    assert said.out == (
+        "requester: making request: std_srvs.srv.SetBool_Request(data=True)\n\n"
+        "response:\nstd_srvs.srv.SetBool_Response(success=True, message='switched')\n\n"
+    )
+    assert "success=False" in say("service", "call", "/robot/switch", "std_srvs/srv/SetBool").out
+
+
+def test_parameters_are_listed_read_and_set(say: Callable[..., Said]) -> None:
+    own = ["  limit", "  names", "  start_type_description_service", "  use_sim_time"]
+    assert say("param", "list", "/robot/driver").out.splitlines() == own
+    assert say("param", "list").out.splitlines() == ["/robot/driver:", *own]
+    assert say("param", "get", "robot/driver", "names").out == "String values are: ['a', 'b']\n"
+    assert say("param", "set", "/robot/driver", "names", "[c]") == (0, "Set parameter successful\n", "")
+    assert say("param", "get", "/robot/driver", "names").out == "String values are: ['c']\n"
+    say("param", "set", "/robot/driver", "names", "[a, b]")
+    refused = say("param", "set", "/robot/driver", "limit", "10")
+    assert refused.code == 2
+    assert refused.err.startswith("throwcollect: setting limit of /robot/driver failed: Parameter limit out of range")
+
+
+def test_a_goal_is_sent_and_its_result_told(say: Callable[..., Said]) -> None:
+    goal = "{trajectory: {joint_names: [succeed], points: [{positions: [1, 2], time_from_start: {sec: 1}}]}}"
+    said = say("action", "send", FOLLOW, FJT.TYPE, goal, "-f")
+    assert said.code == 0, said.err
+    assert "        - 1.0\n" in said.out
+    assert "Feedback:\n    header:\n" in said.out
+    assert "error_string: it succeed\n" in said.out
+    assert said.out.endswith("Goal finished with status: SUCCEEDED\n")
+
+
+def test_a_goal_that_is_not_reached_is_exit_code_1_and_a_rejected_one_2(say: Callable[..., Said]) -> None:
+    said = say("action", "send_goal", FOLLOW, FJT.TYPE, "{trajectory: {joint_names: [abort]}}")
+    assert (said.code, said.err) == (1, f"throwcollect: {FOLLOW}: the goal was not reached: ABORTED\n")
+    said = say("action", "send", FOLLOW, FJT.TYPE, "{}")
+    assert said.code == 2
+    assert f"{FOLLOW}: the goal was rejected" in said.err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ("topic echo /robot/state", "no topic /robot/state\n  expected: /robot/states"),
+        ("topic hz /nothing", "no topic /nothing"),
+        ("topic info /nothing", "no topic /nothing"),
+        ("topic echo //x", "'//x' is no name in ROS"),
+        ("topic echo /robot/states std_msgs/Sting", "unknown interface 'std_msgs/msg/Sting'"),
+        ("topic echo /robot/states std_msgs/String", "/robot/states is no std_msgs/msg/String"),
+        ("topic echo /robot/states sensor_msgs", "expected a name of the form package/msg/Name"),
+        ("topic echo /robot/states --field header.stamp.x", "no field 'x'\n  expected: one of sec, nanosec"),
+        ("topic echo /robot/states --field name.x", "no field 'x'\n  expected: nothing below list"),
+        ("node info /robot/drive", "no node /robot/drive\n  expected: /robot/driver"),
+        ("service call /robot/x std_srvs/srv/SetBool", "no service /robot/x"),
+        ("service call /robot/switch std_srvs/srv/Trigger", "/robot/switch is no std_srvs/srv/Trigger"),
+        ("service call /robot/switch std_srvs/srv/SetBoo", "did you mean 'std_srvs/srv/SetBool'"),
+        ("service call /robot/switch std_srvs/srv/SetBool {dat:", "VALUES: not YAML"),
+        ("service call /robot/switch std_srvs/srv/SetBool 7", "values: should be fields with values, got 7"),
+        ("service call /robot/switch std_srvs/srv/SetBool {dat:\\ 1}", "dat: no such field\n  expected: one of data"),
+        ("service call /robot/switch std_srvs/srv/SetBool {data:\\ 1}", "data: should be boolean, got 1"),
+        (f"action send /robot/x {FJT.TYPE} {{}}", f"no action /robot/x\n  expected: {FOLLOW}"),
+        (
+            f"action send {FOLLOW} {FJT.TYPE} {{goal_time_tolerance:\\ {{sec:\\ 3000000000}}}}",
+            "goal_time_tolerance.sec: should be int32, got 3000000000",
+        ),
+        (
+            f"action send {FOLLOW} {FJT.TYPE} {{trajectory:\\ {{points:\\ [{{x:\\ 1}}]}}}}",
+            "trajectory.points[0].x: no such field",
+        ),
+        ("param get /robot/driver limits", "no parameter limits of /robot/driver\n  expected: limit"),
+        ("param get /robot/drive limit", "no node /robot/drive"),
+        ("param set /robot/driver limits 1", "parameter 'limits' is not declared"),
+        ("param list /nobody", "no node /nobody"),
+        ("topic list --run nobody-1234", "no run 'nobody-1234'"),
+    ],
+)
+def test_a_wrong_request_is_one_clear_message_and_exit_code_2(
+    arguments: str, message: str, say: Callable[..., Said], monkeypatch: pytest.MonkeyPatch, tmp_path: Any
+) -> None:
+    monkeypatch.setenv("THROWCOLLECT_STATE", str(tmp_path))
+    words = [word.replace("\0", " ") for word in arguments.replace("\\ ", "\0").split(" ")]
+    said = say(*words)
+    assert (said.code, said.out) == (2, "")
+    assert message in said.err
+    # The robot, which logs here too, may have been faster.
+    assert "\nthrowcollect: " in f"\n{said.err}"
+    assert "internal error" not in said.err
+
+
+def test_without_a_router_there_is_one_clear_message(say: Callable[..., Said], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("throwcollect.ros.embedded.session._PATIENCE_S", 0.1)
+    monkeypatch.setenv(OVERRIDE_VARIABLE, 'connect/endpoints=["tcp/127.0.0.1:9"]')
+    said = say("node", "list")
+    assert said.code == 2
+    assert "no Zenoh session" in said.err
+    assert "--run RUN" in said.err
+
+
+def test_a_run_is_joined_by_its_name_or_directory(
+    endpoint: str, say: Callable[..., Said], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("THROWCOLLECT_STATE", str(tmp_path))
+    for variable in node_environment(endpoint, 0):
+        monkeypatch.setenv(variable, "nonsense")
+    run = Records().new("throws")
+    record = Record(
+        run=run.run,
+        name="throws",
+        runtime="local",
+        directory=str(tmp_path / "data"),
+        volume=None,
+        logs=str(tmp_path),
+        domain_id=0,
+        started=datetime.now(timezone.utc),
+        launcher=os.getpid(),
+        simulations=1,
+        endpoint=endpoint,
+    )
+    run.write(record)
+    for named in (run.run, "thr", str(tmp_path / "data")):
+        assert say("node", "list", "--run", named) == (0, "/robot/driver\n", "")
+    run.update(endpoint=None)
+    assert say("node", "list", "--run", run.run).code == 3
+    run.close()
+    assert "its launcher died" in say("node", "list", "--run", run.run).err
+
+
+def test_leaving_an_echo_by_ctrl_c_is_quiet(endpoint: str) -> None:
+    process = start("topic", "echo", "/robot/states", "--field", "name")
+    assert process.stdout is not None
+    assert process.stdout.readline() == "- a\n"
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=10)
+    assert (process.returncode, err) == (130, "")
+
+
+def test_the_rate_of_a_topic_is_told_every_second(endpoint: str) -> None:
+    process = start("topic", "hz", "/robot/states")
+    assert process.stdout is not None
+    words = (process.stdout.readline() + process.stdout.readline()).split()
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=10)
+    assert words[:2] == ["average", "rate:"]
+    assert 0 < float(words[2]) < 60
+    assert process.returncode == 130
+
+
+def test_ctrl_c_cancels_the_goal(endpoint: str) -> None:
+    process = start("action", "send", FOLLOW, FJT.TYPE, "{trajectory: {joint_names: [wait]}}")
+    assert process.stdout is not None
+    while not process.stdout.readline().startswith("Goal accepted"):
+        assert process.poll() is None
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=10)
+    assert (process.returncode, err) == (130, "")
+    assert "Canceling goal...\nGoal canceled.\n" in out
+
+
+def test_a_reader_that_leaves_early_is_no_error(endpoint: str) -> None:
+    process = start("topic", "echo", "/robot/states")
+    assert process.stdout is not None
+    process.stdout.readline()
+    process.stdout.close()
+    assert process.stderr is not None
+    assert process.stderr.read() == ""
+    assert process.wait(timeout=10) == 0
+
+
+def test_a_service_that_goes_away_before_it_answers_is_told() -> None:
+    server = (
+        "from throwcollect.ros import embedded as ros; from throwcollect.interfaces import get_service\n"
+        "ros.init(); node = ros.create_node('n')\n"
+        "async def wait(request, response): await ros.Future()\n"
+        "node.create_service(get_service('std_srvs/srv/SetBool'), 'slow', wait)\n"
+        "print('ready', flush=True); ros.spin(node)\n"
+    )
+    with router("tcp/127.0.0.1:0") as endpoint, pytest.MonkeyPatch.context() as patch:
+        patch.setenv(OVERRIDE_VARIABLE, f"connect/endpoints={json.dumps([endpoint])}")
+        serving = subprocess.Popen([sys.executable, "-c", server], stdout=subprocess.PIPE, text=True)
+        assert serving.stdout is not None
+        serving.stdout.readline()
+        calling = start("service", "call", "/slow", "std_srvs/srv/SetBool")
+        assert calling.stdout is not None
+        calling.stdout.readline()
+        os.kill(serving.pid, signal.SIGKILL)
+        serving.communicate()
+        _, err = calling.communicate(timeout=10)
+    assert (calling.returncode, err) == (3, "throwcollect: /slow is gone and has not answered\n")

@@ -1,0 +1,112 @@
+"""Limbs of a simulation: how their controllers are set up, and what is told of them."""
+
+import numpy as np
+import pytest
+
+from throwcollect.config.schema import Config
+from throwcollect.control import GoalStatus, Trajectory, TrajectoryGoal, TrajectoryPoint
+from throwcollect.robots.description import start_posture
+from throwcollect.robots.talos import CONTROLLERS, graph_name
+from throwcollect.sim.simulation import Simulation
+
+ARM, HEAD = "arm_right_controller", "head_controller"
+POSTURE = start_posture(Config())
+ELBOW = CONTROLLERS[ARM].index("arm_right_4_joint")
+
+
+def simulation(**options: object) -> Simulation:
+    return Simulation(Config.model_validate({"controllers": options}))
+
+
+def goal(seconds: float, elbow: float = -1.0) -> TrajectoryGoal:
+    positions = [POSTURE[joint] for joint in CONTROLLERS[ARM]]
+    positions[ELBOW] = elbow
+    return TrajectoryGoal(Trajectory(CONTROLLERS[ARM], [TrajectoryPoint(round(seconds * 1e9), positions)]))
+
+
+def test_controllers_have_the_names_of_either_ros() -> None:
+    names = [limb.name for limb in simulation(names="ros1").limbs.values()]
+    assert names == [
+        "left_arm_controller",
+        "right_arm_controller",
+        "left_leg_controller",
+        "right_leg_controller",
+        "torso_controller",
+        "head_controller",
+        "left_gripper_controller",
+        "right_gripper_controller",
+    ]
+    assert [graph_name(name, "ros2") for name in CONTROLLERS] == list(CONTROLLERS)
+
+
+@pytest.mark.parametrize("seconds", [0.1, 0.7])
+def test_a_result_comes_before_time_goes_on(seconds: float) -> None:
+    world = simulation()
+    world.submit(ARM, 1, goal(seconds))
+    results = []
+    while not results:
+        world.advance(watched=False)
+        results = world.pop_results()
+    ((_, result),) = results
+    assert result.status == GoalStatus.SUCCEEDED
+    assert 0 <= world.now_ns - result.stamp_ns <= 10**9 // world.config.sim.physics_hz
+
+
+def test_whoever_watches_gets_the_state_of_every_control_period() -> None:
+    world = simulation()
+    world.watch([ARM, HEAD])
+    world.submit(ARM, 1, goal(0.5))
+    world.step(100)
+    period_ns = 10**9 // world.config.sim.physics_hz
+    for name in (ARM, HEAD):
+        states = world.limbs[name].pop_states()
+        assert [state.stamp_ns for state in states] == [period_ns * number for number in range(100)]
+    assert [name for name, limb in world.limbs.items() if limb.pop_states()] == []
+    world.watch([])
+    world.step(10)
+    assert world.limbs[ARM].pop_states() == []
+
+
+def test_watching_changes_nothing() -> None:
+    positions = []
+    for watched in ([], [ARM, HEAD]):
+        world = simulation()
+        world.watch(watched)
+        world.submit(ARM, 1, goal(0.5))
+        world.step(400)
+        positions.append(world.world.joint_positions())
+    assert positions[0] == positions[1]
+
+
+def stopped(**options: object) -> tuple[np.ndarray, np.ndarray]:
+    """Command and measured elbow, before and after a cancelled swing of an arm that lags."""
+    world = Simulation(Config.model_validate({"controllers": options, "robot": {"effort_scale": 0.2}}))
+    world.submit(ARM, 1, goal(0.4, elbow=-0.3))
+    world.step(150)
+    before = world.controller_state(ARM)
+    assert world.cancel(ARM, 1)
+    world.step(1)
+    after = world.controller_state(ARM)
+    return np.array([[each.output.positions[ELBOW], each.actual.positions[ELBOW]] for each in (before, after)])
+
+
+def test_a_cancelled_goal_leaves_the_joints_where_they_are_measured_or_commanded() -> None:
+    measured, command = stopped(), stopped(hold="command")
+    lag = abs(measured[0, 0] - measured[0, 1])
+    assert lag > 0.01
+    assert measured[1, 0] == pytest.approx(measured[0, 1], abs=1e-9)
+    assert command[1, 0] == command[0, 0]
+
+
+def test_joints_can_brake_when_a_goal_is_cancelled() -> None:
+    world = simulation(hold="decelerate", max_deceleration_radps2=5.0)
+    world.submit(ARM, 1, goal(0.5, elbow=-1.4))
+    world.step(150)
+    speed = world.controller_state(ARM).actual.velocities[ELBOW]
+    assert speed == pytest.approx(1.0, abs=0.05)
+    position = world.controller_state(ARM).actual.positions[ELBOW]
+    world.cancel(ARM, 1)
+    world.step(300)
+    state = world.controller_state(ARM)
+    assert state.output.positions[ELBOW] == pytest.approx(position + speed**2 / 2 / 5.0, abs=1e-6)
+    assert state.actual.positions[ELBOW] == pytest.approx(state.output.positions[ELBOW], abs=0.005)
