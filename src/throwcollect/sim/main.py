@@ -17,6 +17,13 @@ def _nothing() -> None:
     """Work that makes an executor return from waiting."""
 
 
+def _take_inputs(executor: ros.Executor) -> None:
+    """Handle the inputs that have come by now, but none that come meanwhile."""
+    last = executor.create_task(_nothing)
+    while not last.done():
+        executor.spin_once(timeout_sec=0.0)
+
+
 def run(config: Path, *, name: str) -> None:
     """Serve one simulation until SIGTERM or SIGINT, or until a client sets its state to quitting.
 
@@ -52,7 +59,8 @@ def run(config: Path, *, name: str) -> None:
         while not stopped and not node.quitting:
             if simulation.running:
                 simulation.advance(watched=node.watched)
-                executor.spin_once(timeout_sec=0.0)
+                node.follow_up()
+                _take_inputs(executor)
             else:
                 executor.spin_once(timeout_sec=node.patience_s)
             node.follow_up()

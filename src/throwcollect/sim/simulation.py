@@ -33,10 +33,10 @@ from throwcollect.sim.world import World
 
 _NO_TRIAL = -1
 _SLICE_S = 0.5
-"""Simulated time between two looks at the inputs: about 20 ms of real time."""
+"""Simulated time between two looks at the inputs within a trial or many steps: about 20 ms of real time."""
 
 _WATCHED_SLICE_S = 0.05
-"""The same while somebody watches: the period of action feedback, as upstream."""
+"""The same while somebody watches, and otherwise: the period of action feedback, as upstream."""
 
 _EXECUTING = 2
 """action_msgs/msg/GoalStatus.STATUS_EXECUTING."""
@@ -209,7 +209,8 @@ class Simulation:
         began, stamp = time.monotonic(), self.now_ns
         # In slow motion slices are shorter still, so that the node answers while it waits.
         slice_s = _WATCHED_SLICE_S * min(1.0, self.real_time_factor or 1.0)
-        if not watched and self.real_time_factor is None:
+        busy = self._in_trial or self._steps is not None
+        if busy and not watched and self.real_time_factor is None:
             slice_s = _SLICE_S
         steps = max(1, round(slice_s * self.config.sim.physics_hz))
         if self._steps is not None:
