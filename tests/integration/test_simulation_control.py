@@ -98,11 +98,14 @@ def test_stopping_resets_and_nothing_runs_until_it_plays_again(robot: Robot) -> 
 
 @pytest.mark.parametrize("scope", [Reset.SCOPE_DEFAULT, Reset.SCOPE_ALL])
 def test_a_reset_brings_time_robot_and_ball_back(scope: int, robot: Robot) -> None:
-    start = robot.call("get_entity_state", entity="ball").state
+    def ball() -> Any:
+        return robot.call("get_entity_state", entity="ball").state
+
+    start = ball()
     robot.outcome(robot.send(swing()))
-    assert robot.call("get_entity_state", entity="ball").state.pose.position.z < 0.1
+    robot.wait_until(lambda: ball().pose.position.z < 0.1, "the ball falls")
     assert robot.call("reset_simulation", scope=scope).result.result == Result.RESULT_OK
-    assert robot.call("get_entity_state", entity="ball").state == start
+    assert ball() == start
     assert robot.joint(ELBOW) == pytest.approx(POSTURE[ELBOW], abs=1e-4)
 
 

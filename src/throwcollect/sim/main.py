@@ -57,12 +57,11 @@ def run(config: Path, *, name: str) -> None:
     print(f"{name} is ready", flush=True)
     try:
         while not stopped and not node.quitting:
+            if not simulation.running:
+                executor.spin_once(timeout_sec=node.patience_s)
+            _take_inputs(executor)
             if simulation.running:
                 simulation.advance(watched=node.watched)
-                node.follow_up()
-                _take_inputs(executor)
-            else:
-                executor.spin_once(timeout_sec=node.patience_s)
             node.follow_up()
     finally:
         for each in (*node.companions, node):
