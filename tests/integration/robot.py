@@ -31,7 +31,7 @@ from throwcollect.ros import (
     get_message,
     get_service,
 )
-from throwcollect.ros.backend import VARIABLE
+from throwcollect.ros.backend import VARIABLE, uses_rclpy
 from throwcollect.session_config import CONFIG_FILE_VARIABLE, OVERRIDE_VARIABLE
 
 CONFIG = Config.model_validate({"name": "integration", "tool": {"cup_floor_radius_m": 0.006}})
@@ -45,6 +45,10 @@ PATIENCE_S = 20.0
 
 ALL = QoSProfile(history=HistoryPolicy.KEEP_ALL)
 """Nothing is lost on the client's side, however late it looks."""
+
+in_order_of_arrival = pytest.mark.skipif(
+    uses_rclpy(), reason="rclpy takes up a topic's messages and answers as it likes"
+)
 
 FollowJointTrajectory: Any = get_action("control_msgs/action/FollowJointTrajectory")
 JointTrajectory: Any = get_message("trajectory_msgs/msg/JointTrajectory")

@@ -16,6 +16,7 @@ from tests.integration.robot import (
     Result,
     Robot,
     goal,
+    in_order_of_arrival,
     stamp_ns,
     swing,
 )
@@ -119,6 +120,7 @@ def test_scopes_that_mean_nothing_are_refused_and_change_nothing(scope: int, rob
     assert robot.now_ns() == 5 * STEP_NS
 
 
+@in_order_of_arrival
 def test_a_reset_of_time_stops_goals_where_they_are_and_tells_the_time_though_paused(robot: Robot) -> None:
     robot.put_into(PAUSED)
     with robot.listening("rosgraph_msgs/msg/Clock", "clock") as heard:
@@ -160,6 +162,7 @@ def test_a_reset_of_states_aborts_goals(robot: Robot) -> None:
     assert robot.outcome(handle) == (ABORTED, INVALID_GOAL, "simulation was reset")
 
 
+@in_order_of_arrival
 def test_a_pause_in_the_middle_of_a_goal_changes_nothing_but_the_wait(robot: Robot) -> None:
     def decided_at(*, pause: bool) -> int:
         robot.reset()

@@ -15,6 +15,7 @@ from tests.integration.robot import (
     Result,
     Robot,
     goal,
+    in_order_of_arrival,
     stamp_ns,
 )
 from throwcollect.ros import ActionClient, get_action
@@ -103,6 +104,7 @@ def test_more_steps_than_a_caller_would_wait_for_are_refused_by_the_service(robo
     assert robot.now_ns() == 0
 
 
+@in_order_of_arrival
 def test_the_action_tells_of_every_step_and_ends_paused(robot: Robot, action: ActionClient) -> None:
     robot.put_into(PAUSED)
     told: list[tuple[int, int]] = []

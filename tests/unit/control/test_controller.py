@@ -192,8 +192,12 @@ def test_trajectories_from_the_topic_need_a_look_once_they_are_late() -> None:
     bench.controller.replace(goal(to(1.0, 2.1)).trajectory, bench.now_ns)
     bench.step()
     assert bench.controller.next_decision() == 160
-    bench.controller.take(160)
+    bench.plant.apply(bench.controller.take(160)[-1])
     assert bench.controller.next_decision() == 0
+    assert not bench.controller.at_rest
+    bench.step(2)
+    assert bench.controller.at_rest
+    assert bench.controller.command[0] == 2.1
 
 
 def test_an_idle_controller_repeats_one_row() -> None:

@@ -67,6 +67,16 @@ def test_whoever_watches_gets_the_state_of_every_control_period() -> None:
     assert world.limbs[ARM].pop_states() == []
 
 
+def test_whoever_watches_later_gets_no_states_of_before() -> None:
+    world = simulation()
+    world.watch([ARM])
+    world.submit(ARM, 1, goal(0.5))
+    world.step(10)
+    world.watch([])
+    world.watch([ARM])
+    assert world.limbs[ARM].pop_states() == []
+
+
 def test_watching_changes_nothing() -> None:
     positions = []
     for watched in ([], [ARM, HEAD]):

@@ -67,6 +67,15 @@ def test_the_clock_stands_still_until_every_awaited_controller_has_a_goal(simula
     assert simulation.now_ns == CONFIG.trial_start_ns(0)
 
 
+def test_a_trajectory_that_is_no_goal_waits_for_the_awaited_goals(simulation: Simulation) -> None:
+    simulation.setup = TrialSetup(0, (ARM,), CONFIG)
+    simulation.reset()
+    assert simulation.follow(HEAD, goal(HEAD).trajectory) is None
+    assert not simulation.running
+    assert simulation.submit(ARM, 1, swing()) is None
+    assert simulation.running
+
+
 def test_a_trial_yields_its_episode_once_and_with_the_results_of_its_goals(simulation: Simulation) -> None:
     trial(simulation, 3)
     run(simulation)
@@ -107,6 +116,17 @@ def test_joints_are_at_the_trajectory_when_their_sample_is_taken(simulation: Sim
     assert np.abs(samples.position[:, 10] - wanted).max() < 1e-4
 
 
+def test_what_a_controller_desires_and_measures_is_of_the_same_instant(simulation: Simulation) -> None:
+    simulation.submit(ARM, 1, goal(ARM, 2.0, arm_right_4_joint=-0.5))
+    simulation.step(500)
+    state, now_ns = simulation.controller_state(ARM), simulation.now_ns
+    elbow = CONTROLLERS[ARM].index("arm_right_4_joint")
+    assert state.stamp_ns == state.desired.time_from_start_ns == state.actual.time_from_start_ns == now_ns
+    assert abs(state.desired.velocities[elbow]) > 0.5
+    assert state.error.positions == pytest.approx(np.zeros(len(CONTROLLERS[ARM])), abs=1e-4)
+    assert simulation.controller_state(HEAD).stamp_ns == now_ns
+
+
 def test_a_goal_that_moves_a_locked_joint_is_refused_by_name(simulation: Simulation) -> None:
     refusal = simulation.submit(HEAD, 1, goal(HEAD, head_1_joint=0.2))
     assert refusal is not None
@@ -130,6 +150,12 @@ def test_without_a_trial_the_run_ends_when_limbs_and_ball_are_at_rest(simulation
     run(simulation)
     assert simulation.now_ns - ended > 1e9
     assert [result.status for _, result in simulation.pop_results()] == [GoalStatus.SUCCEEDED] * 2
+
+
+def test_a_trajectory_that_is_no_goal_ends_its_run_too(simulation: Simulation) -> None:
+    assert simulation.follow(ARM, swing().trajectory) is None
+    run(simulation)
+    assert simulation.now_ns > 1e9
 
 
 def test_a_reset_aborts_goals_and_goes_back_to_the_start(simulation: Simulation) -> None:
@@ -259,6 +285,23 @@ def test_set_points_are_kept_with_each_sample_when_they_are_recorded() -> None:
     elbow = CONTROLLERS[ARM].index("arm_right_4_joint")
     assert np.abs(states[ARM].position[:, elbow] - samples.position[:, 10]).max() < 1e-4
     assert states[ARM].elapsed_ns[5] == samples.stamps_ns[5] - samples.stamps_ns[0]
+    simulation.world.close()
+
+
+def test_the_last_look_of_a_trial_tells_the_results_that_it_brings() -> None:
+    config = Config.model_validate({"record": {"topics": ["joint_states", "ball/odometry", "controller_state"]}})
+    simulation = Simulation(config)
+    trial(simulation)
+    run(simulation)
+    lasted_s = (simulation.now_ns - config.trial_start_ns(0)) / 1e9
+    simulation.reset()
+    simulation.pop_results()
+    simulation.submit(ARM, 1, swing())
+    simulation.submit(TORSO, 2, goal(TORSO, lasted_s + 1 / config.sim.physics_hz))
+    run(simulation)
+    assert [name for name, _ in simulation.pop_results()] == [ARM]
+    assert simulation.episode() is not None
+    assert [(name, result.status) for name, result in simulation.pop_results()] == [(TORSO, GoalStatus.SUCCEEDED)]
     simulation.world.close()
 
 
