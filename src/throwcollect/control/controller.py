@@ -180,10 +180,8 @@ class JointTrajectoryController:
             return reason
         self._finish(Decision.invalid("Current goal preempted by new incoming action."))
         self._goal_id = goal_id
-        velocities, logger = self._tracker.velocities_count, self.logger
-        tolerances = goal_tolerances(
-            goal, self._defaults, self._parameters.joints, velocities=velocities, logger=logger
-        )
+        joints, velocities = self._parameters.joints, self._tracker.velocities_count
+        tolerances = goal_tolerances(goal, self._defaults, joints, velocities=velocities, logger=self.logger)
         self._follow(goal.trajectory, self._judge_with(tolerances))
         return None
 
@@ -306,8 +304,11 @@ class JointTrajectoryController:
         results, self._results = tuple(self._results), []
         return results
 
-    def state(self) -> ControllerState:
+    def state(self, time_ns: int | None = None) -> ControllerState:
         """What the last update has seen and done.
+
+        Args:
+            time_ns: Time of what was observed last, if that was after the update [ns].
 
         Returns:
             The state; while a goal is being executed it is also the content of its feedback.
@@ -315,7 +316,7 @@ class JointTrajectoryController:
         Raises:
             ValueError: If there was no update yet, or `take` was not followed by `observe`.
         """
-        return self._tracker.state()
+        return self._tracker.state(time_ns)
 
     def query(self, time_ns: int) -> TrajectoryState:
         """The trajectory that is being followed, at a given time.
@@ -339,7 +340,7 @@ class JointTrajectoryController:
         if decision.status is GoalStatus.ABORTED:
             self.logger.warning("%s: %s", self.name, decision.text)
             self._stop()
-        elif self._goal_id is not None:
+        elif self._goal_id is not None or self._judge.settled(motion):
             end_ns = motion.curve.end_ns
             self._hold(Waypoints.single(*motion.curve.state(end_ns), motion.curve.efforts(end_ns)))
         self._finish(decision)
@@ -385,8 +386,7 @@ class JointTrajectoryController:
 
     def _refusal(self, trajectory: Trajectory, now_ns: int, what: str) -> Refusal | None:
         if not self._active:
-            text = f"Can't accept new {what}. Controller is not running."
-            return self.refuse(Refusal(ErrorCode.INVALID_GOAL, text))
+            return self.refuse(Refusal(ErrorCode.INVALID_GOAL, f"Can't accept new {what}. Controller is not running."))
         if (reason := refusal(trajectory, self._parameters, now_ns)) is not None:
             return self.refuse(reason)
         ahead_ns = (trajectory.stamp_ns or now_ns) - now_ns

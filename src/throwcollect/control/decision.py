@@ -52,12 +52,12 @@ class Errors:
 
 
 def errors(
-    motion: Motion, measured: JointState, *, velocities: bool, continuous: NDArray[np.bool_] | None = None
+    desired: JointState, measured: JointState, *, velocities: bool, continuous: NDArray[np.bool_] | None = None
 ) -> Errors:
     """Errors of one update.
 
     Args:
-        motion: What is being followed.
+        desired: State that is due; its velocities are needed if they count.
         measured: Measured state.
         velocities: Whether velocities count.
         continuous: Joints that turn without end, whose errors are the short way; None if there is none.
@@ -65,12 +65,12 @@ def errors(
     Returns:
         The errors.
     """
-    position = motion.desired - measured.positions
+    position = desired.positions - measured.positions
     if continuous is not None:
         position = np.where(continuous, shortest_turn(position), position)
     velocity = None
-    if velocities and measured.velocities is not None:
-        velocity = motion.curve.state(motion.clock_ns)[1] - measured.velocities
+    if velocities and measured.velocities is not None and desired.velocities is not None:
+        velocity = desired.velocities - measured.velocities
     return Errors(position, velocity)
 
 
@@ -143,6 +143,13 @@ class Judge:
         late = [motion.updates_until_late(limit_ns) for limit_ns in limits if limit_ns]
         return max(0, min(late)) if late else None
 
+    def settled(self, motion: Motion) -> bool:
+        """Whether an end that no goal waits for has been judged for the last time."""
+        tolerances = self.tolerances
+        return tolerances.goal.checked and not self.timeout_ns and 0 < tolerances.goal_time_ns < motion.since_end_ns
+
     def _broken(self, motion: Motion, measured: JointState, limits: Limits) -> str:
-        error = errors(motion, measured, velocities=self.velocities, continuous=self.continuous)
+        velocity = motion.curve.state(motion.clock_ns)[1] if self.velocities else None
+        desired = JointState(motion.desired, velocity)
+        error = errors(desired, measured, velocities=self.velocities, continuous=self.continuous)
         return violations(error.position, error.velocity, limits, self.joints)

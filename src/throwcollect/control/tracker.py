@@ -165,23 +165,24 @@ class Tracker:
         self._commanded = (self.motion, self.motion.clock_ns + self.period_ns)
         return commands
 
-    def state(self) -> ControllerState:
-        """What the last update has seen and done.
+    def state(self, time_ns: int | None = None) -> ControllerState:
+        """What the last update has seen and done; or what one at a later time would see [ns].
 
         Raises:
-            ValueError: If there was no update yet, or its measured state is unknown.
+            ValueError: If there was no update yet, or the measured state is unknown.
         """
         motion, measured = self.motion, self.measured
-        position, velocity, acceleration = motion.curve.state(motion.clock_ns)
-        error = errors(motion, measured, velocities=self.velocities_count, continuous=self.continuous)
+        time_ns = self.time_ns if time_ns is None else time_ns
+        clock_ns = motion.clock_ns + round((time_ns - self.time_ns) * self._scaling)
+        position, velocity, acceleration = motion.curve.state(clock_ns)
+        desired = JointState(position, velocity)
+        error = errors(desired, measured, velocities=self.velocities_count, continuous=self.continuous)
         moving = () if measured.velocities is None else measured.velocities
         return ControllerState(
-            stamp_ns=self.time_ns,
+            stamp_ns=time_ns,
             joint_names=self._parameters.joints,
-            desired=TrajectoryPoint(
-                motion.clock_ns, position, velocity, acceleration, motion.curve.efforts(motion.clock_ns)
-            ),
-            actual=TrajectoryPoint(self.time_ns - motion.start_ns, measured.positions, moving),
+            desired=TrajectoryPoint(clock_ns, position, velocity, acceleration, motion.curve.efforts(clock_ns)),
+            actual=TrajectoryPoint(time_ns - motion.start_ns, measured.positions, moving),
             error=TrajectoryPoint(
                 0, error.position, np.zeros(len(moving)) if error.velocity is None else error.velocity
             ),

@@ -83,7 +83,7 @@ class ControllerNode(Node):
         for state in states:
             self._states.publish(state_message(state))
         if self._action.watched:
-            self._action.publish_feedback(states[-1] if states else self._simulation.controller_state(self.controller))
+            self._action.publish_feedback(self._simulation.controller_state(self.controller))
 
     def set_time(self, time: Time) -> None:
         """Set the node's clock."""

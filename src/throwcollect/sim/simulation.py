@@ -176,7 +176,7 @@ class Simulation:
         self._collect_results()
         if refusal is None:
             self._goals[controller] = GoalOutcome(controller, _EXECUTING, 0, "")
-            self._running |= all(name in self._goals for name in self.setup.controllers)
+            self._run_unless_awaiting()
         return refusal
 
     def cancel(self, controller: str, goal_id: Hashable) -> bool:
@@ -190,14 +190,15 @@ class Simulation:
         return cancelled
 
     def follow(self, controller: str, trajectory: Trajectory) -> Refusal | None:
-        """Let a controller follow a trajectory that is no goal.
+        """Let a controller follow a trajectory that is no goal; it begins a run unless goals are awaited.
 
         Returns:
             None if it is accepted, else the reason of the refusal.
         """
         refusal = self.limbs[controller].follow(trajectory, self.now_ns)
         self._collect_results()
-        self._running |= refusal is None
+        if refusal is None:
+            self._run_unless_awaiting()
         return refusal
 
     def advance(self, *, watched: bool) -> None:
@@ -301,12 +302,13 @@ class Simulation:
         states = {}
         if self._keeps_states:
             self._look(self.limbs.values())
+            self._collect_results()
             states = {name: limb.kept_states() for name, limb in self.limbs.items()}
         return header, samples, states
 
     def controller_state(self, controller: str) -> ControllerState:
-        """What a controller has seen and done last."""
-        return self._observed(controller).controller.state()
+        """What a controller has done last, and sees now."""
+        return self._observed(controller).controller.state(self.now_ns)
 
     def query(self, controller: str, time_ns: int) -> TrajectoryState:
         """What a controller's trajectory is at a given time [ns]."""
@@ -317,6 +319,11 @@ class Simulation:
         self._watched = [self.limbs[name] for name in controllers]
         for limb in self.limbs.values():
             limb.watched = limb in self._watched
+            if not limb.watched:
+                limb.pop_states()
+
+    def _run_unless_awaiting(self) -> None:
+        self._running |= all(name in self._goals for name in self.setup.controllers)
 
     def _take_steps(self, request: StepRequest, most: int) -> None:
         request.taken += self.step(min(most, request.wanted - request.taken))
