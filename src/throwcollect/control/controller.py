@@ -334,11 +334,11 @@ class JointTrajectoryController:
 
     def _decided(self, *, first: bool) -> Decision | None:
         motion = self._tracker.motion
-        decision = self._judge.decide(motion, self._tracker.measured, first=first)
-        if decision is None:
+        if (decision := self._judge.decide(motion, self._tracker.measured, first=first)) is None:
             return None
         if decision.status is GoalStatus.ABORTED:
-            self.logger.warning("%s: %s", self.name, decision.text)
+            holds = "" if self._goal_id is not None else " (no goal is open; the trajectory of the topic ends)"
+            self.logger.warning("%s: %s%s", self.name, decision.text, holds)
             self._stop()
         elif self._goal_id is not None or self._judge.settled(motion):
             end_ns = motion.curve.end_ns
