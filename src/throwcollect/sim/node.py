@@ -95,7 +95,7 @@ class SimulationNode(Node):
     @property
     def patience_s(self) -> float:
         """How long may be waited for inputs while time stands still [s]."""
-        return _REPEAT_S if self._listened else _IDLE_S
+        return _REPEAT_S if self._listened and self._rests else _IDLE_S
 
     @property
     def quitting(self) -> bool:
@@ -141,8 +141,13 @@ class SimulationNode(Node):
 
     def _repeats(self) -> bool:
         """Whether it is time to say again what was said last, as robots go on to tell their state while they rest."""
-        resting = self._simulation.state == State.PLAYING and not self._simulation.running
-        return resting and time.monotonic() - self._published_at >= _REPEAT_S
+        return self._rests and time.monotonic() - self._published_at >= _REPEAT_S
+
+    @property
+    def _rests(self) -> bool:
+        """Whether time stands still for want of anything to do; in a collection every sample is told once."""
+        simulation = self._simulation
+        return simulation.state == State.PLAYING and not simulation.running and simulation.setup.number < 0
 
     def _publish_steps(self, samples: Samples) -> None:
         """Publish the time that steps have led to, as they may end between two samples."""
