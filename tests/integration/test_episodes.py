@@ -14,7 +14,7 @@ from throwcollect.ros import get_message
 from throwcollect.ros.embedded import attachment
 
 KIND = "std_msgs/msg/UInt8MultiArray"
-TRIALS = 30
+TRIALS = 12
 
 
 @contextmanager

@@ -27,7 +27,7 @@ embedded_alone = pytest.mark.skipif(
 
 NAME = "sim_2"
 SEED = 20
-PAYLOADS = 8
+PAYLOADS = 4
 """Malformed payloads for each key; and as many attachments and changed messages."""
 AT_ONCE = 5
 """Less than a queue holds: what there is no room for is refused without a look at it."""
