@@ -197,6 +197,8 @@ class Coordinator(Node):
     def _receive(self, namespace: str, message: bytes) -> None:
         try:
             episode = unpack(message)
+            # Somebody else may publish here, too: what cannot be read must not end the collection later.
+            episode.samples()
         except DatasetError as error:
             self.get_logger().warning(f"{namespace}: unreadable episode: {error}")
             return

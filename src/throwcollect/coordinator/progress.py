@@ -8,6 +8,8 @@ from dataclasses import asdict, dataclass
 from types import TracebackType
 from typing import Any
 
+from pydantic import TypeAdapter, ValidationError
+
 from throwcollect import ros
 from throwcollect.ros import DurabilityPolicy, get_message
 
@@ -71,6 +73,17 @@ class Progress:
         """The message that carries it: a std_msgs/String of JSON."""
         return String(data=json.dumps(asdict(self)))
 
+    @classmethod
+    def read(cls, text: str) -> Progress | None:
+        """Progress from the text of its message; None if somebody else has published something else there."""
+        try:
+            return _PROGRESS.validate_json(text, strict=True)
+        except ValidationError:
+            return None
+
+
+_PROGRESS = TypeAdapter(Progress)
+
 
 class ProgressListener:
     """A node of its own that hears the coordinator's progress; use it as a context manager.
@@ -91,9 +104,8 @@ class ProgressListener:
         self.node = ros.Node(name)
         self._executor = ros.SingleThreadedExecutor()
         self._executor.add_node(self.node)
-        self.node.create_subscription(
-            String, PROGRESS_TOPIC, lambda message: on_progress(Progress(**json.loads(message.data))), PROGRESS_QOS
-        )
+        self._on_progress = on_progress
+        self.node.create_subscription(String, PROGRESS_TOPIC, self._hear, PROGRESS_QOS)
 
     def __enter__(self) -> ProgressListener:
         return self
@@ -107,3 +119,7 @@ class ProgressListener:
     def spin(self, seconds: float) -> None:
         """Wait for a report, at most so long [s]."""
         self._executor.spin_once(timeout_sec=seconds)
+
+    def _hear(self, message: Any) -> None:
+        if (progress := Progress.read(message.data)) is not None:
+            self._on_progress(progress)

@@ -1,6 +1,5 @@
 """What the coordinator makes of a simulation's answers, over a real router."""
 
-import json
 import time
 from collections.abc import Callable, Iterator
 
@@ -9,7 +8,6 @@ import pytest
 from throwcollect import ros
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.goals import FollowJointTrajectory, trial_goals
-from throwcollect.coordinator.progress import Progress
 from throwcollect.coordinator.simulation_client import SimulationClient
 from throwcollect.interfaces import get_service
 from throwcollect.robots.description import start_posture
@@ -146,9 +144,3 @@ def test_an_abandoned_trial_goes_no_further(bench: Bench) -> None:
     bench.settle()
     bench.settle()
     assert "goal" not in bench.requests
-
-
-def test_progress_survives_its_message() -> None:
-    progress = Progress(10, 4, {"landed": 2, "recaught": 1, "lost": 1}, 2, 7.5, hung=["sim_1"])
-    assert Progress(**json.loads(progress.message().data)) == progress
-    assert (progress.landed, progress.failed, progress.lost) == (2, 1, 1)

@@ -1,0 +1,25 @@
+"""What is heard of a collection's progress."""
+
+import json
+from dataclasses import asdict, replace
+
+import pytest
+
+from throwcollect.coordinator.progress import Progress
+
+PROGRESS = Progress(10, 4, {"landed": 2, "recaught": 1, "lost": 1}, 2, 7.5, hung=["sim_1"])
+
+
+def test_progress_survives_its_message() -> None:
+    assert Progress.read(PROGRESS.message().data) == PROGRESS
+    idle = replace(PROGRESS, throws_per_s=0.0, hung=[])
+    assert Progress.read(idle.message().data) == idle
+
+
+@pytest.mark.parametrize("text", ["", "landed", "{}", "[]", "null", '{"total": "ten"}', "{" * 5000, "\0"])
+def test_what_somebody_else_publishes_is_left_alone(text: str) -> None:
+    assert Progress.read(text) is None
+
+
+def test_progress_with_a_wrong_part_is_left_alone() -> None:
+    assert Progress.read(json.dumps({**asdict(PROGRESS), "outcomes": {"landed": "many"}})) is None
