@@ -1,10 +1,12 @@
 """A router in this process and one simulation in another, for all tests of a session."""
 
+import subprocess
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
-from tests.integration.robot import PLAYING, Robot, connected, running_simulation
+from tests.integration.robot import OWN, PLAYING, Robot, connected, running_simulation, start_simulation
 from throwcollect.ros import Context
 from throwcollect.ros.embedded.parameter import parameter_value_to_python
 from throwcollect.ros.router import router
@@ -48,3 +50,15 @@ def robot(shared: Robot, defaults: dict[str, object]) -> Robot:
         shared.put_into(PLAYING)
     shared.reset()
     return shared
+
+
+@pytest.fixture
+def running(endpoint: str, session: Context, tmp_path: Path) -> Iterator[tuple[subprocess.Popen[str], Robot]]:
+    """The process of a simulation of the test's own, which it may end, and a client."""
+    process = start_simulation(tmp_path, endpoint, OWN)
+    robot = Robot(session, OWN)
+    robot.wait_until_ready(process)
+    yield process, robot
+    robot.node.destroy_node()
+    process.kill()
+    process.communicate()

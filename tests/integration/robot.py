@@ -36,6 +36,8 @@ from throwcollect.session_config import CONFIG_FILE_VARIABLE, OVERRIDE_VARIABLE
 
 CONFIG = Config.model_validate({"name": "integration", "tool": {"cup_floor_radius_m": 0.006}})
 """Almost the defaults: the smallest balls fall through this spoon."""
+OWN = "sim_1"
+"""Name of a simulation that a test has for itself."""
 POSTURE = start_posture(CONFIG)
 ARM, TORSO, HEAD = "arm_right_controller", "torso_controller", "head_controller"
 ELBOW = "arm_right_4_joint"

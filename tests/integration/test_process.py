@@ -2,26 +2,10 @@
 
 import signal
 import subprocess
-from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 
-from tests.integration.robot import QUITTING, Result, Robot, start_simulation, swing
-from throwcollect.ros import Context
-
-NAME = "sim_1"
-
-
-@pytest.fixture
-def running(endpoint: str, session: Context, tmp_path: Path) -> Iterator[tuple[subprocess.Popen[str], Robot]]:
-    process = start_simulation(tmp_path, endpoint, NAME)
-    robot = Robot(session, NAME)
-    robot.wait_until_ready(process)
-    yield process, robot
-    robot.node.destroy_node()
-    process.kill()
-    process.communicate()
+from tests.integration.robot import OWN, QUITTING, Result, Robot, swing
 
 
 def assert_ends_well(process: subprocess.Popen[str]) -> None:
@@ -35,9 +19,7 @@ def test_quitting_ends_the_process_after_an_answer(running: tuple[subprocess.Pop
     process, robot = running
     assert robot.put_into(QUITTING).result == Result.RESULT_OK
     assert_ends_well(process)
-    robot.wait_until(
-        lambda: (NAME, f"/{NAME}") not in robot.node.get_node_names_and_namespaces(), "it leaves the graph"
-    )
+    robot.wait_until(lambda: (OWN, f"/{OWN}") not in robot.node.get_node_names_and_namespaces(), "it leaves the graph")
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])

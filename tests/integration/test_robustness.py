@@ -13,9 +13,9 @@ from typing import Any
 import pytest
 import zenoh
 
-from tests.integration.robot import ARM, PLAYING, Robot, connected, environment, goal, start_simulation, swing
+from tests.integration.robot import ARM, OWN, PLAYING, Robot, connected, environment, goal, start_simulation, swing
 from throwcollect.interfaces import deserialize, message_class, serialize
-from throwcollect.ros import Context, DurabilityPolicy, QoSProfile, get_message
+from throwcollect.ros import DurabilityPolicy, QoSProfile, get_message
 from throwcollect.ros.backend import uses_rclpy
 from throwcollect.ros.embedded.attachment import Attachment
 from throwcollect.ros.embedded.keys import EntityKind, Token, data_key
@@ -25,7 +25,6 @@ embedded_alone = pytest.mark.skipif(
     uses_rclpy() or os.environ.get("SIMULATION_ROS") == "rclpy", reason="somebody is on genuine rclpy"
 )
 
-NAME = "sim_2"
 SEED = 20
 PAYLOADS = 4
 """Malformed payloads for each key; and as many attachments and changed messages."""
@@ -54,17 +53,6 @@ sent.result().get_result_async()
 print("accepted", sent.result().accepted, flush=True)
 ros.spin(node)
 """
-
-
-@pytest.fixture
-def running(endpoint: str, session: Context, tmp_path: Path) -> Iterator[tuple[subprocess.Popen[str], Robot]]:
-    process = start_simulation(tmp_path, endpoint, NAME)
-    robot = Robot(session, NAME)
-    robot.wait_until_ready(process)
-    yield process, robot
-    robot.node.destroy_node()
-    process.kill()
-    process.communicate()
 
 
 def endpoints(robot: Robot, kind: EntityKind) -> list[Token]:
@@ -116,9 +104,9 @@ def test_garbage_on_every_key_is_survived(running: tuple[subprocess.Popen[str], 
     chance = random.Random(SEED)
     session, domain = robot.node.context.session, robot.node.context.get_domain_id()
     services, topics = endpoints(robot, EntityKind.SERVICE), endpoints(robot, EntityKind.SUBSCRIPTION)
-    assert {token.name for token in topics} >= {f"/{NAME}/{ARM}/joint_trajectory"}
+    assert {token.name for token in topics} >= {f"/{OWN}/{ARM}/joint_trajectory"}
     assert {token.name for token in services} >= {
-        f"/{NAME}/{ARM}/follow_joint_trajectory/_action/{part}" for part in ("send_goal", "cancel_goal", "get_result")
+        f"/{OWN}/{ARM}/follow_joint_trajectory/_action/{part}" for part in ("send_goal", "cancel_goal", "get_result")
     }
     for token in topics:
         key = data_key(domain, token.name, token.ros_type, token.type_hash)
@@ -193,7 +181,7 @@ def test_tokens_of_odd_forms_are_survived(running: tuple[subprocess.Popen[str], 
     letters = string.ascii_letters + string.digits + "%_:,.-~@é\N{GRINNING FACE}"
     tokens = []
     for index in range(300):
-        chunks = ["1a", str(index), str(index), "MS", "%", f"%{NAME}", "odd", f"%{NAME}%joint_states"]
+        chunks = ["1a", str(index), str(index), "MS", "%", f"%{OWN}", "odd", f"%{OWN}%joint_states"]
         chunks += ["sensor_msgs::msg::dds_::JointState_", "RIHS01_0", "::,1:,:,:,,"]
         for _ in range(chance.randint(1, 4)):
             where = chance.randrange(len(chunks))
@@ -265,10 +253,10 @@ def start_router(listen: str) -> tuple[subprocess.Popen[str], str]:
 
 def test_a_simulation_goes_on_while_its_router_is_away_and_is_all_there_when_it_is_back(tmp_path: Path) -> None:
     router, endpoint = start_router("tcp/127.0.0.1:0")
-    simulation = start_simulation(tmp_path, endpoint, NAME)
+    simulation = start_simulation(tmp_path, endpoint, OWN)
     try:
         with connected(endpoint) as context:
-            robot = Robot(context, NAME)
+            robot = Robot(context, OWN)
             robot.wait_until_ready(simulation)
             before = {token.key() for kind in EntityKind for token in endpoints(robot, kind)}
             assert robot.set({"sim.real_time_factor": 1.0}).successful
@@ -301,7 +289,7 @@ def test_two_simulations_of_one_name_both_work(
 ) -> None:
     process, robot = running
     (tmp_path / "twin").mkdir()
-    twin = start_simulation(tmp_path / "twin", endpoint, NAME)
+    twin = start_simulation(tmp_path / "twin", endpoint, OWN)
     try:
         robot.wait_until(lambda: robot.node.count_publishers(robot.topic("episode")) == 2, "the twin is ready")
         with robot.listening("sensor_msgs/msg/JointState", "joint_states") as heard:
@@ -317,5 +305,5 @@ def test_two_simulations_of_one_name_both_work(
     finally:
         twin.kill()
         output, _ = twin.communicate()
-    assert f"there is another node /{NAME}/{NAME}" in output
+    assert f"there is another node /{OWN}/{OWN}" in output
     assert_works(robot)

@@ -18,7 +18,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
                 item.add_marker(missing)
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def zenoh_rmw() -> None:
     """Genuine and embedded nodes meet over Zenoh alone."""
     if os.environ.get("RMW_IMPLEMENTATION") != "rmw_zenoh_cpp":

@@ -28,6 +28,8 @@ from throwcollect.tasks.trajectory import throw_trajectory
 
 _DISCOVERY_PERIOD_S = 0.1
 _REPORT_PERIOD_S = 0.2
+_UNREADABLE_PERIOD_S = 10.0
+"""Whoever publishes garbage may do so often."""
 _RATE_WINDOW_S = 10.0
 """Throws per second are averaged over this time."""
 
@@ -200,7 +202,9 @@ class Coordinator(Node):
             # Somebody else may publish here, too: what cannot be read must not end the collection later.
             episode.samples()
         except DatasetError as error:
-            self.get_logger().warning(f"{namespace}: unreadable episode: {error}")
+            self.get_logger().warning(
+                f"{namespace}: unreadable episode: {error}", throttle_duration_sec=_UNREADABLE_PERIOD_S
+            )
             return
         trial = episode.header.trial
         self._simulations[namespace].hung = False

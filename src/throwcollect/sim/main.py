@@ -14,7 +14,7 @@ from throwcollect.sim.simulation import Simulation
 
 
 def _nothing() -> None:
-    """Work that makes an executor return from waiting."""
+    """Work that marks a place among the inputs."""
 
 
 def _take_inputs(executor: ros.Executor) -> None:
@@ -48,7 +48,6 @@ def run(config: Path, *, name: str) -> None:
     def stop(_number: int, _frame: FrameType | None) -> None:
         nonlocal stopped
         stopped = True
-        executor.create_task(_nothing)
 
     signal.signal(signal.SIGINT, stop)
     signal.signal(signal.SIGTERM, stop)

@@ -42,7 +42,9 @@ _SAMPLED = QoSProfile(depth=100)
 _WHOLE = QoSProfile(history=HistoryPolicy.KEEP_ALL)
 """Every episode reaches every subscriber, however slow it is."""
 
-_IDLE_S = 1.0
+_IDLE_S = 0.2
+"""Signals are heeded between two waits: their handlers must not touch what the executor may be in the middle of."""
+
 _REPEAT_S = 0.02
 """Real time between two messages on a topic of samples while time stands still; that of the robot's joint states."""
 

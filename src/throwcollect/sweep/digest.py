@@ -21,13 +21,18 @@ _WITHOUT_EFFECT_INSIDE = frozenset(
     {"sim.real_time_factor", "record.zstd_level", "record.trials_per_shard", "controllers.names"}
 )
 
-# Keys that came later count where they differ from their defaults, so that older trials keep their digests.
-_LATER = {f"controllers.{key}": value for key, value in ControllersConfig().model_dump().items()}
+# Sections that came later count where they differ from their defaults, so that older digests hold.
+_LATER_SECTIONS = {"controllers": ControllersConfig().model_dump(mode="json")}
+_LATER = {f"{section}.{key}": value for section, keys in _LATER_SECTIONS.items() for key, value in keys.items()}
 
 
 def config_digest(config: Config) -> str:
     """SHA-256 in hex over a configuration; its sections `run` and `containers`, and their keys, do not count."""
-    return hashlib.sha256(json.dumps(config.model_dump(mode="json", exclude=set(_RUN))).encode()).hexdigest()
+    sections = config.model_dump(mode="json", exclude=set(_RUN))
+    for section, defaults in _LATER_SECTIONS.items():
+        if sections[section] == defaults:
+            del sections[section]
+    return hashlib.sha256(json.dumps(sections).encode()).hexdigest()
 
 
 def trial_digests(config: Config, points: Points, seeds: Sequence[int]) -> Iterator[str]:

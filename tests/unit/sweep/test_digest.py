@@ -83,3 +83,9 @@ def test_the_digest_of_a_configuration_is_over_everything_but_how_it_is_run():
     otherwise = Config(run=RunConfig(simulations=9), containers=ContainersConfig(volume="throws"))
     assert config_digest(otherwise) == config_digest(Config())
     assert config_digest(Config(name="other")) != config_digest(Config())
+
+
+def test_a_plan_made_before_the_section_controllers_still_belongs_to_its_configuration():
+    before = "09626b408b776e79ab4ff485411deb75f2b6615377a41e80b715b04bdb842333"
+    assert config_digest(Config(name="old")) == before
+    assert config_digest(Config(name="old", controllers=ControllersConfig(hold="command"))) != before
