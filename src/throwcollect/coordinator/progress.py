@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from types import TracebackType
@@ -93,15 +94,15 @@ class ProgressListener:
 
     Args:
         on_progress: Called with every report, within `spin`.
-        name: Name of the node.
+        name: Name of the node; one of this process alone, and hidden, by default.
 
     Raises:
         ThrowcollectError: If there is no router.
     """
 
-    def __init__(self, on_progress: Callable[[Progress], None], *, name: str = "progress_listener") -> None:
+    def __init__(self, on_progress: Callable[[Progress], None], *, name: str | None = None) -> None:
         ros.init()
-        self.node = ros.Node(name)
+        self.node = ros.Node(name or f"_throwcollect_{os.getpid()}")
         self._executor = ros.SingleThreadedExecutor()
         self._executor.add_node(self.node)
         self._on_progress = on_progress

@@ -24,7 +24,7 @@ class Listening:
     Args:
         on_progress: Called with every report, within `spin`.
         domain_id: ROS domain of the run.
-        name: Name of the node.
+        name: Name of the node; one of this process alone, and hidden, by default.
         on_connect: Called with the node whenever it is made anew.
     """
 
@@ -33,7 +33,7 @@ class Listening:
         on_progress: Callable[[Progress], None],
         *,
         domain_id: int,
-        name: str = "progress_listener",
+        name: str | None = None,
         on_connect: Callable[[ros.Node], None] = lambda _: None,
     ) -> None:
         self._on_progress = on_progress

@@ -54,7 +54,7 @@ def scale(run: Run, simulations: int) -> None:
     """
     record = living(run)
     with _graph_of(record):
-        node = ros.Node("scale")
+        node = ros.Node(f"_throwcollect_{os.getpid()}")
         client = node.create_client(SetParameters, f"/{LAUNCHER}/set_parameters")
         if not client.wait_for_service(_ANSWER_S):
             raise _silent(record)
