@@ -15,6 +15,7 @@ import typer
 from typer.exceptions import TyperException
 
 import throwcollect
+from throwcollect.cli.dataset_commands import DatasetArgument, JsonOption, dataset_app
 from throwcollect.cli.ros import ros_app
 from throwcollect.errors import Interrupted, ThrowcollectError
 
@@ -25,7 +26,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-dataset_app = typer.Typer(help="Look into datasets.", no_args_is_help=True)
 app.add_typer(dataset_app, name="dataset")
 image_app = typer.Typer(help="Make the image that containers are made from.", no_args_is_help=True)
 app.add_typer(image_app, name="image")
@@ -41,7 +41,6 @@ SetOption = Annotated[
     list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Replace a key of the file; may be repeated.")
 ]
 TrialsOption = Annotated[str | None, typer.Option("--trials", metavar="K", help="Number of trials.")]
-JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 RunOption = Annotated[
     str | None,
     typer.Option(
@@ -49,7 +48,6 @@ RunOption = Annotated[
     ),
 ]
 FollowOption = Annotated[bool, typer.Option("-f", "--follow", help="Go on until the run ends.")]
-DatasetArgument = Annotated[Path, typer.Argument(metavar="DIR", help="Directory of the dataset.", readable=False)]
 
 DEFAULT_CONFIG = Path("throwcollect.yaml")
 RUNS = "Runs"
@@ -219,30 +217,6 @@ def doctor(json: JsonOption = False) -> None:
     from throwcollect.cli.show import show_doctor
 
     show_doctor(json=json)
-
-
-@dataset_app.command("info")
-def dataset_info(directory: DatasetArgument, json: JsonOption = False) -> None:
-    """Say what a dataset holds."""
-    from throwcollect.cli.dataset import show_info
-
-    show_info(directory, json=json)
-
-
-@dataset_app.command("verify")
-def dataset_verify(directory: DatasetArgument, json: JsonOption = False) -> None:
-    """Check a dataset against itself and against physics."""
-    from throwcollect.cli.dataset import show_verification
-
-    show_verification(directory, json=json)
-
-
-@dataset_app.command("digest")
-def dataset_digest(directory: DatasetArgument) -> None:
-    """Print one hash over all episodes in trial order."""
-    from throwcollect.cli.dataset import show_digest
-
-    show_digest(directory)
 
 
 @image_app.command("build")
