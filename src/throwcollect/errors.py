@@ -6,7 +6,9 @@
     ├── ConfigError                  exit 2   the request is wrong; nothing has been started
     │   └── PlanError                exit 2   the sweep yields no trial that could be run
     ├── WorkerError                  exit 3   a process of the run could not be started or was lost for good
+    ├── LossError                    exit 3   a dataset was mended, but trials of it are lost
     ├── DatasetError                 exit 4   a dataset is missing, torn or contradicts itself
+    │   └── ForeignPlanError         exit 4   a plan was made for another configuration
     ├── RequestError                 exit 1   what a client asks of a running simulation cannot be done
     └── Interrupted                  exit 130 stopped by the user; what is finished is on disk
 
@@ -98,10 +100,20 @@ class WorkerError(ThrowcollectError):
     exit_code = 3
 
 
+class LossError(ThrowcollectError):
+    """A dataset was mended, but trials of it are lost."""
+
+    exit_code = 3
+
+
 class DatasetError(ThrowcollectError):
     """A dataset is missing, torn or contradicts itself."""
 
     exit_code = 4
+
+
+class ForeignPlanError(DatasetError):
+    """A plan was made for another configuration than the one beside it."""
 
 
 class RequestError(ThrowcollectError):

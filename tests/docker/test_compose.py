@@ -71,12 +71,17 @@ def run(environment: dict[str, str], *arguments: str | Path, cwd: Path = ROOT) -
     )
 
 
-def test_the_files_are_those_of_processes_for_any_number(environment: dict[str, str], tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("environment", "numbers"), [("v2", ("1", "8")), ("1.29", ("4",))], indirect=["environment"], ids=["v2", "1.29"]
+)
+def test_the_files_are_those_of_processes_for_any_number(
+    environment: dict[str, str], numbers: tuple[str, ...], tmp_path: Path
+) -> None:
     config = write_config(tmp_path, trials=24)
     collect(config, tmp_path / "local", 2)
     expected = fingerprints(tmp_path / "local")
     before = leftovers()
-    for simulations in ("1", "4", "8"):
+    for simulations in numbers:
         output = tmp_path / simulations
         done = run(environment, SCRIPT, config, simulations, output)
         assert done.returncode == 0, done.stdout + done.stderr
@@ -94,6 +99,7 @@ def test_the_exit_code_is_that_of_the_collection(environment: dict[str, str], tm
     assert leftovers() == before
 
 
+@pytest.mark.parametrize("environment", ["v2"], indirect=True)
 def test_the_documented_command_runs(environment: dict[str, str], tmp_path: Path) -> None:
     assert len(re.findall(rf"^.*{re.escape(COMMAND)}$", DOCUMENT, flags=re.MULTILINE)) == 3
     for name in ("compose", "configs"):
@@ -106,8 +112,9 @@ def test_the_documented_command_runs(environment: dict[str, str], tmp_path: Path
     assert (again.returncode, again.stderr) == (2, "compose/collect.sh: dataset exists already\n")
 
 
+@pytest.mark.parametrize("environment", ["v2"], indirect=True)
 def test_a_node_that_dies_is_started_again(environment: dict[str, str], tmp_path: Path) -> None:
-    config = write_config(tmp_path, trials=150)
+    config = write_config(tmp_path, trials=100)
     collect(config, tmp_path / "undisturbed", 2)
     command = [str(SCRIPT), str(config), "2", str(tmp_path / "data")]
     process = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)

@@ -12,15 +12,17 @@ pytestmark = pytest.mark.e2e
 CONFIGS = sorted((Path(__file__).parents[2] / "configs").glob("*.yaml"))
 WHOLE = {"grid": 84, "reference": 2}
 """Trials of those that have as many as their points."""
+LONG = {"targets": 132}
+"""Trials of those that need more than a few to show what they are for."""
 
 
 def test_there_are_configurations() -> None:
-    assert {path.stem for path in CONFIGS} >= {"dmp", "grid", "quickstart", "randomised", "reference"}
+    assert {path.stem for path in CONFIGS} >= {"dmp", "grid", "quickstart", "randomised", "reference", "targets"}
 
 
 @pytest.mark.parametrize("config", CONFIGS, ids=lambda path: path.stem)
 def test_a_configuration_is_collected_and_verified(config: Path, tmp_path: Path) -> None:
-    trials = WHOLE.get(config.stem, 3)
+    trials = WHOLE.get(config.stem, LONG.get(config.stem, 3))
     options = [] if config.stem in WHOLE else ["--trials", str(trials)]
     collected = call("up", "-n", "2", config, "--output", tmp_path / "data", "--json", *options)
     assert collected.returncode == 0, collected.stderr

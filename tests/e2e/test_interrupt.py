@@ -7,6 +7,7 @@ import signal
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import psutil
 import pytest
@@ -15,6 +16,7 @@ from mcap.records import Chunk, Metadata
 from mcap.stream_reader import StreamReader
 
 from tests.e2e.collection import Running, call, collect, fingerprints, start, write_config
+from throwcollect.dataset.journal import read_journal
 
 pytestmark = pytest.mark.e2e
 TRIALS = 16
@@ -62,7 +64,7 @@ def assert_gone(nodes: list[psutil.Process]) -> None:
     assert alive == []
 
 
-def episodes(part: Path) -> Counter[str]:
+def episodes(part: Path, *, cut: bool = False) -> Counter[str]:
     """Trials of the whole episodes of a shard, as MCAP's own reader finds them."""
     found: Counter[str] = Counter()
     data = io.BytesIO(part.read_bytes())
@@ -74,9 +76,23 @@ def episodes(part: Path) -> Counter[str]:
                 found[record.metadata["trial"]] += 1
     except (McapError, EOFError):
         # The footer is missing; up to there, all records were read.
-        assert data.tell() == len(data.getvalue())
-    assert chunks == len(found) + 1
+        assert cut or data.tell() == len(data.getvalue())
+    assert cut or chunks == len(found) + 1
     return found
+
+
+def assert_goes_on(directory: Path, reference: Path) -> None:
+    """Resuming ends with the files of an undisturbed collection, and runs no trial twice."""
+    said = call("resume", directory, "-n", "2", "--runtime", "local")
+    assert said.returncode == 0, said.stderr
+    assert fingerprints(directory) == fingerprints(reference)
+    assert Counter(event["trial"] for event in events(directory) if event["event"] == "commit") == dict.fromkeys(
+        range(TRIALS), 1
+    )
+
+
+def events(directory: Path) -> list[dict[str, Any]]:
+    return list(read_journal(directory / "logs" / "journal.jsonl"))
 
 
 def test_ctrl_c_before_any_simulation_is_ready(config: Path, tmp_path: Path, started: list[Running]) -> None:
@@ -106,6 +122,23 @@ def test_an_interruption_finishes_what_runs(
     assert 0 < len(found) < TRIALS
     assert set(found.values()) == {1}
     assert "the dataset is not finished" in call("dataset", "info", tmp_path / "data").stderr
+    assert f"try: throwcollect resume {tmp_path / 'data'}" in err
+    assert_goes_on(tmp_path / "data", reference)
+
+
+def test_what_runs_gets_the_grace_of_the_configuration(
+    config: Path, reference: Path, tmp_path: Path, started: list[Running]
+) -> None:
+    running, nodes = begin(started, config, tmp_path / "data", "--set", "run.grace_s=0.5")
+    in_the_middle(running, whole=reference)
+    # Its trial will never end.
+    running.node("--name", "sim_0").suspend()
+    running.process.send_signal(signal.SIGTERM)
+    code, _, _ = running.finish()
+    assert code == 130
+    assert_gone(nodes)
+    # The coordinator came to its own end; it was not ended by force, as after some seconds more.
+    assert "interrupted; what is finished is in" in (tmp_path / "data" / "logs" / "coordinator.log").read_text()
 
 
 def test_a_second_ctrl_c_does_not_wait_for_trials(
@@ -137,24 +170,51 @@ def test_a_killed_launcher_takes_its_nodes_along(
     running.process.send_signal(signal.SIGKILL)
     running.finish()
     assert_gone(nodes)
+    assert_goes_on(tmp_path / "data", reference)
 
 
-def test_a_killed_coordinator_ends_the_run(
+def test_a_killed_coordinator_is_started_again_and_takes_in_what_is_there(
     config: Path, reference: Path, tmp_path: Path, started: list[Running]
 ) -> None:
-    running, nodes = begin(started, config, tmp_path / "data", "--set", "run.trial_timeout_s=1")
+    running, _ = begin(started, config, tmp_path / "data", "--set", "run.trial_timeout_s=5")
     in_the_middle(running, whole=reference)
-    coordinator = running.node("coordinator", str(tmp_path / "data"))
-    for name in ("sim_0", "sim_1"):
-        running.node("--name", name).suspend()
-    log = tmp_path / "data" / "logs" / "coordinator.log"
-    running.wait_until(lambda: "no episode within 1 s" in log.read_text())
-    coordinator.kill()
+    running.node("coordinator", str(tmp_path / "data")).kill()
+    code, _, err = running.finish()
+    assert code == 0, err
+    assert "coordinator was lost (ended by SIGKILL) and is started again" in err
+    assert fingerprints(tmp_path / "data") == fingerprints(reference)
+    assert next(event["episodes"] for event in events(tmp_path / "data") if event["event"] == "recovered") > 0
+
+
+def test_a_coordinator_that_cannot_be_kept_alive_ends_the_run(
+    config: Path, reference: Path, tmp_path: Path, started: list[Running]
+) -> None:
+    running, nodes = begin(started, config, tmp_path / "data", "--set", "run.restarts=0")
+    in_the_middle(running, whole=reference)
+    running.node("coordinator", str(tmp_path / "data")).kill()
     code, out, err = running.finish()
     assert (code, out) == (3, "")
-    assert "throwcollect: the coordinator stopped: ended by SIGKILL\n  evidence: " in err
-    assert "is given to another simulation: no episode within 1 s" in err
+    assert "throwcollect: the coordinator stopped: ended by SIGKILL\n" in err
     assert_gone(nodes)
+
+
+def test_a_power_cut_costs_what_had_not_reached_the_disk(
+    config: Path, reference: Path, tmp_path: Path, started: list[Running]
+) -> None:
+    running, nodes = begin(started, config, tmp_path / "data")
+    in_the_middle(running, 0.6, whole=reference)
+    for process in (*nodes, running.process):
+        process.kill()
+    running.finish()
+    assert_gone(nodes)
+    part = tmp_path / "data" / "small_00000.mcap.part"
+    os.truncate(part, part.stat().st_size * 2 // 3)
+    kept = len(episodes(part, cut=True))
+    os.truncate(tmp_path / "data" / "plan.parquet", 100)
+    said = call("resume", tmp_path / "data", "-n", "2", "--runtime", "local")
+    assert said.returncode == 0, said.stderr
+    assert fingerprints(tmp_path / "data") == fingerprints(reference)
+    assert next(event["episodes"] for event in events(tmp_path / "data") if event["event"] == "recovered") == kept > 0
 
 
 def test_a_killed_router_costs_nothing(config: Path, reference: Path, tmp_path: Path, started: list[Running]) -> None:

@@ -59,7 +59,7 @@ def describe(found: Mapping[str, Any]) -> str:
     """
     outcomes = ", ".join(f"{count} {outcome}" for outcome, count in found["outcomes"].items())
     lines = {
-        "trials": f"{found['trials']}: {outcomes}",
+        "trials": f"{found['trials']}: {outcomes}{_missing(found)}",
         "landing": _landing(found.get("landing")),
         "episodes": f"{found['episodes']}, {found['samples']} samples, {found['duration_s']:.0f} s of simulated time",
         "files": f"{found['shards']} MCAP of {found['recordings_bytes'] / 1e6:.1f} MB, "
@@ -71,6 +71,13 @@ def describe(found: Mapping[str, Any]) -> str:
         lines["took"] = f"{found['wall_s']:.1f} s, {found['episodes'] / found['wall_s']:.1f} throws/s from start to end"
     width = max(map(len, lines))
     return "".join(f"{key:{width}}  {text}\n" for key, text in lines.items())
+
+
+def _missing(found: Mapping[str, Any]) -> str:
+    wanted = found.get("wanted")
+    if wanted is None or found["outcomes"].get("landed", 0) >= wanted:
+        return ""
+    return f"; {wanted} should have landed, but all trials were used up"
 
 
 def _landing(landing: Mapping[str, Any] | None) -> str:

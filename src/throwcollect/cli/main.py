@@ -17,7 +17,7 @@ from typer.exceptions import TyperException
 import throwcollect
 from throwcollect.cli.dataset_commands import DatasetArgument, JsonOption, dataset_app
 from throwcollect.cli.ros import ros_app
-from throwcollect.errors import Interrupted, ThrowcollectError
+from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError
 
 app = typer.Typer(
     name="throwcollect",
@@ -41,6 +41,15 @@ SetOption = Annotated[
     list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Replace a key of the file; may be repeated.")
 ]
 TrialsOption = Annotated[str | None, typer.Option("--trials", metavar="K", help="Number of trials.")]
+SimulationsOption = Annotated[
+    str | None, typer.Option("-n", metavar="N", help="Number of simulations: run.simulations.")
+]
+RuntimeOption = Annotated[
+    str | None, typer.Option("--runtime", metavar="auto|local|docker", help="Where the nodes run: run.runtime.")
+]
+DetachOption = Annotated[
+    bool, typer.Option("-d", "--detach", help="Print the id of the run as soon as its nodes are started.")
+]
 RunOption = Annotated[
     str | None,
     typer.Option(
@@ -79,28 +88,53 @@ def _options(
 
 @app.command()
 def up(
-    config: ConfigArgument = DEFAULT_CONFIG,
-    simulations: Annotated[
-        str | None, typer.Option("-n", metavar="N", help="Number of simulations: run.simulations.")
+    config: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="[CONFIG]", help="YAML file of the collection; throwcollect.yaml by default.", readable=False
+        ),
     ] = None,
+    simulations: SimulationsOption = None,
     settings: SetOption = None,
-    runtime: Annotated[
-        str | None, typer.Option("--runtime", metavar="auto|local|docker", help="Where the nodes run: run.runtime.")
-    ] = None,
+    runtime: RuntimeOption = None,
     output: Annotated[
         Path | None, typer.Option("--output", metavar="DIR", help="Directory of the dataset; must be new or empty.")
     ] = None,
+    resume: Annotated[
+        Path | None,
+        typer.Option("--resume", metavar="DIR", help="Go on with the dataset in DIR; without CONFIG, with its own."),
+    ] = None,
     trials: TrialsOption = None,
-    detach: Annotated[
-        bool, typer.Option("-d", "--detach", help="Print the id of the run as soon as its nodes are started.")
-    ] = False,
+    detach: DetachOption = False,
     json: JsonOption = False,
 ) -> None:
     """Collect a dataset: start the simulations, run all trials, write the files."""
-    from throwcollect.cli.up import collect
+    from throwcollect.cli.up import collect, go_on
 
     overrides = _overrides(settings, trials=trials, run__simulations=simulations, run__runtime=runtime)
-    collect(config, overrides=overrides, output=output, detach=detach, json=json)
+    if resume is None:
+        collect(config or DEFAULT_CONFIG, overrides=overrides, output=output, detach=detach, json=json)
+    elif output is not None:
+        raise ConfigError(f"--output {output}: should be left out with --resume, which names the directory")
+    else:
+        go_on(resume, path=config, overrides=overrides, detach=detach, json=json)
+
+
+@app.command("resume")
+def resume_(
+    directory: DatasetArgument,
+    simulations: SimulationsOption = None,
+    settings: SetOption = None,
+    runtime: RuntimeOption = None,
+    trials: TrialsOption = None,
+    detach: DetachOption = False,
+    json: JsonOption = False,
+) -> None:
+    """Go on with a dataset whose collection was ended by anything, or with more trials."""
+    from throwcollect.cli.up import go_on
+
+    overrides = _overrides(settings, trials=trials, run__simulations=simulations, run__runtime=runtime)
+    go_on(directory, path=None, overrides=overrides, detach=detach, json=json)
 
 
 @app.command(rich_help_panel=RUNS)

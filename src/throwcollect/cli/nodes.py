@@ -8,7 +8,8 @@ from pathlib import Path
 from throwcollect.cli.dataset import describe
 from throwcollect.config.loader import load
 from throwcollect.coordinator.main import run
-from throwcollect.coordinator.prepare import prepare
+from throwcollect.coordinator.prepare import more_trials, prepare
+from throwcollect.coordinator.resume import begun, resume
 from throwcollect.dataset.inspect import info
 
 
@@ -16,8 +17,9 @@ def coordinate(directory: Path, *, config: Path | None) -> None:
     """Collect into a directory.
 
     Args:
-        directory: Directory of the dataset: prepared, or new if a configuration is given.
-        config: YAML file of the collection, of which the plan is made first; the summary is printed at the end.
+        directory: Directory of the dataset: prepared, or also a new one if a configuration is given.
+        config: YAML file of the collection, of which the plan is made first, unless it is there; the summary is
+            printed at the end.
 
     Raises:
         ConfigError: If the configuration, the sweep or the directory cannot be used.
@@ -27,7 +29,8 @@ def coordinate(directory: Path, *, config: Path | None) -> None:
     if config is None:
         run(directory)
         return
-    plan = prepare(load(config), directory, sweep_directory=config.parent)
-    print(f"plan: {len(plan.trials)} trials; dataset: {directory}", flush=True)
+    freeze = resume if begun(directory) else prepare
+    plan = freeze(load(config), directory, sweep_directory=config.parent)
+    print(f"plan: {len(plan.trials)} trials{more_trials(plan)}; dataset: {directory}", flush=True)
     run(directory)
     sys.stdout.write(describe(info(directory).as_dict()))

@@ -29,12 +29,12 @@ def show_config(path: Path, overrides: Sequence[str], *, json: bool) -> None:
 
 
 def show_plan(path: Path, overrides: Sequence[str], *, json: bool) -> None:
-    """Print the trials that would be run.
+    """Print the trials that would be run: of a plan that grows, those that are known before anything runs.
 
     Raises:
         ConfigError: If the configuration cannot be used, or the sweep yields no trial that could be run.
     """
-    from throwcollect.coordinator.prepare import checked_plan
+    from throwcollect.coordinator.prepare import checked_plan, more_trials
 
     plan = checked_plan(load(path, overrides), directory=path.parent)
     if json:
@@ -57,7 +57,7 @@ def show_plan(path: Path, overrides: Sequence[str], *, json: bool) -> None:
         note = f"  refused: {trial.refused}" if trial.refused else ""
         typer.echo("  ".join([str(trial.number).rjust(len("trial")), *numbers]) + note)
     refused = Counter(trial.refused for trial in plan.trials if trial.refused)
-    typer.echo(f"{len(plan.trials)} trials, {refused.total()} refused", err=True)
+    typer.echo(f"{len(plan.trials)} trials, {refused.total()} refused{more_trials(plan)}", err=True)
 
 
 def show_doctor(*, json: bool) -> None:

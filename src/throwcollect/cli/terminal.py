@@ -100,7 +100,8 @@ class _Bar:
         self._progress.stop()
 
     def update(self, progress: Progress) -> None:
-        self._progress.update(self._task, total=progress.total, completed=progress.ended, description=progress.counts)
+        completed, total = progress.steps
+        self._progress.update(self._task, total=total, completed=completed, description=progress.counts)
 
     def say(self, line: str) -> None:
         self.warn(line)

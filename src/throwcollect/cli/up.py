@@ -17,15 +17,19 @@ from throwcollect.cli.summary import print_summary
 from throwcollect.cli.terminal import Display, display
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
-from throwcollect.coordinator.prepare import prepare
+from throwcollect.coordinator.prepare import more_trials, prepare
+from throwcollect.coordinator.resume import begun, finished, resume
 from throwcollect.dataset.directory import CONFIG, PLAN
-from throwcollect.errors import ConfigError
+from throwcollect.dataset.inspect import info
+from throwcollect.dataset.journal import collected_s
+from throwcollect.errors import ConfigError, Problem
 from throwcollect.runtime.choice import choose
 from throwcollect.runtime.detached import start_launcher, wait_for_nodes
 from throwcollect.runtime.launcher import launch, place_of
 from throwcollect.runtime.ports import reserved_port
 from throwcollect.runtime.records import OpenRun, Record, Records, Run
 from throwcollect.runtime.runs import busy, left_in
+from throwcollect.sweep.plan import Plan
 
 _MANY_TRIALS = 1000
 """From here on the plan takes long enough to be announced."""
@@ -33,16 +37,24 @@ _MANY_TRIALS = 1000
 
 @dataclass(frozen=True)
 class _Request:
-    """What the user asked for: the configuration, where its file lies, the directory of the dataset, and when."""
+    """What the user asked for: the configuration, where its file lies, the dataset's directory, when, and if anew."""
 
     config: Config
     sweep_directory: Path
     directory: Path
     started: datetime
+    resumed: bool
 
 
 def collect(path: Path, *, overrides: Sequence[str], output: Path | None, detach: bool, json: bool) -> None:
     """Collect a dataset and print its summary or, detached, the id of the run.
+
+    Args:
+        path: The configuration's file.
+        overrides: What replaces keys of it.
+        output: Directory of the dataset, new or empty; None for one that is named after the configuration.
+        detach: Whether to return as soon as the nodes are started.
+        json: Whether to print JSON.
 
     Raises:
         ConfigError: If the configuration, the sweep or the output directory cannot be used.
@@ -53,6 +65,39 @@ def collect(path: Path, *, overrides: Sequence[str], output: Path | None, detach
     started = datetime.now(timezone.utc)
     config = load(path, overrides)
     directory = output or Path("datasets") / f"{config.name}-{datetime.now():%Y%m%d-%H%M%S}"
+    _collect(_Request(config, path.parent, directory, started, resumed=False), detach=detach, json=json)
+
+
+def go_on(directory: Path, *, path: Path | None, overrides: Sequence[str], detach: bool, json: bool) -> None:
+    """Go on with the dataset that an earlier collection has left, and print as `collect` does.
+
+    Args:
+        directory: Directory of the dataset.
+        path: File with its configuration; None for the configuration that lies in the directory.
+        overrides: What replaces keys of it.
+        detach: Whether to return as soon as the nodes are started.
+        json: Whether to print JSON.
+
+    Raises:
+        ConfigError: If there is no such dataset, or the configuration is another one.
+        WorkerError: If nodes cannot be started or kept alive.
+        DatasetError: If the dataset cannot be written.
+        Interrupted: If the user stopped the collection.
+    """
+    started = datetime.now(timezone.utc)
+    if not begun(directory):
+        raise ConfigError(f"{directory}: holds no dataset", expected="a directory that throwcollect up has made")
+    try:
+        config = load(path or directory / CONFIG, overrides)
+    except ConfigError as error:
+        hint = f"throwcollect up CONFIG --resume {directory}, if the dataset's own file is damaged"
+        raise ConfigError(error.problems, hint=error.hint if path else hint) from error
+    sweep_directory = directory if path is None else path.parent
+    _collect(_Request(config, sweep_directory, directory, started, resumed=True), detach=detach, json=json)
+
+
+def _collect(request: _Request, *, detach: bool, json: bool) -> None:
+    config, directory = request.config, request.directory
     records = Records()
     with display(quiet=json, bar=not detach) as shown:
         left = left_in(records, directory)
@@ -60,7 +105,14 @@ def collect(path: Path, *, overrides: Sequence[str], output: Path | None, detach
             run, config = _taken_over(records, left, config)
             shown.say(f"run {run.run}: its launcher had died; it goes on where its containers are")
         else:
-            run = _prepared(records, _Request(config, path.parent, directory, started), shown)
+            plan = None
+            if request.resumed:
+                plan = resume(config, directory, sweep_directory=request.sweep_directory)
+                if finished(directory, plan):
+                    shown.say(f"{directory}: every trial has ended, nothing is left to do")
+                    print_summary(info(directory).as_dict(), directory, as_json=json)
+                    return
+            run = _prepared(records, request, plan, shown)
         if not detach:
             with Interruptions() as interruptions:
                 summary = launch(run, config, onlooker=shown, interruptions=lambda: interruptions.count)
@@ -89,7 +141,7 @@ def serve(run: str, lock: int) -> None:
         launch(inherited, config, onlooker=shown, interruptions=lambda: interruptions.count)
 
 
-def _prepared(records: Records, request: _Request, shown: Display) -> OpenRun:
+def _prepared(records: Records, request: _Request, plan: Plan | None, shown: Display) -> OpenRun:
     """A run that is ready to be launched; nothing is left behind if that fails."""
     config = request.config
     with ExitStack() as undo:
@@ -102,12 +154,18 @@ def _prepared(records: Records, request: _Request, shown: Display) -> OpenRun:
         runtime = choose(config, say=shown.say) if volume else None
         if runtime == "local":
             volume = None
+        if volume and plan is not None:
+            raise ConfigError(
+                [Problem(f"a dataset in the volume {volume} cannot be resumed from here", key="containers.volume")],
+                expected="a dataset in a directory",
+            )
         directory = run.directory / "data" if volume else request.directory
-        if (config.trials or 0) >= _MANY_TRIALS:
-            shown.say(f"plan: checking {config.trials} trials against limits and collisions, about 5 ms each")
-        made = not directory.exists()
-        plan = prepare(config, directory, sweep_directory=request.sweep_directory)
-        undo.callback(_remove_plan, directory, made=made)
+        if plan is None:
+            if (config.trials or 0) >= _MANY_TRIALS and not config.grows:
+                shown.say(f"plan: checking {config.trials} trials against limits and collisions, about 5 ms each")
+            made = not directory.exists()
+            plan = prepare(config, directory, sweep_directory=request.sweep_directory)
+            undo.callback(_remove_plan, directory, made=made)
         runtime = runtime or choose(config, say=shown.say)
         record = Record(
             run=run.run,
@@ -120,6 +178,7 @@ def _prepared(records: Records, request: _Request, shown: Display) -> OpenRun:
             started=request.started,
             launcher=os.getpid(),
             simulations=config.run.simulations,
+            earlier_s=collected_s(directory),
         )
         # Finds what cannot be had of what the configuration asks for.
         place_of(record, config).close()
@@ -128,7 +187,7 @@ def _prepared(records: Records, request: _Request, shown: Display) -> OpenRun:
     refused = sum(trial.refused is not None for trial in plan.trials)
     note = f", {refused} refused by calculation (see `throwcollect plan`)" if refused else ""
     where = f"volume {volume}" if volume else directory
-    shown.say(f"plan: {len(plan.trials)} trials{note}; dataset: {where}")
+    shown.say(f"plan: {len(plan.trials)} trials{note}{more_trials(plan)}; dataset: {where}")
     return run
 
 

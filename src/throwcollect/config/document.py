@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 from ruamel.yaml import YAML
+from ruamel.yaml.constructor import SafeConstructor
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
@@ -13,6 +15,8 @@ from throwcollect.config.problems import Location, dotted
 from throwcollect.errors import ConfigError, Problem
 
 _TAG = "tag:yaml.org,2002:"
+_MOST_BYTES = 5_000_000
+_MOST_VALUES = 1_000_000
 _SWEPT = ("sweep", "parameters")
 _SWEPT_FIELDS = ("min", "max", "scale", "count", "values")
 
@@ -35,6 +39,7 @@ class Document:
         self.values: dict[str, Any] = {}
         self.problems: list[Problem] = []
         self._path = path
+        self._count = 0
         self._lines: dict[Location, int | None] = {}
         try:
             node = _compose(_text_of(path))
@@ -93,6 +98,10 @@ class Document:
     def _plain(self, node: Node | None, location: Location, *, in_file: bool, inside: tuple[Node, ...] = ()) -> Any:
         if node is None:
             return None
+        self._count += 1
+        if self._count > _MOST_VALUES:
+            # Aliases of aliases make a short text as large as they like.
+            raise ConfigError([Problem(f"holds more than {_MOST_VALUES} values", path=self._path)])
         if node in inside:
             self._note(node, location, "an alias cannot be inside its own anchor", in_file=in_file)
             return None
@@ -136,7 +145,11 @@ class Document:
 
 def _text_of(path: Path) -> str:
     try:
-        return path.read_bytes().decode("utf-8")
+        with path.open("rb") as file:
+            data = file.read(_MOST_BYTES + 1)
+        if len(data) > _MOST_BYTES:
+            raise ConfigError([Problem(f"larger than {_MOST_BYTES} bytes", path=path)])
+        return data.decode("utf-8")
     except FileNotFoundError as error:
         raise ConfigError([Problem("no such file", path=path)]) from error
     except IsADirectoryError as error:
@@ -170,13 +183,19 @@ def _line(error: YAMLError) -> int | None:
     return mark.line + 1 if mark else None
 
 
+@cache
+def _constructor() -> SafeConstructor:
+    constructor: SafeConstructor = YAML(typ="safe", pure=True).constructor
+    return constructor
+
+
 def _scalar(node: Node) -> Any:
     """Value of a YAML 1.2 scalar; dates and other extensions stay text.
 
     Raises:
         ValueError: If it cannot be read as what its tag says.
     """
-    constructor = YAML(typ="safe", pure=True).constructor
+    constructor = _constructor()
     readers = {
         "null": lambda _: None,
         "bool": constructor.construct_yaml_bool,

@@ -41,7 +41,13 @@ _SAMPLERS = """\
 
 The file of the sampler `list` is CSV (UTF-8, commas, a header line) or Parquet; its columns are named with dotted keys.
 A set of `values` is drawn from in equal shares. Everything is drawn from `seed`.
+
+With `sweep.target` or `until`, trials are added to the plan while it is collected: [targets.md](targets.md).
 """
+
+
+_ANY = {"containers.": "<node>", "sweep.target.": "<target>"}
+"""What stands for the name of any of the sections that hold the same."""
 
 
 def page() -> str:
@@ -67,7 +73,7 @@ def _sections(shape: Shape, prefix: str) -> Iterator[str]:
         elif len(twins := _twins(shape, child)) > 1:
             if name == twins[0]:
                 yield f"## {', '.join(f'`{prefix}{twin}`' for twin in twins)}\n\n{_own_sentence(child)}\n"
-                yield from _sections(child, f"{prefix}<node>.")
+                yield from _sections(child, f"{prefix}{_ANY[prefix]}.")
         elif child.keys:
             yield f"## `{key}`\n\n{child.node['description']}\n"
             yield from _sections(child, f"{key}.")
@@ -78,13 +84,18 @@ def _sections(shape: Shape, prefix: str) -> Iterator[str]:
 
 def _twins(shape: Shape, child: Shape) -> list[str]:
     """Keys of sections that hold the same as one of them."""
-    title = child.node.get("title")
-    return [name for name, each in shape.keys.items() if child.keys and each.keys and each.node.get("title") == title]
+    title = _title(child)
+    return [name for name, each in shape.keys.items() if title is not None and _title(each) == title]
+
+
+def _title(shape: Shape) -> str | None:
+    """Name of the model of a section, also of one that may be null; None of everything else."""
+    return next((each.node.get("title") for each in shape.alternatives if each.keys), None)
 
 
 def _own_sentence(shape: Shape) -> str:
     """What a section says of itself, and not the key that holds it."""
-    return str(json_schema()["$defs"][shape.node["title"]]["description"])
+    return str(json_schema()["$defs"][_title(shape)]["description"])
 
 
 def _table(shape: Shape, prefix: str) -> str:
@@ -102,7 +113,7 @@ def _sentence(shape: Shape) -> str:
 
 
 def _default(child: Shape, name: str, holder: Shape) -> str:
-    if name in holder.node.get("required", []):
+    if any(name in each.node.get("required", []) for each in holder.alternatives):
         return "required"
     if "default" not in child.node:
         return "absent"

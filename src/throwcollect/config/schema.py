@@ -16,6 +16,9 @@ from throwcollect.config.controllers import ControllersConfig
 from throwcollect.config.kinds import Angle, ContradictionError, Joint, Name
 from throwcollect.config.run import RunConfig
 from throwcollect.config.section import Section
+from throwcollect.config.sweep import Parameter, Range, SweepConfig, Values
+
+__all__ = ["Config", "Parameter", "Range", "SweepConfig", "Values"]
 
 _BETWEEN_TRIALS_S = 10
 """Simulated time between the slots of two trials: results of a trial's goals expire before the next one."""
@@ -218,84 +221,6 @@ class ThrowConfig(Section):
         return self
 
 
-class Range(Section):
-    """An interval to draw from."""
-
-    min: float
-    """Lower bound, in the unit of the key."""
-    max: float
-    """Upper bound, in the unit of the key."""
-    scale: Literal["linear", "log"] = "linear"
-    """Whether the value or its logarithm is spread evenly."""
-    count: PositiveInt | None = None
-    """Number of grid points, both ends included; for the sampler `grid` only."""
-
-    @model_validator(mode="after")
-    def _ordered(self) -> Range:
-        wrong = {}
-        if self.min > self.max:
-            wrong["min"] = f"should be at most max, {self.max}, got {self.min}"
-        elif self.scale == "log" and self.min <= 0:
-            wrong["min"] = f"should be above 0 on a logarithmic scale, got {self.min}"
-        if self.count == 1 and self.min < self.max:
-            wrong["count"] = "should be 2 or more, as both min and max are grid points"
-        if wrong:
-            raise ContradictionError(wrong)
-        return self
-
-
-class Values(Section):
-    """A set of values to choose from."""
-
-    values: Annotated[list[float], Field(min_length=1)]
-    """The values, in the unit of the key."""
-
-
-def _parameter_kind(value: Any) -> str | None:
-    if isinstance(value, BaseModel):
-        return type(value).__name__
-    if not isinstance(value, dict):
-        return None
-    return "Values" if "values" in value else "Range"
-
-
-Parameter = Annotated[Annotated[Range, Tag("Range")] | Annotated[Values, Tag("Values")], Discriminator(_parameter_kind)]
-
-
-class SweepConfig(Section):
-    """Which parameters vary from trial to trial, and how they are drawn."""
-
-    sampler: Literal["grid", "uniform", "latin_hypercube", "sobol", "list"] = "sobol"
-    """How points are drawn; `list` reads them from `file`."""
-    parameters: dict[str, Parameter] = {}
-    """Dotted configuration keys (`task.duration_s`, `ball.mass_kg`, ...) and what they range over."""
-    file: str | None = None
-    """CSV or Parquet file with one row a trial and dotted keys as columns; for the sampler `list`.
-
-    A relative path starts at the directory of the configuration file."""
-
-    @model_validator(mode="after")
-    def _sampler_has_what_it_reads(self) -> SweepConfig:
-        wrong = {}
-        if self.sampler == "list":
-            if self.file is None:
-                wrong["file"] = "missing; the sampler list should have a CSV or Parquet file"
-            if self.parameters:
-                wrong["parameters"] = "should be left out, as the sampler list takes keys and values from its file"
-        elif self.file is not None:
-            wrong["file"] = f"should be left out, as the sampler {self.sampler} reads no file"
-        for key, parameter in self.parameters.items():
-            if not isinstance(parameter, Range):
-                continue
-            if self.sampler == "grid" and parameter.count is None:
-                wrong[f"parameters.{key}.count"] = "missing; the sampler grid should know how many points to take"
-            elif self.sampler not in ("grid", "list") and parameter.count is not None:
-                wrong[f"parameters.{key}.count"] = f"should be left out, as the sampler {self.sampler} has no grid"
-        if wrong:
-            raise ContradictionError(wrong)
-        return self
-
-
 class RecordConfig(Section):
     """What is recorded, and how it is cut into files."""
 
@@ -318,6 +243,13 @@ class RecordConfig(Section):
         return self
 
 
+class UntilConfig(Section):
+    """When enough has been collected."""
+
+    landed: Annotated[int, Field(ge=1, le=1_000_000)]
+    """Throws that should land, at least; trials are added to the plan until so many have."""
+
+
 class Config(Section):
     """One collection: from the robot to the dataset."""
 
@@ -326,7 +258,10 @@ class Config(Section):
     seed: Annotated[int, Field(ge=0, lt=2**32)] = 0
     """Root of all randomness."""
     trials: Annotated[int, Field(ge=1, le=10_000_000)] | None = None
-    """Number of trials; none for `grid` and `list` means all points."""
+    """Number of trials, with `until` the largest one; none means all points for `grid` and `list`, ten for each throw
+    that should land with `until`."""
+    until: UntilConfig | None = None
+    """Collects until enough throws have landed, or `trials` are used up."""
     robot: RobotConfig = RobotConfig()
     """The robot."""
     tool: ToolConfig = ToolConfig()
@@ -360,6 +295,8 @@ class Config(Section):
         for joint in self.robot.posture:
             if joint in self.task.start:
                 wrong[f"robot.posture.{joint}"] = "should be left out, as task.start sets this joint"
+        if self.until is not None and self.sweep.sampler == "list":
+            wrong["until"] = "should be left out, as the file of the sampler list is not part of the dataset"
         if self.containers.sim.ports and self.run.simulations > 1:
             wrong["containers.sim.ports"] = (
                 f"should be left out, as {self.run.simulations} simulations cannot share a port of this machine"
@@ -367,6 +304,11 @@ class Config(Section):
         if wrong:
             raise ContradictionError(wrong)
         return self
+
+    @property
+    def grows(self) -> bool:
+        """Whether trials are added to the plan while it is collected."""
+        return self.until is not None or self.sweep.target is not None
 
     def without_run(self) -> Config:
         """This configuration with all that does not change the dataset at its default."""

@@ -15,6 +15,7 @@ _UNITS = {
     "_mps2": "m/s²",
     "_kg": "kg",
     "_hz": "Hz",
+    "_rad": "rad",
     "_m": "m",
     "_s": "s",
 }

@@ -58,6 +58,13 @@ def leaves(config: Config) -> Iterator[tuple[str, Any]]:
     return _leaves(config, ())
 
 
+def differences(one: Config, other: Config) -> dict[str, tuple[Any, Any]]:
+    """Dotted keys in which two configurations differ, with both values; None where a key is absent."""
+    before, after = dict(leaves(one)), dict(leaves(other))
+    keys = [*before, *(key for key in after if key not in before)]
+    return {key: (before.get(key), after.get(key)) for key in keys if before.get(key) != after.get(key)}
+
+
 def sweepable_keys(config: Config) -> list[str]:
     """Dotted keys that a sweep of this configuration may vary."""
     return [key for key, value in leaves(config) if _obstacle(config, key, value) is None]

@@ -48,6 +48,12 @@ class Leases:
         """Whether every trial was completed or given up."""
         return self._ended == self._total
 
+    def add(self, trials: Iterable[int]) -> None:
+        """Take in further trials, with numbers above those that are there."""
+        fresh = sorted(set(trials))
+        self._fresh.extend(fresh)
+        self._total += len(fresh)
+
     def upcoming(self, count: int) -> list[int]:
         """The trials that will be handed out next, at most so many."""
         return [*sorted(self._returned), *islice(self._fresh, count)][:count]
@@ -75,6 +81,15 @@ class Leases:
         trial = heapq.heappop(self._returned) if self._returned else self._fresh.popleft()
         self._holders[simulation] = trial
         return trial
+
+    def recall(self, trial: int) -> None:
+        """Count a trial as completed that was so before any was handed out.
+
+        Raises:
+            ValueError: If it does not wait to be handed out.
+        """
+        self._fresh.remove(trial)
+        self._ended += 1
 
     def complete(self, simulation: str, trial: int) -> bool:
         """A simulation handed in the episode of a trial.

@@ -12,27 +12,36 @@ from throwcollect import ros
 from throwcollect.coordinator.node import Coordinator
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.errors import Interrupted
+from throwcollect.tasks.throw import ThrowResult
 
 _IDLE_S = 0.05
+_SYNC_EVERY_S = 1.0
+"""What a power cut may cost."""
 _TELL_EVERY_S = 10.0
 """For whoever reads the log; the topic has it more often."""
 
 
 def run(directory: Path) -> None:
-    """Collect every trial of the plan in `directory`, and finish the dataset.
+    """Collect every trial of the plan in `directory` that has no episode yet, and finish the dataset.
 
-    SIGINT and SIGTERM drain: running trials are finished and written, no new one is started.
+    SIGINT and SIGTERM drain: running trials are finished and written within `run.grace_s`, no new one is started.
 
     Args:
-        directory: Directory of the dataset, as `prepare` left it.
+        directory: Directory of the dataset, as `prepare` or `resume` left it.
 
     Raises:
         DatasetError: If the directory holds no plan, or cannot be written.
         Interrupted: If a signal ended the collection before its last trial.
     """
     writer = DatasetWriter.open(directory)
+    # All of that before there is a node: a large dataset takes its time, in which nobody would get an answer.
+    there: list[tuple[int, ThrowResult]] = []
+    if found := writer.recover(lambda trial, result: there.append((trial, result))):
+        print(f"{found} episodes of an earlier collection are whole", flush=True)
     ros.init()
     node = Coordinator(writer.plan, writer)
+    for trial, result in there:
+        node.recall(trial, result)
 
     def drain(_number: int, _frame: FrameType | None) -> None:
         node.drain()
@@ -43,7 +52,7 @@ def run(directory: Path) -> None:
     executor.add_node(node)
     # What is here now stays until the end; the garbage collector need not go through it again and again.
     gc.freeze()
-    started = told = time.monotonic()
+    started = told = synced = time.monotonic()
     try:
         while not node.finished:
             # Simulations come first: what can wait is done when no message is there.
@@ -51,12 +60,18 @@ def run(directory: Path) -> None:
             executor.spin_once(timeout_sec=0.0 if waiting else _IDLE_S)
             if node.backlog:
                 node.write_one()
-            if time.monotonic() >= told + _TELL_EVERY_S:
-                told = time.monotonic()
+            now = time.monotonic()
+            if now >= synced + _SYNC_EVERY_S:
+                synced = now
+                writer.sync()
+            if now >= told + _TELL_EVERY_S:
+                told = now
                 print(node.report().line, flush=True)
         print(node.report().line, flush=True)
         if not node.complete:
-            raise Interrupted(f"interrupted; what is finished is in {directory}")
+            raise Interrupted(
+                f"interrupted; what is finished is in {directory}", hint=f"throwcollect resume {directory}"
+            )
         writer.finish(wall_s=time.monotonic() - started)
     finally:
         writer.close()

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from throwcollect.config.schema import Config
 from throwcollect.config.values import is_physics
 from throwcollect.coordinator.goals import FollowJointTrajectory, TrialGoals, trial_goals
+from throwcollect.coordinator.growth import Growth
 from throwcollect.coordinator.leases import Leases
 from throwcollect.coordinator.progress import PROGRESS_QOS, PROGRESS_TOPIC, Progress, String
 from throwcollect.coordinator.simulation_client import EPISODE_TOPIC, SimulationClient
@@ -23,7 +24,7 @@ from throwcollect.robots.talos import CONTROLLERS, controller_of, graph_name
 from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.ros import Node, graph_changes
 from throwcollect.sweep.plan import Plan, Trial
-from throwcollect.tasks.throw import Outcome, judge
+from throwcollect.tasks.throw import Outcome, ThrowResult, judge
 from throwcollect.tasks.trajectory import throw_trajectory
 
 _DISCOVERY_PERIOD_S = 0.1
@@ -59,6 +60,7 @@ class Coordinator(Node):
         self._config = plan.config
         self._trials: dict[int, Trial] = {trial.number: trial for trial in plan.trials if trial.refused is None}
         self._leases = Leases(self._trials, retries=self._config.run.retries)
+        self._growth = Growth(plan) if self._config.grows else None
         self._limits = joint_limits()
         self._simulations: dict[str, SimulationClient] = {}
         self._discovered_changes = -1
@@ -67,6 +69,7 @@ class Coordinator(Node):
         self._outcomes: Counter[str] = Counter()
         self._ends: deque[tuple[float, int]] = deque([(time.monotonic(), 0)])
         self._draining = False
+        self._drain_deadline = math.inf
         # A simulation that is held back for onlookers needs its time, and is not lost.
         slowed_s = self._config.sim.max_trial_s / (self._config.sim.real_time_factor or math.inf)
         self._patience_s = self._config.run.trial_timeout_s + slowed_s
@@ -85,19 +88,36 @@ class Coordinator(Node):
 
     @property
     def finished(self) -> bool:
-        """Whether every trial has ended and is written; while draining, whether no trial is running any more."""
+        """Whether every trial has ended and is written; while draining, whether running ones have ended or had time."""
         if self._backlog:
             return False
-        return self._leases.finished or (self._draining and self._leases.leased == 0)
+        if self.complete:
+            return True
+        if self._growth is not None and self._growth.over:
+            return False
+        return self._draining and (self._leases.leased == 0 or time.monotonic() > self._drain_deadline)
 
     @property
     def complete(self) -> bool:
-        """Whether every trial of the plan has ended."""
-        return self._leases.finished
+        """Whether every trial of the plan has ended, and none will be added to it."""
+        return self._leases.finished and self._growth is None
 
     def drain(self) -> None:
-        """Lease no more trials; those that run are finished."""
-        self._draining = True
+        """Lease no more trials; those that run may end within `run.grace_s`."""
+        if not self._draining:
+            self._draining = True
+            self._drain_deadline = time.monotonic() + self._config.run.grace_s
+
+    def recall(self, trial: int, result: ThrowResult) -> None:
+        """Count a trial as ended whose episode is in the dataset already, before anything is leased.
+
+        Args:
+            trial: Number of the trial.
+            result: What came of it.
+        """
+        self._leases.recall(trial)
+        self._note(trial, result)
+        self._ends = deque([(time.monotonic(), self._leases.ended)])
 
     def write_one(self) -> None:
         """Judge and write the oldest episode of the backlog.
@@ -110,19 +130,49 @@ class Coordinator(Node):
             episode.samples(), episode.header, config=setup.config, trajectory=setup.trajectory, limits=self._limits
         )
         self._writer.append(episode, result)
-        self._outcomes[result.outcome.value] += 1
+        self._note(episode.header.trial, result)
 
     def prepare_one(self) -> bool:
-        """Work out the next trial that will be leased and is not worked out yet, so that no simulation waits for it.
+        """Do a piece of work that can wait, of some milliseconds, so that no simulation will wait for it.
+
+        That is to work out one of the trials that will be leased next, or to get on with the next round of the plan.
 
         Returns:
-            Whether there was one.
+            Whether there was something to do.
+
+        Raises:
+            DatasetError: If the plan, or a shard that is complete without further trials, cannot be written.
         """
         for trial in self._leases.upcoming(len(self._simulations)):
             if trial not in self._setups:
                 self._setups[trial] = self._setup(trial)
                 return True
-        return False
+        return self._growth is not None and self._grow(self._growth)
+
+    def _grow(self, growth: Growth) -> bool:
+        if growth.over:
+            self._growth = None
+            self._writer.close_plan()
+            return True
+        trials = None if self._draining else growth.step()
+        if trials:
+            self._writer.extend(trials)
+            fresh = {trial.number: trial for trial in trials if trial.refused is None}
+            self._trials |= fresh
+            self._leases.add(fresh)
+            for namespace in self._simulations:
+                self._lease(namespace)
+        return trials is not None
+
+    @property
+    def _expected(self) -> int:
+        """Number of trials that will be added to the plan, as long as nothing else may end it."""
+        return self._growth.most if self._growth is not None and self._config.until is None else 0
+
+    def _note(self, trial: int, result: ThrowResult) -> None:
+        self._outcomes[result.outcome.value] += 1
+        if self._growth is not None:
+            self._growth.tell(trial, result)
 
     def report(self) -> Progress:
         """Publish the progress, and return it."""
@@ -133,12 +183,13 @@ class Coordinator(Node):
             self._ends.popleft()
         since, before = self._ends[0]
         progress = Progress(
-            total=self._leases.total,
+            total=self._leases.total + self._expected,
             ended=ended,
             outcomes=dict(self._outcomes),
             simulations=len(self._simulations),
             throws_per_s=(ended - before) / (now - since) if now > since else 0.0,
             hung=[name.strip("/") for name, simulation in self._simulations.items() if simulation.hung],
+            wanted=self._config.until.landed if self._config.until else None,
         )
         self._progress.publish(progress.message())
         return progress
@@ -187,6 +238,7 @@ class Coordinator(Node):
         setup = self._setups.get(trial) or self._setup(trial)
         self._setups[trial] = setup
         simulation.deadline = time.monotonic() + self._patience_s
+        self._writer.note("lease", trial=trial, simulation=namespace.strip("/"))
         simulation.begin(trial, setup.physics, setup.goals)
 
     def _setup(self, number: int) -> _Setup:
@@ -221,8 +273,10 @@ class Coordinator(Node):
         if trial is None:
             return
         self.get_logger().warning(f"{namespace}: trial {trial} is given to another simulation: {reason}")
+        self._writer.note("fail", trial=trial, simulation=namespace.strip("/"), reason=reason)
         if (given_up := self._leases.fail(namespace, reason)) is not None:
             number, reasons = given_up
             self._setups.pop(number)
+            result = ThrowResult(Outcome.LOST, reason="; ".join(reasons))
             self._writer.append_lost(number, "; ".join(reasons))
-            self._outcomes[Outcome.LOST.value] += 1
+            self._note(number, result)

@@ -8,12 +8,13 @@ from throwcollect.config.schema import Config
 from throwcollect.dataset.writer import create
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.robots.feasibility import Feasibility
-from throwcollect.sweep.plan import Plan, make_plan
+from throwcollect.sweep.plan import Check, Plan, make_plan
+from throwcollect.sweep.rounds import Rounds
 from throwcollect.tasks.trajectory import throw_trajectory
 
 
 def checked_plan(config: Config, *, directory: Path) -> Plan:
-    """Draw all trials and refuse those that the robot cannot do.
+    """Draw all trials that are known before anything runs, and refuse those that the robot cannot do.
 
     Args:
         config: The configuration.
@@ -22,8 +23,26 @@ def checked_plan(config: Config, *, directory: Path) -> Plan:
     Raises:
         ConfigError: If the sweep cannot be drawn, or no trial is left.
     """
+    return make_plan(config, check=feasibility_check(config), directory=directory)
+
+
+def feasibility_check(config: Config) -> Check:
+    """Says of trials of a configuration why the robot cannot do them, in about 5 ms each.
+
+    Raises:
+        ConfigError: If the robot's files cannot be read.
+    """
     feasibility = Feasibility(config)
-    return make_plan(config, check=lambda trial: feasibility.check(trial, throw_trajectory(trial)), directory=directory)
+    return lambda trial: feasibility.check(trial, throw_trajectory(trial))
+
+
+def more_trials(plan: Plan) -> str:
+    """What is said behind the number of a plan's trials: whether more will follow, and how many."""
+    rounds = Rounds(plan.config) if plan.config.grows else None
+    if rounds is None or len(plan.trials) >= rounds.limit:
+        return ""
+    until = f", until {plan.config.until.landed} have landed" if plan.config.until else ""
+    return f"; more follow from their results{until}, at most {rounds.limit} in all"
 
 
 def prepare(config: Config, directory: Path, *, sweep_directory: Path) -> Plan:

@@ -25,12 +25,13 @@ class Progress:
     """The state of a collection, whole in every message, so that anybody may join late.
 
     Attributes:
-        total: Number of trials to run.
+        total: Number of trials to run; with `wanted`, of those that are known so far.
         ended: Number of trials that have ended, whether they are written yet or not.
         outcomes: Number of written trials of each outcome.
         simulations: Number of simulations in the ROS graph.
         throws_per_s: Trials that ended per second of the last ten seconds.
         hung: Names of the simulations that took too long for a trial and have not been heard of since.
+        wanted: Number of throws that are to land; None if the collection ends with its plan.
     """
 
     total: int
@@ -39,6 +40,7 @@ class Progress:
     simulations: int
     throws_per_s: float
     hung: list[str]
+    wanted: int | None = None
 
     @property
     def landed(self) -> int:
@@ -56,19 +58,30 @@ class Progress:
         return sum(self.outcomes.values()) - self.landed - self.lost
 
     @property
+    def steps(self) -> tuple[int, int]:
+        """How far it has come and has to go: in throws that landed if a number of them is wanted, else in trials."""
+        if self.wanted is None:
+            return self.ended, self.total
+        return min(self.landed, self.wanted), self.wanted
+
+    @property
     def counts(self) -> str:
         """Landed and failed throws, simulations and speed, in one line."""
-        parts = [f"{self.landed} landed", f"{self.failed} failed"]
-        if self.lost:
-            parts.append(f"{self.lost} lost")
-        parts.append(f"{self.simulations} simulation{'' if self.simulations == 1 else 's'}")
-        parts.append(f"{self.throws_per_s:.1f} throws/s")
+        parts = [f"{self.landed} landed", *self._others]
         return ", ".join(parts)
 
     @property
     def line(self) -> str:
         """All of it that people want to see, in one line."""
-        return f"{self.ended}/{self.total} throws: {self.counts}"
+        if self.wanted is None:
+            return f"{self.ended}/{self.total} throws: {self.counts}"
+        return f"{self.ended} throws: {', '.join([f'{self.landed}/{self.wanted} landed', *self._others])}"
+
+    @property
+    def _others(self) -> list[str]:
+        lost = [f"{self.lost} lost"] if self.lost else []
+        simulations = f"{self.simulations} simulation{'' if self.simulations == 1 else 's'}"
+        return [f"{self.failed} failed", *lost, simulations, f"{self.throws_per_s:.1f} throws/s"]
 
     def message(self) -> Any:
         """The message that carries it: a std_msgs/String of JSON."""

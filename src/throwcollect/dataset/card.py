@@ -19,6 +19,7 @@ import pyarrow.compute as pc
 import throwcollect
 from throwcollect.config.schema import Config
 from throwcollect.dataset.bag import to_yaml
+from throwcollect.sweep.plan import FIRST_TRIALS
 
 _LIBRARIES = ("pybullet", "numpy", "rosbags", "mcap", "zstandard", "pyarrow", "pin", "example-robot-data")
 _SIZES = ((1_000, "n<1K"), (10_000, "1K<n<10K"), (100_000, "10K<n<100K"), (1_000_000, "100K<n<1M"))
@@ -36,7 +37,7 @@ class Provenance:
         python: Version of Python.
         libraries: Versions of the libraries that the data pass through.
         simulations: Number of simulations; None if not known.
-        wall_s: Real time that it took [s].
+        wall_s: Real time that it took [s]; None if not known.
     """
 
     finished: datetime
@@ -45,10 +46,10 @@ class Provenance:
     python: str
     libraries: Mapping[str, str]
     simulations: int | None
-    wall_s: float
+    wall_s: float | None
 
     @classmethod
-    def of_this_machine(cls, *, simulations: int | None, wall_s: float) -> Provenance:
+    def of_this_machine(cls, *, simulations: int | None, wall_s: float | None) -> Provenance:
         """Provenance of a collection that ends now, here."""
         return cls(
             finished=datetime.now(timezone.utc),
@@ -110,7 +111,7 @@ def data_card(config: Config, throws: pa.Table, provenance: Provenance) -> str:
         "",
         "- `metadata.yaml` and `*.mcap`: the recordings, a rosbag2 bag (`ros2 bag info`, Foxglove, `rosbags`, `mcap`).",
         "- `throws.parquet`: one row a trial: swept values, outcome, release, apex, landing, place of its recording.",
-        "- `plan.parquet`: the trials as they were drawn before the first one ran.",
+        "- `plan.parquet`: the trials, each as it was drawn before it ran.",
         "- `config.yaml`: the configuration; collecting with it again yields the same data.",
         "",
         *_ranges(config, throws),
@@ -137,13 +138,27 @@ def _ranges(config: Config, throws: pa.Table) -> list[str]:
     return [
         "## What varies",
         "",
-        f"Drawn by the sampler `{config.sweep.sampler}` with seed {config.seed}.",
+        *_drawn(config),
         "",
         "| key | lowest | highest |",
         "|---|---|---|",
         *rows,
         "",
     ]
+
+
+def _drawn(config: Config) -> list[str]:
+    """How the values came about, one sentence a line."""
+    lines = [f"Drawn by the sampler `{config.sweep.sampler}` with seed {config.seed}."]
+    if config.sweep.target is not None:
+        bins = [
+            f"`{name}` from {each.min:g} to {each.max:g} in {each.bins} bins"
+            for name, each in config.sweep.target.dimensions.items()
+        ]
+        lines.append(f"After {FIRST_TRIALS} trials, values were chosen that spread landings over {', '.join(bins)}.")
+    if config.until is not None:
+        lines.append(f"Collected until {config.until.landed} throws had landed, or all trials had been used up.")
+    return lines
 
 
 def _provenance(provenance: Provenance) -> dict[str, str]:
@@ -156,5 +171,6 @@ def _provenance(provenance: Provenance) -> dict[str, str]:
     }
     if provenance.simulations is not None:
         facts["simulations"] = str(provenance.simulations)
-    facts["wall time"] = f"{provenance.wall_s:.1f} s"
+    if provenance.wall_s is not None:
+        facts["wall time"] = f"{provenance.wall_s:.1f} s"
     return facts

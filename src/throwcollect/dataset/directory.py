@@ -7,6 +7,12 @@ PLAN = "plan.parquet"
 THROWS = "throws.parquet"
 METADATA = "metadata.yaml"
 CARD = "README.md"
+TRIALS = "trials.parquet"
+"""Beside the configuration of a derived dataset: the points that its sampler `list` reads."""
+SOURCES = "sources.parquet"
+"""Where the trials of a derived dataset come from."""
+SHARD_SUFFIX = ".mcap"
+JOURNAL = "logs/journal.jsonl"
 
 FORMAT = "1"
 """Version of the layout that ``docs/dataset.md`` describes."""
@@ -19,4 +25,4 @@ def shard_name(collection: str, number: int) -> str:
         collection: Name of the collection.
         number: Number of the shard, counted from 0.
     """
-    return f"{collection}_{number:05d}.mcap"
+    return f"{collection}_{number:05d}{SHARD_SUFFIX}"

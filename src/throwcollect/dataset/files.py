@@ -21,7 +21,9 @@ _HINTS = {
 
 def unwritable(path: Path, error: OSError) -> DatasetError:
     """The error that says that a path cannot be written, and why."""
-    return DatasetError(f"{path}: cannot be written: {error.strerror}", hint=_HINTS.get(error.errno or 0))
+    # Some libraries fill the text of an error with their own; the number is the system's.
+    reason = os.strerror(error.errno) if error.errno else error
+    return DatasetError(f"{path}: cannot be written: {reason}", hint=_HINTS.get(error.errno or 0))
 
 
 @contextmanager
@@ -54,6 +56,18 @@ def replacing(path: Path) -> Iterator[int]:
             beside.unlink()
 
 
+def remove(path: Path) -> None:
+    """Remove a file, if it is there.
+
+    Raises:
+        DatasetError: If it cannot be removed.
+    """
+    try:
+        path.unlink(missing_ok=True)
+    except OSError as error:
+        raise DatasetError(f"{path}: cannot be removed: {error.strerror}") from error
+
+
 def sync_directory(directory: Path) -> None:
     """Make names in a directory survive a power cut.
 
@@ -76,6 +90,25 @@ def write_all(descriptor: int, data: bytes) -> None:
     view = memoryview(data)
     while view:
         view = view[os.write(descriptor, view) :]
+
+
+def read_text(path: Path, *, most_bytes: int) -> str:
+    """UTF-8 text of a file.
+
+    Raises:
+        DatasetError: If it is missing, no file, no such text, or larger than `most_bytes`.
+    """
+    try:
+        # Opening a pipe would wait for somebody to write into it.
+        with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb") as file:
+            data = file.read(most_bytes + 1)
+        if len(data) > most_bytes:
+            raise DatasetError(f"{path}: cannot be read: larger than {most_bytes} bytes")
+        return data.decode("utf-8")
+    except OSError as error:
+        raise DatasetError(f"{path}: cannot be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise DatasetError(f"{path}: cannot be read: no UTF-8 text: byte {error.start}") from error
 
 
 def write_file(path: Path, data: bytes) -> None:

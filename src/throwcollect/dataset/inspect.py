@@ -24,6 +24,7 @@ class Info:
         trials: Number of planned trials.
         episodes: Number of trials with an episode.
         outcomes: Number of trials of each outcome, most frequent first.
+        wanted: Number of throws that were to land; None if there was no such number.
         landing: Lowest and highest ``x_m`` and ``y_m`` at which a ball landed [m], in world; None if none did.
         samples: Number of samples in all episodes.
         duration_s: Simulated time of all episodes together [s].
@@ -38,6 +39,7 @@ class Info:
     trials: int
     episodes: int
     outcomes: Mapping[str, int]
+    wanted: int | None
     landing: Mapping[str, tuple[float, float]] | None
     samples: int
     duration_s: float
@@ -62,7 +64,16 @@ def info(directory: Path) -> Info:
         DatasetError: If the directory holds no finished dataset, or its tables are damaged.
         ConfigError: If its ``config.yaml`` is wrong.
     """
-    dataset = Dataset.open(directory)
+    return summary(Dataset.open(directory))
+
+
+def summary(dataset: Dataset) -> Info:
+    """Summary of an open dataset.
+
+    Raises:
+        DatasetError: If its metadata lack a field, or its directory cannot be read.
+    """
+    directory = dataset.directory
     try:
         shards = dataset.bag["relative_file_paths"]
         topics = {
@@ -81,6 +92,7 @@ def info(directory: Path) -> Info:
         trials=len(dataset.throws),
         episodes=len(dataset),
         outcomes=count_outcomes(dataset.throws),
+        wanted=dataset.config.until.landed if dataset.config.until else None,
         landing=_landing(dataset.throws),
         samples=samples,
         duration_s=(samples - len(dataset)) / dataset.config.record.rate_hz,

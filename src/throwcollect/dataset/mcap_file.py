@@ -46,6 +46,11 @@ class EpisodeRun:
     metadata_length: int
     messages: int
 
+    @property
+    def length(self) -> int:
+        """Size of the records [bytes]."""
+        return self.chunk_index.chunk_length + self.chunk_index.message_index_length + self.metadata_length
+
 
 def episode_run(episode: Episode) -> EpisodeRun:
     """Records of an episode.
@@ -65,7 +70,7 @@ def episode_run(episode: Episode) -> EpisodeRun:
 
 
 def _run(chunk: Chunk, indexes: Mapping[int, bytes], metadata: bytes, messages: int) -> EpisodeRun:
-    data = b"".join((chunk.record(), *indexes.values(), metadata))
+    data = b"".join((chunk.record_header(), chunk.data, *indexes.values(), metadata))
     return EpisodeRun(data, episode_index(chunk, indexes), len(metadata), messages)
 
 

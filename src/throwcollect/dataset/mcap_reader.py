@@ -5,8 +5,9 @@ from __future__ import annotations
 import io
 import mmap
 import os
+import stat
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +19,7 @@ from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
 
 from throwcollect.dataset.mcap_file import EPISODE, MAGIC
-from throwcollect.episode.chunk import Chunk
+from throwcollect.episode.chunk import CHUNK_HEADER_BYTES, CHUNK_MARK, CHUNK_MARK_OFFSET, Chunk
 from throwcollect.episode.message import Episode, make_episode
 from throwcollect.errors import DatasetError
 
@@ -77,13 +78,13 @@ class StoredEpisode:
     Attributes:
         episode: The episode.
         chunk: Record of its chunk.
-        indexes: Records of the chunk's message indexes.
+        indexes: Records of the chunk's message indexes, by channel.
         facts: The Metadata record at its end.
     """
 
     episode: Episode
     chunk: Record
-    indexes: tuple[Record, ...]
+    indexes: Mapping[int, Record]
     facts: Record
 
 
@@ -119,6 +120,24 @@ class McapContents:
             raise DatasetError(f"byte {offset}: a record of {length} bytes goes beyond the end of the file")
         return Record(offset, opcode, self._data[offset:end])
 
+    def find(self, pattern: bytes, start: int) -> int:
+        """Where some bytes are first found from `start` on; -1 if nowhere."""
+        return self._data.find(pattern, start)
+
+    def next_chunk(self, start: int) -> int:
+        """Where the first whole record from `start` on begins that looks like a chunk; -1 if none does.
+
+        Records need not follow each other: chunks are found by the bytes that all their headers hold.
+        """
+        mark = self.find(CHUNK_MARK, start + CHUNK_MARK_OFFSET)
+        while mark >= 0:
+            offset = mark - CHUNK_MARK_OFFSET
+            size = Chunk.announced_size(self._data[offset : offset + CHUNK_HEADER_BYTES])
+            if 0 < size <= len(self._data) - offset:
+                return offset
+            mark = self.find(CHUNK_MARK, mark + 1)
+        return -1
+
     def records(self, offset: int = len(MAGIC)) -> Iterator[Record]:
         """Records from an offset on, to the footer or the end of the file.
 
@@ -132,6 +151,22 @@ class McapContents:
                 return
             offset = record.end
 
+    def message_indexes(self, offset: int) -> tuple[dict[int, Record], Record]:
+        """The Message Index records from an offset on, by channel, and the record that follows them.
+
+        Raises:
+            DatasetError: If the file ends before that, or a channel has more than one.
+        """
+        indexes: dict[int, Record] = {}
+        record = self.record(offset)
+        while record.opcode == Opcode.MESSAGE_INDEX:
+            channel = int.from_bytes(record.data[_RECORD_HEADER.size : _RECORD_HEADER.size + 2], "little")
+            if channel in indexes:
+                raise DatasetError(f"byte {record.offset}: a second message index of channel {channel}")
+            indexes[channel] = record
+            record = self.record(record.end)
+        return indexes, record
+
     def episode(self, offset: int) -> StoredEpisode:
         """The episode whose chunk begins at an offset.
 
@@ -141,13 +176,7 @@ class McapContents:
         chunk = self.record(offset)
         if chunk.opcode != Opcode.CHUNK:
             raise DatasetError(f"byte {offset}: a {chunk.kind} where the chunk of an episode should be")
-        indexes = []
-        for record in self.records(chunk.end):
-            if record.opcode != Opcode.MESSAGE_INDEX:
-                break
-            indexes.append(record)
-        else:
-            raise DatasetError(f"byte {offset}: nothing says what episode the chunk is")
+        indexes, record = self.message_indexes(chunk.end)
         if record.opcode != Opcode.METADATA or (facts := record.parse(records.Metadata)).name != EPISODE:
             raise DatasetError(f"byte {record.offset}: a {record.kind} where the metadata of an episode should be")
         try:
@@ -157,26 +186,43 @@ class McapContents:
             )
         except DatasetError as error:
             raise DatasetError(f"byte {offset}: {error}") from error
-        return StoredEpisode(episode, chunk, tuple(indexes), record)
+        return StoredEpisode(episode, chunk, indexes, record)
 
 
 @contextmanager
-def opened(path: Path) -> Iterator[McapContents]:
-    """The contents of a file, mapped into memory while the block lasts.
+def mapped(path: Path) -> Iterator[McapContents]:
+    """The contents of a file, mapped into memory while the block lasts, whatever they are.
 
     Raises:
-        DatasetError: If the file is missing, cannot be read, or is no MCAP file.
+        DatasetError: If the file is missing, cannot be read, or is no regular file.
     """
     try:
-        with path.open("rb") as file:
-            size = os.fstat(file.fileno()).st_size
-            data = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) if size else b""
+        # Opening a pipe would wait for somebody to write into it.
+        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+        try:
+            status = os.fstat(descriptor)
+            if not stat.S_ISREG(status.st_mode):
+                raise DatasetError(f"{path}: cannot be read: not a file")
+            data = mmap.mmap(descriptor, 0, access=mmap.ACCESS_READ) if status.st_size else b""
+        finally:
+            os.close(descriptor)
     except OSError as error:
         raise DatasetError(f"{path}: cannot be read: {error.strerror}") from error
     try:
-        if data[: len(MAGIC)] != MAGIC:
-            raise DatasetError(f"{path}: not an MCAP file")
         yield McapContents(data)
     finally:
         if isinstance(data, mmap.mmap):
             data.close()
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[McapContents]:
+    """The contents of an MCAP file, mapped into memory while the block lasts.
+
+    Raises:
+        DatasetError: If the file is missing, cannot be read, or is no MCAP file.
+    """
+    with mapped(path) as contents:
+        if contents.slice(0, len(MAGIC)) != MAGIC:
+            raise DatasetError(f"{path}: not an MCAP file")
+        yield contents

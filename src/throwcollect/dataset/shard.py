@@ -8,7 +8,7 @@ file ``<name>_00000.mcap``, and the other vanishes.
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Mapping
+from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,6 +18,7 @@ from throwcollect.dataset.files import replacing, unwritable, write_all
 from throwcollect.dataset.mcap_file import EpisodeRun, McapFile, episode_run
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.message import Episode
+from throwcollect.errors import DatasetError
 
 
 @dataclass(frozen=True)
@@ -25,12 +26,12 @@ class FinishedShard:
     """A shard in trial order under its final name.
 
     Attributes:
-        summary: What the bag's metadata say of it.
+        summary: What the bag's metadata say of it; None when no trial of it has an episode, and so no file.
         offsets: Where the chunk of each trial's episode begins [bytes].
     """
 
-    summary: FileSummary
-    offsets: Mapping[int, int]
+    summary: FileSummary | None
+    offsets: dict[int, int]
 
 
 class OpenShard:
@@ -38,21 +39,46 @@ class OpenShard:
 
     Attributes:
         missing: Trials that have neither an episode nor are known to be lost.
+        path: Final path of the shard.
+        part: Path of the shard while it is filled.
 
     Args:
         path: Final path of the shard.
-        trials: Trials whose episodes or losses it waits for.
         channels: What is recorded.
     """
 
-    def __init__(self, path: Path, trials: Collection[int], channels: Channels) -> None:
-        self.missing = set(trials)
-        self._path = path
-        self._part = path.with_name(f"{path.name}.part")
+    def __init__(self, path: Path, channels: Channels) -> None:
+        self.missing: set[int] = set()
+        self.path = path
+        self.part = path.with_name(f"{path.name}.part")
         self._channels = channels
         self._descriptor: int | None = None
-        self._file: McapFile | None = None
+        self._size = 0
+        self._synced = True
         self._runs: dict[int, tuple[int, EpisodeRun]] = {}
+
+    def expect(self, trials: Iterable[int]) -> None:
+        """Wait for the episodes or losses of more trials."""
+        self.missing.update(trials)
+
+    def adopt(self, runs: Iterable[tuple[int, int, EpisodeRun]], *, size: int) -> None:
+        """Go on with the unfinished file of a shard.
+
+        Args:
+            runs: Trial, offset [bytes] and records of each episode that lies in the file already.
+            size: Where its last whole episode ends [bytes]; what follows is cut off.
+
+        Raises:
+            DatasetError: If the file cannot be written.
+        """
+        try:
+            self._descriptor = os.open(self.part, os.O_RDWR)
+            self._cut(self._descriptor, size)
+        except OSError as error:
+            raise unwritable(self.part, error) from error
+        self._size = size
+        for trial, offset, run in runs:
+            self._remember(trial, offset, run)
 
     def append(self, episode: Episode) -> None:
         """Write an episode; when it fails, the file is as it was before.
@@ -61,38 +87,33 @@ class OpenShard:
             DatasetError: If the episode's chunk is damaged, or the file cannot be written.
         """
         run = episode_run(episode)
-        start = self._file.size if self._file else 0
+        start = self._size
         try:
             if self._descriptor is None:
-                self._descriptor = os.open(self._part, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666)
-            if self._file is None:
-                self._file = McapFile(self._write, self._channels, start_ns=episode.chunk.start_ns)
-            offset = self._file.size
-            self._file.append(run)
+                self._descriptor = os.open(self.part, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666)
+            if not start:
+                McapFile(self._write, self._channels, start_ns=episode.chunk.start_ns)
+            offset = self._size
+            self._write(run.data)
         except OSError as error:
             if self._descriptor is not None:
                 with suppress(OSError):
-                    os.ftruncate(self._descriptor, start)
-                    os.lseek(self._descriptor, start, os.SEEK_SET)
-            raise unwritable(self._part, error) from error
-        # The bytes are in the file now; keeping them in memory too would hold whole shards there.
-        self._runs[episode.header.trial] = (offset, replace(run, data=b""))
-        self.missing.discard(episode.header.trial)
+                    self._cut(self._descriptor, start)
+            self._size = start
+            raise unwritable(self.part, error) from error
+        self._remember(episode.header.trial, offset, run)
 
-    def finish(self) -> FinishedShard | None:
+    def finish(self) -> FinishedShard:
         """Write the shard in trial order and remove what it was copied from.
-
-        Returns:
-            The finished shard; None when no trial of it has an episode.
 
         Raises:
             DatasetError: If the shard cannot be written.
         """
         if self._descriptor is None or not self._runs:
-            return None
+            return FinishedShard(None, {})
         offsets = {}
         first = min(self._runs)
-        with replacing(self._path) as descriptor:
+        with replacing(self.path) as descriptor:
             file = McapFile(
                 lambda data: write_all(descriptor, data),
                 self._channels,
@@ -101,16 +122,31 @@ class OpenShard:
             for trial in sorted(self._runs):
                 offset, run = self._runs[trial]
                 offsets[trial] = file.size
-                index = run.chunk_index
-                length = index.chunk_length + index.message_index_length + run.metadata_length
-                file.append(replace(run, data=os.pread(self._descriptor, length, offset)))
-            summary = file.finish(self._path.name)
+                data = os.pread(self._descriptor, run.length, offset)
+                if len(data) != run.length:
+                    raise DatasetError(f"{self.part}: was cut off by somebody else while it was written")
+                file.append(replace(run, data=data))
+            summary = file.finish(self.path.name)
         self.close()
         try:
-            self._part.unlink()
+            self.part.unlink()
         except OSError as error:
-            raise unwritable(self._part, error) from error
+            raise unwritable(self.part, error) from error
         return FinishedShard(summary, offsets)
+
+    def sync(self) -> None:
+        """Have what was appended survive a power cut.
+
+        Raises:
+            DatasetError: If the disk fails.
+        """
+        if self._descriptor is None or self._synced:
+            return
+        try:
+            os.fdatasync(self._descriptor)
+        except OSError as error:
+            raise unwritable(self.part, error) from error
+        self._synced = True
 
     def close(self) -> None:
         """Close the file; it stays where it is."""
@@ -118,7 +154,19 @@ class OpenShard:
             os.close(self._descriptor)
             self._descriptor = None
 
+    def _remember(self, trial: int, offset: int, run: EpisodeRun) -> None:
+        # The bytes are in the file; keeping them in memory too would hold whole shards there.
+        self._runs[trial] = (offset, replace(run, data=b""))
+        self.missing.discard(trial)
+
     def _write(self, data: bytes) -> None:
         if self._descriptor is None:
             raise ValueError("the shard is closed")
         write_all(self._descriptor, data)
+        self._size += len(data)
+        self._synced = False
+
+    @staticmethod
+    def _cut(descriptor: int, size: int) -> None:
+        os.ftruncate(descriptor, size)
+        os.lseek(descriptor, size, os.SEEK_SET)

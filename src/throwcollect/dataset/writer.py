@@ -2,11 +2,13 @@
 
 A directory that holds ``config.yaml`` and ``plan.parquet`` is a created dataset; one that also holds ``metadata.yaml``
 is finished, as that file is written last. While a dataset is filled, each open shard lies beside its final name (see
-`shard`), and each finished shard's rows are kept for ``throws.parquet``.
+`shard`), and each finished shard's rows are kept for ``throws.parquet``. Whatever ends that, the next writer takes in
+what is there (see `recovery`) and goes on.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import NamedTuple
@@ -15,19 +17,24 @@ import pyarrow as pa
 
 from throwcollect.config.loader import load, resolved_yaml
 from throwcollect.config.schema import Config
-from throwcollect.dataset.bag import FileSummary, bag_information, to_yaml
+from throwcollect.dataset.bag import FileSummary, dataset_metadata
 from throwcollect.dataset.card import Provenance, data_card
 from throwcollect.dataset.digest import combined_digest
-from throwcollect.dataset.directory import CARD, CONFIG, FORMAT, METADATA, PLAN, THROWS, shard_name
-from throwcollect.dataset.files import write_file
-from throwcollect.dataset.shard import OpenShard
+from throwcollect.dataset.directory import CARD, CONFIG, METADATA, PLAN, THROWS, shard_name
+from throwcollect.dataset.files import remove, write_file
+from throwcollect.dataset.journal import Event, Journal
+from throwcollect.dataset.recovery import recover_shard
+from throwcollect.dataset.shard import FinishedShard, OpenShard
 from throwcollect.dataset.throws import Place, Row, ThrowsTable, encode_table
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.message import Episode
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.robots.description import full_description
-from throwcollect.sweep.plan import Plan
+from throwcollect.sweep.plan import Plan, Trial
 from throwcollect.tasks.throw import Outcome, ThrowResult
+
+Tell = Callable[[int, ThrowResult], None]
+"""Told a trial and what came of it."""
 
 
 def create(directory: Path, plan: Plan) -> None:
@@ -48,10 +55,11 @@ def create(directory: Path, plan: Plan) -> None:
     except OSError as error:
         raise ConfigError(f"{directory}: cannot be used as directory of a dataset: {error.strerror}") from error
     if taken:
+        begun = PLAN in taken or CONFIG in taken
         raise ConfigError(
             f"{directory}: holds {', '.join(taken[:3])}{' and more' if taken[3:] else ''}",
             expected="a directory that is new or empty",
-            hint="choose another one with --output",
+            hint=f"choose another one with --output{f', or go on: throwcollect resume {directory}' if begun else ''}",
         )
     with ExitStack() as undo:
         undo.callback(_clear, directory, remove=made)
@@ -84,32 +92,22 @@ class DatasetWriter:
     Args:
         directory: A directory as `create` leaves it.
         plan: The plan that lies there.
+        journal: Told what happens; None for datasets that are written in one go. It is closed with the writer.
+        growing: Whether trials may still be added to the plan, until `close_plan`.
     """
 
-    def __init__(self, directory: Path, plan: Plan) -> None:
+    def __init__(self, directory: Path, plan: Plan, *, journal: Journal | None = None, growing: bool = False) -> None:
         self.plan = plan
         self._directory = directory
         self._config: Config = plan.config
+        self._journal = journal
+        self._growing = growing
         self._channels = Channels(self._config, full_description(self._config))
-        self._trials = {trial.number: trial for trial in plan.trials}
         self._table = ThrowsTable(plan.keys, tuple(self._config.task.end))
         self._shards: dict[int, OpenShard] = {}
         self._rows: dict[int, dict[int, Row]] = {}
         self._finished: dict[int, _Finished] = {}
-        members: dict[int, list[int]] = {}
-        for number in self._trials:
-            members.setdefault(number // self._config.record.trials_per_shard, []).append(number)
-        for shard, numbers in members.items():
-            runnable = [number for number in numbers if self._trials[number].refused is None]
-            path = directory / shard_name(self._config.name, shard)
-            self._shards[shard] = OpenShard(path, runnable, self._channels)
-            self._rows[shard] = {
-                number: self._table.refused_row(number, trial.values, trial.refused)
-                for number in numbers
-                if (trial := self._trials[number]).refused is not None
-            }
-        for shard in members:
-            self._finish_shard_if_complete(shard)
+        self._expect(plan.trials)
 
     @classmethod
     def create(cls, directory: Path, plan: Plan) -> DatasetWriter:
@@ -124,18 +122,79 @@ class DatasetWriter:
 
     @classmethod
     def open(cls, directory: Path) -> DatasetWriter:
-        """Open a directory as `create` leaves it.
+        """Open a dataset to collect into, and keep all others from doing so; call `recover` next.
 
         Raises:
-            DatasetError: If it is not one, or trials of it have run already.
+            DatasetError: If the directory holds no plan of its configuration, or another process collects into it.
             ConfigError: If its ``config.yaml`` is wrong.
         """
         for name in (CONFIG, PLAN):
             if not (directory / name).is_file():
                 raise DatasetError(f"{directory}: holds no {name}", expected="a dataset that was created")
-        if used := sorted(path.name for path in directory.iterdir() if path.name == METADATA or ".mcap" in path.name):
-            raise DatasetError(f"{directory}: trials of it have run already: it holds {used[0]}")
-        return cls(directory, Plan.read(directory / PLAN, load(directory / CONFIG)))
+        with ExitStack() as undo:
+            journal = undo.enter_context(Journal(directory))
+            plan = Plan.read(directory / PLAN, load(directory / CONFIG))
+            undo.pop_all()
+        return cls(directory, plan, journal=journal, growing=plan.config.grows)
+
+    def recover(self, tell: Tell | None = None) -> int:
+        """Take in what earlier writers have left: every episode that is whole stays, everything else is removed.
+
+        A finished dataset becomes an unfinished one by that, whose trials may all have ended; `finish` writes the same
+        files again.
+
+        Args:
+            tell: Told each trial that has an episode, in order of shards.
+
+        Returns:
+            Number of episodes.
+
+        Raises:
+            DatasetError: If files cannot be read or written.
+        """
+        for name in (METADATA, THROWS):
+            remove(self._directory / name)
+        found = 0
+        for number, shard in list(self._shards.items()):
+            recovered = recover_shard(shard, self.plan, self._channels, keep=self._settled(number))
+            for each in recovered.episodes:
+                place = Place(shard.path.name, -1, each.samples, each.digest)
+                self._rows[number][each.trial] = self._row(each.trial, each.result, place)
+                if tell is not None:
+                    tell(each.trial, each.result)
+            found += len(recovered.episodes)
+            if recovered.finished is not None:
+                self._close_shard(number, recovered.finished)
+            else:
+                self._finish_shard_if_complete(number)
+        if found:
+            self.note("recovered", episodes=found)
+        return found
+
+    def extend(self, trials: Sequence[Trial]) -> None:
+        """Add trials to the plan, and to the one on disk before this returns.
+
+        Args:
+            trials: Numbered on from those that are there.
+
+        Raises:
+            DatasetError: If the plan cannot be written.
+        """
+        plan = Plan(self._config, (*self.plan.trials, *trials))
+        plan.write(self._directory / PLAN)
+        self.plan = plan
+        self.note("planned", trials=len(plan.trials))
+        self._expect(trials)
+
+    def close_plan(self) -> None:
+        """No trial will be added any more.
+
+        Raises:
+            DatasetError: If a shard that is complete by that cannot be written.
+        """
+        self._growing = False
+        for number in list(self._shards):
+            self._finish_shard_if_complete(number)
 
     def append(self, episode: Episode, result: ThrowResult) -> None:
         """Write an episode.
@@ -147,12 +206,14 @@ class DatasetWriter:
         Raises:
             DatasetError: If the episode is damaged, is of no trial that is waited for, or cannot be written.
         """
-        number = episode.header.trial
-        shard = self._waiting_shard(number)
-        self._shards[shard].append(episode)
-        place = Place(shard_name(self._config.name, shard), -1, episode.header.samples, episode.digest)
-        self._rows[shard][number] = self._table.row(number, self._trials[number].values, result, place)
-        self._finish_shard_if_complete(shard)
+        trial = episode.header.trial
+        number = self._waiting_shard(trial)
+        shard = self._shards[number]
+        shard.append(episode)
+        place = Place(shard.path.name, -1, episode.header.samples, episode.digest)
+        self._rows[number][trial] = self._row(trial, result, place)
+        self.note("commit", trial=trial, outcome=result.outcome.value, digest=episode.digest)
+        self._finish_shard_if_complete(number)
 
     def append_lost(self, trial: int, reason: str) -> None:
         """Write that a trial has no episode.
@@ -164,17 +225,36 @@ class DatasetWriter:
         Raises:
             DatasetError: If the trial is not waited for, or the shard that it completes cannot be written.
         """
-        shard = self._waiting_shard(trial)
-        self._shards[shard].missing.remove(trial)
-        result = ThrowResult(Outcome.LOST, reason=reason)
-        self._rows[shard][trial] = self._table.row(trial, self._trials[trial].values, result, None)
-        self._finish_shard_if_complete(shard)
+        number = self._waiting_shard(trial)
+        self._shards[number].missing.remove(trial)
+        self._rows[number][trial] = self._row(trial, ThrowResult(Outcome.LOST, reason=reason), None)
+        self.note("lost", trial=trial, reason=reason)
+        self._finish_shard_if_complete(number)
 
-    def finish(self, *, wall_s: float, simulations: int | None = None) -> None:
+    def note(self, event: Event, **details: object) -> None:
+        """Write an event into the journal.
+
+        Raises:
+            DatasetError: If it cannot be written.
+        """
+        if self._journal is not None:
+            self._journal.note(event, **details)
+
+    def sync(self) -> None:
+        """Have all that was appended survive a power cut.
+
+        Raises:
+            DatasetError: If the disk fails.
+        """
+        for shard in self._shards.values():
+            shard.sync()
+
+    def finish(self, *, wall_s: float | None, simulations: int | None = None) -> None:
         """Write everything that describes the dataset as a whole; ``metadata.yaml`` comes last.
 
         Args:
-            wall_s: Real time that the collection took [s], for the data card.
+            wall_s: Real time that this writer collected for [s], for the data card; that of earlier ones is added;
+                None if it is not known.
             simulations: Number of simulations that took part, for the data card; None if that is not known.
 
         Raises:
@@ -182,25 +262,49 @@ class DatasetWriter:
         """
         if self._shards:
             missing = sorted(number for shard in self._shards.values() for number in shard.missing)
-            raise DatasetError(f"{self._directory}: {len(missing)} trials are missing, such as {missing[0]}")
+            example = f", such as {missing[0]}" if missing else ""
+            raise DatasetError(f"{self._directory}: {len(missing)} trials are missing{example}")
         finished = [self._finished[shard] for shard in sorted(self._finished)]
         throws = pa.concat_tables([each.rows for each in finished])
         digest = combined_digest(throws["digest"].drop_null().to_pylist())
         files = [each.summary for each in finished if each.summary]
-        custom = {"throwcollect.format": FORMAT, "throwcollect.digest": digest}
-        metadata = {"rosbag2_bagfile_information": bag_information(files, self._channels.all, custom)}
-        provenance = Provenance.of_this_machine(simulations=simulations, wall_s=wall_s)
+        earlier_s = self._journal.earlier_s if self._journal else 0.0
+        whole_s = None if wall_s is None else earlier_s + wall_s
+        provenance = Provenance.of_this_machine(simulations=simulations, wall_s=whole_s)
         # How it was run may not change the dataset, so what is kept of that is in the data card alone.
         config = self._config.without_run()
         write_file(self._directory / THROWS, encode_table(throws))
         write_file(self._directory / CARD, data_card(config, throws, provenance).encode())
         write_file(self._directory / CONFIG, resolved_yaml(config).encode())
-        write_file(self._directory / METADATA, to_yaml(metadata).encode())
+        write_file(self._directory / METADATA, dataset_metadata(files, self._channels.all, digest).encode())
+        self.note("finished")
 
     def close(self) -> None:
         """Close all files; what is written stays."""
         for shard in self._shards.values():
             shard.close()
+        if self._journal is not None:
+            self._journal.close()
+            self._journal = None
+
+    def _expect(self, trials: Sequence[Trial]) -> None:
+        members: dict[int, list[Trial]] = {}
+        for trial in trials:
+            members.setdefault(trial.number // self._config.record.trials_per_shard, []).append(trial)
+        for number, added in members.items():
+            if number not in self._shards:
+                path = self._directory / shard_name(self._config.name, number)
+                self._shards[number] = OpenShard(path, self._channels)
+                self._rows[number] = {}
+            self._shards[number].expect(trial.number for trial in added if trial.refused is None)
+            for trial in added:
+                if trial.refused is not None:
+                    row = self._table.refused_row(trial.number, trial.values, trial.refused)
+                    self._rows[number][trial.number] = row
+            self._finish_shard_if_complete(number)
+
+    def _row(self, trial: int, result: ThrowResult, place: Place | None) -> Row:
+        return self._table.row(trial, self.plan.trials[trial].values, result, place)
 
     def _waiting_shard(self, trial: int) -> int:
         shard = trial // self._config.record.trials_per_shard
@@ -208,14 +312,20 @@ class DatasetWriter:
             raise DatasetError(f"{self._directory}: no episode of trial {trial} is waited for")
         return shard
 
+    def _settled(self, number: int) -> bool:
+        """Whether no trial will be added to a shard any more."""
+        return not self._growing or len(self.plan.trials) >= (number + 1) * self._config.record.trials_per_shard
+
     def _finish_shard_if_complete(self, number: int) -> None:
         shard = self._shards[number]
-        if shard.missing:
-            return
-        finished = shard.finish()
+        if not shard.missing and self._settled(number):
+            self._close_shard(number, shard.finish())
+
+    def _close_shard(self, number: int, finished: FinishedShard) -> None:
         rows = [row for _, row in sorted(self._rows.pop(number).items())]
-        if finished is not None:
-            for row in rows:
-                row["chunk_offset"] = finished.offsets.get(row["trial"])
-        self._finished[number] = _Finished(finished.summary if finished else None, self._table.table(rows))
-        del self._shards[number]
+        for row in rows:
+            row["chunk_offset"] = finished.offsets.get(row["trial"])
+        self._finished[number] = _Finished(finished.summary, self._table.table(rows))
+        shard = self._shards.pop(number)
+        if finished.summary is not None:
+            self.note("shard", name=shard.path.name)

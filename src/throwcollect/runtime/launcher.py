@@ -22,6 +22,7 @@ from throwcollect.runtime.listening import Listening
 from throwcollect.runtime.local import LocalRuntime
 from throwcollect.runtime.nodes import LAUNCHER, NodeExit, endpoint_of
 from throwcollect.runtime.records import OpenRun, Record
+from throwcollect.runtime.runs import goes_on
 from throwcollect.runtime.scaling import offer_scaling
 from throwcollect.runtime.supervisor import NodeState, Supervisor
 
@@ -79,7 +80,7 @@ def launch(
         interruptions: How often the user has asked to stop: at first running trials are finished, then no more.
 
     Returns:
-        What the dataset holds, and ``wall_s``: the time since the run was started [s].
+        What the dataset holds, and ``wall_s``: the time since the run was started, and of earlier runs into it [s].
 
     Raises:
         ConfigError: If the configuration cannot be used after all.
@@ -187,7 +188,7 @@ class _Launcher:
             whole = self._summary()
         wall_s = (datetime.now(timezone.utc) - self._run.record.started).total_seconds()
         # Somebody may have set the clock back.
-        return {**whole, "wall_s": max(wall_s, _POLL_S)}
+        return {**whole, "wall_s": max(wall_s, _POLL_S) + self._run.record.earlier_s}
 
     def _open(self) -> tuple[str, ...]:
         """Make what the nodes need; names of those that a launcher before this one has left."""
@@ -224,10 +225,12 @@ class _Launcher:
     def _check(self, end: NodeExit | None) -> None:
         if self._interruptions() and (end is None or end.code != 0):
             dataset = self._run.record.dataset
-            raise Interrupted(f"interrupted; finished throws are in {dataset}, the dataset is not complete")
+            message = f"interrupted; finished throws are in {dataset}, the dataset is not complete"
+            raise Interrupted(message, hint=goes_on(self._run.record))
         if end is not None and end.code != 0:
             kind = DatasetError if end.code == DatasetError.exit_code else WorkerError
-            raise kind(f"the coordinator stopped: {end.reason}", evidence=end.log or None)
+            hint = goes_on(self._run.record) if kind is WorkerError else None
+            raise kind(f"the coordinator stopped: {end.reason}", evidence=end.log or None, hint=hint)
 
     def _summary(self) -> dict[str, Any]:
         record = self._run.record

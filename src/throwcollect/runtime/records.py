@@ -53,6 +53,7 @@ class Record:
         started: When it was started.
         launcher: Process id of its launcher.
         simulations: Number of simulations that are wanted.
+        earlier_s: Real time that earlier runs collected into the same dataset for [s].
         endpoint: Zenoh endpoint of the router, as this machine reaches it; None while there is none.
         nodes: Its nodes; none once it has ended.
         trials: Number of trials to run; None before the first report of the coordinator.
@@ -74,6 +75,7 @@ class Record:
     started: datetime
     launcher: int
     simulations: int
+    earlier_s: float = 0.0
     endpoint: str | None = None
     nodes: tuple[NodeState, ...] = ()
     trials: int | None = None

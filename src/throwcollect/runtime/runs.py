@@ -7,9 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from throwcollect.dataset.directory import CONFIG
 from throwcollect.errors import ConfigError, DatasetError, Interrupted, ThrowcollectError, WorkerError
-from throwcollect.runtime.nodes import COORDINATOR
 from throwcollect.runtime.records import Record, Records, Run
 
 if TYPE_CHECKING:
@@ -80,11 +78,9 @@ def left_in(records: Records, directory: Path) -> Run | None:
     for run in _into(records, directory):
         if run.status == "running":
             raise busy(run.record)
-        if run.status == "died" and run.record.runtime == "docker":
-            nodes = {node.name for found in on_engine() if found.run_id == run.record.run for node in found.nodes}
-            # Its memory cannot be had back: without it there is nothing to go on with.
-            if COORDINATOR in nodes:
-                return run
+        mine = on_engine() if run.status == "died" and run.record.runtime == "docker" else []
+        if any(found.nodes for found in mine if found.run_id == run.record.run):
+            return run
     return None
 
 
@@ -111,12 +107,16 @@ def failure(record: Record) -> ThrowcollectError | None:
     return kind(record.message)
 
 
+def goes_on(record: Record) -> str | None:
+    """The command that goes on with the dataset of a run that is over; None if there is none, as it is in a volume."""
+    return None if record.volume else f"throwcollect resume {record.directory}"
+
+
 def died(record: Record) -> WorkerError:
     """The error that says that the launcher of a run died before the run ended."""
     hint = f"throwcollect down --run {record.run} cleans up"
-    if record.runtime == "docker" and record.volume is None:
-        again = f"throwcollect up {record.directory}/{CONFIG} --output {record.directory}"
-        hint = f"{again} goes on where its containers are; {hint}"
+    if again := goes_on(record):
+        hint = f"{again} goes on where it ended, or with its containers if they live; {hint}"
     return WorkerError(
         f"run {record.run}: its launcher died; finished throws are in {record.dataset}",
         evidence=f"the logs are in {record.logs}",

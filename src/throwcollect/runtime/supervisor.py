@@ -12,13 +12,13 @@ from types import TracebackType
 from typing import Literal
 
 from throwcollect.config.run import RunConfig
-from throwcollect.errors import WorkerError
+from throwcollect.errors import Interrupted, WorkerError
 from throwcollect.runtime.nodes import COORDINATOR, ROUTER, NodeExit, Runtime, simulation_name
 
 _FIRST_BACKOFF_S = 0.2
 _LONGEST_BACKOFF_S = 10.0
-_DRAIN_S = 15.0
-"""Time that a coordinator gets to finish its running trials after it was told to stop."""
+_CLOSING_S = 7.0
+"""Time that a coordinator gets to write its files once the running trials have ended or were dropped."""
 _FROZEN_S = 3.0
 """Somebody may stop a node to look at it; after this time it counts as lost."""
 
@@ -125,8 +125,10 @@ class Supervisor:
         self._ready |= {name for name in self._simulations if name not in self._ready and self.runtime.ready(name)}
         for node in self.runtime.exits():
             self._last_end[node.name] = node.reason
-            if node.name == COORDINATOR:
+            if node.name == COORDINATOR and not (_killed(node) and self._schedule_restart(node)):
                 end = node
+            elif node.name == COORDINATOR:
+                news.append(f"{node.name} was lost ({node.reason}) and is started again")
             else:
                 fate = "is started again" if self._schedule_restart(node) else "is given up"
                 news.append(f"{node.name} was lost ({node.reason}) and {fate}{_last_words(node)}")
@@ -159,10 +161,12 @@ class Supervisor:
             hurry: Asked again and again whether to end at once.
 
         Returns:
-            How it ended; None when it had to be ended by force.
+            How it ended; None when it had to be ended by force, or was about to be started again.
         """
+        if COORDINATOR in self._due:
+            return None
         self.runtime.signal(COORDINATOR, signal.SIGINT)
-        deadline = time.monotonic() + _DRAIN_S
+        deadline = time.monotonic() + self._run.grace_s + _CLOSING_S
         while time.monotonic() < deadline and not hurry():
             for node in self.runtime.exits():
                 if node.name == COORDINATOR:
@@ -201,25 +205,22 @@ class Supervisor:
         return NodeState(name, status, self._restarts.get(name, 0), handle, self._last_end.get(name))
 
     def _end_frozen(self) -> list[str]:
-        """End nodes by force that have been frozen for long; the coordinator, whose memory is needed, is only named."""
+        """End nodes by force that have been frozen for long."""
         now, news = time.monotonic(), []
         frozen = self.runtime.frozen()
         self._frozen_since = {name: self._frozen_since.get(name, now) for name in frozen}
         for name, since in self._frozen_since.items():
             if now - since >= _FROZEN_S:
-                # Told once: it begins to count anew, from the far future for a coordinator.
+                # Told once.
                 self._frozen_since[name] = math.inf
-                if name == COORDINATOR:
-                    news.append(f"{name} is frozen (paused or stopped); nothing goes on until it continues")
-                else:
-                    news.append(f"{name} is frozen (paused or stopped) and is ended")
-                    self.runtime.signal(name, signal.SIGKILL)
+                news.append(f"{name} is frozen (paused or stopped) and is ended")
+                self.runtime.signal(name, signal.SIGKILL)
         return news
 
     def _schedule_restart(self, node: NodeExit) -> bool:
         """Whether a node that ended will be started again."""
         count = self._restarts.get(node.name, 0)
-        worked = node.name == ROUTER or node.name in self._ready
+        worked = node.name in (ROUTER, COORDINATOR) or node.name in self._ready
         if count >= (self._run.restarts if worked else min(_RESTARTS_BEFORE_READY, self._run.restarts)):
             self._given_up[node.name] = node
             return False
@@ -246,6 +247,11 @@ class Supervisor:
                 evidence=self.runtime.log_tail(self._simulations[0]) or None,
                 hint=hint,
             )
+
+
+def _killed(node: NodeExit) -> bool:
+    """Whether a node was ended from outside, and not by itself: its exit code is no number that it could return."""
+    return node.code is not None and (node.code < 0 or node.code > Interrupted.exit_code)
 
 
 def _last_words(node: NodeExit) -> str:

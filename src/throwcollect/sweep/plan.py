@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,14 +14,24 @@ import numpy as np
 
 from throwcollect.config.schema import Config
 from throwcollect.config.values import reason_not_sweepable, with_values
-from throwcollect.errors import ConfigError, DatasetError, PlanError, Problem
+from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError, PlanError, Problem
 from throwcollect.sweep.digest import config_digest, trial_digests
+from throwcollect.sweep.parquet import read_parquet
+from throwcollect.sweep.points import Points
 from throwcollect.sweep.samplers import draw_points
 
 _FORMAT = "1"
 _FORMAT_KEY = b"throwcollect.plan_format"
 _CONFIG_KEY = b"throwcollect.config_digest"
 _MOST_REASONS = 5
+
+ROUND_TRIALS = 64
+"""Trials of a round, by which a plan grows."""
+FIRST_TRIALS = 2 * ROUND_TRIALS
+"""Trials of the rounds that depend on no result."""
+
+Check = Callable[[Config], str | None]
+"""Says of the configuration of a trial why it cannot be run, or None when it can."""
 
 _NUMBER = re.compile(r"(?<![\w.])-?\d[\d.]*(?:e[-+]?\d+)?")
 
@@ -103,17 +113,10 @@ class Plan:
             config: The configuration; its section `run` may differ.
 
         Raises:
-            DatasetError: If the file is missing, damaged, no plan, or the plan of another configuration.
+            DatasetError: If the file is missing, damaged, or no plan.
+            ForeignPlanError: If it is the plan of another configuration.
         """
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-
-        try:
-            table: Any = pq.ParquetFile(path, page_checksum_verification=True).read()
-        except FileNotFoundError as error:
-            raise DatasetError(f"{path}: the plan is missing") from error
-        except (pa.ArrowException, OSError) as error:
-            raise DatasetError(f"{path}: the plan is damaged: {error}") from error
+        table = read_parquet(path)
         metadata = table.schema.metadata or {}
         keys = tuple(table.column_names[4:])
         found = metadata.get(_FORMAT_KEY, b"none").decode(errors="replace")
@@ -124,10 +127,10 @@ class Plan:
                 evidence=f"got {found}",
             )
         if metadata.get(_CONFIG_KEY, b"") != config_digest(config).encode():
-            raise DatasetError(f"{path}: the plan belongs to another configuration")
+            raise ForeignPlanError(f"{path}: the plan belongs to another configuration")
         for key in keys:
             if reason := reason_not_sweepable(config, key):
-                raise DatasetError(f"{path}: the plan is damaged: column {key!r}: {reason}")
+                raise DatasetError(f"{path}: is damaged: column {key!r}: {reason}")
         numbers, digests, seeds, refused, *values = (column.to_pylist() for column in table.columns)
         if numbers != list(range(len(numbers))):
             raise DatasetError(f"{path}: the trials are not numbered from 0 without gaps")
@@ -135,10 +138,8 @@ class Plan:
         return cls(config, tuple(Trial(n, dict(zip(keys, row, strict=True)), *rest) for n, row, *rest in rows))
 
 
-def make_plan(
-    config: Config, *, check: Callable[[Config], str | None] | None = None, directory: Path | None = None
-) -> Plan:
-    """Draw all trials of a sweep.
+def make_plan(config: Config, *, check: Check | None = None, directory: Path | None = None) -> Plan:
+    """Draw all trials of a sweep; of one that grows, its first two rounds (see `rounds`).
 
     Args:
         config: Configuration with the sweep.
@@ -151,23 +152,36 @@ def make_plan(
         ConfigError: If the file of the sampler `list` cannot be used.
     """
     points = draw_points(config, directory=directory or Path())
-    seeds = [_seed(config.seed, number) for number in range(len(points.values))]
-    rows = zip(points.values.tolist(), seeds, trial_digests(config, points, seeds), strict=True)
-    trials = []
-    for number, (row, seed, digest) in enumerate(rows):
-        values = dict(zip(points.keys, row, strict=True))
-        refused = _refusal(with_values(config, values), check) if check else None
-        trials.append(Trial(number, values, seed, digest, refused))
+    if config.grows:
+        points = points.first(FIRST_TRIALS)
+    trials = tuple(make_trials(config, points, check=check))
     if reasons := [trial.refused for trial in trials if trial.refused is not None]:
         _check_some_left(reasons, len(trials))
-    return Plan(config, tuple(trials))
+    return Plan(config, trials)
+
+
+def make_trials(config: Config, points: Points, *, check: Check | None = None, first: int = 0) -> Iterator[Trial]:
+    """The trials of points, one by one, as each is checked.
+
+    Args:
+        config: Configuration that the trials vary.
+        points: Their values.
+        check: Says of the configuration of a trial why it cannot be run.
+        first: Number of the first one.
+    """
+    seeds = [_seed(config.seed, number) for number in range(first, first + len(points.values))]
+    rows = zip(points.values.tolist(), seeds, trial_digests(config, points, seeds), strict=True)
+    for number, (row, seed, digest) in enumerate(rows, first):
+        values = dict(zip(points.keys, row, strict=True))
+        refused = _refusal(with_values(config, values), check) if check else None
+        yield Trial(number, values, seed, digest, refused)
 
 
 def _seed(root: int, number: int) -> int:
     return int(np.random.SeedSequence(root, spawn_key=(number,)).generate_state(1, np.uint64)[0])
 
 
-def _refusal(config: Config, check: Callable[[Config], str | None]) -> str | None:
+def _refusal(config: Config, check: Check) -> str | None:
     try:
         return check(config)
     except ConfigError as error:

@@ -16,13 +16,15 @@ from throwcollect.sweep.points import Points
 from throwcollect.sweep.table import read_points
 
 _MOST_TRIALS = 10_000_000
+_TRIALS_PER_LANDED = 10
+"""Trials for each throw that should land, at most, where a configuration says how many should and no more."""
 
 UnitSampler = Callable[[int, int, np.random.Generator], NDArray[np.float64]]
 """Number of points, number of keys, randomness → points of the unit cube, shape ``(n_trials, n_keys)``."""
 
 
 def draw_points(config: Config, *, directory: Path) -> Points:
-    """Draw the points of all trials.
+    """Draw the points of all trials; those of a plan that grows are the most that it may come to.
 
     The first points of `uniform` and `sobol` do not depend on how many follow, so more trials keep those that exist.
     `grid` goes through its points with the last key fastest.
@@ -46,11 +48,14 @@ def draw_points(config: Config, *, directory: Path) -> Points:
         )
     if sweep.sampler == "grid":
         return _grid(sweep.parameters, config.trials)
-    if config.trials is None:
+    trials = config.trials
+    if trials is None and config.until is not None:
+        trials = _TRIALS_PER_LANDED * config.until.landed
+    if trials is None:
         raise PlanError([Problem(f"missing; the sampler {sweep.sampler} draws any number of trials", key="trials")])
     randomness = np.random.default_rng(np.random.SeedSequence(config.seed))
-    unit = UNIT_SAMPLERS[sweep.sampler](config.trials, len(sweep.parameters), randomness)
-    columns = [_spread(parameter, unit[:, i]) for i, parameter in enumerate(sweep.parameters.values())]
+    unit = UNIT_SAMPLERS[sweep.sampler](trials, len(sweep.parameters), randomness)
+    columns = [spread(parameter, unit[:, i]) for i, parameter in enumerate(sweep.parameters.values())]
     return Points(tuple(sweep.parameters), np.column_stack(columns))
 
 
@@ -81,8 +86,8 @@ UNIT_SAMPLERS = MappingProxyType[str, UnitSampler](
 """Samplers that fill the unit cube, by the name they have in `sweep.sampler`."""
 
 
-def _spread(parameter: Parameter, unit: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Values at places from 0 to 1 along a parameter; sets of values get equal shares of the interval."""
+def spread(parameter: Parameter, unit: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Values at places from 0 to 1 along a parameter, 1 excluded; sets of values get equal shares of the interval."""
     if isinstance(parameter, Values):
         return np.array(parameter.values)[(unit * len(parameter.values)).astype(np.int64)]
     if parameter.scale == "log":
@@ -91,6 +96,19 @@ def _spread(parameter: Parameter, unit: NDArray[np.float64]) -> NDArray[np.float
     else:
         spread = parameter.min + unit * (parameter.max - parameter.min)
     return np.clip(spread, parameter.min, parameter.max)
+
+
+def places(parameter: Parameter, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The inverse of `spread`: places from 0 to 1 of values; a value of a set is in the middle of its share."""
+    if isinstance(parameter, Values):
+        nearest = np.argmin(np.abs(np.subtract.outer(values, parameter.values)), axis=1)
+        return np.asarray((nearest + 0.5) / len(parameter.values))
+    low, high = parameter.min, parameter.max
+    if low == high:
+        return np.zeros(len(values))
+    if parameter.scale == "log":
+        values, low, high = np.log(values), math.log(low), math.log(high)
+    return (values - low) / (high - low)
 
 
 def _grid(parameters: dict[str, Parameter], trials: int | None) -> Points:

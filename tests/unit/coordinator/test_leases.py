@@ -74,3 +74,15 @@ def test_upcoming_trials_are_those_that_are_handed_out_next() -> None:
     leases.fail("a", "killed")
     assert leases.upcoming(3) == [0, 2, 3]
     assert [leases.lease("a"), leases.lease("c")] == [0, 2]
+
+
+def test_trials_may_be_added_while_others_run() -> None:
+    leases = Leases([0, 1], retries=1)
+    assert [leases.lease("a"), leases.lease("b"), leases.lease("c")] == [0, 1, None]
+    leases.complete("a", 0)
+    leases.complete("b", 1)
+    assert leases.finished
+    leases.add([4, 2])
+    assert not leases.finished
+    assert leases.total == 4
+    assert [leases.lease("a"), leases.lease("b"), leases.lease("c")] == [2, 4, None]

@@ -23,3 +23,13 @@ def test_what_somebody_else_publishes_is_left_alone(text: str) -> None:
 
 def test_progress_with_a_wrong_part_is_left_alone() -> None:
     assert Progress.read(json.dumps({**asdict(PROGRESS), "outcomes": {"landed": "many"}})) is None
+
+
+def test_the_line_counts_trials_or_throws_that_should_land() -> None:
+    assert PROGRESS.line == "4/10 throws: 2 landed, 1 failed, 1 lost, 2 simulations, 7.5 throws/s"
+    assert PROGRESS.steps == (4, 10)
+    until = replace(PROGRESS, wanted=5)
+    assert until.line == "4 throws: 2/5 landed, 1 failed, 1 lost, 2 simulations, 7.5 throws/s"
+    assert until.steps == (2, 5)
+    assert replace(until, outcomes={"landed": 7}).steps == (5, 5)
+    assert Progress.read(until.message().data) == until

@@ -21,7 +21,7 @@ MAY_DIFFER = "README.md"
 
 
 def files_of(directory: Path) -> dict[str, bytes]:
-    return {path.name: path.read_bytes() for path in directory.iterdir()}
+    return {path.name: path.read_bytes() for path in directory.iterdir() if path.is_file()}
 
 
 @contextmanager
@@ -226,13 +226,6 @@ def test_another_process_can_fill_what_was_created(collection: Any, tmp_path: Pa
     assert verify(tmp_path / "dataset") == []
 
 
-def test_only_a_fresh_dataset_can_be_opened_for_filling(collection: Any, tmp_path: Path, dataset: Path) -> None:
+def test_what_was_not_created_cannot_be_opened(tmp_path: Path) -> None:
     with pytest.raises(DatasetError, match=r"holds no config\.yaml"):
         DatasetWriter.open(tmp_path)
-    with pytest.raises(DatasetError, match="trials of it have run already"):
-        DatasetWriter.open(dataset)
-    begun = DatasetWriter.create(tmp_path / "begun", collection.plan)
-    collection.fill(begun, [1])
-    begun.close()
-    with pytest.raises(DatasetError, match=r"trials of it have run already: it holds quick_00000\.mcap\.part"):
-        DatasetWriter.open(tmp_path / "begun")

@@ -145,7 +145,7 @@ def test_a_directory_into_which_a_living_run_collects_is_refused(records: Record
     ("fields", "nodes", "left"),
     [
         ({"runtime": "docker"}, ["router", "coordinator"], True),
-        ({"runtime": "docker"}, ["router", "sim_0"], False),
+        ({"runtime": "docker"}, ["sim_0"], True),
         ({"runtime": "docker"}, [], False),
         ({"runtime": "local"}, ["coordinator"], False),
         ({"runtime": "docker", "ended": NOW}, ["coordinator"], False),
@@ -168,11 +168,11 @@ def test_containers_outlive_their_launcher(
     assert run is None or run.record == record
 
 
-def test_the_way_on_after_the_death_of_a_launcher_depends_on_where_nodes_live(make: Make) -> None:
-    assert "throwcollect up" not in str(died(make("a", "died")))
-    again = died(make("b", "died", runtime="docker", directory="/b"))
-    assert "try: throwcollect up /b/config.yaml --output /b goes on where its containers are" in str(again)
-    assert "throwcollect up" not in str(died(make("c", "died", runtime="docker", volume="v")))
+def test_the_way_on_after_the_death_of_a_launcher_depends_on_where_the_dataset_is(make: Make) -> None:
+    again = "try: throwcollect resume /b goes on where it ended, or with its containers if they live; throwcollect down"
+    assert again in str(died(make("a", "died", directory="/b")))
+    assert again in str(died(make("b", "died", runtime="docker", directory="/b")))
+    assert "resume" not in str(died(make("c", "died", runtime="docker", volume="v")))
 
 
 def test_an_engine_that_is_not_there_is_not_waited_for(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

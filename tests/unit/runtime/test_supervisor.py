@@ -242,17 +242,39 @@ def test_one_ready_simulation_is_enough(runtime: FakeRuntime, clock: Clock) -> N
     assert [state(supervisor, name).status for name in SIMULATIONS] == ["starting", "running"]
 
 
-def test_a_frozen_simulation_is_ended_after_three_seconds(runtime: FakeRuntime, clock: Clock) -> None:
+@pytest.mark.parametrize("name", ["sim_0", ROUTER, COORDINATOR])
+def test_a_frozen_node_is_ended_after_three_seconds(name: str, runtime: FakeRuntime, clock: Clock) -> None:
     supervisor = supervise(runtime)
-    runtime.paused.add("sim_0")
+    runtime.paused.add(name)
     supervisor.poll()
     clock.now += 2.9
     assert supervisor.poll() == (None, [])
-    assert (state(supervisor, "sim_0").status, runtime.signals) == ("frozen", [])
+    assert (state(supervisor, name).status, runtime.signals) == ("frozen", [])
     clock.now += 0.2
-    assert supervisor.poll() == (None, ["sim_0 is frozen (paused or stopped) and is ended"])
+    assert supervisor.poll() == (None, [f"{name} is frozen (paused or stopped) and is ended"])
     assert supervisor.poll() == (None, [])
-    assert runtime.signals == [("sim_0", signal.SIGKILL)]
+    assert runtime.signals == [(name, signal.SIGKILL)]
+
+
+@pytest.mark.parametrize("code", [-9, 137])
+def test_a_coordinator_that_was_killed_is_started_again(code: int, runtime: FakeRuntime, clock: Clock) -> None:
+    supervisor = supervise(runtime, restarts=1)
+    runtime.die(COORDINATOR, code)
+    end, news = supervisor.poll()
+    assert end is None
+    assert [line.endswith("and is started again") for line in news] == [True]
+    assert supervisor.drain() is None
+    wait_for_start(supervisor, runtime, clock, COORDINATOR)
+    runtime.die(COORDINATOR, code)
+    assert supervisor.poll()[0] is not None
+
+
+@pytest.mark.parametrize("code", [0, 1, 2, 3, 4, 130])
+def test_a_coordinator_that_came_to_its_own_end_has_ended(code: int, runtime: FakeRuntime, clock: Clock) -> None:
+    supervisor = supervise(runtime)
+    runtime.die(COORDINATOR, code)
+    end, _ = supervisor.poll()
+    assert (end is not None, state(supervisor, COORDINATOR).restarts) == (True, 0)
 
 
 def test_a_simulation_that_continues_in_time_is_left_alone(runtime: FakeRuntime, clock: Clock) -> None:
@@ -263,16 +285,6 @@ def test_a_simulation_that_continues_in_time_is_left_alone(runtime: FakeRuntime,
         clock.now += 2.0
         runtime.paused.clear()
         assert supervisor.poll() == (None, [])
-    assert runtime.signals == []
-
-
-def test_a_frozen_coordinator_is_named_but_never_ended(runtime: FakeRuntime, clock: Clock) -> None:
-    supervisor = supervise(runtime)
-    runtime.paused.add(COORDINATOR)
-    supervisor.poll()
-    clock.now += 3.1
-    told = [line for _ in range(3) for line in supervisor.poll()[1]]
-    assert told == ["coordinator is frozen (paused or stopped); nothing goes on until it continues"]
     assert runtime.signals == []
 
 

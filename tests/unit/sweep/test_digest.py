@@ -7,13 +7,16 @@ import pytest
 from throwcollect.config.containers import ContainersConfig, NodeContainerConfig
 from throwcollect.config.controllers import ControllersConfig
 from throwcollect.config.run import RunConfig
-from throwcollect.config.schema import Config, Range, SweepConfig
+from throwcollect.config.schema import Config, Range, SweepConfig, UntilConfig
+from throwcollect.config.sweep import TargetConfig
 from throwcollect.config.values import leaves, with_values
 from throwcollect.sweep.digest import config_digest, trial_digests
 from throwcollect.sweep.points import Points
 
-WITHOUT_EFFECT = {"name", "trials", "sim.real_time_factor", "record.zstd_level", "record.trials_per_shard"}
+WITHOUT_EFFECT = {"name", "trials", "until", "sim.real_time_factor", "record.zstd_level", "record.trials_per_shard"}
 POINTS = Points(("ball.mass_kg", "task.duration_s"), np.array([[0.1, 1.0], [0.2, 1.0]]))
+
+TARGET = TargetConfig.model_validate({"distance_m": {"min": 1, "max": 2, "bins": 4}})
 
 
 def digests(config: Config, points: Points = POINTS, seeds: tuple[int, ...] = (5, 6)) -> list[str]:
@@ -47,6 +50,8 @@ def test_it_does_not_matter_whether_a_value_was_swept_or_fixed():
         {"sim": Config().sim.model_copy(update={"real_time_factor": 1.0})},
         {"record": Config().record.model_copy(update={"zstd_level": 9, "trials_per_shard": 9})},
         {"controllers": ControllersConfig(names="ros1")},
+        {"until": UntilConfig(landed=9)},
+        {"sweep": SweepConfig(parameters={"ball.mass_kg": Range(min=0.1, max=0.2)}, target=TARGET)},
     ],
 )
 def test_what_does_not_change_samples_does_not_change_digests(changes):
@@ -89,3 +94,11 @@ def test_a_plan_made_before_the_section_controllers_still_belongs_to_its_configu
     before = "09626b408b776e79ab4ff485411deb75f2b6615377a41e80b715b04bdb842333"
     assert config_digest(Config(name="old")) == before
     assert config_digest(Config(name="old", controllers=ControllersConfig(hold="command"))) != before
+
+
+def test_a_plan_made_before_targets_still_belongs_to_its_configuration():
+    sweep = SweepConfig(parameters={"ball.mass_kg": Range(min=0.1, max=0.2)})
+    before = "ad57f77989d00389417c918c12a5291022ea27e8bca7c3da9f188a4a58b1b461"
+    assert config_digest(Config(name="old", sweep=sweep)) == before
+    assert config_digest(Config(name="old", sweep=sweep.model_copy(update={"target": TARGET}))) != before
+    assert config_digest(Config(name="old", sweep=sweep, until=UntilConfig(landed=5))) != before

@@ -146,7 +146,7 @@ def test_a_plan_may_be_read_for_another_way_of_running_but_not_for_another_confi
 
 
 def test_a_missing_plan_is_an_error(tmp_path):
-    with pytest.raises(DatasetError, match=r"plan\.parquet: the plan is missing$"):
+    with pytest.raises(DatasetError, match=r"plan\.parquet: is missing$"):
         Plan.read(tmp_path / "plan.parquet", swept())
 
 
@@ -162,7 +162,7 @@ def test_cuts_are_noticed_and_so_are_flipped_bits_that_matter(tmp_path):
     content = path.read_bytes()
     for length in range(0, len(content), 97):
         path.write_bytes(content[:length])
-        with pytest.raises(DatasetError, match=r"plan\.parquet: the plan is damaged: "):
+        with pytest.raises(DatasetError, match=r"plan\.parquet: is damaged: "):
             Plan.read(path, swept())
     noticed = 0
     for position in range(0, len(content), 7):

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from throwcollect.config.schema import Config, Range, SweepConfig, Values
 from throwcollect.errors import PlanError
-from throwcollect.sweep.samplers import UNIT_SAMPLERS, draw_points
+from throwcollect.sweep.samplers import UNIT_SAMPLERS, draw_points, places, spread
 
 HERE = Path()
 NAMES = sorted(UNIT_SAMPLERS)
@@ -148,3 +148,23 @@ def test_scipy_is_imported_by_those_who_draw_with_it_alone():
         "sys.exit(any(name in sys.modules for name in ('scipy', 'pyarrow', 'throwcollect.robots')))"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+@settings(deadline=None, max_examples=50)
+@given(parameters, st.floats(0, 1, exclude_max=True))
+def test_places_are_where_values_are_spread_from(parameter, place):
+    found = places(parameter, spread(parameter, np.array([place])))[0]
+    if isinstance(parameter, Values):
+        # Equal values of a set cannot be told apart.
+        values = parameter.values
+        assert values[int(found * len(values))] == values[int(place * len(values))]
+    elif parameter.max > parameter.min * (1 + 1e-6):
+        assert found == pytest.approx(place, abs=1e-8)
+    else:
+        assert 0 <= found <= 1
+
+
+def test_until_draws_ten_times_as_many_points_as_should_land_unless_trials_says_otherwise():
+    sweep = SweepConfig(parameters=SPREAD)
+    assert len(draw_points(Config(until={"landed": 30}, sweep=sweep), directory=HERE).values) == 300
+    assert len(draw_points(Config(trials=40, until={"landed": 30}, sweep=sweep), directory=HERE).values) == 40

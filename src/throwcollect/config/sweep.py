@@ -1,0 +1,155 @@
+"""What varies from trial to trial, and what the throws are spread over."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, Discriminator, Field, PositiveInt, Tag, model_validator
+
+from throwcollect.config.kinds import ContradictionError
+from throwcollect.config.section import Section
+
+LANDING_HEIGHT = "scene.landing_height_m"
+"""Key that must be swept where heights are a target."""
+
+_MOST_CELLS = 10_000
+
+
+class Range(Section):
+    """An interval to draw from."""
+
+    min: float
+    """Lower bound, in the unit of the key."""
+    max: float
+    """Upper bound, in the unit of the key."""
+    scale: Literal["linear", "log"] = "linear"
+    """Whether the value or its logarithm is spread evenly."""
+    count: PositiveInt | None = None
+    """Number of grid points, both ends included; for the sampler `grid` only."""
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Range:
+        wrong = {}
+        if self.min > self.max:
+            wrong["min"] = f"should be at most max, {self.max}, got {self.min}"
+        elif self.scale == "log" and self.min <= 0:
+            wrong["min"] = f"should be above 0 on a logarithmic scale, got {self.min}"
+        if self.count == 1 and self.min < self.max:
+            wrong["count"] = "should be 2 or more, as both min and max are grid points"
+        if wrong:
+            raise ContradictionError(wrong)
+        return self
+
+
+class Values(Section):
+    """A set of values to choose from."""
+
+    values: Annotated[list[float], Field(min_length=1)]
+    """The values, in the unit of the key."""
+
+
+def _parameter_kind(value: Any) -> str | None:
+    if isinstance(value, BaseModel):
+        return type(value).__name__
+    if not isinstance(value, dict):
+        return None
+    return "Values" if "values" in value else "Range"
+
+
+Parameter = Annotated[Annotated[Range, Tag("Range")] | Annotated[Values, Tag("Values")], Discriminator(_parameter_kind)]
+
+
+class Bins(Section):
+    """Equal intervals of a landing target."""
+
+    min: float
+    """Lower end, in the unit of the target."""
+    max: float
+    """Upper end, in the unit of the target."""
+    bins: Annotated[int, Field(ge=1, le=1000)]
+    """Number of intervals."""
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Bins:
+        if self.min >= self.max:
+            raise ContradictionError({"min": f"should be below max, {self.max}, got {self.min}"})
+        return self
+
+
+class TargetConfig(Section):
+    """Landing targets over which throws that land are spread evenly: as many in each cell of the bins, if they can."""
+
+    distance_m: Bins | None = None
+    """Horizontal distance of the landing ball from the origin of the robot's base."""
+    height_m: Bins | None = None
+    """Height of the landing plane, `scene.landing_height_m`, which must be swept."""
+    hit_angle_rad: Bins | None = None
+    """Direction of flight at landing below the horizontal: 0 is level, 1.5708 straight down."""
+
+    @property
+    def dimensions(self) -> dict[str, Bins]:
+        """The bins of each target that is there, by its key."""
+        named = {"distance_m": self.distance_m, "height_m": self.height_m, "hit_angle_rad": self.hit_angle_rad}
+        return {name: bins for name, bins in named.items() if bins is not None}
+
+    @model_validator(mode="after")
+    def _can_be_spread_over(self) -> TargetConfig:
+        wrong = {}
+        if not self.dimensions:
+            wrong["distance_m"] = "missing; at least one of distance_m, height_m and hit_angle_rad should be there"
+        if self.distance_m and self.distance_m.min < 0:
+            wrong["distance_m.min"] = f"should be 0 or more, got {self.distance_m.min}"
+        if (angle := self.hit_angle_rad) and max(-angle.min, angle.max) > math.pi / 2:
+            outer = "max" if angle.max > math.pi / 2 else "min"
+            wrong[f"hit_angle_rad.{outer}"] = f"should be from -1.5708 to 1.5708 rad, got {getattr(angle, outer)}"
+        cells = math.prod(each.bins for each in self.dimensions.values())
+        if cells > _MOST_CELLS:
+            last = list(self.dimensions)[-1]
+            wrong[f"{last}.bins"] = f"makes {cells} cells together with the others; there may be {_MOST_CELLS}"
+        if wrong:
+            raise ContradictionError(wrong)
+        return self
+
+
+class SweepConfig(Section):
+    """Which parameters vary from trial to trial, and how they are drawn."""
+
+    sampler: Literal["grid", "uniform", "latin_hypercube", "sobol", "list"] = "sobol"
+    """How points are drawn; `list` reads them from `file`."""
+    parameters: dict[str, Parameter] = {}
+    """Dotted configuration keys (`task.duration_s`, `ball.mass_kg`, ...) and what they range over."""
+    file: str | None = None
+    """CSV or Parquet file with one row a trial and dotted keys as columns; for the sampler `list`.
+
+    A relative path starts at the directory of the configuration file."""
+    target: TargetConfig | None = None
+    """Spreads throws over landing targets: trials are added to the plan where throws are few."""
+
+    @model_validator(mode="after")
+    def _sampler_has_what_it_reads(self) -> SweepConfig:
+        wrong = {}
+        if self.sampler == "list":
+            if self.file is None:
+                wrong["file"] = "missing; the sampler list should have a CSV or Parquet file"
+            if self.parameters:
+                wrong["parameters"] = "should be left out, as the sampler list takes keys and values from its file"
+        elif self.file is not None:
+            wrong["file"] = f"should be left out, as the sampler {self.sampler} reads no file"
+        if self.target is not None:
+            if self.sampler != "sobol":
+                wrong["sampler"] = f"should be sobol, with which the search for target begins, got {self.sampler}"
+            if not self.parameters:
+                wrong["parameters"] = "missing; target should have parameters to reach it with"
+            if self.target.height_m and LANDING_HEIGHT not in self.parameters:
+                wrong["target.height_m"] = f"should be left out, as {LANDING_HEIGHT} is not swept"
+        for key, parameter in self.parameters.items():
+            if not isinstance(parameter, Range):
+                continue
+            if self.sampler == "grid" and parameter.count is None:
+                wrong[f"parameters.{key}.count"] = "missing; the sampler grid should know how many points to take"
+            elif self.sampler not in ("grid", "list") and parameter.count is not None:
+                wrong[f"parameters.{key}.count"] = f"should be left out, as the sampler {self.sampler} has no grid"
+        if wrong:
+            raise ContradictionError(wrong)
+        return self

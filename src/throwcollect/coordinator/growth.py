@@ -1,0 +1,66 @@
+"""Makes the further rounds of a plan that grows, a little at a time, while its trials are run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from throwcollect.coordinator.prepare import feasibility_check
+from throwcollect.sweep.plan import Check, Plan, Trial, make_trials
+from throwcollect.sweep.rounds import Rounds
+from throwcollect.tasks.throw import ThrowResult
+
+
+class Growth:
+    """The trials that a plan will still get.
+
+    Args:
+        plan: The plan as it is by now.
+
+    Raises:
+        ConfigError: If the sweep cannot be drawn.
+    """
+
+    def __init__(self, plan: Plan) -> None:
+        self._config = plan.config
+        self._rounds = Rounds(plan.config)
+        self._rounds.add(plan.trials)
+        self._check: Check | None = None
+        self._coming: Iterator[Trial] | None = None
+        self._checked: list[Trial] = []
+
+    @property
+    def over(self) -> bool:
+        """Whether no trial will follow."""
+        return self._coming is None and self._rounds.over
+
+    @property
+    def most(self) -> int:
+        """Number of trials that may follow at most."""
+        return 0 if self.over else self._rounds.limit - self._rounds.planned
+
+    def tell(self, trial: int, result: ThrowResult) -> None:
+        """Take in what came of a trial."""
+        self._rounds.tell(trial, result)
+
+    def step(self) -> tuple[Trial, ...] | None:
+        """Do the next piece of work, of some milliseconds: draw a round, or check one of its trials.
+
+        Returns:
+            The trials of a round when it is ready, none before that; None if there is nothing to do.
+        """
+        if self._coming is None:
+            if self._rounds.over or not self._rounds.due:
+                return None
+            points = self._rounds.draw()
+            if points is not None:
+                self._check = self._check or feasibility_check(self._config)
+                self._coming = make_trials(self._config, points, check=self._check, first=self._rounds.planned)
+            return ()
+        trial = next(self._coming, None)
+        if trial is not None:
+            self._checked.append(trial)
+            return ()
+        trials = tuple(self._checked)
+        self._coming, self._checked = None, []
+        self._rounds.add(trials)
+        return trials

@@ -1,0 +1,142 @@
+"""What happened while a dataset was collected, in the order in which it did: ``logs/journal.jsonl``.
+
+One JSON object a line, only ever appended to, through all interruptions: `event`, `time` (Unix [s]) and what belongs to
+the event. Nothing is read back from it to make the dataset; it is there for people, and for how long it all took.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Literal, get_args
+
+from throwcollect.dataset.directory import JOURNAL
+from throwcollect.dataset.files import unwritable, write_all
+from throwcollect.errors import DatasetError
+
+_LOCK_S = 5.0
+"""Whoever was killed a moment ago may still hold it."""
+
+Event = Literal["opened", "recovered", "planned", "lease", "commit", "fail", "lost", "shard", "finished"]
+"""
+- ``opened``: a process began to collect into the directory: `pid`.
+- ``recovered``: what earlier ones had left was taken in: `episodes`.
+- ``planned``: trials were added to the plan: `trials` in all.
+- ``lease``: a trial was given to a simulation: `trial`, `simulation`.
+- ``commit``: its episode was written: `trial`, `outcome`, `digest`.
+- ``fail``: a simulation did not bring it back: `trial`, `simulation`, `reason`.
+- ``lost``: no simulation did: `trial`, `reason`.
+- ``shard``: a file was finished: `name`.
+- ``finished``: the dataset was.
+"""
+
+
+class Journal:
+    """The journal of a dataset that is being collected, which one process at a time may hold.
+
+    Attributes:
+        earlier_s: Real time that earlier processes collected for [s].
+
+    Args:
+        directory: Directory of the dataset.
+
+    Raises:
+        DatasetError: If another process holds it, or it cannot be written.
+    """
+
+    def __init__(self, directory: Path) -> None:
+        self._path = directory / JOURNAL
+        try:
+            self._path.parent.mkdir(exist_ok=True)
+            self._descriptor = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o666)
+        except OSError as error:
+            raise unwritable(self._path, error) from error
+        if not self._locked():
+            os.close(self._descriptor)
+            raise DatasetError(
+                f"{directory}: another process collects into it", hint="throwcollect ps lists the runs of this machine"
+            )
+        self.earlier_s = collected_s(directory)
+        size = os.fstat(self._descriptor).st_size
+        if size and os.pread(self._descriptor, 1, size - 1) != b"\n":
+            # Whoever wrote last was killed within a line.
+            self._append(b"\n")
+        self.note("opened", pid=os.getpid())
+
+    def __enter__(self) -> Journal:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def note(self, event: Event, **details: Any) -> None:
+        """Write down an event.
+
+        Raises:
+            DatasetError: If it cannot be written.
+        """
+        self._append(json.dumps({"event": event, "time": round(time.time(), 3), **details}).encode() + b"\n")
+
+    def close(self) -> None:
+        """Let other processes have it."""
+        os.close(self._descriptor)
+
+    def _locked(self) -> bool:
+        deadline = time.monotonic() + _LOCK_S
+        while True:
+            try:
+                fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError:
+                if time.monotonic() > deadline:
+                    return False
+                time.sleep(0.05)
+            else:
+                return True
+
+    def _append(self, data: bytes) -> None:
+        try:
+            write_all(self._descriptor, data)
+        except OSError as error:
+            raise unwritable(self._path, error) from error
+
+
+def read_journal(path: Path) -> Iterator[dict[str, Any]]:
+    """Events of a journal, in order; lines that were cut off or damaged are left out.
+
+    Args:
+        path: The file; if it is missing, nothing happened.
+    """
+    try:
+        file = path.open("rb")
+    except OSError:
+        return
+    with file:
+        for line in file:
+            try:
+                entry = json.loads(line)
+            except ValueError:
+                continue
+            if (
+                isinstance(entry, dict)
+                and entry.get("event") in get_args(Event)
+                and isinstance(entry.get("time"), int | float)
+            ):
+                yield entry
+
+
+def collected_s(directory: Path) -> float:
+    """Real time for which processes have collected into a dataset: from first to last event of each, in all [s]."""
+    total = began = last = 0.0
+    for entry in read_journal(directory / JOURNAL):
+        if entry["event"] == "opened":
+            total += max(last - began, 0.0)
+            began = entry["time"]
+        last = entry["time"]
+    return total + max(last - began, 0.0)

@@ -1,0 +1,156 @@
+"""Takes in what an interrupted collection has left of a shard: every whole episode stays, the rest is run again.
+
+Whatever happened, one of two things holds afterwards. Either the shard's final file is there and is, byte for byte,
+what its episodes call for; or all that is left of it lies in the file with the ending ``.part``, to which episodes can
+be appended as if nothing had happened.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from throwcollect.dataset.files import remove, unwritable
+from throwcollect.dataset.judging import judged
+from throwcollect.dataset.mcap_file import EpisodeRun, McapFile, episode_run
+from throwcollect.dataset.mcap_reader import mapped
+from throwcollect.dataset.salvage import salvage
+from throwcollect.dataset.shard import FinishedShard, OpenShard
+from throwcollect.episode.channels import Channels
+from throwcollect.errors import DatasetError
+from throwcollect.sweep.plan import Plan
+from throwcollect.tasks.throw import ThrowResult
+
+
+@dataclass(frozen=True)
+class RecoveredEpisode:
+    """An episode that needs not be run again.
+
+    Attributes:
+        trial: Number of its trial.
+        samples: Number of its samples.
+        digest: Its digest.
+        result: What came of it.
+    """
+
+    trial: int
+    samples: int
+    digest: str
+    result: ThrowResult
+
+
+@dataclass(frozen=True)
+class RecoveredShard:
+    """What was left of a shard.
+
+    Attributes:
+        episodes: In order of trials.
+        finished: The shard, if its final file stays; else None, and it goes on as an open one.
+    """
+
+    episodes: tuple[RecoveredEpisode, ...]
+    finished: FinishedShard | None
+
+
+@dataclass(frozen=True)
+class _Found:
+    """A whole episode, and where it lies in its file."""
+
+    episode: RecoveredEpisode
+    offset: int
+    run: EpisodeRun
+
+
+def recover_shard(shard: OpenShard, plan: Plan, channels: Channels, *, keep: bool) -> RecoveredShard:
+    """Take in what is left of a shard.
+
+    Args:
+        shard: Waits for all its trials; those whose episodes are there are not missing any more when this returns.
+        plan: Its trials.
+        channels: What is recorded.
+        keep: Whether the final file may stay if it has an episode of every trial that the shard waits for.
+
+    Raises:
+        DatasetError: If files cannot be read or written.
+    """
+    remove(shard.path.with_name(f"{shard.path.name}.new"))
+    wanted = frozenset(shard.missing)
+    final = _whole_episodes(shard.path, plan, channels, wanted)
+    if keep and final and final.keys() == wanted:
+        finished = _finished(shard.path, channels, final)
+        if finished is not None:
+            remove(shard.part)
+            return RecoveredShard(_in_order(final.values()), finished)
+    begun = _whole_episodes(shard.part, plan, channels, wanted)
+    if final and not begun:
+        try:
+            os.replace(shard.path, shard.part)
+        except OSError as error:
+            raise unwritable(shard.part, error) from error
+        final, begun = {}, final
+    if not begun:
+        remove(shard.part)
+    else:
+        runs = [(trial, found.offset, found.run) for trial, found in begun.items()]
+        shard.adopt(runs, size=max(offset + run.length for _, offset, run in runs))
+    begun |= _moved(shard, {trial: found for trial, found in final.items() if trial not in begun})
+    remove(shard.path)
+    return RecoveredShard(_in_order(begun.values()), None)
+
+
+def _whole_episodes(path: Path, plan: Plan, channels: Channels, wanted: Collection[int]) -> dict[int, _Found]:
+    """Episodes of a file that are as they would be if they were collected again, by trial."""
+    found: dict[int, _Found] = {}
+    if not path.exists():
+        return found
+    for salvaged in salvage(path):
+        episode = salvaged.stored.episode
+        trial = episode.header.trial
+        if not salvaged.intact or trial not in wanted or trial in found:
+            continue
+        try:
+            result = judged(plan, episode)
+        except DatasetError:
+            continue
+        columns = [channel.id for channel in channels.recorded]
+        if list(episode.table.columns) == columns and episode.header.start_ns == plan.config.trial_start_ns(trial):
+            recovered = RecoveredEpisode(trial, episode.header.samples, episode.digest, result)
+            found[trial] = _Found(recovered, salvaged.offset, replace(episode_run(episode), data=b""))
+    return found
+
+
+def _finished(path: Path, channels: Channels, found: Mapping[int, _Found]) -> FinishedShard | None:
+    """The shard that a file is; None if it is not what its episodes call for."""
+    offsets = {}
+    written = 0
+    same = True
+    with mapped(path) as contents:
+
+        def compare(data: bytes) -> None:
+            nonlocal written, same
+            same = same and contents.slice(written, written + len(data)) == data
+            written += len(data)
+
+        first = found[min(found)].run.chunk_index.message_start_time
+        file = McapFile(compare, channels, start_ns=first)
+        for trial in sorted(found):
+            offset, run = found[trial].offset, found[trial].run
+            offsets[trial] = file.size
+            file.append(replace(run, data=contents.slice(offset, offset + run.length)))
+        summary = file.finish(path.name)
+        return FinishedShard(summary, offsets) if same and written == len(contents) else None
+
+
+def _moved(shard: OpenShard, found: Mapping[int, _Found]) -> dict[int, _Found]:
+    """Append episodes of the shard's final file to the unfinished one."""
+    if found:
+        with mapped(shard.path) as contents:
+            for each in found.values():
+                shard.append(contents.episode(each.offset).episode)
+    return dict(found)
+
+
+def _in_order(found: Iterable[_Found]) -> tuple[RecoveredEpisode, ...]:
+    return tuple(sorted((each.episode for each in found), key=lambda each: each.trial))

@@ -1,0 +1,1 @@
+"""Stored throws, simulated once more and compared bit for bit."""

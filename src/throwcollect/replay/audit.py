@@ -1,0 +1,100 @@
+"""Replays many throws of a dataset in several processes."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+
+from throwcollect.dataset.reader import Dataset
+from throwcollect.errors import DatasetError
+from throwcollect.replay.comparison import Comparison, compare
+
+_AT_ONCE = 4
+"""Trials that a process fetches at a time."""
+
+
+def chosen_trials(dataset: Dataset, *, sample: int | None) -> list[int]:
+    """Trials that have an episode, in order; of these, if asked for, a random choice that is always the same.
+
+    Args:
+        dataset: The dataset.
+        sample: How many; None for all.
+
+    Raises:
+        DatasetError: If no trial has an episode.
+    """
+    trials = [row["trial"] for row in dataset.throws.select(["trial", "shard"]).to_pylist() if row["shard"]]
+    if not trials:
+        raise DatasetError(f"{dataset.directory}: no trial has an episode")
+    if sample is None or sample >= len(trials):
+        return trials
+    picked = np.random.default_rng(dataset.config.seed).choice(len(trials), size=sample, replace=False)
+    return [trials[index] for index in sorted(picked.tolist())]
+
+
+def replayed(directory: Path, trials: Sequence[int]) -> Iterator[Comparison]:
+    """Simulate stored throws again, on all cores, and compare them.
+
+    Args:
+        directory: Directory of the dataset.
+        trials: Trials that have an episode.
+
+    Yields:
+        One comparison for each, in the given order.
+
+    Raises:
+        DatasetError: If an episode is damaged.
+        WorkerError: If the physics engine does not start.
+    """
+    processes = min(len(os.sched_getaffinity(0)), len(trials))
+    if processes == 1:
+        _begin(directory)
+        yield from map(_replay, trials)
+        return
+    # A new interpreter each: the physics engine must not be forked.
+    with multiprocessing.get_context("spawn").Pool(processes, _begin, (directory, True)) as pool:
+        yield from pool.imap(_replay, trials, chunksize=_AT_ONCE)
+
+
+class _Worker:
+    """What a process keeps from one trial to the next."""
+
+    def __init__(self, directory: Path) -> None:
+        with _silence():
+            from throwcollect.replay.throw import Replayer
+        self.dataset = Dataset.open(directory)
+        self.replayer = Replayer(self.dataset.config)
+
+
+_worker: list[_Worker] = []
+
+
+@contextmanager
+def _silence() -> Iterator[None]:
+    """Nothing reaches standard error: Bullet tells there when it was built."""
+    kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 2)
+    try:
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(nowhere)
+
+
+def _begin(directory: Path, child: bool = False) -> None:
+    if child:
+        # Ctrl-C is for the process that started this one, which ends it.
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _worker[:] = [_Worker(directory)]
+
+
+def _replay(trial: int) -> Comparison:
+    worker = _worker[0]
+    return compare(worker.dataset.episode(trial), worker.replayer.run(worker.dataset.plan, trial))

@@ -1,0 +1,61 @@
+"""Simulates one trial in this process, by the controllers and the physics of a simulation node, without the graph."""
+
+from __future__ import annotations
+
+from throwcollect.config.schema import Config
+from throwcollect.config.values import is_physics, with_values
+from throwcollect.coordinator.goals import trial_goals
+from throwcollect.episode.channels import Channels
+from throwcollect.episode.chunk import ChunkEncoder
+from throwcollect.episode.message import Episode
+from throwcollect.errors import ThrowcollectError
+from throwcollect.robots.description import full_description, start_posture
+from throwcollect.sim.controller_messages import read_goal
+from throwcollect.sim.simulation import Simulation, TrialSetup
+from throwcollect.sweep.plan import Plan
+from throwcollect.tasks.trajectory import throw_trajectory
+
+
+class Replayer:
+    """Runs trials of one collection, one after the other.
+
+    Args:
+        config: Its configuration; slow motion for onlookers is left out.
+
+    Raises:
+        ConfigError: If it does not describe a world.
+        WorkerError: If the physics engine does not start.
+    """
+
+    def __init__(self, config: Config) -> None:
+        self._config = config
+        self._simulation = Simulation(config)
+        self._simulation.real_time_factor = None
+        self._encoder = ChunkEncoder(Channels(config, full_description(config)), level=config.record.zstd_level)
+
+    def run(self, plan: Plan, trial: int) -> Episode:
+        """The episode of a trial.
+
+        Args:
+            plan: The plan that has it.
+            trial: Its number.
+
+        Raises:
+            ThrowcollectError: If a controller refuses its goal, as it would in a collection.
+        """
+        simulation = self._simulation
+        values = plan.trials[trial].values
+        config = plan.config_of(plan.trials[trial])
+        posture = start_posture(config)
+        sent = trial_goals(throw_trajectory(config), posture)
+        physics = with_values(self._config, {key: value for key, value in values.items() if is_physics(key)})
+        simulation.setup = TrialSetup(trial, sent.controllers, physics)
+        simulation.reset()
+        for controller, goal in zip(sent.controllers, sent.goals, strict=True):
+            refusal = simulation.submit(controller, trial, read_goal(goal))
+            if refusal is not None:
+                raise ThrowcollectError(f"trial {trial}: {controller} refuses its goal: {refusal}")
+        while (ended := simulation.episode()) is None:
+            simulation.advance(watched=False)
+        header, samples, states = ended
+        return Episode(header, *self._encoder.encode(samples, states))

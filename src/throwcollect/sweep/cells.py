@@ -1,0 +1,129 @@
+"""Landing targets as a grid of cells, and which of them should be thrown at next."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from throwcollect.config.sweep import LANDING_HEIGHT, TargetConfig
+from throwcollect.sweep.plan import Trial
+from throwcollect.tasks.outcome import ThrowResult
+
+NOWHERE = -1
+"""In the place of a cell: none."""
+
+_TIE = 1e-6
+"""Cells whose scores differ by less are equally thin."""
+_MOST_DOUBLINGS = 60
+_DOUBT = 4
+"""Misses that a doubt counts for."""
+
+
+class Cells:
+    """The cells of landing targets; places are in units of their bins, so that each cell is a cube of side 1.
+
+    Attributes:
+        shape: Number of bins of each target, ``(n_targets,)``.
+        count: Number of cells.
+
+    Args:
+        target: The targets and their bins.
+    """
+
+    def __init__(self, target: TargetConfig) -> None:
+        self._names = tuple(target.dimensions)
+        bins = target.dimensions.values()
+        self._low = np.array([each.min for each in bins])
+        self._width = np.array([(each.max - each.min) / each.bins for each in bins])
+        self.shape = tuple(each.bins for each in bins)
+        self.count = math.prod(self.shape)
+
+    def place(self, trial: Trial, result: ThrowResult) -> NDArray[np.float64]:
+        """Where a throw landed, in bins, shape ``(n_targets,)``; NaN if it has no landing."""
+        measured = dict.fromkeys(self._names, math.nan)
+        if result.landing is not None and result.hit_angle_rad is not None:
+            measured = {
+                "distance_m": math.hypot(*result.landing.position[:2]),
+                "height_m": trial.values.get(LANDING_HEIGHT, math.nan),
+                "hit_angle_rad": result.hit_angle_rad,
+            }
+        place: NDArray[np.float64] = (np.array([measured[name] for name in self._names]) - self._low) / self._width
+        return place
+
+    def cells_of(self, places: NDArray[np.float64]) -> NDArray[np.int64]:
+        """Cell of each place, shape ``(n_places,)``, -1 where it is in none.
+
+        Args:
+            places: In bins, shape ``(n_places, n_targets)``; the upper end of the last bin is in it, NaN is in none.
+        """
+        shape = np.array(self.shape)
+        inside = ((places >= 0) & (places <= shape)).all(axis=1)
+        found = np.full(len(places), NOWHERE, dtype=np.int64)
+        bins = np.minimum(places[inside].astype(np.int64), shape - 1)
+        found[inside] = np.ravel_multi_index(tuple(bins.T), self.shape)
+        return found
+
+    def corners(self, cells: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Lower corner of each cell in bins, shape ``(n_cells, n_targets)``."""
+        return np.column_stack(np.unravel_index(cells, self.shape)).astype(np.float64)
+
+
+class Thinness:
+    """Which cells should be thrown at next: each time the one with the lowest score.
+
+    The score of a cell is the number of throws that have landed in it or are asked for, and for cells that seem out of
+    reach a penalty on top: ``2^(missed - 1) - 1``, so that each further miss doubles the wait for the next try, and the
+    square of how much farther than one bin the nearest landing is, so that the edge of what is reached moves outwards
+    before what lies beyond it is tried.
+
+    Args:
+        landed: Throws that landed in each cell, shape ``(n_cells,)``.
+        asked: Throws that are asked for but whose results are not known yet.
+        missed: Throws at each cell that landed elsewhere or not at all, since the last landing in it.
+        away: Distance of each cell's centre from the nearest landing [bins].
+        randomness: Decides between cells that are equally thin.
+    """
+
+    def __init__(
+        self,
+        *,
+        landed: NDArray[np.int64],
+        asked: NDArray[np.int64],
+        missed: NDArray[np.int64],
+        away: NDArray[np.float64],
+        randomness: np.random.Generator,
+    ) -> None:
+        self._missed = missed
+        self._doubted = np.zeros(len(missed), dtype=np.bool_)
+        self._score = landed + asked + _futile(missed) + np.maximum(away - 1, 0) ** 2
+        self._score += _TIE * randomness.permutation(len(missed)) / len(missed)
+
+    def take(self, count: int) -> NDArray[np.int64]:
+        """So many cells, one after the other; each counts as asked for at once."""
+        taken = np.empty(count, dtype=np.int64)
+        for index in range(count):
+            taken[index] = np.argmin(self._score)
+            self._score[taken[index]] += 1
+        return taken
+
+    def doubt(self, cells: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Give cells back that it seems useless to throw at; from now on they count as if missed four times more.
+
+        Args:
+            cells: Some that were taken, shape ``(n_cells,)``.
+
+        Returns:
+            Which of them are given back: not those that had been doubted before, and were taken all the same.
+        """
+        fresh = ~self._doubted[cells]
+        np.subtract.at(self._score, cells[fresh], 1)
+        doubted = np.unique(cells[fresh])
+        self._doubted[doubted] = True
+        self._score[doubted] += _futile(self._missed[doubted] + _DOUBT) - _futile(self._missed[doubted])
+        return fresh
+
+
+def _futile(missed: NDArray[np.int64]) -> NDArray[np.float64]:
+    return np.exp2(np.clip(missed - 1, 0, _MOST_DOUBLINGS)) - 1

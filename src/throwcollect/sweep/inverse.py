@@ -1,0 +1,134 @@
+"""An inverse model of throws that is learned on the way: from a place to land at to parameters."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+_BASES = 8
+"""Landed throws near a goal from which a way to it is looked for."""
+_NEIGHBOURS_PER_PARAMETER = 3
+_RIDGE = 1e-3
+"""Share of the mean square spread of the neighbours along a parameter."""
+_LEAST = 1e-300
+"""Keeps the models solvable where all neighbours are one point."""
+_DAMPING_BINS = 0.1
+"""Error in the target that is accepted for smaller steps."""
+_LONGEST_STEP = 0.3
+_ALONG_NOISE = 0.1
+"""Standard deviation of the noise that, by the model, does not change where the ball lands."""
+_NOISE = 0.02
+"""Standard deviation of the noise in all directions."""
+_JUDGES = 8
+"""Ended throws near a proposal that say how likely it lands."""
+_PROGRESS = 0.7
+"""A proposal is promising if it is predicted to land this much nearer to its goal than any throw has."""
+_CLOSE_BINS = 0.5
+"""... or as near as this."""
+_FAILURE_BINS = 2.0
+"""A proposal that surely fails is as bad as one that is so many bins off."""
+
+
+class InverseModel:
+    """Proposes parameters by local linear models around throws that landed.
+
+    Parameters are places in the unit cube, targets are in bins. Args hold the throws so far, in order of trials.
+
+    Args:
+        tried: Parameters of all throws, shape ``(n_throws, n_parameters)``.
+        landed: Which of them landed, shape ``(n_throws,)``.
+        places: Where those that landed did, shape ``(n_landed, n_targets)``.
+    """
+
+    def __init__(self, tried: NDArray[np.float64], landed: NDArray[np.bool_], places: NDArray[np.float64]) -> None:
+        self._success = landed.astype(np.float64)
+        self._parameters = tried[landed]
+        self._places = places
+        self._by_all_parameters = cKDTree(tried)
+        self._by_parameters = cKDTree(self._parameters)
+        self._by_place = cKDTree(places)
+
+    @staticmethod
+    def enough(landed: int, parameters: int) -> bool:
+        """Whether so many throws that landed make a model of so many parameters."""
+        return landed >= parameters + 2
+
+    def away(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Distance of places from the nearest landing [bins], shape ``(n_places,)``."""
+        distances: NDArray[np.float64] = self._by_place.query(places)[0]
+        return distances
+
+    def propose(
+        self, goals: NDArray[np.float64], randomness: np.random.Generator
+    ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        """Parameters that should bring the ball to one of some goals each.
+
+        From each of the landed throws that are nearest to a goal one way is tried: the shortest step that, by a
+        linear model of its neighbours, leads to the goal, and noise, most of it along directions that do not change
+        the landing, so that throws at one cell differ. The way with the smallest predicted error is taken; that
+        throws near its end failed counts as error, too.
+
+        Args:
+            goals: Where to land, shape ``(n_proposals, n_goals, n_targets)``.
+            randomness: Source of the noise.
+
+        Returns:
+            Places in the unit cube, shape ``(n_proposals, n_parameters)``; and which of them are promising: predicted
+            to land at their goal, or clearly nearer to it than any throw before.
+        """
+        flat = goals.reshape(-1, goals.shape[-1])
+        bases = _nearest(self._by_place, flat, _BASES)
+        distinct, which = np.unique(bases, return_inverse=True)
+        which = which.reshape(bases.shape)
+        slopes, inverses = self._linear_models(distinct)
+        slope, inverse = slopes[which], inverses[which]
+        start, landing, goal = self._parameters[bases], self._places[bases], flat[:, np.newaxis]
+        step = _product(inverse, goal - landing)
+        length = np.sqrt((step**2).sum(axis=-1, keepdims=True))
+        step *= _LONGEST_STEP / np.maximum(length, _LONGEST_STEP)
+        along = _ALONG_NOISE * randomness.standard_normal(step.shape)
+        along -= _product(inverse, _product(slope, along))
+        ends = start + step + along + _NOISE * randomness.standard_normal(step.shape)
+        # Few digits, so that processors that round sums differently agree.
+        ends = np.clip(ends, 0.0, 1.0 - 1e-9).round(9)
+        missing = landing + _product(slope, ends - start) - goal
+        error = np.sqrt((missing**2).sum(axis=-1))
+        near = _nearest(self._by_all_parameters, ends.reshape(-1, ends.shape[-1]), _JUDGES)
+        failing = 1.0 - self._success[near].mean(axis=-1).reshape(error.shape)
+        promising = error <= np.maximum(_CLOSE_BINS, _PROGRESS * self.away(flat)[:, np.newaxis])
+        best = (error + _FAILURE_BINS * failing).reshape(len(goals), -1).argmin(axis=1)
+        proposals = np.arange(len(goals))
+        chosen: NDArray[np.float64] = ends.reshape(len(goals), -1, ends.shape[-1])[proposals, best]
+        return chosen, promising.reshape(len(goals), -1)[proposals, best]
+
+    def _linear_models(self, bases: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """How landings change with parameters around throws that landed, and the damped inverses of that.
+
+        Returns:
+            Shapes ``(n_bases, n_targets, n_parameters)`` and ``(n_bases, n_parameters, n_targets)``.
+        """
+        dimensions = self._parameters.shape[1]
+        neighbours = _nearest(
+            self._by_parameters, self._parameters[bases], _NEIGHBOURS_PER_PARAMETER * (dimensions + 1)
+        )
+        moved = self._parameters[neighbours] - self._parameters[bases][:, np.newaxis]
+        caused = self._places[neighbours] - self._places[bases][:, np.newaxis]
+        transposed = np.swapaxes(moved, 1, 2)
+        spread = transposed @ moved
+        ridge = _RIDGE * np.trace(spread, axis1=1, axis2=2) / dimensions + _LEAST
+        slopes_t = np.linalg.solve(spread + ridge[:, np.newaxis, np.newaxis] * np.eye(dimensions), transposed @ caused)
+        slopes = np.swapaxes(slopes_t, 1, 2)
+        damped = slopes @ slopes_t + _DAMPING_BINS**2 * np.eye(slopes.shape[1])
+        return slopes, slopes_t @ np.linalg.inv(damped)
+
+
+def _nearest(tree: cKDTree, points: NDArray[np.float64], count: int) -> NDArray[np.int64]:
+    """Indices of the nearest members of a tree, nearest first, shape ``(n_points, count)`` or as many as there are."""
+    found: NDArray[np.int64] = tree.query(points, range(1, min(count, tree.n) + 1))[1]
+    return found
+
+
+def _product(matrices: NDArray[np.float64], vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    product: NDArray[np.float64] = (matrices @ vectors[..., np.newaxis])[..., 0]
+    return product

@@ -1,0 +1,118 @@
+"""The sampler of `sweep.target`: spreads throws that land over the cells of landing targets."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from throwcollect.config.schema import Config, Parameter
+from throwcollect.config.sweep import TargetConfig
+from throwcollect.sweep.cells import NOWHERE, Cells, Thinness
+from throwcollect.sweep.inverse import InverseModel
+from throwcollect.sweep.plan import ROUND_TRIALS, Trial
+from throwcollect.sweep.samplers import places, spread
+from throwcollect.tasks.outcome import Outcome, ThrowResult
+
+_RANDOMNESS = 0
+"""First number of the spawn keys of rounds; those of trials have one number alone."""
+_GOALS = 3
+"""Places in a cell of which the one is aimed at that the ball gets to best."""
+
+
+class TargetSampler:
+    """Draws round after round, each from the results of those two or more before it.
+
+    It is a pure function of the configuration and these results: asked again from the first round on, with the same
+    results, it draws the same points.
+
+    Args:
+        config: Configuration with the sweep.
+        target: Its landing targets.
+        first: Number of the first round that is drawn from results.
+    """
+
+    def __init__(self, config: Config, target: TargetConfig, *, first: int) -> None:
+        self.next_round = first
+        """Number of the round that `draw` draws next."""
+        self._seed = config.seed
+        self._parameters: Mapping[str, Parameter] = config.sweep.parameters
+        self._cells = Cells(target)
+        self._aims = np.full(first * ROUND_TRIALS, NOWHERE)
+
+    @property
+    def dimensions(self) -> int:
+        """Number of targets."""
+        return len(self._cells.shape)
+
+    def place(self, trial: Trial, result: ThrowResult) -> NDArray[np.float64]:
+        """What `draw` wants to know of a trial, shape ``(n_targets,)``: where it landed in bins; NaN if it did not."""
+        if result.outcome is not Outcome.LANDED:
+            return np.full(self.dimensions, np.nan)
+        return self._cells.place(trial, result)
+
+    def draw(
+        self, otherwise: NDArray[np.float64], tried: NDArray[np.float64], ended: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """The points of the next round.
+
+        Args:
+            otherwise: Points to take while too few throws have landed, shape ``(n_trials, n_parameters)``: of a whole
+                round or, if it is the last one, of as many trials as it has.
+            tried: Values of the trials of all rounds but the one before, shape ``(n_tried, n_parameters)``.
+            ended: What `place` says of each of them, shape ``(n_tried, n_targets)``.
+
+        Returns:
+            Values in the units of the parameters, shape ``(n_trials, n_parameters)``.
+        """
+        key = (_RANDOMNESS, self.next_round)
+        randomness = np.random.default_rng(np.random.SeedSequence(self._seed, spawn_key=key))
+        self.next_round += 1
+        landed = np.isfinite(ended[:, 0])
+        if not InverseModel.enough(int(landed.sum()), tried.shape[1]):
+            self._aims = np.append(self._aims, np.full(ROUND_TRIALS, NOWHERE))
+            return otherwise
+        model = InverseModel(self._unit(tried), landed, ended[landed])
+        thinness = self._thinness(model, self._cells.cells_of(ended), randomness)
+        aims = np.empty(0, dtype=np.int64)
+        unit = np.empty((0, tried.shape[1]))
+        while len(aims) < ROUND_TRIALS:
+            cells = thinness.take(ROUND_TRIALS - len(aims))
+            corners = self._cells.corners(cells)[:, np.newaxis]
+            places_inside = randomness.random((len(cells), _GOALS, self.dimensions))
+            proposed, promising = model.propose(corners + places_inside, randomness)
+            given_back = np.zeros(len(cells), dtype=np.bool_)
+            given_back[~promising] = thinness.doubt(cells[~promising])
+            aims = np.append(aims, cells[~given_back])
+            unit = np.append(unit, proposed[~given_back], axis=0)
+        self._aims = np.append(self._aims, aims)
+        columns = [spread(parameter, unit[:, i]) for i, parameter in enumerate(self._parameters.values())]
+        # A round that is cut short begins as a whole one does, so that it can be made whole later.
+        return np.column_stack(columns)[: len(otherwise)]
+
+    def _thinness(self, model: InverseModel, reached: NDArray[np.int64], randomness: np.random.Generator) -> Thinness:
+        """How thin the cells are.
+
+        Args:
+            model: What is known of the way to them.
+            reached: Cell of each trial that has ended, shape ``(n_tried,)``.
+            randomness: Decides between equals.
+        """
+        cells = self._cells.count
+        aimed, under_way = self._aims[: len(reached)], self._aims[len(reached) :]
+        latest = np.full(cells, NOWHERE)
+        inside = np.flatnonzero(reached != NOWHERE)
+        np.maximum.at(latest, reached[inside], inside)
+        at_cells = np.flatnonzero(aimed != NOWHERE)
+        missed = at_cells[at_cells > latest[aimed[at_cells]]]
+        return Thinness(
+            landed=np.bincount(reached[inside], minlength=cells),
+            asked=np.bincount(under_way[under_way != NOWHERE], minlength=cells),
+            missed=np.bincount(aimed[missed], minlength=cells),
+            away=model.away(self._cells.corners(np.arange(cells)) + 0.5),
+            randomness=randomness,
+        )
+
+    def _unit(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.column_stack([places(each, values[:, i]) for i, each in enumerate(self._parameters.values())])

@@ -1,0 +1,126 @@
+"""What a dataset's directory has to hold before a collection goes on with it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from throwcollect.config.loader import load
+from throwcollect.config.schema import Config
+from throwcollect.coordinator.prepare import prepare
+from throwcollect.coordinator.resume import begun, finished, resume
+from throwcollect.errors import ConfigError, DatasetError
+
+SETTINGS: dict[str, Any] = {
+    "name": "small",
+    "trials": 4,
+    "sweep": {"parameters": {"task.duration_s": {"min": 1.0, "max": 1.2}, "ball.mass_kg": {"min": 0.03, "max": 0.06}}},
+}
+
+
+def config_with(**changes: Any) -> Config:
+    return Config.model_validate({**SETTINGS, **changes})
+
+
+@pytest.fixture(scope="module")
+def prepared(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+    directory = tmp_path_factory.mktemp("prepared") / "data"
+    prepare(config_with(), directory, sweep_directory=directory)
+    return contents(directory)
+
+
+@pytest.fixture
+def directory(prepared: dict[str, bytes], tmp_path: Path) -> Path:
+    for name, content in prepared.items():
+        (tmp_path / name).write_bytes(content)
+    return tmp_path
+
+
+def contents(directory: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in directory.iterdir()}
+
+
+def test_what_is_whole_is_left_alone(directory: Path) -> None:
+    before = {path.name: path.stat().st_mtime_ns for path in directory.iterdir()}
+    plan = resume(config_with(), directory, sweep_directory=directory)
+    assert len(plan.trials) == 4
+    assert {path.name: path.stat().st_mtime_ns for path in directory.iterdir()} == before
+
+
+def test_how_it_is_run_may_change(directory: Path, prepared: dict[str, bytes]) -> None:
+    resume(config_with(run={"simulations": 7}), directory, sweep_directory=directory)
+    assert load(directory / "config.yaml").run.simulations == 7
+    assert contents(directory)["plan.parquet"] == prepared["plan.parquet"]
+
+
+def test_anything_else_may_not_and_all_differences_are_told(directory: Path, prepared: dict[str, bytes]) -> None:
+    other = config_with(ball={"radius_m": 0.03}, seed=5)
+    with pytest.raises(ConfigError, match="the same configuration") as raised:
+        resume(other, directory, sweep_directory=directory)
+    assert [str(problem) for problem in raised.value.problems] == [
+        f"seed: {directory} was begun with 0, got 5",
+        f"ball.radius_m: {directory} was begun with 0.025, got 0.03",
+    ]
+    assert contents(directory) == prepared
+
+
+def test_more_trials_go_on_where_the_others_ended(directory: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
+    before = resume(config_with(), directory, sweep_directory=directory)
+    after = resume(config_with(trials=6), directory, sweep_directory=directory)
+    assert after.trials[:4] == before.trials
+    fresh = tmp_path_factory.mktemp("fresh") / "data"
+    prepare(config_with(trials=6), fresh, sweep_directory=fresh)
+    assert contents(directory) == contents(fresh)
+
+
+def test_fewer_trials_are_refused(directory: Path, prepared: dict[str, bytes]) -> None:
+    with pytest.raises(ConfigError, match=rf"trials: {directory} has 4 already, got 3\n  expected: 4 or more"):
+        resume(config_with(trials=3), directory, sweep_directory=directory)
+    assert contents(directory) == prepared
+
+
+def test_a_sampler_that_draws_other_trials_is_refused(tmp_path: Path) -> None:
+    sweep = {**SETTINGS["sweep"], "sampler": "latin_hypercube"}
+    prepare(config_with(sweep=sweep), tmp_path / "data", sweep_directory=tmp_path)
+    before = contents(tmp_path / "data")
+    with pytest.raises(ConfigError, match="the sampler latin_hypercube draws other trials when there are more"):
+        resume(config_with(sweep=sweep, trials=5), tmp_path / "data", sweep_directory=tmp_path)
+    assert contents(tmp_path / "data") == before
+
+
+@pytest.mark.parametrize("length", [None, 0, 100])
+def test_a_plan_that_is_lost_is_made_again(directory: Path, prepared: dict[str, bytes], length: int | None) -> None:
+    plan = directory / "plan.parquet"
+    plan.unlink() if length is None else plan.write_bytes(prepared["plan.parquet"][:length])
+    resume(config_with(), directory, sweep_directory=directory)
+    assert contents(directory) == prepared
+
+
+@pytest.mark.parametrize("length", [None, 0, 500, -400])
+def test_a_configuration_that_is_lost_is_put_back(
+    directory: Path, prepared: dict[str, bytes], length: int | None
+) -> None:
+    config = directory / "config.yaml"
+    config.unlink() if length is None else config.write_bytes(prepared["config.yaml"][:length])
+    with pytest.raises(DatasetError, match="the plan belongs to another configuration"):
+        resume(config_with(seed=5), directory, sweep_directory=directory)
+    resume(config_with(), directory, sweep_directory=directory)
+    assert contents(directory) == prepared
+
+
+def test_without_plan_and_configuration_nobody_knows_what_it_was(directory: Path) -> None:
+    for path in directory.iterdir():
+        path.write_bytes(b"")
+    with pytest.raises(DatasetError, match=r"plan\.parquet: is damaged: .*\n  try: throwcollect up CONFIG --resume"):
+        resume(config_with(), directory, sweep_directory=directory)
+
+
+def test_a_directory_without_either_is_not_begun(directory: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
+    assert begun(directory)
+    assert not begun(tmp_path_factory.mktemp("empty"))
+
+
+def test_a_dataset_without_metadata_is_not_finished(directory: Path) -> None:
+    assert not finished(directory, resume(config_with(), directory, sweep_directory=directory))

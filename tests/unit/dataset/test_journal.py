@@ -1,0 +1,46 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from throwcollect.dataset.journal import Journal, collected_s, read_journal
+
+
+def journal_of(directory: Path, *lines: str) -> None:
+    (directory / "logs").mkdir(exist_ok=True)
+    (directory / "logs" / "journal.jsonl").write_text("".join(lines))
+
+
+def line(event: str, time: float) -> str:
+    return json.dumps({"event": event, "time": time}) + "\n"
+
+
+def test_events_are_read_back_in_order_with_their_times(tmp_path: Path) -> None:
+    with Journal(tmp_path) as journal:
+        journal.note("lease", trial=3, simulation="sim_0")
+        journal.note("commit", trial=3, outcome="landed", digest="00")
+    events = list(read_journal(tmp_path / "logs" / "journal.jsonl"))
+    assert [event["event"] for event in events] == ["opened", "lease", "commit"]
+    assert (events[1]["trial"], events[1]["simulation"]) == (3, "sim_0")
+    assert events[0]["time"] <= events[1]["time"] <= events[2]["time"]
+
+
+def test_a_line_that_was_cut_off_does_not_spoil_the_next(tmp_path: Path) -> None:
+    journal_of(tmp_path, line("opened", 1.0), '{"event": "comm')
+    with Journal(tmp_path) as journal:
+        journal.note("finished")
+    assert [e["event"] for e in read_journal(tmp_path / "logs" / "journal.jsonl")] == ["opened", "opened", "finished"]
+
+
+@pytest.mark.parametrize("damaged", ["\x00\xff", "[1]", '{"event": "nonsense", "time": 1}', '{"event": "commit"}', "7"])
+def test_what_is_no_event_is_left_out(tmp_path: Path, damaged: str) -> None:
+    journal_of(tmp_path, line("opened", 1.0), f"{damaged}\n", line("commit", 2.0))
+    assert [e["event"] for e in read_journal(tmp_path / "logs" / "journal.jsonl")] == ["opened", "commit"]
+
+
+def test_pauses_between_processes_do_not_count_as_time_of_collecting(tmp_path: Path) -> None:
+    assert collected_s(tmp_path) == 0.0
+    journal_of(tmp_path, line("opened", 10.0), line("commit", 12.5), line("opened", 1000.0), line("finished", 1004.0))
+    assert collected_s(tmp_path) == 6.5

@@ -1,0 +1,295 @@
+"""Whatever ends a collection, and wherever, the next one goes on and ends with the same files."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import strategies as st
+
+from throwcollect.dataset.verify import verify
+from throwcollect.dataset.writer import DatasetWriter, create
+from throwcollect.errors import DatasetError
+from throwcollect.sweep.plan import Plan
+from throwcollect.tasks.throw import ThrowResult
+
+from .conftest import Collection
+
+TRIALS = 4
+
+
+class Killed(BaseException):
+    """The process is gone: nothing that follows happens."""
+
+
+class KilledAt:
+    """Within this block the process dies in the n-th call that changes a file; a write then leaves half its bytes.
+
+    Attributes:
+        died: Whether it came to that call.
+    """
+
+    NAMES = ("write", "replace", "unlink", "ftruncate", "fsync")
+
+    def __init__(self, call: int) -> None:
+        self._left = call
+        self.died = False
+
+    def __enter__(self) -> KilledAt:
+        self._originals = {name: getattr(os, name) for name in self.NAMES}
+        for name, original in self._originals.items():
+            setattr(os, name, self._counted(name, original))
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> bool:
+        for name, original in self._originals.items():
+            setattr(os, name, original)
+        return kind is Killed
+
+    def _counted(self, name: str, original: Callable[..., Any]) -> Callable[..., Any]:
+        def call(*arguments: Any, **options: Any) -> Any:
+            if self.died:
+                raise Killed
+            self._left -= 1
+            if self._left < 0:
+                self.died = True
+                if name == "write":
+                    original(arguments[0], arguments[1][: len(arguments[1]) // 2])
+                raise Killed
+            return original(*arguments, **options)
+
+        return call
+
+
+def abandon(writer: DatasetWriter) -> None:
+    """What the system does for a killed process."""
+    with suppress(OSError):
+        writer.close()
+
+
+def files_of(directory: Path) -> dict[str, bytes]:
+    return {p.name: p.read_bytes() for p in directory.iterdir() if p.is_file() and p.name != "README.md"}
+
+
+class Trials:
+    """Episodes and results of a collection, made once."""
+
+    def __repr__(self) -> str:
+        return "trials"
+
+    def __init__(self, collection: Any) -> None:
+        self.plan = collection.plan
+        self.episodes = [collection.episode(trial) for trial in range(TRIALS)]
+        self.results: list[ThrowResult] = [collection.result(episode) for episode in self.episodes]
+
+    def append(self, writer: DatasetWriter, trial: int) -> None:
+        writer.append(self.episodes[trial], self.results[trial])
+
+    def go_on(self, directory: Path, order: list[int] | None = None) -> set[int]:
+        """Resume, run what is missing, and finish; the trials that needed not be run again."""
+        there: dict[int, ThrowResult] = {}
+        writer = DatasetWriter.open(directory)
+        try:
+            count = writer.recover(there.__setitem__)
+            assert count == len(there)
+            assert all(self.results[trial] == result for trial, result in there.items())
+            for trial in order or range(TRIALS):
+                if trial not in there:
+                    self.append(writer, trial)
+            writer.finish(wall_s=1.0)
+        finally:
+            abandon(writer)
+        return set(there)
+
+
+@pytest.fixture(scope="module")
+def trials() -> Trials:
+    return Trials(Collection({"trials": TRIALS, "record": {"trials_per_shard": 2}}))
+
+
+@pytest.fixture(scope="module")
+def expected(trials: Trials, tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+    directory = tmp_path_factory.mktemp("expected") / "dataset"
+    create(directory, trials.plan)
+    assert trials.go_on(directory) == set()
+    return files_of(directory)
+
+
+def test_a_collection_killed_at_any_instant_goes_on_to_the_same_files(
+    trials: Trials, expected: dict[str, bytes], tmp_path: Path
+) -> None:
+    call, died = 0, True
+    while died:
+        directory = tmp_path / str(call)
+        create(directory, trials.plan)
+        begun = DatasetWriter.open(directory)
+        written: set[int] = set()
+        with KilledAt(call) as killed:
+            begun.recover()
+            for trial in [1, 2, 0, 3]:
+                trials.append(begun, trial)
+                written.add(trial)
+            begun.finish(wall_s=1.0)
+        abandon(begun)
+        kept = trials.go_on(directory)
+        assert files_of(directory) == expected, f"killed at call {call}"
+        assert kept >= written, f"killed at call {call}: episodes were lost"
+        shutil.rmtree(directory)
+        call, died = call + 1, killed.died
+    assert call > 40
+
+
+@settings(
+    max_examples=15,
+    deadline=None,
+    derandomize=True,
+    phases=[Phase.generate],
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
+@given(data=st.data())
+def test_any_interleaving_of_episodes_crashes_and_power_cuts_ends_in_the_same_files(
+    data: st.DataObject, trials: Trials, expected: dict[str, bytes], tmp_path: Path
+) -> None:
+    """Power cuts leave files of any length; whoever resumes may be interrupted, too."""
+    directory = tmp_path / "dataset"
+    shutil.rmtree(directory, ignore_errors=True)
+    create(directory, trials.plan)
+    for _ in range(data.draw(st.integers(1, 3), label="interruptions")):
+        writer = DatasetWriter.open(directory)
+        there: dict[int, ThrowResult] = {}
+        order = data.draw(st.permutations(range(TRIALS)), label="order")
+        with KilledAt(data.draw(st.integers(0, 80), label="killed at call")):
+            writer.recover(there.__setitem__)
+            for trial in order:
+                if trial not in there:
+                    trials.append(writer, trial)
+            writer.finish(wall_s=1.0)
+        abandon(writer)
+        shards = sorted(directory.glob("*.mcap*"))
+        for path in data.draw(st.lists(st.sampled_from(shards), unique=True) if shards else st.just([]), label="cut"):
+            os.truncate(path, data.draw(st.integers(0, path.stat().st_size), label="to"))
+    trials.go_on(directory)
+    assert files_of(directory) == expected
+
+
+def test_a_finished_shard_with_a_flipped_bit_costs_one_episode(
+    trials: Trials, expected: dict[str, bytes], tmp_path: Path
+) -> None:
+    directory = tmp_path / "dataset"
+    create(directory, trials.plan)
+    trials.go_on(directory)
+    shard = directory / "quick_00000.mcap"
+    content = bytearray(shard.read_bytes())
+    content[content.rindex(trials.episodes[1].chunk.data) + 1000] ^= 1
+    shard.write_bytes(content)
+    assert trials.go_on(directory) == {0, 2, 3}
+    assert files_of(directory) == expected
+
+
+def test_what_a_crash_left_beside_a_finished_shard_is_removed(
+    trials: Trials, expected: dict[str, bytes], tmp_path: Path
+) -> None:
+    directory = tmp_path / "dataset"
+    create(directory, trials.plan)
+    trials.go_on(directory)
+    shard = directory / "quick_00001.mcap"
+    (directory / "quick_00001.mcap.part").write_bytes(shard.read_bytes()[:5000])
+    (directory / "quick_00001.mcap.new").write_bytes(b"half")
+    assert trials.go_on(directory) == {0, 1, 2, 3}
+    assert files_of(directory) == expected
+
+
+def test_episodes_of_a_damaged_shard_and_of_an_unfinished_one_are_put_together(
+    trials: Trials, expected: dict[str, bytes], tmp_path: Path
+) -> None:
+    directory = tmp_path / "dataset"
+    create(directory, trials.plan)
+    writer = DatasetWriter.open(directory)
+    trials.append(writer, 0)
+    writer.close()
+    unfinished = (directory / "quick_00000.mcap.part").read_bytes()
+    trials.go_on(directory)
+    (directory / "quick_00000.mcap.part").write_bytes(unfinished)
+    shard = directory / "quick_00000.mcap"
+    # Neither holds all: one lacks trial 1, in the other trial 0 is damaged.
+    content = bytearray(shard.read_bytes())
+    content[content.rindex(trials.episodes[0].chunk.data) + 1000] ^= 1
+    shard.write_bytes(content)
+    assert trials.go_on(directory) == {0, 1, 2, 3}
+    assert files_of(directory) == expected
+
+
+def test_episodes_that_are_not_of_this_plan_do_not_stay(trials: Trials, tmp_path: Path) -> None:
+    other = Trials(Collection({"trials": TRIALS, "record": {"trials_per_shard": 2}, "sim": {"max_trial_s": 30.0}}))
+    create(tmp_path / "other", other.plan)
+    other.go_on(tmp_path / "other")
+    create(tmp_path / "dataset", trials.plan)
+    shutil.copy(tmp_path / "other" / "quick_00000.mcap", tmp_path / "dataset")
+    writer = DatasetWriter.open(tmp_path / "dataset")
+    assert writer.recover() == 0
+    writer.close()
+    assert not list((tmp_path / "dataset").glob("*.mcap*"))
+
+
+def test_a_trial_that_was_lost_is_run_again(trials: Trials, expected: dict[str, bytes], tmp_path: Path) -> None:
+    directory = tmp_path / "dataset"
+    create(directory, trials.plan)
+    writer = DatasetWriter.open(directory)
+    writer.append_lost(2, "gone")
+    for trial in (0, 1, 3):
+        trials.append(writer, trial)
+    writer.finish(wall_s=1.0)
+    writer.close()
+    assert trials.go_on(directory) == {0, 1, 3}
+    assert files_of(directory) == expected
+
+
+def test_a_shard_that_may_still_get_trials_is_not_finished(
+    trials: Trials, expected: dict[str, bytes], tmp_path: Path
+) -> None:
+    directory = tmp_path / "dataset"
+    first = replace(trials.plan, trials=trials.plan.trials[:3])
+    create(directory, first)
+    writer = DatasetWriter(directory, first, growing=True)
+    for trial in (2, 0, 1):
+        trials.append(writer, trial)
+    assert sorted(path.name for path in directory.glob("*.mcap*")) == ["quick_00000.mcap", "quick_00001.mcap.part"]
+    writer.extend(trials.plan.trials[3:])
+    assert Plan.read(directory / "plan.parquet", trials.plan.config) == trials.plan
+    writer.close_plan()
+    with pytest.raises(DatasetError, match="1 trials are missing, such as 3"):
+        writer.finish(wall_s=1.0)
+    trials.append(writer, 3)
+    writer.finish(wall_s=1.0)
+    assert files_of(directory) == expected
+
+
+def test_closing_the_plan_finishes_what_is_complete(trials: Trials, tmp_path: Path) -> None:
+    directory = tmp_path / "dataset"
+    first = replace(trials.plan, trials=trials.plan.trials[:1])
+    create(directory, first)
+    writer = DatasetWriter(directory, first, growing=True)
+    trials.append(writer, 0)
+    assert not (directory / "quick_00000.mcap").exists()
+    writer.close_plan()
+    writer.finish(wall_s=1.0)
+    assert verify(directory) == []
+
+
+def test_two_processes_cannot_collect_into_one_directory(
+    trials: Trials, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("throwcollect.dataset.journal._LOCK_S", 0.0)
+    create(tmp_path / "dataset", trials.plan)
+    writer = DatasetWriter.open(tmp_path / "dataset")
+    with pytest.raises(DatasetError, match="another process collects into it"):
+        DatasetWriter.open(tmp_path / "dataset")
+    writer.close()
+    DatasetWriter.open(tmp_path / "dataset").close()

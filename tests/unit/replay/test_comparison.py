@@ -1,0 +1,59 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from throwcollect.config.schema import Config
+from throwcollect.episode.channels import Channels
+from throwcollect.episode.chunk import ChunkEncoder
+from throwcollect.episode.message import Episode
+from throwcollect.episode.record import Contact, EpisodeHeader, Samples
+from throwcollect.errors import DatasetError
+from throwcollect.replay.comparison import compare
+from throwcollect.robots.description import full_description
+
+COUNT = 5
+CONFIG = Config()
+ENCODER = ChunkEncoder(Channels(CONFIG, full_description(CONFIG)), level=1)
+SAMPLES = Samples(
+    stamps_ns=16_000_000_000 + 4_000_000 * np.arange(COUNT),
+    position=np.ones((COUNT, 32)),
+    velocity=np.zeros((COUNT, 32)),
+    effort=np.zeros((COUNT, 32)),
+    ball_position=np.ones((COUNT, 3)),
+    ball_orientation_xyzw=np.tile([0.0, 0.0, 0.0, 1.0], (COUNT, 1)),
+    ball_linear_velocity=np.zeros((COUNT, 3)),
+    ball_angular_velocity=np.zeros((COUNT, 3)),
+)
+HEADER = EpisodeHeader(0, 16_000_000_000, "landed", (Contact("spoon", 16_000_000_000, None),), (), COUNT)
+
+
+def episode(samples: Samples = SAMPLES, header: EpisodeHeader = HEADER) -> Episode:
+    return Episode(header, *ENCODER.encode(samples))
+
+
+def test_the_same_throw_has_no_differences() -> None:
+    assert compare(episode(), episode()).differences == ()
+
+
+def test_the_last_bit_is_a_difference_with_its_time_and_size() -> None:
+    position = SAMPLES.ball_position.copy()
+    position[3, 1] = np.nextafter(1.0, 2.0)
+    found = compare(episode(), episode(replace(SAMPLES, ball_position=position)))
+    assert found.differences == ("ball_position: from 0.012 s on, by up to 2.22e-16",)
+    assert found.stored != found.again
+
+
+def test_other_contacts_and_a_shorter_throw_are_told() -> None:
+    header = replace(HEADER, contacts=(), samples=3)
+    found = compare(episode(), episode(SAMPLES[:3], header))
+    assert [text.split(":")[0] for text in found.differences] == ["contacts", "samples"]
+
+
+def test_a_damaged_throw_is_not_compared() -> None:
+    whole = episode()
+    damaged = Episode(HEADER, whole.chunk, "0" * 64)
+    with pytest.raises(DatasetError, match="SHA-256 of its records is"):
+        compare(damaged, whole)

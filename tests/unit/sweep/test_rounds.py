@@ -1,0 +1,164 @@
+"""Which trials come next in a plan that grows."""
+
+import random
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from tests.unit.sweep.thrower import collected, configuration, go_on, throw
+
+from throwcollect.errors import PlanError
+from throwcollect.sweep.plan import Trial, make_plan, make_trials
+from throwcollect.sweep.rounds import Rounds
+from throwcollect.sweep.samplers import draw_points
+from throwcollect.tasks.outcome import Outcome, ThrowResult
+
+LANDED = throw(make_plan(configuration()).trials[0])
+FAILED = ThrowResult(Outcome.RECAUGHT)
+
+
+def test_the_analytic_thrower_throws() -> None:
+    assert LANDED.outcome is Outcome.LANDED
+
+
+def growing(**options: object) -> tuple[Rounds, list[Trial]]:
+    config = configuration(**options)  # type: ignore[arg-type]
+    rounds, trials = Rounds(config), list(make_plan(config).trials)
+    rounds.add(trials)
+    return rounds, trials
+
+
+def test_a_plan_begins_with_two_rounds_that_depend_on_nothing() -> None:
+    config = configuration(trials=None, landed=1000)
+    points = draw_points(config, directory=Path()).values
+    assert [list(trial.values.values()) for trial in make_plan(config).trials] == points[:128].tolist()
+    assert len(points) == 10_000
+
+
+def test_a_round_is_due_when_all_but_the_one_before_have_ended() -> None:
+    rounds, _ = growing()
+    for number in range(64, 128):
+        rounds.tell(number, LANDED)
+    for number in range(63):
+        rounds.tell(number, LANDED)
+        assert not rounds.due
+    rounds.tell(63, LANDED)
+    assert rounds.due
+
+
+def test_refused_trials_are_not_waited_for() -> None:
+    config = configuration()
+    rounds = Rounds(config)
+    rounds.add([replace(trial, refused="too fast") for trial in make_plan(config).trials])
+    assert rounds.due
+
+
+def test_results_of_the_round_before_change_nothing() -> None:
+    drawn = []
+    for last in (LANDED, FAILED, None):
+        rounds, trials = growing()
+        for trial in trials[:64]:
+            rounds.tell(trial.number, throw(trial))
+        for trial in trials[64:] if last else ():
+            rounds.tell(trial.number, last)
+        points = rounds.draw()
+        assert points is not None
+        drawn.append(points.values.tolist())
+    assert drawn[0] == drawn[1] == drawn[2]
+
+
+def test_a_result_that_is_told_twice_counts_once() -> None:
+    rounds, _ = growing(target=None, landed=65)
+    for number in [*range(64), *range(64)]:
+        rounds.tell(number, LANDED)
+    assert rounds.due
+    assert not rounds.over
+
+
+def test_no_round_follows_when_enough_have_landed_without_those_of_the_round_before() -> None:
+    rounds, _ = growing(trials=None, target=None, landed=64)
+    for number in range(128):
+        assert not rounds.over
+        rounds.tell(number, LANDED if number != 5 else FAILED)
+    assert not rounds.over
+    rounds, _ = growing(trials=None, target=None, landed=63)
+    for number in range(64):
+        assert not rounds.over
+        rounds.tell(number, LANDED if number != 5 else FAILED)
+    assert rounds.over
+
+
+@pytest.mark.parametrize("sampler", ["sobol", "uniform", "latin_hypercube"])
+def test_until_serves_the_points_of_the_sampler_in_whole_rounds(sampler: str) -> None:
+    config = configuration(trials=2000, target=None, landed=300, sampler=sampler)
+    trials = collected(config)
+    assert len(trials) % 64 == 0
+    landings = [throw(trial).outcome is Outcome.LANDED for trial in trials]
+    assert sum(landings) >= 300
+    assert sum(landings[:-192]) < 300, "each round is there because those two before it were not enough"
+    points = draw_points(config, directory=Path()).values[: len(trials)]
+    assert [list(trial.values.values()) for trial in trials] == points.tolist()
+
+
+def test_until_ends_when_trials_are_used_up() -> None:
+    trials = collected(configuration(trials=200, target=None, landed=5000))
+    assert [trial.number for trial in trials] == list(range(200))
+    assert len(collected(configuration(trials=None, target=None, landed=20), throw=lambda _: FAILED)) == 200
+
+
+def test_a_grid_until_enough_have_landed_has_no_more_than_its_points() -> None:
+    axes = {
+        "task.duration_s": {"min": 1.0, "max": 2.0, "count": 15},
+        "ball.friction": {"values": [0.1 * i for i in range(10)]},
+    }
+    config = configuration(trials=None, target=None, landed=5000, sampler="grid", parameters=axes)
+    assert len(collected(config, throw=lambda _: FAILED)) == 150
+
+
+def test_target_needs_a_number_of_trials() -> None:
+    with pytest.raises(PlanError, match=r"^trials: missing; the sampler sobol draws any number of trials$"):
+        Rounds(configuration(trials=None))
+
+
+@pytest.mark.parametrize("options", [{}, {"trials": None, "landed": 300}])
+def test_the_order_in_which_trials_end_does_not_matter(options: dict[str, int]) -> None:
+    config = configuration(**options)  # type: ignore[arg-type]
+    expected = collected(config)
+
+    def shuffled(trials: list[Trial]) -> list[Trial]:
+        return random.Random(len(trials)).sample(trials, len(trials))
+
+    assert collected(config, order=shuffled) == expected
+    assert collected(config, order=reversed) == expected
+
+
+@pytest.mark.parametrize("rounds", [2, 3, 4, 7])
+def test_a_collection_that_is_left_goes_on_as_if_it_had_not_been(rounds: int) -> None:
+    config = configuration(trials=500)
+    left = collected(config, rounds=rounds)
+    assert len(left) == 64 * rounds
+    assert go_on(config, left) == collected(config)
+
+
+def test_a_collection_may_go_on_beyond_its_last_round_which_was_cut_short() -> None:
+    few, more = configuration(trials=330), configuration(trials=500)
+    begun = collected(few)
+    assert len(begun) == 330
+    assert go_on(more, begun) == collected(more)
+
+
+def test_a_collection_that_was_shorter_than_two_rounds_may_go_on_as_well() -> None:
+    begun = collected(configuration(trials=30))
+    assert len(begun) == 30
+    assert go_on(configuration(trials=330), begun) == collected(configuration(trials=330))
+
+
+def test_trials_of_later_rounds_are_numbered_seeded_and_hashed_as_any_other() -> None:
+    config = configuration(trials=300)
+    trials = collected(config)
+    assert [trial.number for trial in trials] == list(range(300))
+    assert len({trial.seed for trial in trials}) == len({trial.digest for trial in trials}) == 300
+    again = configuration(trials=300, target=None)
+    points = draw_points(again, directory=Path())
+    last = replace(points, values=points.values[:1] * 0 + [list(trials[-1].values.values())])
+    assert next(make_trials(again, last, first=299)) == trials[-1]
