@@ -1,0 +1,53 @@
+"""Datasets that others are made from, and which of their trials are taken."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+
+from throwcollect.dataset.directory import METADATA
+from throwcollect.dataset.reader import Dataset
+from throwcollect.errors import DatasetError
+
+
+@dataclass(frozen=True)
+class Source:
+    """A dataset and the trials that are taken from it.
+
+    Attributes:
+        dataset: The dataset.
+        trials: Numbers of the trials, in the order in which they are taken; each has an episode.
+        without_episode: Number of trials that were asked for but have no episode, by outcome.
+    """
+
+    dataset: Dataset
+    trials: tuple[int, ...]
+    without_episode: Mapping[str, int]
+
+    @property
+    def digest(self) -> str:
+        """Digest of the dataset, as it was written.
+
+        Raises:
+            DatasetError: If its metadata do not have it.
+        """
+        custom = self.dataset.bag.get("custom_data")
+        digest = custom.get("throwcollect.digest") if isinstance(custom, dict) else None
+        if not isinstance(digest, str):
+            raise DatasetError(f"{self.dataset.directory / METADATA}: throwcollect.digest is missing")
+        return digest
+
+
+def source(dataset: Dataset, wanted: Collection[int] | None = None) -> Source:
+    """Take trials of a dataset that have an episode.
+
+    Args:
+        dataset: The dataset.
+        wanted: Numbers of trials; None for all.
+    """
+    numbers = range(len(dataset.throws)) if wanted is None else sorted(wanted)
+    outcomes = dataset.throws["outcome"].to_pylist()
+    has_episode = dataset.throws["shard"].is_valid().to_pylist()
+    missing = Counter(outcomes[number] for number in numbers if not has_episode[number])
+    return Source(dataset, tuple(number for number in numbers if has_episode[number]), dict(sorted(missing.items())))

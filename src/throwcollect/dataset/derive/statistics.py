@@ -1,0 +1,201 @@
+"""Statistics of a dataset: of the columns of its table, and of its trajectories as people normalise them with."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from throwcollect.dataset.card import count_outcomes
+from throwcollect.dataset.reader import Dataset
+from throwcollect.episode.record import Samples
+from throwcollect.robots.talos import JOINTS
+
+QUANTILES = (0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99)
+_PLACES = frozenset({"trial", "chunk_offset"})
+"""Columns of numbers that measure nothing."""
+_AXES = ("x", "y", "z")
+_CHANNELS = (
+    ("position_rad", "position", JOINTS),
+    ("velocity_radps", "velocity", JOINTS),
+    ("effort_nm", "effort", JOINTS),
+    ("ball_position_m", "ball_position", _AXES),
+    ("ball_velocity_mps", "ball_linear_velocity", _AXES),
+)
+"""Name of a group of signals here, the attribute of `Samples` that has them, and the signals' names."""
+
+
+@dataclass(frozen=True)
+class ColumnStatistics:
+    """A column of numbers of the table of throws; of the rows that have one.
+
+    Attributes:
+        count: Number of rows that have a number.
+        nulls: Number of rows that have none.
+        min: Smallest number; None without numbers, like all that follow.
+        max: Largest number.
+        mean: Mean.
+        std: Standard deviation, of the population.
+        quantiles: Quantiles at `QUANTILES`, linear between neighbours, by names such as ``q05``.
+    """
+
+    count: int
+    nulls: int
+    min: float | None
+    max: float | None
+    mean: float | None
+    std: float | None
+    quantiles: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class SignalStatistics:
+    """A recorded signal, over all samples of all episodes.
+
+    Attributes:
+        min: Smallest value.
+        max: Largest value.
+        mean: Mean.
+        std: Standard deviation, of the population; 0 for a joint that is locked.
+    """
+
+    min: float
+    max: float
+    mean: float
+    std: float
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """Statistics of a dataset.
+
+    Attributes:
+        trials: Number of trials.
+        outcomes: Number of trials of each outcome, most frequent first.
+        columns: Each column of numbers of the table of throws.
+        episodes: Number of episodes.
+        samples: Number of samples that `signals` are over.
+        samples_not_finite: Number of samples left out as they hold a number that is not finite.
+        signals: Joints' positions [rad], velocities [rad/s] and torques [Nm], the ball's position [m] and velocity
+            [m/s] in world: by group, such as ``position_rad``, then by joint or axis. Empty without samples.
+    """
+
+    trials: int
+    outcomes: Mapping[str, int]
+    columns: Mapping[str, ColumnStatistics]
+    episodes: int
+    samples: int
+    samples_not_finite: int
+    signals: Mapping[str, Mapping[str, SignalStatistics]]
+
+    def as_dict(self) -> dict[str, Any]:
+        """The same for JSON."""
+        return asdict(self)
+
+
+def statistics(directory: Path) -> Statistics:
+    """Statistics of a dataset; episodes are read one at a time.
+
+    Args:
+        directory: Its directory.
+
+    Raises:
+        DatasetError: If the directory holds no finished dataset, or it is damaged.
+        ConfigError: If its ``config.yaml`` is wrong.
+    """
+    dataset = Dataset.open(directory)
+    moments = _Moments(sum(len(names) for _, _, names in _CHANNELS))
+    for episode in dataset:
+        moments.add(_table(episode.samples()))
+    return Statistics(
+        trials=len(dataset.throws),
+        outcomes=count_outcomes(dataset.throws),
+        columns=dict(_columns(dataset.throws)),
+        episodes=len(dataset),
+        samples=moments.count,
+        samples_not_finite=moments.left_out,
+        signals=_signals(moments) if moments.count else {},
+    )
+
+
+def _columns(throws: pa.Table) -> Iterator[tuple[str, ColumnStatistics]]:
+    for field in throws.schema:
+        if field.name in _PLACES or not (pa.types.is_floating(field.type) or pa.types.is_integer(field.type)):
+            continue
+        numbers = throws[field.name].drop_null().to_numpy().astype(np.float64)
+        numbers = numbers[np.isfinite(numbers)]
+        yield field.name, _column(numbers, nulls=len(throws) - len(numbers))
+
+
+def _column(numbers: NDArray[np.float64], *, nulls: int) -> ColumnStatistics:
+    if not len(numbers):
+        return ColumnStatistics(0, nulls, None, None, None, None, {})
+    quantiles = np.quantile(numbers, QUANTILES).tolist()
+    return ColumnStatistics(
+        count=len(numbers),
+        nulls=nulls,
+        min=float(numbers.min()),
+        max=float(numbers.max()),
+        mean=float(numbers.mean()),
+        std=float(numbers.std()),
+        quantiles={f"q{round(100 * at):02d}": value for at, value in zip(QUANTILES, quantiles, strict=True)},
+    )
+
+
+def _table(samples: Samples) -> NDArray[np.float64]:
+    """All signals side by side, shape ``(n_samples, n_signals)``."""
+    return np.hstack([getattr(samples, attribute) for _, attribute, _ in _CHANNELS])
+
+
+class _Moments:
+    """Extrema, means and squared deviations of columns that come in pieces (Chan, Golub and LeVeque, 1979).
+
+    Args:
+        width: Number of columns.
+    """
+
+    def __init__(self, width: int) -> None:
+        self.count = 0
+        self.left_out = 0
+        self.min = np.full(width, math.inf)
+        self.max = np.full(width, -math.inf)
+        self.mean = np.zeros(width)
+        self._squares = np.zeros(width)
+
+    @property
+    def std(self) -> NDArray[np.float64]:
+        """Standard deviations of the population, shape ``(width,)``."""
+        return np.sqrt(self._squares / self.count)
+
+    def add(self, rows: NDArray[np.float64]) -> None:
+        """Take in rows, shape ``(n_rows, width)``; those with a number that is not finite are left out."""
+        finite = np.isfinite(rows).all(axis=1)
+        self.left_out += int(np.count_nonzero(~finite))
+        rows = rows[finite]
+        if not len(rows):
+            return
+        mean = rows.mean(axis=0)
+        apart, total = mean - self.mean, self.count + len(rows)
+        self._squares += ((rows - mean) ** 2).sum(axis=0) + apart**2 * (self.count * len(rows) / total)
+        self.mean += apart * (len(rows) / total)
+        self.count = total
+        self.min = np.minimum(self.min, rows.min(axis=0))
+        self.max = np.maximum(self.max, rows.max(axis=0))
+
+
+def _signals(moments: _Moments) -> dict[str, dict[str, SignalStatistics]]:
+    columns = (moments.min, moments.max, moments.mean, moments.std)
+    each = (_signal(*numbers) for numbers in zip(*(column.tolist() for column in columns), strict=True))
+    return {group: dict(zip(names, islice(each, len(names)), strict=True)) for group, _, names in _CHANNELS}
+
+
+def _signal(low: float, high: float, mean: float, std: float) -> SignalStatistics:
+    # Rounding must not make noise of a constant: whoever normalises divides by its deviation.
+    return SignalStatistics(low, high, low, 0.0) if low == high else SignalStatistics(low, high, mean, std)

@@ -1,0 +1,253 @@
+"""Conditions on the columns of a table, written as Python writes them: which rows fulfil one, and numbers of each row.
+
+Text is parsed by Python and evaluated here by Arrow, so nothing of it is ever run. Names with dots are names of
+columns, ``weights.arm_right_4_joint[0]`` is the column ``weights.arm_right_4_joint.0``. What is null in a row stays
+null in comparisons and arithmetic, and a null condition is not fulfilled.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from types import MappingProxyType
+from typing import Any, Literal
+
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from throwcollect.errors import ConfigError, Problem
+
+_SHOWN = 100
+"""Characters of an expression that a message shows."""
+
+_Kind = Literal["a number", "text", "a condition", "None"]
+
+_COMPARISONS = MappingProxyType[type[ast.cmpop], Callable[..., Any]](
+    {
+        ast.Eq: pc.equal,
+        ast.NotEq: pc.not_equal,
+        ast.Lt: pc.less,
+        ast.LtE: pc.less_equal,
+        ast.Gt: pc.greater,
+        ast.GtE: pc.greater_equal,
+    }
+)
+
+
+def _floor_divide(left: Any, right: Any) -> Any:
+    return pc.floor(pc.divide(left, right))
+
+
+def _remainder(left: Any, right: Any) -> Any:
+    return pc.subtract(left, pc.multiply(right, _floor_divide(left, right)))
+
+
+_ARITHMETIC = MappingProxyType[type[ast.operator], Callable[..., Any]](
+    {
+        ast.Add: pc.add,
+        ast.Sub: pc.subtract,
+        ast.Mult: pc.multiply,
+        ast.Div: pc.divide,
+        ast.FloorDiv: _floor_divide,
+        ast.Mod: _remainder,
+        ast.Pow: pc.power,
+    }
+)
+
+
+def _hypot(x: Any, y: Any) -> Any:
+    return pc.sqrt(pc.add(pc.multiply(x, x), pc.multiply(y, y)))
+
+
+_FUNCTIONS = MappingProxyType[str, tuple[int, Callable[..., Any]]](
+    {"abs": (1, pc.abs), "sqrt": (1, pc.sqrt), "hypot": (2, _hypot)}
+)
+"""Number of arguments, and the function."""
+
+
+@dataclass(frozen=True)
+class _Value:
+    """What a part of an expression yields: an Arrow array with one value a row, or a scalar for all of them."""
+
+    kind: _Kind
+    data: Any
+
+
+class Expression:
+    """An expression on the columns of a table.
+
+    Args:
+        text: The expression.
+        place: What it was given as, for messages: ``--where``.
+
+    Raises:
+        ConfigError: If it is no expression; all methods raise it for what cannot be evaluated.
+    """
+
+    def __init__(self, text: str, *, place: str) -> None:
+        # Line breaks mean nothing here, but would end a statement of Python.
+        self._text = " ".join(text.splitlines()).strip()
+        self._place = place
+        try:
+            self._tree = ast.parse(self._text, mode="eval").body
+        except SyntaxError as error:
+            raise self._error((error.offset or 1) - 1, f"cannot be understood: {error.msg}", example=True) from error
+        except (ValueError, RecursionError, MemoryError) as error:
+            raise self._error(0, "cannot be understood", example=True) from error
+
+    def rows(self, table: pa.Table) -> list[int]:
+        """Numbers of the rows that fulfil the expression as a condition."""
+        found = self._evaluated(table, "a condition")
+        return [number for number, holds in enumerate(found.to_pylist()) if holds]
+
+    def numbers(self, table: pa.Table) -> list[float | None]:
+        """The expression's number in each row; None where it is null."""
+        values: list[float | None] = self._evaluated(table, "a number").to_pylist()
+        return values
+
+    def _evaluated(self, table: pa.Table, kind: _Kind) -> Any:
+        try:
+            value = _Evaluation(table, self._error_at).value(self._tree)
+        except RecursionError as error:
+            raise self._error(0, "is nested too deeply") from error
+        if value.kind != kind:
+            raise self._error(0, f"should be {kind}, is {value.kind}")
+        if isinstance(value.data, pa.Scalar):
+            return pa.repeat(value.data, len(table))
+        return value.data
+
+    def _error_at(self, node: ast.expr, problem: str) -> ConfigError:
+        # Python counts bytes, people count characters.
+        before = self._text.encode()[: node.col_offset].decode()
+        return self._error(len(before), problem)
+
+    def _error(self, column: int, problem: str, *, example: bool = False) -> ConfigError:
+        start = max(0, column - _SHOWN // 2)
+        shown = f"\n    {self._text[start : start + _SHOWN]}\n    {' ' * (column - start)}^"
+        return ConfigError(
+            [Problem(f"{problem} (character {column + 1}){shown}", self._place)],
+            expected="such as: outcome == 'landed' and landing_x_m > 1.5" if example else None,
+        )
+
+
+class _Evaluation:
+    """Evaluates parts of an expression on a table.
+
+    Args:
+        table: The table.
+        error: Makes an error that points to a part.
+    """
+
+    def __init__(self, table: pa.Table, error: Callable[[ast.expr, str], ConfigError]) -> None:
+        self._table = table
+        self._error = error
+
+    def value(self, node: ast.expr) -> _Value:
+        """The value of a part."""
+        match node:
+            case ast.Constant():
+                return self._constant(node)
+            case ast.Name() | ast.Attribute() | ast.Subscript():
+                return self._column(node)
+            case ast.BoolOp():
+                combine = pc.and_kleene if isinstance(node.op, ast.And) else pc.or_kleene
+                return self._combined(combine, [self._of(part, "a condition") for part in node.values])
+            case ast.UnaryOp(op=ast.Not()):
+                return _Value("a condition", pc.invert(self._of(node.operand, "a condition")))
+            case ast.UnaryOp(op=ast.USub()):
+                return _Value("a number", pc.negate(self._of(node.operand, "a number")))
+            case ast.UnaryOp(op=ast.UAdd()):
+                return _Value("a number", self._of(node.operand, "a number"))
+            case ast.BinOp() if operation := _ARITHMETIC.get(type(node.op)):
+                operands = self._of(node.left, "a number"), self._of(node.right, "a number")
+                return _Value("a number", operation(*operands))
+            case ast.Compare():
+                return self._comparison(node)
+            case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]) if name in _FUNCTIONS:
+                count, function = _FUNCTIONS[name]
+                if len(arguments) != count:
+                    raise self._error(node, f"{name} takes {count} number{'s' if count > 1 else ''}")
+                return _Value("a number", function(*(self._of(each, "a number") for each in arguments)))
+        hint = "use `and`, `or`, `not`" if isinstance(node, ast.BinOp) else f"known functions: {', '.join(_FUNCTIONS)}"
+        raise self._error(node, f"only comparisons, `and`, `or`, `not`, arithmetic and columns are allowed; {hint}")
+
+    def _of(self, node: ast.expr, kind: _Kind) -> Any:
+        value = self.value(node)
+        if value.kind != kind:
+            raise self._error(node, f"should be {kind}, is {value.kind}")
+        return value.data
+
+    def _combined(self, combine: Callable[..., Any], parts: Sequence[Any]) -> _Value:
+        whole = parts[0]
+        for part in parts[1:]:
+            whole = combine(whole, part)
+        return _Value("a condition", whole)
+
+    def _constant(self, node: ast.Constant) -> _Value:
+        match node.value:
+            case bool():
+                return _Value("a condition", pa.scalar(node.value))
+            case int() | float():
+                try:
+                    return _Value("a number", pa.scalar(float(node.value)))
+                except OverflowError as error:
+                    raise self._error(node, "too large a number") from error
+            case str():
+                return _Value("text", pa.scalar(node.value))
+            case None:
+                return _Value("None", pa.scalar(None))
+        raise self._error(node, "should be a number, a text in quotes, True, False or None")
+
+    def _column(self, node: ast.expr) -> _Value:
+        name = self._name(node)
+        known = self._table.column_names
+        if name not in known:
+            near = get_close_matches(name, known, 1)
+            raise self._error(node, f"no column {name!r}" + (f"; did you mean {near[0]!r}?" if near else ""))
+        column = self._table[name]
+        if pa.types.is_string(column.type):
+            return _Value("text", column)
+        return _Value("a number", column.cast(pa.float64()))
+
+    def _name(self, node: ast.expr) -> str:
+        match node:
+            case ast.Name():
+                return node.id
+            case ast.Attribute():
+                return f"{self._name(node.value)}.{node.attr}"
+            case ast.Subscript(slice=ast.Constant(value=int(index))):
+                return f"{self._name(node.value)}.{index}"
+        raise self._error(node, "should be the name of a column")
+
+    def _comparison(self, node: ast.Compare) -> _Value:
+        parts = []
+        operands = [node.left, *node.comparators]
+        for left, operator, right in zip(operands, node.ops, operands[1:], strict=False):
+            if isinstance(operator, ast.In | ast.NotIn):
+                found = self._membership(left, right)
+                parts.append(pc.invert(found) if isinstance(operator, ast.NotIn) else found)
+            else:
+                parts.append(self._compared(left, operator, right))
+        return self._combined(pc.and_kleene, parts)
+
+    def _compared(self, left: ast.expr, operator: ast.cmpop, right: ast.expr) -> Any:
+        a, b = self.value(left), self.value(right)
+        if b.kind == "None":
+            if isinstance(operator, ast.Is | ast.IsNot | ast.Eq | ast.NotEq):
+                return pc.is_null(a.data) if isinstance(operator, ast.Is | ast.Eq) else pc.is_valid(a.data)
+            raise self._error(right, "None can be compared by `is` and `is not` only")
+        if isinstance(operator, ast.Is | ast.IsNot):
+            raise self._error(right, "`is` is for None only; use == or !=")
+        if a.kind != b.kind:
+            raise self._error(right, f"{b.kind} cannot be compared with {a.kind}")
+        if a.kind == "a condition" and not isinstance(operator, ast.Eq | ast.NotEq):
+            raise self._error(right, "conditions can be compared by == and != only")
+        return _COMPARISONS[type(operator)](a.data, b.data)
+
+    def _membership(self, left: ast.expr, right: ast.expr) -> Any:
+        if not isinstance(right, ast.List | ast.Tuple | ast.Set) or not right.elts:
+            raise self._error(right, "should be a list, such as ['landed', 'recaught']")
+        equal = [self._compared(left, ast.Eq(), element) for element in right.elts]
+        return self._combined(pc.or_kleene, equal).data

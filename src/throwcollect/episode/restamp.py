@@ -1,0 +1,106 @@
+"""The same episode under another number, in that trial's slot of time: as if it had been recorded there.
+
+Nothing in an episode depends on when it happened but its stamps, so what a simulation records in another slot are the
+same bytes but for them.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import threading
+from dataclasses import replace
+
+import numpy as np
+import zstandard
+from isal.isal_zlib import crc32
+
+from throwcollect.config.schema import Config
+from throwcollect.episode.channels import Channels
+from throwcollect.episode.chunk import Chunk, MessageTable
+from throwcollect.episode.message import Episode
+from throwcollect.episode.record import EpisodeHeader
+from throwcollect.errors import DatasetError
+
+_NS_PER_S = 1_000_000_000
+_SECONDS = ("stamp.sec", "clock.sec")
+"""How paths of fields end that hold the seconds of a stamp; durations, such as `time_from_start`, stay as they are."""
+
+
+class _OfEachThread(threading.local):
+    """A compressor must not be shared."""
+
+    def __init__(self, level: int) -> None:
+        self.compressor = zstandard.ZstdCompressor(level=level)
+
+
+class Restamper:
+    """Gives episodes of one configuration other numbers; threads may share one.
+
+    Args:
+        config: Configuration of the trials, but for what is swept.
+        channels: What it records.
+    """
+
+    def __init__(self, config: Config, channels: Channels) -> None:
+        self._config = config
+        self._topics = {
+            channel.id: (topic, [name for name in topic.layout.dtype.names or () if name.endswith(_SECONDS)])
+            for channel, topic in channels.recorded.items()
+        }
+        self._of_this_thread = _OfEachThread(config.record.zstd_level)
+
+    def restamped(self, episode: Episode, trial: int) -> Episode:
+        """An episode as trial `trial` of the configuration would have yielded it.
+
+        Args:
+            episode: The episode; its hash is checked.
+            trial: Its new number.
+
+        Raises:
+            DatasetError: If the episode is damaged, or its messages are not those that the configuration records.
+        """
+        episode.check_records()
+        start_ns = self._config.trial_start_ns(trial)
+        by_ns = start_ns - episode.header.start_ns
+        contents = bytearray(episode.contents)
+        table = MessageTable(contents, episode.header.samples)
+        self._move(table, by_ns)
+        chunk = Chunk(
+            data=self._of_this_thread.compressor.compress(contents),
+            uncompressed_size=len(contents),
+            crc=crc32(contents),
+            start_ns=episode.chunk.start_ns + by_ns,
+            end_ns=episode.chunk.end_ns + by_ns,
+        )
+        moved = Episode(_moved(episode.header, trial, by_ns), chunk, hashlib.sha256(contents).hexdigest())
+        # What has just been compressed need not be decompressed.
+        moved.table = table
+        return moved
+
+    def _move(self, table: MessageTable, by_ns: int) -> None:
+        if list(table.columns) != list(self._topics):
+            raise DatasetError(f"chunk: has the channels {list(table.columns)}", expected=f"{list(self._topics)}")
+        for channel, (topic, fields) in self._topics.items():
+            messages = table.messages(channel)
+            if not topic.layout.describes(messages[:1]):
+                raise DatasetError(f"chunk: messages of {topic.name} are not laid out as {topic.type_name} is here")
+            headers = table.headers(channel)
+            for time in ("log_time", "publish_time"):
+                headers[time] = headers[time].astype(np.int64) + by_ns
+            rows = messages.view(topic.layout.dtype)[:, 0]
+            for seconds in fields:
+                nanoseconds = seconds.removesuffix("sec") + "nanosec"
+                stamps = rows[seconds].astype(np.int64) * _NS_PER_S + rows[nanoseconds] + by_ns
+                rows[seconds], rows[nanoseconds] = np.divmod(stamps, _NS_PER_S)
+
+
+def _moved(header: EpisodeHeader, trial: int, by_ns: int) -> EpisodeHeader:
+    contacts = tuple(
+        replace(
+            contact,
+            start_ns=contact.start_ns + by_ns,
+            end_ns=None if contact.end_ns is None else contact.end_ns + by_ns,
+        )
+        for contact in header.contacts
+    )
+    return replace(header, trial=trial, start_ns=header.start_ns + by_ns, contacts=contacts)

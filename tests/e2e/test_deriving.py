@@ -1,0 +1,108 @@
+"""A derived dataset is the dataset that a collection of its trials gives, and docs/deriving.md is true."""
+
+import re
+import shlex
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+from tests.e2e.collection import collect, fingerprints
+from throwcollect.cli.main import app
+from throwcollect.dataset.verify import verify
+
+pytestmark = pytest.mark.e2e
+PAGE = (Path(__file__).parents[2] / "docs" / "deriving.md").read_text(encoding="utf-8")
+
+MONDAY = """\
+name: monday
+trials: 8
+seed: 7
+ball: {mass_kg: 0.045, drag_coefficient: 0.4}
+sweep:
+  parameters:
+    task.end.arm_right_4_joint: {min: -0.7, max: -0.2}
+    task.duration_s: {min: 0.9, max: 1.2}
+record:
+  topics: [joint_states, ball/odometry, controller_state, tf, clock]
+  trials_per_shard: 6
+run: {runtime: local}
+"""
+TUESDAY = """\
+name: tuesday
+trials: 6
+seed: 8
+ball: {mass_kg: 0.03, drag_coefficient: 0.4}
+sweep:
+  sampler: uniform
+  parameters:
+    task.duration_s: {min: 0.9, max: 1.2}
+    task.trajectory.gamma: {min: 1.0, max: 1.2}
+record:
+  topics: [joint_states, ball/odometry, controller_state, tf, clock]
+  zstd_level: 3
+run: {runtime: local}
+"""
+OF_DERIVED_ONLY = {"trials.parquet", "sources.parquet"}
+
+
+@pytest.fixture(scope="module")
+def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A directory with the datasets that the page speaks of, and all that its commands make of them."""
+    directory = tmp_path_factory.mktemp("home")
+    for text in (MONDAY, TUESDAY):
+        name = text.split()[1]
+        config = directory / f"{name}.yaml"
+        config.write_text(text)
+        collect(config, directory / "datasets" / name, 1)
+    for block in re.findall(r"```sh\n(.*?)```", PAGE, flags=re.DOTALL):
+        for line in block.replace("\\\n", " ").splitlines():
+            program, command, *arguments = shlex.split(line)
+            assert program == "throwcollect"
+            if command == "up":
+                config, _, output = arguments
+                collect(directory / config, directory / output, 1)
+            else:
+                with pytest.MonkeyPatch.context() as patch:
+                    patch.chdir(directory)
+                    done = CliRunner().invoke(app, [command, *arguments])
+                assert done.exit_code == 0, done.output
+    return directory / "datasets"
+
+
+def collected_anew(derived: Path, directory: Path) -> dict[str, str]:
+    collect(derived / "config.yaml", directory, 1)
+    return fingerprints(directory)
+
+
+def as_derived(directory: Path) -> dict[str, str]:
+    return {name: digest for name, digest in fingerprints(directory).items() if name not in OF_DERIVED_ONLY}
+
+
+def test_a_merged_dataset_is_what_a_collection_of_its_trials_gives(home: Path, tmp_path: Path) -> None:
+    assert verify(home / "both") == []
+    assert as_derived(home / "both") == collected_anew(home / "both", tmp_path / "anew")
+
+
+def test_a_filtered_dataset_is_what_a_collection_of_its_trials_gives(home: Path) -> None:
+    assert len(fingerprints(home / "short")) > 1
+    assert as_derived(home / "short") == fingerprints(home / "again")
+
+
+def test_all_derived_datasets_are_whole(home: Path) -> None:
+    derived = [path.parent for path in home.rglob("sources.parquet")]
+    assert {str(path.relative_to(home)) for path in derived} == {
+        *("both", "short", "few"),
+        *("parts/train", "parts/test", "rings/train", "rings/test"),
+    }
+    for directory in derived:
+        assert verify(directory) == []
+
+
+def test_the_python_of_the_page_works(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (python,) = re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL)
+    monkeypatch.chdir(home.parent)
+    names: dict[str, Any] = {}
+    exec(python, names)  # noqa: S102
+    assert names["elbow"].std > 0.1

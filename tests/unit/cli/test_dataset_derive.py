@@ -1,0 +1,68 @@
+import json
+import re
+from pathlib import Path
+
+import pytest
+from tests.unit.dataset.conftest import Collection
+from typer.testing import CliRunner
+
+from throwcollect.cli.dataset_commands import dataset_app
+
+
+def run(*arguments: str | Path) -> str:
+    done = CliRunner().invoke(dataset_app, list(map(str, arguments)), catch_exceptions=False)
+    assert done.exit_code == 0, done.output
+    return done.output
+
+
+@pytest.fixture(scope="module")
+def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Seven trials, one of which was refused and one lost."""
+    collection = Collection()
+    collection.refuse(2, "too fast")
+    return collection.collect(tmp_path_factory.mktemp("cli") / "source", [0, 1, 3, 4, 5, 6], lost=[4])
+
+
+def test_what_was_left_out_is_said(source: Path, tmp_path: Path) -> None:
+    text = run("filter", source, tmp_path / "a", "--where", "trial < 6")
+    assert re.fullmatch(
+        rf"{tmp_path}/a: 4 of 7 trials\n  digest  [0-9a-f]{{64}}\n"
+        r"left out, as they have no episode: 1 lost, 1 refused\n",
+        text,
+    )
+    found = json.loads(run("merge", source, tmp_path / "a", tmp_path / "b", "--json"))
+    assert found.pop("digest")
+    assert found == {
+        "directory": str(tmp_path / "b"),
+        "trials": 9,
+        "offered": 11,
+        "without_episode": {"lost": 1, "refused": 1},
+    }
+    assert run("sample", source, tmp_path / "c", "--count", "2", "--seed", "3").startswith(
+        f"{tmp_path}/c: 2 of 7 trials\n"
+    )
+
+
+def test_a_split_says_how_many_trials_and_cells_each_part_has(source: Path, tmp_path: Path) -> None:
+    arguments = ("--fractions", "a=0.5,b=0.5", "--cells", "trial=2", "--seed", "1")
+    text = run("split", source, tmp_path / "parts", *arguments)
+    told = re.findall(rf"^{tmp_path}/parts/([ab]): (\d) of 7 trials in (\d) cells$", text, flags=re.MULTILINE)
+    assert text.endswith("left out, as they have no episode: 1 lost, 1 refused\n")
+    assert sum(int(trials) for _, trials, _ in told) == 5
+    found = json.loads(run("split", source, tmp_path / "again", *arguments, "--json"))
+    assert told == [(name, str(part["dataset"]["trials"]), str(part["cells"])) for name, part in found["parts"].items()]
+    assert found["without_episode"] == {"lost": 1, "refused": 1}
+
+
+def test_statistics_are_tables_or_json(source: Path) -> None:
+    text = run("stats", source)
+    assert text.startswith("7 trials: 5 landed, 1 lost, 1 refused\n\nthrows ")
+    found = json.loads(run("stats", source, "--json"))
+    column = found["columns"]["landing_x_m"]
+    cells = [column["count"], column["nulls"], column["min"], *(column["quantiles"][q] for q in ("q05", "q50", "q95"))]
+    row = next(line.split() for line in text.splitlines() if line.startswith("landing_x_m "))
+    assert row[1:7] == [f"{cell:.6g}" for cell in cells]
+    elbow = found["signals"]["position_rad"]["arm_right_4_joint"]
+    row = next(line.split() for line in text.splitlines() if line.startswith("arm_right_4_joint "))
+    assert row[1:] == [f"{elbow[name]:.6g}" for name in ("min", "max", "mean", "std")]
+    assert text.endswith(f"signals over {found['samples']} samples of 5 episodes\n")

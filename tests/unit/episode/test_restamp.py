@@ -1,0 +1,80 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tests.unit.dataset.conftest import Collection, throw
+
+from throwcollect.episode.channels import Channels
+from throwcollect.episode.message import Episode
+from throwcollect.episode.record import Contact, ControllerSamples
+from throwcollect.episode.restamp import Restamper
+from throwcollect.errors import DatasetError
+from throwcollect.robots.description import full_description
+from throwcollect.robots.talos import CONTROLLERS
+
+EVERYTHING = ["joint_states", "ball/odometry", "controller_state", "tf", "clock"]
+
+
+def recorded(collection: Collection, *, as_trial: int) -> Episode:
+    """Trial 4 as it is recorded in the slot of another one."""
+    samples, header = throw(collection.config, 4)
+    by_ns = collection.config.trial_start_ns(as_trial) - header.start_ns
+    contacts = tuple(
+        Contact(each.body, each.start_ns + by_ns, None if each.end_ns is None else each.end_ns + by_ns)
+        for each in header.contacts
+    )
+    assert any(each.end_ns is None for each in contacts)
+    elapsed = samples.stamps_ns - header.start_ns
+    targets = {
+        name: ControllerSamples(elapsed, *(np.full((len(samples), len(CONTROLLERS[name])), 0.5) for _ in range(4)))
+        for name in ("arm_right_controller", "torso_controller")
+    }
+    header = replace(header, trial=as_trial, start_ns=header.start_ns + by_ns, contacts=contacts)
+    samples = replace(samples, stamps_ns=samples.stamps_ns + by_ns)
+    return Episode(header, *collection.encoder.encode(samples, targets))
+
+
+@pytest.fixture(scope="module")
+def collection() -> Collection:
+    return Collection({"record": {"topics": EVERYTHING}})
+
+
+@pytest.fixture(scope="module")
+def restamper(collection: Collection) -> Restamper:
+    return Restamper(collection.config, Channels(collection.config, full_description(collection.config)))
+
+
+@pytest.mark.parametrize("number", [0, 4, 9_999_999])
+def test_an_episode_under_another_number_is_what_would_have_been_recorded_there(
+    number: int, collection: Collection, restamper: Restamper
+) -> None:
+    moved, expected = (
+        restamper.restamped(recorded(collection, as_trial=4), number),
+        recorded(collection, as_trial=number),
+    )
+    assert moved.header == expected.header
+    assert moved.chunk == expected.chunk
+    assert moved.digest == expected.digest
+    moved.check_records()
+    assert np.array_equal(moved.samples().stamps_ns, expected.samples().stamps_ns)
+
+
+def test_the_episode_itself_stays_as_it_is(collection: Collection, restamper: Restamper) -> None:
+    episode, untouched = recorded(collection, as_trial=4), recorded(collection, as_trial=4)
+    restamper.restamped(episode, 0)
+    assert episode.contents == untouched.contents
+    assert episode.header == untouched.header
+
+
+def test_an_episode_whose_records_are_not_what_was_hashed_is_refused(
+    collection: Collection, restamper: Restamper
+) -> None:
+    episode = recorded(collection, as_trial=4)
+    forged = Episode(episode.header, episode.chunk, "0" * 64)
+    with pytest.raises(DatasetError, match="SHA-256 of its records"):
+        restamper.restamped(forged, 0)
+
+
+def test_an_episode_of_other_topics_is_refused(restamper: Restamper) -> None:
+    with pytest.raises(DatasetError, match="has the channels"):
+        restamper.restamped(Collection().episode(4), 0)
