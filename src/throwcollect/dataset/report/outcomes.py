@@ -1,0 +1,89 @@
+"""Outcomes as a report shows them: in one order, each with a colour and a marker of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from throwcollect.dataset.throws import REFUSED
+from throwcollect.tasks.throw import Outcome
+
+
+@dataclass(frozen=True)
+class Style:
+    """How an outcome is drawn.
+
+    Attributes:
+        colour: In hex; told apart by people who confuse red and green, on white and on black.
+        symbol: Marker in plotly's words.
+        marker: Marker in matplotlib's words.
+    """
+
+    colour: str
+    symbol: str
+    marker: str
+
+
+LANDED = Outcome.LANDED.value
+
+_STYLES = {
+    LANDED: Style("#0072B2", "circle", "o"),
+    Outcome.LIMIT_VIOLATED.value: Style("#E69F00", "diamond", "D"),
+    Outcome.SELF_HIT.value: Style("#D55E00", "x", "X"),
+    Outcome.RECAUGHT.value: Style("#CC79A7", "triangle-up", "^"),
+    Outcome.NOT_RELEASED.value: Style("#56B4E9", "square", "s"),
+    Outcome.TIMEOUT.value: Style("#009E73", "triangle-down", "v"),
+    Outcome.TRACKING_FAILED.value: Style("#999933", "cross", "P"),
+    Outcome.LOST.value: Style("#7F7F7F", "hexagon", "h"),
+    REFUSED: Style("#B3B3B3", "star", "*"),
+}
+_UNKNOWN = Style("#882255", "pentagon", "p")
+
+
+def style_of(outcome: str) -> Style:
+    """How an outcome is drawn."""
+    return _STYLES.get(outcome, _UNKNOWN)
+
+
+def in_words(outcome: str) -> str:
+    """An outcome as people write it."""
+    return outcome.replace("_", " ")
+
+
+@dataclass(frozen=True)
+class Outcomes:
+    """The outcomes of all trials.
+
+    Attributes:
+        names: Those that occur; ``landed`` first, then always in the same order.
+        codes: Index into `names` of each trial, shape ``(n_trials,)``.
+    """
+
+    names: tuple[str, ...]
+    codes: NDArray[np.intp]
+
+    @classmethod
+    def of(cls, outcomes: Iterable[str]) -> Outcomes:
+        """Outcomes in the order of trials."""
+        listed = list(outcomes)
+        order = list(_STYLES)
+        names = sorted(set(listed), key=lambda name: (order.index(name) if name in order else len(order), name))
+        index = {name: code for code, name in enumerate(names)}
+        return cls(tuple(names), np.array([index[name] for name in listed], dtype=np.intp))
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Number of trials of each outcome."""
+        return dict(zip(self.names, np.bincount(self.codes, minlength=len(self.names)).tolist(), strict=True))
+
+    @property
+    def landed(self) -> int:
+        """Number of trials that landed."""
+        return self.counts.get(LANDED, 0)
+
+    def are(self, name: str) -> NDArray[np.bool_]:
+        """Which trials have an outcome, shape ``(n_trials,)``."""
+        return np.array([each == name for each in self.names])[self.codes]
