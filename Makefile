@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 READY_DEV := $(VENV)/.ready-dev
 
-.PHONY: up test check bench clean
+.PHONY: up test check bench bench-full clean
 
 up: $(READY)
 	$(BIN)/throwcollect up -n 2 configs/quickstart.yaml
@@ -34,6 +34,10 @@ check: $(READY_DEV)
 # Throws a second against the raw limit of the same machine, in the same run.
 bench: $(READY_DEV)
 	$(BIN)/python -m bench
+
+# A database as large as a published one, collected in peace and among crashes: the same files. Takes half an hour.
+bench-full: $(READY_DEV)
+	$(BIN)/python -m bench.full
 
 clean:
 	rm -rf $(VENV) .mypy_cache .pytest_cache .ruff_cache .import_linter_cache .hypothesis
