@@ -148,13 +148,24 @@ def basis(phase: NDArray[np.float64], *, count: int, alpha_x: float) -> NDArray[
     Returns:
         Shape ``(n, count)``.
     """
-    centres = np.exp(-alpha_x * np.linspace(0, 1, count))
-    widths = (0.75 * np.diff(centres)) ** 2
-    exponents = (phase[:, None] - centres) ** 2 / (-2 * np.append(widths, widths[-1]))
+    centres, variances = kernels(count=count, alpha_x=alpha_x)
+    exponents = (phase[:, None] - centres) ** 2 / (-2 * variances)
     # Far from all centres every psi underflows; their ratios do not.
     psi = np.exp(exponents - exponents.max(axis=1, keepdims=True))
     weighted: NDArray[np.float64] = psi * (phase / psi.sum(axis=1))[:, None]
     return weighted
+
+
+def kernels(*, count: int, alpha_x: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Centres ``c_i`` and squared widths ``sigma2_i`` of the basis functions over the phase, each ``(count,)``.
+
+    Args:
+        count: Number of basis functions, at least 2.
+        alpha_x: Decay constant of the phase.
+    """
+    centres = np.exp(-alpha_x * np.linspace(0, 1, count))
+    widths = (0.75 * np.diff(centres)) ** 2
+    return centres, np.append(widths, widths[-1])
 
 
 def fit_dmp(

@@ -1,0 +1,60 @@
+"""Numbered Parquet files of limited size, in numbered directories: ``chunk-000/file-000.parquet``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import TracebackType
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+PATH = "chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
+FILES_PER_CHUNK = 1000
+MEGABYTES_PER_FILE = 100
+
+
+class ParquetSeries:
+    """Writes tables of one schema, each as a row group; to be used as a context manager.
+
+    Attributes:
+        paths: Files so far.
+
+    Args:
+        directory: Where.
+    """
+
+    def __init__(self, directory: Path) -> None:
+        self._directory = directory
+        self._writer: pq.ParquetWriter | None = None
+        self.paths: list[Path] = []
+
+    def __enter__(self) -> ParquetSeries:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        if self._writer is not None:
+            self._writer.close()
+
+    def place(self) -> tuple[int, int]:
+        """Numbers of directory and file that the next table goes to."""
+        full = self.paths and self.paths[-1].stat().st_size >= MEGABYTES_PER_FILE * 2**20
+        if self._writer is not None and full:
+            self._writer.close()
+            self._writer = None
+        return divmod(len(self.paths) - (self._writer is not None), FILES_PER_CHUNK)
+
+    def append(self, table: pa.Table) -> None:
+        """Write a table.
+
+        Raises:
+            OSError: If it cannot be written.
+        """
+        chunk, file = self.place()
+        if self._writer is None:
+            path = self._directory / PATH.format(chunk_index=chunk, file_index=file)
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._writer = pq.ParquetWriter(path, table.schema, compression="zstd")
+            self.paths.append(path)
+        self._writer.write_table(table)

@@ -1,0 +1,70 @@
+"""Samples at another rate."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicHermiteSpline
+
+from throwcollect.episode.record import Samples
+
+_NS_PER_S = 1_000_000_000
+
+
+def resampled_count(samples: int, *, recorded_hz: int, rate_hz: int) -> int:
+    """Number of samples that `resample` gives for a number of recorded ones."""
+    return (samples - 1) * rate_hz // recorded_hz + 1
+
+
+def resample(samples: Samples, *, recorded_hz: int, rate_hz: int) -> Samples:
+    """Samples at a lower rate, from the first one on to the last that still lies within the record.
+
+    If the rate divides the recorded one these are every n-th sample as it was recorded. Otherwise positions of joints
+    and ball lie on the cubic through positions and velocities of both neighbours; all else is linear between them, the
+    ball's orientation normalised. Nothing is filtered.
+
+    Args:
+        samples: As recorded, at least one.
+        recorded_hz: Their rate.
+        rate_hz: Rate to give; at most `recorded_hz`.
+    """
+    if recorded_hz % rate_hz == 0:
+        return samples[:: recorded_hz // rate_hz]
+    count = resampled_count(len(samples), recorded_hz=recorded_hz, rate_hz=rate_hz)
+    # In units of the recorded spacing, so that instants which are samples are hit exactly.
+    places = np.arange(count) * recorded_hz / rate_hz
+    orientation = _linear(_without_flips(samples.ball_orientation_xyzw), places)
+    return Samples(
+        stamps_ns=samples.stamps_ns[0] + np.round(np.arange(count) * (_NS_PER_S / rate_hz)).astype(np.int64),
+        position=_cubic(samples.position, samples.velocity / recorded_hz, places),
+        velocity=_linear(samples.velocity, places),
+        effort=_linear(samples.effort, places),
+        ball_position=_cubic(samples.ball_position, samples.ball_linear_velocity / recorded_hz, places),
+        ball_orientation_xyzw=orientation / np.linalg.norm(orientation, axis=1, keepdims=True),
+        ball_linear_velocity=_linear(samples.ball_linear_velocity, places),
+        ball_angular_velocity=_linear(samples.ball_angular_velocity, places),
+    )
+
+
+def _linear(values: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:
+    before = np.minimum(places.astype(np.intp), len(values) - 1)
+    after = np.minimum(before + 1, len(values) - 1)
+    share = (places - before)[:, np.newaxis]
+    between: NDArray[np.float64] = (1 - share) * values[before] + share * values[after]
+    return between
+
+
+def _cubic(
+    values: NDArray[np.float64], slopes: NDArray[np.float64], places: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    if len(values) < 2:
+        return values[: len(places)]
+    curve: NDArray[np.float64] = CubicHermiteSpline(np.arange(len(values)), values, slopes)(places)
+    return curve
+
+
+def _without_flips(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The same orientations, each as that of its two quaternions which is near the one before."""
+    turns = np.sum(quaternions[1:] * quaternions[:-1], axis=1) < 0
+    signs = np.where(np.cumsum(turns) % 2, -1.0, 1.0)
+    return np.vstack([quaternions[:1], quaternions[1:] * signs[:, np.newaxis]])

@@ -1,0 +1,101 @@
+"""What is known of a throw over time, and the unit of every column: one description for all formats."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from throwcollect.robots.talos import JOINTS
+
+_SUFFIXES = {
+    "_kgpm3": "kg/m^3",
+    "_per_s": "1/s",
+    "_radps2": "rad/s^2",
+    "_radps": "rad/s",
+    "_mps2": "m/s^2",
+    "_mps": "m/s",
+    "_rad": "rad",
+    "_kg": "kg",
+    "_nm": "N m",
+    "_hz": "Hz",
+    "_m": "m",
+    "_s": "s",
+}
+_ANGLES = ("task.start.", "task.end.", "robot.posture.", "task.trajectory.weights.")
+
+
+def unit_of(column: str) -> str:
+    """Unit of a column of numbers by its name; ``1`` for counts, shares and ratios.
+
+    Args:
+        column: Name of a column or a dotted configuration key.
+    """
+    if column.startswith(_ANGLES):
+        return "rad"
+    return next((unit for suffix, unit in _SUFFIXES.items() if column.endswith(suffix)), "1")
+
+
+@dataclass(frozen=True)
+class Signal:
+    """One quantity over time.
+
+    Attributes:
+        name: Name of the array ``(n_samples, n_components)``, or ``(n_samples,)`` without components.
+        description: What it is.
+        components: Name of each component as a column of its own; empty for a scalar.
+        each: The components in words.
+        pattern: The names of their columns in short.
+    """
+
+    name: str
+    description: str
+    components: tuple[str, ...] = ()
+    each: str = ""
+    pattern: str = ""
+
+    @property
+    def unit(self) -> str:
+        """Unit of all its components."""
+        return unit_of(self.name)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Shape of one sample."""
+        return (len(self.components),) if self.components else ()
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of its columns in a table."""
+        return self.components or (self.name,)
+
+
+def signals_of(moving: Sequence[str]) -> tuple[Signal, ...]:
+    """All signals of an exported throw.
+
+    Args:
+        moving: Joints that the task moves.
+    """
+    every = f"{len(JOINTS)} joints"
+    return (
+        Signal("time_s", "Time since the start of the trial.", pattern="time_s"),
+        _joints("joint_position_rad", "Measured joint positions.", JOINTS, every),
+        _joints("joint_velocity_radps", "Measured joint velocities.", JOINTS, every),
+        _joints("joint_effort_nm", "Torques of the motors; 0 for locked joints.", JOINTS, every),
+        _joints("command_position_rad", "Commanded positions, on the trajectory that controllers were sent.", moving),
+        _joints("command_velocity_radps", "Commanded velocities.", moving),
+        _joints("command_acceleration_radps2", "Commanded accelerations.", moving),
+        _ball("ball_position_m", "Ball centre in world.", "", "xyz", "_m"),
+        _ball("ball_orientation_xyzw", "Unit quaternion, ball to world.", "q", "xyzw", ""),
+        _ball("ball_velocity_mps", "Velocity of the ball in world.", "v", "xyz", "_mps"),
+        _ball("ball_angular_velocity_radps", "Angular velocity of the ball in world.", "w", "xyz", "_radps"),
+    )
+
+
+def _joints(name: str, description: str, joints: Sequence[str], each: str = "moving joints") -> Signal:
+    ending = name.removeprefix("joint_")
+    return Signal(name, description, tuple(f"{joint}_{ending}" for joint in joints), each, f"<joint>_{ending}")
+
+
+def _ball(name: str, description: str, prefix: str, axes: str, unit: str) -> Signal:
+    components = tuple(f"ball_{prefix}{axis}{unit}" for axis in axes)
+    return Signal(name, description, components, ", ".join(axes), ", ".join(components))
