@@ -1,0 +1,51 @@
+"""`throwcollect dataset view`: throws for Foxglove, Rerun and RViz."""
+
+from __future__ import annotations
+
+import json as jsonlib
+import re
+from pathlib import Path
+
+import typer
+
+from throwcollect.dataset.viewer.view import view
+from throwcollect.errors import ConfigError
+
+
+def write_view(directory: Path, output: Path, *, trials: str | None, json: bool) -> None:
+    """Make throws ready for viewers and print what was written.
+
+    Raises:
+        ConfigError: If the choice of trials is wrong, or the output cannot be used.
+        DatasetError: If the dataset is damaged, a trial has no episode, or the output cannot be written.
+    """
+    written = view(directory, output, None if trials is None else numbers(trials))
+    if json:
+        typer.echo(jsonlib.dumps(written.as_dict(), indent=2))
+        return
+    typer.echo(
+        f"{written.recording}: {written.throws} throw{'s' * (written.throws != 1)}, {written.duration_s:.0f} s, "
+        f"{written.recording_bytes / 1e6:.1f} MB; meshes beside it: {written.mesh_bytes / 1e6:.1f} MB\n"
+        f"Foxglove  open {written.recording.name}, then import the layout {written.layout}\n"
+        f"Rerun     ROS_PACKAGE_PATH={output.absolute()} rerun {written.recording}"
+    )
+
+
+def numbers(text: str) -> list[int]:
+    """Numbers of trials such as ``3,5,7-9``, in the order in which they are given.
+
+    Raises:
+        ConfigError: If the text is something else, or names a trial twice.
+    """
+    chosen: list[int] = []
+    for part in text.split(","):
+        found = re.fullmatch(r"\s*([0-9]{1,7})\s*(?:-\s*([0-9]{1,7})\s*)?", part)
+        if found is None:
+            raise ConfigError(f"--trials: {part!r} is no trial", expected="numbers and ranges such as 3,5,7-9")
+        first, last = int(found[1]), int(found[2] or found[1])
+        if last < first:
+            raise ConfigError(f"--trials: {part!r} runs backwards", expected=f"{last}-{first}")
+        chosen += range(first, last + 1)
+    if len(set(chosen)) < len(chosen):
+        raise ConfigError(f"--trials: {text!r} names a trial twice", expected="each trial once")
+    return chosen

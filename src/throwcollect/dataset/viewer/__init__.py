@@ -1,0 +1,1 @@
+"""A dataset made ready for Foxglove, Rerun and RViz: frames, meshes and markers beside what was recorded."""

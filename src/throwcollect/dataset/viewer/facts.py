@@ -1,0 +1,41 @@
+"""What the table of throws says of the throw that is shown."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from throwcollect.dataset.throws import Row
+from throwcollect.interfaces import get_message
+from throwcollect.tasks.outcome import Outcome
+
+NAME = "throw"
+HARDWARE = "throwcollect"
+"""By these two names a viewer chooses the status to show."""
+
+
+def throw_facts(row: Row, stamp_ns: int) -> Any:
+    """A row of the table of throws, without the columns that are null.
+
+    Args:
+        row: The row.
+        stamp_ns: Stamp of the message [ns].
+
+    Returns:
+        A diagnostic_msgs/DiagnosticArray with one status: OK if the throw landed, else a warning.
+    """
+    status, pair = (get_message(f"diagnostic_msgs/msg/{name}") for name in ("DiagnosticStatus", "KeyValue"))
+    sec, nanosec = divmod(stamp_ns, 1_000_000_000)
+    stamp = get_message("builtin_interfaces/msg/Time")(sec=sec, nanosec=nanosec)
+    shown = status(
+        level=status.OK if row["outcome"] == Outcome.LANDED else status.WARN,
+        name=NAME,
+        hardware_id=HARDWARE,
+        message=": ".join(part for part in (f"trial {row['trial']} {row['outcome']}", row["reason"]) if part),
+        values=[pair(key=key, value=_text(value)) for key, value in row.items() if value is not None],
+    )
+    header = get_message("std_msgs/msg/Header")(stamp=stamp)
+    return get_message("diagnostic_msgs/msg/DiagnosticArray")(header=header, status=[shown])
+
+
+def _text(value: object) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

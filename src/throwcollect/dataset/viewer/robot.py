@@ -1,0 +1,167 @@
+"""What viewers draw of robot and ball: URDF texts without collision shapes, their shapes, and the files of meshes."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from scipy.spatial.transform import Rotation
+
+from throwcollect.config.schema import BallConfig
+from throwcollect.dataset.files import unwritable
+from throwcollect.episode.topics import BALL
+from throwcollect.errors import DatasetError
+from throwcollect.robots.description import SPOON
+from throwcollect.robots.model import share_directory
+
+Rgba = tuple[float, float, float, float]
+
+BALL_RGBA: Rgba = (1.0, 0.45, 0.0, 1.0)
+"""Colour of the ball."""
+
+_SPOON_RGBA: Rgba = (0.55, 0.35, 0.2, 1.0)
+_DEFAULT_RGBA: Rgba = (1.0, 1.0, 1.0, 1.0)
+_PACKAGE = "package://"
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A shape of a link.
+
+    Attributes:
+        link: The link, whose frame it moves with.
+        position: Its origin in that frame [m].
+        rotation_xyzw: Unit quaternion, shape to frame.
+        size: Edge lengths of a box or of the box around a cylinder along z [m]; scale of a mesh.
+        kind: ``box``, ``cylinder`` or ``mesh``.
+        mesh: Path of the mesh's file, relative to the directory that holds its package; empty if it is none.
+        rgba: Its colour.
+    """
+
+    link: str
+    position: tuple[float, ...]
+    rotation_xyzw: tuple[float, ...]
+    size: tuple[float, ...]
+    kind: str
+    mesh: str
+    rgba: Rgba
+
+
+@dataclass(frozen=True)
+class DrawnRobot:
+    """The robot as viewers draw it.
+
+    Attributes:
+        urdf: URDF text without collision shapes; meshes are ``package://`` URLs.
+        shapes: The same shapes.
+    """
+
+    urdf: str
+    shapes: tuple[Shape, ...]
+
+    @property
+    def meshes(self) -> list[str]:
+        """Paths of the mesh files, each once."""
+        return sorted({shape.mesh for shape in self.shapes if shape.mesh})
+
+    def copy_package(self, directory: Path) -> None:
+        """Put the meshes into a directory, with a ``package.xml`` by which they are found.
+
+        Raises:
+            DatasetError: If a file cannot be copied.
+        """
+        for mesh in self.meshes:
+            target = directory / mesh
+            try:
+                target.parent.mkdir(parents=True, exist_ok=True)
+                shutil.copyfile(share_directory() / mesh, target)
+            except OSError as error:
+                raise unwritable(target, error) from error
+        for package in sorted({mesh.split("/", 1)[0] for mesh in self.meshes}):
+            path = Path(package, "package.xml")
+            try:
+                text = (share_directory() / path).read_text(encoding="utf-8")
+                # Foxglove searches for the name that a package gives itself, which in URLs is that of its directory.
+                renamed = re.sub(r"<name>[^<]*</name>", f"<name>{package}</name>", text, count=1)
+                (directory / path).write_text(renamed, encoding="utf-8")
+            except OSError as error:
+                raise unwritable(directory / path, error) from error
+
+
+def drawn_robot(description: str) -> DrawnRobot:
+    """The robot as viewers draw it.
+
+    Args:
+        description: URDF text of the robot, as in the dataset.
+
+    Raises:
+        DatasetError: If the text is not a URDF that can be drawn.
+    """
+    try:
+        robot = ElementTree.fromstring(description)  # noqa: S314 - the dataset's own description
+        for link in robot.iter("link"):
+            for shape in link.findall("collision"):
+                link.remove(shape)
+            if link.get("name") == SPOON:
+                for shape in link.findall("visual"):
+                    shape.append(_material("spoon", _SPOON_RGBA))
+        colors = {name: rgba for material in robot.iter("material") for name, rgba in _color(material).items()}
+        shapes = tuple(
+            _shape(link.attrib["name"], visual, colors) for link in robot.iter("link") for visual in link.iter("visual")
+        )
+    except (ElementTree.ParseError, AttributeError, KeyError, ValueError) as error:
+        raise DatasetError(f"robot description: cannot be drawn: {error}") from error
+    return DrawnRobot(ElementTree.tostring(robot, encoding="unicode"), shapes)
+
+
+def ball_urdf(ball: BallConfig) -> str:
+    """URDF text of the ball, whose only link is its frame."""
+    robot = ElementTree.Element("robot", name=BALL)
+    shape = ElementTree.SubElement(ElementTree.SubElement(robot, "link", name=BALL), "visual")
+    geometry = ElementTree.SubElement(shape, "geometry")
+    ElementTree.SubElement(geometry, "sphere", radius=repr(ball.radius_m))
+    shape.append(_material(BALL, BALL_RGBA))
+    return ElementTree.tostring(robot, encoding="unicode")
+
+
+def _material(name: str, rgba: Rgba) -> ElementTree.Element:
+    material = ElementTree.Element("material", name=name)
+    ElementTree.SubElement(material, "color", rgba=" ".join(map(repr, rgba)))
+    return material
+
+
+def _color(material: ElementTree.Element) -> dict[str, Rgba]:
+    """The colour that a material's name stands for, if it says so."""
+    color = material.find("color")
+    if color is None:
+        return {}
+    r, g, b, a = _numbers(color.attrib["rgba"])
+    return {material.get("name", ""): (r, g, b, a)}
+
+
+def _shape(link: str, visual: ElementTree.Element, colors: Mapping[str, Rgba]) -> Shape:
+    origin, material = visual.find("origin"), visual.find("material")
+    xyz, rpy = (_numbers("0 0 0" if origin is None else origin.get(key, "0 0 0")) for key in ("xyz", "rpy"))
+    (geometry,) = visual.findall("geometry/*")
+    mesh = ""
+    if geometry.tag == "mesh":
+        size = _numbers(geometry.get("scale", "1 1 1"))
+        mesh = geometry.attrib["filename"].removeprefix(_PACKAGE)
+    elif geometry.tag == "box":
+        size = _numbers(geometry.attrib["size"])
+    elif geometry.tag == "cylinder":
+        diameter = 2 * float(geometry.attrib["radius"])
+        size = (diameter, diameter, float(geometry.attrib["length"]))
+    else:
+        raise ValueError(f"link {link} has a {geometry.tag}")
+    rotation = tuple(Rotation.from_euler("xyz", rpy).as_quat().tolist())
+    rgba = _DEFAULT_RGBA if material is None else colors.get(material.get("name", ""), _DEFAULT_RGBA)
+    return Shape(link, xyz, rotation, size, geometry.tag, mesh, rgba)
+
+
+def _numbers(text: str) -> tuple[float, ...]:
+    return tuple(map(float, text.split()))

@@ -1,0 +1,67 @@
+"""The command that makes throws ready for viewers, as `docs/viewing.md` shows it."""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+from tests.unit.dataset.conftest import Collection
+from typer.testing import CliRunner
+
+from throwcollect.cli.dataset_view import numbers
+from throwcollect.cli.main import app
+from throwcollect.errors import ConfigError
+
+PAGE = Path(__file__).parents[3] / "docs" / "viewing.md"
+
+
+def test_trials_are_numbers_and_ranges_in_the_order_given() -> None:
+    assert numbers("7-9, 3,5-5") == [7, 8, 9, 3, 5]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "'' is no trial"),
+        ("3,", "'' is no trial"),
+        ("3;4", "'3;4' is no trial"),
+        ("-1", "'-1' is no trial"),
+        ("1-99999999999", "'1-99999999999' is no trial"),
+        ("9-7", "'9-7' runs backwards"),
+        ("3,1-4", "'3,1-4' names a trial twice"),
+    ],
+)
+def test_anything_else_is_refused(text: str, message: str) -> None:
+    with pytest.raises(ConfigError, match=f"--trials: {re.escape(message)}"):
+        numbers(text)
+
+
+def test_the_page_says_what_the_command_writes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    page = PAGE.read_text(encoding="utf-8")
+    (command,) = re.findall(r"^throwcollect (dataset view .*)$", page, re.MULTILINE)
+    monkeypatch.chdir(tmp_path)
+    Collection().collect(tmp_path / "datasets" / "quick")
+    result = CliRunner().invoke(app, [*shlex.split(command), "--json"], catch_exceptions=False)
+    assert result.exit_code == 0
+    found = json.loads(result.stdout)
+    assert (found["throws"], found["recording"]) == (4, "views/quick/throws.mcap")
+    written = {entry.name + "/" * entry.is_dir() for entry in Path("views/quick").iterdir()}
+    listed = re.findall(r"^\| `([\w.-]+/?)` \|", page, re.MULTILINE)
+    assert written == set(listed)
+    assert f"STL, {found['mesh_bytes'] / 1e6:.1f} MB" in page
+    topics = {
+        topic for cell in re.findall(r"^\| (`/.*?) \|", page, re.MULTILINE) for topic in re.findall("`(.*?)`", cell)
+    }
+    recorded = Path("views/quick/metadata.yaml").read_text(encoding="utf-8")
+    assert topics == set(re.findall(r"name: (/.*)", recorded))
+
+
+def test_the_command_says_what_to_do_next(tmp_path: Path) -> None:
+    Collection({"trials": 1}).collect(tmp_path / "quick")
+    output = tmp_path / "view"
+    result = CliRunner().invoke(app, ["dataset", "view", str(tmp_path / "quick"), str(output)], catch_exceptions=False)
+    assert result.stdout.startswith(f"{output}/throws.mcap: 1 throw, ")
+    assert f"ROS_PACKAGE_PATH={output} rerun {output}/throws.mcap" in result.stdout
