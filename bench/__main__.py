@@ -11,7 +11,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from bench import collection, containers, intake, raw, soak
+from bench import collection, containers, intake, raw, reading, soak
 from throwcollect.config.loader import load
 from throwcollect.sweep.plan import make_plan
 
@@ -47,6 +47,9 @@ def main() -> None:
         report["soak"] = [asdict(look) for look in looks]
         soak.show(looks)
         episodes = [intake.measure(Path(scratch) / "1-0") for _ in range(arguments.rounds)]
+        read = reading.measure(Path(scratch) / "1-0", rounds=arguments.rounds)
+        report["reading"] = asdict(read)
+        reading.show(read)
     report["intake_episodes_per_s"] = [rate for rate, _ in episodes]
     report["intake_raw_episodes_per_s"] = [limit for _, limit in episodes]
     rate, share = (statistics.median(values) for values in zip(*((r, r / limit) for r, limit in episodes), strict=True))

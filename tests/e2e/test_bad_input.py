@@ -267,6 +267,10 @@ def test_a_full_disk(moment: str, small: Path, tmp_path: Path, dataset: tuple[Pa
     left = {path.name for path in (tmp_path / "data").glob("*.mcap*")}
     assert left == (set() if moment == "plan" else {"small_00000.mcap.part"})
     assert (tmp_path / "data").exists() == (moment != "plan")
+    if moment != "plan":
+        resumed = call("resume", tmp_path / "data", "-n", "1", "--json")
+        assert resumed.returncode == 0, resumed.stderr
+        assert json.loads(resumed.stdout)["digest"] == dataset[1]["digest"]
 
 
 def test_directories_that_are_no_whole_dataset(

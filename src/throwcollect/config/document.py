@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ from throwcollect.errors import ConfigError, Problem
 
 _TAG = "tag:yaml.org,2002:"
 _MOST_BYTES = 5_000_000
-_MOST_VALUES = 1_000_000
+_MOST_VALUES = 100_000
 _SWEPT = ("sweep", "parameters")
 _SWEPT_FIELDS = ("min", "max", "scale", "count", "values")
 
@@ -196,7 +197,7 @@ def _scalar(node: Node) -> Any:
         ValueError: If it cannot be read as what its tag says.
     """
     constructor = _constructor()
-    readers = {
+    readers: dict[str, Callable[[ScalarNode], Any]] = {
         "null": lambda _: None,
         "bool": constructor.construct_yaml_bool,
         "int": constructor.construct_yaml_int,

@@ -8,14 +8,22 @@ from __future__ import annotations
 import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from ruamel.yaml import YAML
+from ruamel.yaml.composer import Composer, ComposerError
+from ruamel.yaml.error import YAMLError
+from ruamel.yaml.events import AliasEvent
 
+from throwcollect.dataset.directory import FORMAT
+from throwcollect.dataset.files import read_text
 from throwcollect.episode.channels import Channel
+from throwcollect.errors import DatasetError
 from throwcollect.interfaces import type_hash
 
 VERSION = 9
+_MOST_BYTES = 10_000_000
 _ROS_DISTRO = "jazzy"
 """Release whose interface definitions the messages follow."""
 
@@ -88,6 +96,46 @@ def bag_information(
         "custom_data": dict(custom_data),
         "ros_distro": _ROS_DISTRO,
     }
+
+
+def dataset_metadata(files: Sequence[FileSummary], channels: Sequence[Channel], digest: str) -> str:
+    """Text of a dataset's ``metadata.yaml``.
+
+    Args:
+        files: Its MCAP files, in order.
+        channels: All channels.
+        digest: Hash over all episodes.
+    """
+    custom = {"throwcollect.format": FORMAT, "throwcollect.digest": digest}
+    return to_yaml({"rosbag2_bagfile_information": bag_information(files, channels, custom)})
+
+
+class _PlainComposer(Composer):
+    """Refuses what makes a short text as large as it likes, or what is no plain value."""
+
+    def compose_node(self, parent: Any, index: Any) -> Any:
+        event = self.parser.peek_event()
+        if isinstance(event, AliasEvent) or getattr(event, "tag", None):
+            raise ComposerError(problem="an alias or a tag", problem_mark=event.start_mark)
+        return super().compose_node(parent, index)
+
+
+def from_yaml(path: Path) -> Mapping[str, Any]:
+    """Keys and values of a YAML file such as `to_yaml` makes them: without anchors and tags.
+
+    Raises:
+        DatasetError: If the file cannot be read, is no such YAML, or is larger than any bag's metadata.
+    """
+    yaml = YAML(typ="safe", pure=True)
+    yaml.Composer = _PlainComposer
+    text = read_text(path, most_bytes=_MOST_BYTES)
+    try:
+        document = yaml.load(text)
+    except RecursionError as error:
+        raise DatasetError(f"{path}: cannot be read: values are nested too deeply") from error
+    except (YAMLError, ValueError) as error:
+        raise DatasetError(f"{path}: cannot be read: {error}") from error
+    return document if isinstance(document, dict) else {}
 
 
 def to_yaml(data: Mapping[str, Any]) -> str:

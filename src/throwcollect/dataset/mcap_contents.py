@@ -50,7 +50,7 @@ class FileContents:
         channels: Channel records of the file.
     """
 
-    def __init__(self, schemas: Sequence[records.Schema], channels: Sequence[records.Channel]) -> None:
+    def __init__(self, schemas: list[records.Schema], channels: list[records.Channel]) -> None:
         self.schemas = schemas
         self.channels = channels
         self._chunk_indexes: list[records.ChunkIndex] = []
@@ -67,7 +67,8 @@ class FileContents:
         """
         offsets = {channel: start + offset for channel, offset in index.message_index_offsets.items()}
         self._chunk_indexes.append(replace(index, chunk_start_offset=start, message_index_offsets=offsets))
-        self._counts.update(dict.fromkeys(offsets, messages))
+        for channel in offsets:
+            self._counts[channel] += messages
 
     def add_metadata(self, name: str, start: int, length: int) -> None:
         """Count a Metadata record."""

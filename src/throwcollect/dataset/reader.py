@@ -9,15 +9,13 @@ from typing import Any
 
 import pyarrow as pa
 import pyarrow.compute as pc
-import pyarrow.parquet as pq
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
 
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
+from throwcollect.dataset.bag import from_yaml
 from throwcollect.dataset.directory import CONFIG, METADATA, PLAN, THROWS
 from throwcollect.dataset.mcap_reader import opened
-from throwcollect.dataset.throws import ThrowsTable
+from throwcollect.dataset.throws import read_throws_table
 from throwcollect.episode.message import Episode
 from throwcollect.errors import DatasetError
 from throwcollect.sweep.plan import Plan
@@ -105,15 +103,11 @@ def read_bag_metadata(directory: Path) -> Mapping[str, Any]:
         DatasetError: If the directory holds no dataset or an unfinished one, or ``metadata.yaml`` is damaged.
     """
     path = directory / METADATA
-    try:
-        document = YAML(typ="safe").load(path.read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
+    if not path.exists():
         if (directory / PLAN).is_file():
-            raise DatasetError(f"{directory}: the dataset is not finished: it has no {METADATA}") from error
-        raise DatasetError(f"{directory}: holds no dataset") from error
-    except (OSError, UnicodeDecodeError, YAMLError) as error:
-        raise DatasetError(f"{path}: cannot be read: {error}") from error
-    bag = document.get("rosbag2_bagfile_information") if isinstance(document, dict) else None
+            raise DatasetError(f"{directory}: the dataset is not finished: it has no {METADATA}")
+        raise DatasetError(f"{directory}: holds no dataset")
+    bag = from_yaml(path).get("rosbag2_bagfile_information")
     if not isinstance(bag, dict):
         raise DatasetError(f"{path}: not the metadata of a rosbag2 bag")
     return bag
@@ -126,16 +120,7 @@ def read_throws(directory: Path, plan: Plan) -> pa.Table:
         DatasetError: If the table is missing or damaged, or is not one of this plan.
     """
     path = directory / THROWS
-    try:
-        table = pq.read_table(path, page_checksum_verification=True)
-    except FileNotFoundError as error:
-        raise DatasetError(f"{path}: is missing") from error
-    except (OSError, pa.ArrowException) as error:
-        raise DatasetError(f"{path}: is damaged: {error}") from error
-    schema = ThrowsTable(plan.keys, tuple(plan.config.task.end)).schema
-    if not table.schema.equals(schema):
-        wrong = sorted(set(table.schema.names) ^ set(schema.names)) or "types of columns"
-        raise DatasetError(f"{path}: not the table of this plan: differs in {wrong}")
+    table = read_throws_table(path, plan)
     if table["trial"].to_pylist() != [trial.number for trial in plan.trials]:
         raise DatasetError(f"{path}: its rows are not the {len(plan.trials)} trials of the plan in order")
     return table

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from throwcollect.tasks.throw import BallState, Outcome, Peak, ThrowResult
+from throwcollect.errors import DatasetError
+from throwcollect.sweep.parquet import read_parquet
+from throwcollect.sweep.plan import Plan
+from throwcollect.tasks.throw import Outcome, ThrowResult
 
 REFUSED = "refused"
 """Outcome of a trial that the plan refused; all others are those of `Outcome`."""
@@ -35,103 +39,65 @@ class Place:
     digest: str
 
 
-@dataclass(frozen=True)
-class _Column:
-    name: str
-    type: pa.DataType
-    description: str
-    read: Callable[[ThrowResult], object]
+def _field(name: str, kind: pa.DataType, description: str) -> pa.Field:
+    return pa.field(name, kind, metadata={"description": description})
 
 
-def _component(read: Callable[[ThrowResult], BallState | None], axis: int, *, velocity: bool) -> Callable[..., object]:
-    def component(result: ThrowResult) -> float | None:
-        state = read(result)
-        if state is None:
-            return None
-        return (state.velocity if velocity else state.position)[axis]
-
-    return component
+def _number(name: str, description: str) -> pa.Field:
+    return _field(name, pa.float64(), description)
 
 
-def _state_columns(name: str, when: str, read: Callable[[ThrowResult], BallState | None]) -> list[_Column]:
-    def time(result: ThrowResult) -> float | None:
-        state = read(result)
-        return None if state is None else state.time_s
-
-    columns = [_Column(f"{name}_time_s", pa.float64(), f"Time since the start of the trial {when} [s].", time)]
-    for axis, letter in enumerate("xyz"):
-        text = f"Ball centre in world {when}, {letter} [m]."
-        columns.append(_Column(f"{name}_{letter}_m", pa.float64(), text, _component(read, axis, velocity=False)))
-    for axis, letter in enumerate("xyz"):
-        text = f"Velocity of the ball in world {when}, {letter} [m/s]."
-        columns.append(_Column(f"{name}_v{letter}_mps", pa.float64(), text, _component(read, axis, velocity=True)))
-    return columns
-
-
-def _peak_columns(name: str, of: str, read: Callable[[ThrowResult], Peak | None]) -> list[_Column]:
-    def share(result: ThrowResult) -> float | None:
-        peak = read(result)
-        return None if peak is None else peak.share
-
-    def joint(result: ThrowResult) -> str | None:
-        peak = read(result)
-        return None if peak is None else peak.joint
-
+def _state_fields(name: str, when: str) -> list[pa.Field]:
     return [
-        _Column(f"{name}_peak_share", pa.float64(), f"{of} [-]; 1 is at the limit.", share),
-        _Column(f"{name}_peak_joint", pa.string(), f"Joint that had {name}_peak_share.", joint),
+        _number(f"{name}_time_s", f"Time since the start of the trial {when} [s]."),
+        *(_number(f"{name}_{axis}_m", f"Ball centre in world {when}, {axis} [m].") for axis in "xyz"),
+        *(_number(f"{name}_v{axis}_mps", f"Velocity of the ball in world {when}, {axis} [m/s].") for axis in "xyz"),
     ]
 
 
-def _result_columns(joints: Sequence[str]) -> list[_Column]:
-    number = pa.float64()
+def _peak_fields(name: str, of: str) -> list[pa.Field]:
     return [
-        *_state_columns("release", "when it left the spoon", lambda result: result.release),
-        *_state_columns("apex", "at the highest point of its flight", lambda result: result.apex),
-        *_state_columns("landing", "when it crossed the landing plane", lambda result: result.landing),
-        _Column("release_speed_mps", number, "Speed at release [m/s].", lambda result: result.release_speed_mps),
-        _Column(
-            "release_elevation_rad",
-            number,
-            "Direction of flight at release above the horizontal [rad].",
-            lambda result: result.release_elevation_rad,
-        ),
-        _Column("flight_time_s", number, "From release to landing [s].", lambda result: result.flight_time_s),
-        _Column(
-            "hit_angle_rad",
-            number,
-            "Direction of flight at landing below the horizontal [rad].",
-            lambda result: result.hit_angle_rad,
-        ),
-        _Column(
-            "recontacts",
-            pa.int64(),
-            "Contacts with spoon or robot between release and landing.",
-            lambda result: result.recontacts,
-        ),
-        *_peak_columns(
-            "position",
-            "Largest distance of a moving joint from the middle of its range over half the range",
-            lambda result: result.position_peak,
-        ),
-        *_peak_columns("velocity", "Largest speed of a joint over its limit", lambda result: result.velocity_peak),
-        *_peak_columns("effort", "Largest torque of a joint over its limit", lambda result: result.effort_peak),
-        _Column(
-            "effort_saturated_share",
-            number,
-            "Share of samples in which some joint's torque is at its limit [-].",
-            lambda result: result.effort_saturated_share,
-        ),
-        *(_tracking_column(joint) for joint in joints),
+        _number(f"{name}_peak_share", f"{of} [-]; 1 is at the limit."),
+        _field(f"{name}_peak_joint", pa.string(), f"Joint that had {name}_peak_share."),
     ]
 
 
-def _tracking_column(joint: str) -> _Column:
-    def error(result: ThrowResult) -> float | None:
-        return None if result.tracking_error_rad is None else result.tracking_error_rad.get(joint)
+def _result_fields(joints: Sequence[str]) -> list[pa.Field]:
+    range_share = "Largest distance of a moving joint from the middle of its range over half the range"
+    return [
+        *_state_fields("release", "when it left the spoon"),
+        *_state_fields("apex", "at the highest point of its flight"),
+        *_state_fields("landing", "when it crossed the landing plane"),
+        _number("release_speed_mps", "Speed at release [m/s]."),
+        _number("release_elevation_rad", "Direction of flight at release above the horizontal [rad]."),
+        _number("flight_time_s", "From release to landing [s]."),
+        _number("hit_angle_rad", "Direction of flight at landing below the horizontal [rad]."),
+        _field("recontacts", pa.int64(), "Contacts with spoon or robot between release and landing."),
+        *_peak_fields("position", range_share),
+        *_peak_fields("velocity", "Largest speed of a joint over its limit"),
+        *_peak_fields("effort", "Largest torque of a joint over its limit"),
+        _number("effort_saturated_share", "Share of samples in which some joint's torque is at its limit [-]."),
+        *(
+            _number(f"{joint}_tracking_error_rad", f"Largest distance of {joint} from its commanded trajectory [rad].")
+            for joint in joints
+        ),
+    ]
 
-    text = f"Largest distance of {joint} from its commanded trajectory [rad]."
-    return _Column(f"{joint}_tracking_error_rad", pa.float64(), text, error)
+
+def _result_values(result: ThrowResult, joints: Sequence[str]) -> Iterator[object]:
+    """Values of `_result_fields`, in their order."""
+    for state in (result.release, result.apex, result.landing):
+        yield from (None,) * 7 if state is None else (state.time_s, *state.position, *state.velocity)
+    yield result.release_speed_mps
+    yield result.release_elevation_rad
+    yield result.flight_time_s
+    yield result.hit_angle_rad
+    yield result.recontacts
+    for peak in (result.position_peak, result.velocity_peak, result.effort_peak):
+        yield from (None, None) if peak is None else (peak.share, peak.joint)
+    yield result.effort_saturated_share
+    errors = result.tracking_error_rad or {}
+    yield from map(errors.get, joints)
 
 
 class ThrowsTable:
@@ -147,14 +113,16 @@ class ThrowsTable:
 
     def __init__(self, parameters: Sequence[str], joints: Sequence[str]) -> None:
         self._parameters = tuple(parameters)
-        self._columns = _result_columns(joints)
+        self._joints = tuple(joints)
+        fields = _result_fields(joints)
+        self._names = [field.name for field in fields]
         self.schema = pa.schema(
             [
                 _field("trial", pa.int64(), "Number of the trial."),
-                *(_field(key, pa.float64(), f"Swept value of {key}.") for key in parameters),
+                *(_number(key, f"Swept value of {key}.") for key in parameters),
                 _field("outcome", pa.string(), f"{', '.join(outcome.value for outcome in Outcome)} or {REFUSED}."),
                 _field("reason", pa.string(), "Why the throw did not simply land; null if it did."),
-                *(_field(column.name, column.type, column.description) for column in self._columns),
+                *fields,
                 _field("shard", pa.string(), "MCAP file that holds the episode; null when there is none."),
                 _field("chunk_offset", pa.int64(), "Where the episode's chunk begins in that file [bytes]."),
                 _field("samples", pa.int64(), "Number of samples of the episode."),
@@ -172,8 +140,7 @@ class ThrowsTable:
             place: Where its episode lies; None if there is none.
         """
         row = self._known(trial, values, result.outcome.value, result.reason)
-        for column in self._columns:
-            row[column.name] = column.read(result)
+        row.update(zip(self._names, _result_values(result, self._joints), strict=True))
         if place is not None:
             row.update(vars(place))
         return row
@@ -190,12 +157,26 @@ class ThrowsTable:
         return pa.Table.from_pylist(list(rows), schema=self.schema)
 
 
+def read_throws_table(path: Path, plan: Plan) -> pa.Table:
+    """A table of throws, whatever trials its rows are of.
+
+    Args:
+        path: The file.
+        plan: Its trials; they say which columns there are.
+
+    Raises:
+        DatasetError: If the table is missing or damaged, or has other columns.
+    """
+    table = read_parquet(path)
+    schema = ThrowsTable(plan.keys, tuple(plan.config.task.end)).schema
+    if not table.schema.equals(schema):
+        wrong = sorted(set(table.schema.names) ^ set(schema.names)) or "types of columns"
+        raise DatasetError(f"{path}: not the table of this plan: differs in {wrong}")
+    return table
+
+
 def encode_table(table: pa.Table) -> bytes:
     """Parquet bytes of a table; equal tables give equal bytes."""
     buffer = io.BytesIO()
     pq.write_table(table.combine_chunks(), buffer, compression="zstd", write_page_checksum=True)
     return buffer.getvalue()
-
-
-def _field(name: str, kind: pa.DataType, description: str) -> pa.Field:
-    return pa.field(name, kind, metadata={"description": description})

@@ -1,35 +1,39 @@
-"""Checks a finished dataset: every file against the others, against itself, and against physics."""
+"""Checks a finished dataset: every file against the others, against itself, and against physics.
+
+What cannot be read is reported, and everything that does not depend on it is checked all the same.
+"""
 
 from __future__ import annotations
 
+import reprlib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from throwcollect.config.loader import load
-from throwcollect.dataset.bag import bag_information
-from throwcollect.dataset.digest import combined_digest
-from throwcollect.dataset.directory import CARD, CONFIG, FORMAT, METADATA, PLAN, THROWS, shard_name
+from throwcollect.dataset.bag import FileSummary, bag_information
+from throwcollect.dataset.digest import combined_digest, is_digest
+from throwcollect.dataset.directory import CARD, FORMAT, METADATA, SHARD_SUFFIX, THROWS
 from throwcollect.dataset.findings import Finding
-from throwcollect.dataset.reader import read_bag_metadata, read_throws
-from throwcollect.dataset.throws import REFUSED
+from throwcollect.dataset.reader import read_bag_metadata
 from throwcollect.dataset.verify_episode import EpisodeCheck
 from throwcollect.dataset.verify_shard import ShardCheck
-from throwcollect.errors import ThrowcollectError
-from throwcollect.sweep.plan import Plan
-from throwcollect.tasks.throw import Outcome
+from throwcollect.dataset.verify_tables import Tables, check_tables, shard_of
+from throwcollect.errors import DatasetError
 
-_WITHOUT_EPISODE = (REFUSED, Outcome.LOST.value)
-
-Rows = list[dict[str, Any]]
+_UNFINISHED = (".part", ".new")
+_short = reprlib.Repr()
+"""Values from a file may be as large and as deep as they like."""
+_short.maxstring = _short.maxother = 120
+_short.maxlevel = _short.maxdict = _short.maxlist = 3
 
 
 def verify(directory: Path) -> list[Finding]:
     """Check a dataset.
 
-    Checked are: the bag's metadata against the files; of each file every record, index, count and CRC, the latched
-    topics and the order of trials; of each episode its digest, layout, stamps, and flight, which must be ballistic;
-    the table of throws against the episodes, which are judged again, and against the plan; and the dataset's digest.
+    Checked are: the configuration and the plan against each other; the bag's metadata against the files; of each file
+    every record, index, count and CRC, the latched topics and the order of trials; of each episode its digest, layout,
+    stamps, and flight, which must be ballistic; the table of throws against the episodes, which are judged again, and
+    against the plan; and the dataset's digest.
 
     Args:
         directory: Its directory.
@@ -40,92 +44,107 @@ def verify(directory: Path) -> list[Finding]:
     Raises:
         DatasetError: If the directory holds no finished dataset.
     """
-    bag = read_bag_metadata(directory)
-    place = CONFIG
+    bag, findings = None, []
     try:
-        config = load(directory / CONFIG)
-        place = PLAN
-        plan = Plan.read(directory / PLAN, config)
-        place = THROWS
-        rows: Rows = read_throws(directory, plan).to_pylist()
-    except ThrowcollectError as error:
-        return [Finding(place, "", str(error).removeprefix(f"{directory / place}: "))]
-    findings = [*_plan_findings(plan, rows), *_placement_findings(plan, rows)]
-    checks = _check_shards(directory, plan, rows)
+        bag = read_bag_metadata(directory)
+    except DatasetError as error:
+        if not (directory / METADATA).exists():
+            raise
+        findings.append(Finding(METADATA, "", str(error).removeprefix(f"{directory / METADATA}: ")))
+    tables = check_tables(directory)
+    findings += tables.findings
+    checks = _check_shards(directory, tables)
     findings += [finding for check in checks.values() for finding in check.findings]
-    findings += _bag_findings(bag, checks)
-    findings += _stray_findings(directory, set(checks))
+    if bag is not None:
+        findings += _bag_findings(bag, checks)
+        findings += _digest_findings(bag, tables, checks)
+    findings += _stray_findings(directory, checks)
     return findings
 
 
-def _plan_findings(plan: Plan, rows: Rows) -> Iterator[Finding]:
-    for trial, row in zip(plan.trials, rows, strict=True):
-        place = f"trial {trial.number}"
-        for key, value in trial.values.items():
-            if row[key] != value:
-                yield Finding(THROWS, place, f"has {key} = {row[key]!r}, the plan {value!r}")
-        if (row["outcome"] == REFUSED) != (trial.refused is not None):
-            yield Finding(THROWS, place, f"is {row['outcome']}, the plan says {trial.refused or 'nothing against it'}")
-        elif trial.refused is not None and row["reason"] != trial.refused:
-            yield Finding(THROWS, place, f"was refused as {row['reason']!r}, in the plan as {trial.refused!r}")
-
-
-def _placement_findings(plan: Plan, rows: Rows) -> Iterator[Finding]:
-    record = plan.config.record
-    for row in rows:
-        expected = None
-        if row["outcome"] not in _WITHOUT_EPISODE:
-            expected = shard_name(plan.config.name, row["trial"] // record.trials_per_shard)
-        if row["shard"] != expected:
-            yield Finding(
-                THROWS, f"trial {row['trial']}", f"is {row['outcome']} with shard {row['shard']}, not {expected}"
-            )
-
-
-def _check_shards(directory: Path, plan: Plan, rows: Rows) -> dict[str, ShardCheck]:
-    problems = EpisodeCheck(plan).problems
-    by_shard: dict[str, Rows] = {}
-    for row in rows:
-        if row["shard"] is not None:
-            by_shard.setdefault(Path(row["shard"]).name, []).append(row)
+def _check_shards(directory: Path, tables: Tables) -> dict[str, ShardCheck]:
+    """Check the files that rows name; all that are there if there are no rows."""
+    names = {path.name for path in directory.iterdir() if path.suffix == SHARD_SUFFIX}
+    expected: dict[str, list[int]] | None = None
+    if tables.plan is not None and tables.rows is not None:
+        expected = {}
+        refused = {trial.number for trial in tables.plan.trials if trial.refused is not None}
+        for trial in sorted({*range(len(tables.plan.trials)), *tables.rows}):
+            name, row = shard_of(tables.plan, trial), tables.rows.get(trial)
+            # A trial whose row is missing most likely has an episode.
+            if (trial not in refused and name in names) if row is None else row["shard"] == name:
+                expected.setdefault(name, []).append(trial)
+    check = EpisodeCheck(tables.plan, tables.rows or {}, doubtful=tables.doubtful)
     return {
-        name: ShardCheck(directory / name, plan.config, members, problems) for name, members in sorted(by_shard.items())
+        name: ShardCheck(directory / name, tables.config, None if expected is None else expected[name], check.problems)
+        for name in sorted(names if expected is None else expected)
     }
 
 
 def _bag_findings(bag: Mapping[str, Any], checks: Mapping[str, ShardCheck]) -> Iterator[Finding]:
-    digests = {trial: digest for check in checks.values() for trial, digest in check.digests.items()}
-    digest = combined_digest(digests[trial] for trial in sorted(digests))
-    custom = bag.get("custom_data")
-    written = custom.get("throwcollect.digest") if isinstance(custom, dict) else None
-    if written != digest:
-        yield Finding(METADATA, "custom_data: throwcollect.digest", f"is {written}, the episodes give {digest}")
     summaries = [check.summary for check in checks.values() if check.summary is not None]
     channels = next((check.channels for check in checks.values() if check.channels is not None), None)
-    if channels is None or len(summaries) != len(checks):
-        return  # what the files hold is not known in full; that is a finding already
+    whole = len(summaries) == len(checks)
     expected = bag_information(
-        summaries, channels.all, {"throwcollect.format": FORMAT, "throwcollect.digest": str(written)}
+        summaries, channels.all if channels else (), {"throwcollect.format": FORMAT, "throwcollect.digest": ""}
     )
-    yield from (
-        Finding(METADATA, key, f"is {_shortened(bag.get(key))}, the files give {_shortened(value)}")
-        for key, value in expected.items()
-        if bag.get(key) != value
-    )
-    if unknown := sorted(set(bag) - set(expected)):
-        yield Finding(METADATA, "", f"has unknown keys: {', '.join(unknown)}")
+    if unknown := sorted(map(str, set(bag) - set(expected))):
+        yield Finding(METADATA, "", f"has unknown keys: {_shortened(unknown)}")
+    del expected["custom_data"]
+    if not channels:
+        del expected["topics_with_message_count"]
+    if not whole:
+        # What all files hold together is not known; that is a finding already.
+        yield from _file_findings(bag, summaries)
+        return
+    for key, value in expected.items():
+        if bag.get(key) != value:
+            yield Finding(METADATA, key, f"is {_shortened(bag.get(key))}, the files give {_shortened(value)}")
 
 
-def _stray_findings(directory: Path, shards: set[str]) -> Iterator[Finding]:
+def _file_findings(bag: Mapping[str, Any], summaries: list[FileSummary]) -> Iterator[Finding]:
+    entries = bag.get("files")
+    said = {each.get("path"): each for each in entries if isinstance(each, dict)} if isinstance(entries, list) else {}
+    for summary in summaries:
+        (expected,) = bag_information([summary], (), {})["files"]
+        if said.get(summary.path) != expected:
+            found = _shortened(said.get(summary.path))
+            yield Finding(METADATA, f"files: {summary.path}", f"is {found}, the file gives {_shortened(expected)}")
+
+
+def _digest_findings(bag: Mapping[str, Any], tables: Tables, checks: Mapping[str, ShardCheck]) -> Iterator[Finding]:
+    custom = bag.get("custom_data")
+    said = custom if isinstance(custom, dict) else {}
+    if said.get("throwcollect.format") != FORMAT:
+        yield Finding(METADATA, "custom_data: throwcollect.format", f"is {_shortened(said.get('throwcollect.format'))}")
+    if unknown := sorted(map(str, set(said) - {"throwcollect.format", "throwcollect.digest"})):
+        yield Finding(METADATA, "custom_data", f"has unknown keys: {_shortened(unknown)}")
+    digests = {trial: digest for check in checks.values() for trial, digest in check.digests.items()}
+    damaged = any(check.summary is None for check in checks.values())
+    if damaged:
+        if tables.rows is None:
+            return
+        # The table stands in for episodes that cannot be read.
+        digests = {trial: row["digest"] for trial, row in tables.rows.items() if is_digest(row["digest"])} | digests
+    written, digest = said.get("throwcollect.digest"), combined_digest(digests[trial] for trial in sorted(digests))
+    if written != digest:
+        giver = THROWS if damaged else "the episodes"
+        yield Finding(
+            METADATA,
+            "custom_data: throwcollect.digest",
+            f"is {_shortened(written)}, {giver} give{'s' * damaged} {digest}",
+        )
+
+
+def _stray_findings(directory: Path, checks: Mapping[str, ShardCheck]) -> Iterator[Finding]:
     for path in sorted(directory.iterdir()):
-        if ".mcap" in path.name and path.name not in shards:
-            yield Finding(path.name, "", "no row of throws.parquet has its episode in this file")
-        elif path.suffix in (".part", ".new"):
+        if path.suffix in _UNFINISHED:
             yield Finding(path.name, "", "a file that was not written to its end")
+        elif SHARD_SUFFIX in path.name and path.name not in checks:
+            yield Finding(path.name, "", "no row of throws.parquet has its episode in this file")
     if not (directory / CARD).is_file():
         yield Finding(CARD, "", "is missing")
 
 
 def _shortened(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= 120 else f"{text[:117]}..."
+    return _short.repr(value)

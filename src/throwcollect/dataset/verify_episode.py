@@ -3,85 +3,143 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
 import numpy as np
 
 from throwcollect.config.schema import Config
+from throwcollect.dataset.judging import judged
 from throwcollect.dataset.mcap_file import EpisodeRun, episode_run
 from throwcollect.dataset.mcap_reader import StoredEpisode
 from throwcollect.dataset.throws import Place, ThrowsTable
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.message import Episode
 from throwcollect.episode.record import Samples
-from throwcollect.errors import DatasetError
-from throwcollect.robots.model import joint_limits
+from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.sweep.plan import Plan
 from throwcollect.tasks.flight import flight_residual
-from throwcollect.tasks.throw import judge
-from throwcollect.tasks.trajectory import throw_trajectory
 
 BALLISTIC_TOLERANCE_M = 1e-9
 """A recorded flight and the computed one differ by rounding, below 1e-12 m; the smallest kick moves a ball by more."""
 _RELATIVE_TOLERANCE = 1e-9
 """Numbers that are judged again on another machine may differ in their last bits."""
+_MOST_TOLD = 3
+"""Columns of a row that are told one by one."""
 _NS_PER_S = 1_000_000_000
+
+
+class RowJudge:
+    """Makes the rows of the table of throws anew, from episodes as they lie in their files.
+
+    Args:
+        plan: The plan that has their trials.
+    """
+
+    def __init__(self, plan: Plan) -> None:
+        self._plan = plan
+        self._table = ThrowsTable(plan.keys, tuple(plan.config.task.end))
+
+    def row(self, stored: StoredEpisode, shard: str) -> dict[str, Any]:
+        """The row of an episode.
+
+        Args:
+            stored: The episode.
+            shard: Name of its file.
+
+        Raises:
+            DatasetError: If the episode is damaged.
+        """
+        episode = stored.episode
+        trial = self._plan.trials[episode.header.trial]
+        place = Place(shard, stored.chunk.offset, episode.header.samples, episode.digest)
+        return self._table.row(trial.number, trial.values, judged(self._plan, episode), place)
 
 
 class EpisodeCheck:
     """Checks the episodes of one dataset.
 
     Args:
-        plan: Its trials.
+        plan: Its trials; None if they are not known, and then neither rows nor physics are looked at.
+        rows: Rows of the table of throws, by trial; where there is none, the episode is not compared with it.
+        doubtful: Trials that the plan has wrong; neither rows nor physics of theirs are looked at.
     """
 
-    def __init__(self, plan: Plan) -> None:
+    def __init__(
+        self, plan: Plan | None, rows: Mapping[int, Mapping[str, Any]], *, doubtful: Collection[int] = ()
+    ) -> None:
         self._plan = plan
-        self._table = ThrowsTable(plan.keys, tuple(plan.config.task.end))
-        self._limits = joint_limits()
+        self._rows = rows
+        self._doubtful = doubtful
+        self._judge = RowJudge(plan) if plan else None
 
-    def problems(self, stored: StoredEpisode, row: Mapping[str, Any], channels: Channels) -> Iterator[str]:
+    def problems(self, stored: StoredEpisode, shard: str, channels: Channels | None) -> Iterator[str]:
         """Everything that is wrong with an episode.
 
         Args:
             stored: The episode as it lies in its file.
-            row: Its row in the table of throws.
-            channels: What the dataset records.
+            shard: Name of that file.
+            channels: What the dataset records; None if that is not known.
 
         Yields:
             What is wrong, a sentence each.
         """
         episode = stored.episode
         try:
-            run = episode_run(episode)
-            samples = episode.samples()
+            yield from _record_problems(stored, episode_run(episode))
         except DatasetError as error:
             yield str(error)
             return
+        problems = list(self.content_problems(episode, channels))
+        yield from problems
+        row = self._rows.get(episode.header.trial)
+        if self._judge is not None and row is not None and not problems and episode.header.trial not in self._doubtful:
+            # Swept values were compared with the plan, and that is where they come from here.
+            judged_row = self._judge.row(stored, shard)
+            yield from _row_problems({name: judged_row[name] for name in judged_row if "." not in name}, row)
+
+    def content_problems(self, episode: Episode, channels: Channels | None) -> Iterator[str]:
+        """Everything that is wrong with an episode wherever it lies.
+
+        Args:
+            episode: The episode.
+            channels: What the dataset records; None if that is not known.
+
+        Yields:
+            What is wrong, a sentence each.
+        """
         try:
+            samples = episode.samples()
             episode.check_records()
         except DatasetError as error:
             yield str(error)
-        yield from _record_problems(stored, run)
-        yield from _message_problems(episode, channels)
-        config = self._plan.config_of(self._plan.trials[episode.header.trial])
-        yield from _stamp_problems(episode, samples, config)
-        yield from self._row_problems(stored, samples, config, row)
+            return
+        if channels is not None:
+            yield from _message_problems(episode, channels)
+        if self._plan is None or episode.header.trial in self._doubtful:
+            return
+        if episode.header.trial >= len(self._plan.trials):
+            yield f"the plan has {len(self._plan.trials)} trials"
+            return
+        try:
+            config = self._plan.config_of(self._plan.trials[episode.header.trial])
+        except ConfigError as error:
+            yield f"the plan has values that cannot be: {error}"
+            return
+        if stamp_problems := list(_stamp_problems(episode, samples, config)):
+            yield from stamp_problems
+            return  # nothing can be measured by such stamps
         residual = flight_residual(samples, episode.header, config=config)
         if residual is not None and not residual <= BALLISTIC_TOLERANCE_M:
             yield f"the flight departs from ballistic motion by {residual:.3g} m"
 
-    def _row_problems(
-        self, stored: StoredEpisode, samples: Samples, config: Config, row: Mapping[str, Any]
-    ) -> Iterator[str]:
-        header = stored.episode.header
-        result = judge(samples, header, config=config, trajectory=throw_trajectory(config), limits=self._limits)
-        place = Place(row["shard"], stored.chunk.offset, header.samples, stored.episode.digest)
-        values = self._plan.trials[header.trial].values
-        for name, value in self._table.row(header.trial, values, result, place).items():
-            if not _same(value, row[name]):
-                yield f"throws.parquet has {name} = {row[name]!r}, the episode gives {value!r}"
+
+def _row_problems(expected: Mapping[str, Any], row: Mapping[str, Any]) -> Iterator[str]:
+    wrong = [name for name, value in expected.items() if not _same(value, row[name])]
+    if wrong:
+        told = ", ".join(f"{name} = {row[name]!r}, the episode gives {expected[name]!r}" for name in wrong[:_MOST_TOLD])
+        more = f"; {len(wrong) - _MOST_TOLD} more columns differ" if len(wrong) > _MOST_TOLD else ""
+        yield f"throws.parquet has {told}{more}"
 
 
 def _message_problems(episode: Episode, channels: Channels) -> Iterator[str]:
@@ -105,7 +163,7 @@ def _message_problems(episode: Episode, channels: Channels) -> Iterator[str]:
 def _record_problems(stored: StoredEpisode, run: EpisodeRun) -> Iterator[str]:
     """Differences between the records around a chunk and what its contents call for."""
     start = stored.chunk.offset
-    indexes = b"".join(record.data for record in stored.indexes)
+    indexes = b"".join(record.data for record in stored.indexes.values())
     first = len(stored.chunk.data)
     if indexes != run.data[first : first + run.chunk_index.message_index_length]:
         yield f"the message indexes from byte {start + first} on do not fit the chunk"

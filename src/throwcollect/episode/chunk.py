@@ -32,6 +32,13 @@ from throwcollect.errors import DatasetError
 _COMPRESSION = b"zstd"
 _CHUNK_HEADER = struct.Struct("<BQQQQII4sQ")
 """Opcode, length, start and end time, uncompressed size and CRC, length and name of the compression, data's length."""
+CHUNK_HEADER_BYTES = _CHUNK_HEADER.size
+CHUNK_MARK_OFFSET = 37
+CHUNK_MARK = struct.pack("<I4s", len(_COMPRESSION), _COMPRESSION)
+"""Bytes that the record of every chunk has at `CHUNK_MARK_OFFSET`: the length and the name of the compression."""
+MOST_RATIO = 4096
+"""Uncompressed bytes that one compressed byte may stand for. Each message has a stamp of its own, so recordings stay
+far below; zstd by itself reaches 30,000."""
 _PREFIX_BYTES = 9
 """Opcode and length, which a record's length leaves out."""
 _MESSAGE_HEADER = struct.Struct("<BQHIQQ")
@@ -45,8 +52,8 @@ _MESSAGE_HEADERS = np.dtype(
     }
 )
 """`_MESSAGE_HEADER`, of many records at once."""
-_ALIKE = ("opcode", "length", "channel")
-"""What is the same in all records of a channel."""
+_ALIKE_BYTES = 11
+"""Opcode, length and channel: what is the same at the start of all records of a channel."""
 
 
 class _OfEachThread(threading.local):
@@ -72,14 +79,14 @@ class Chunk:
     """A compressed MCAP chunk.
 
     Attributes:
-        data: Compressed records (zstd).
+        data: Compressed records (zstd); a view of the bytes that they came in spares a copy.
         uncompressed_size: Size of the records [bytes].
         crc: CRC-32 of the records.
         start_ns: Time of the first message [ns].
         end_ns: Time of the last message [ns].
     """
 
-    data: bytes
+    data: bytes | memoryview
     uncompressed_size: int
     crc: int
     start_ns: int
@@ -87,7 +94,11 @@ class Chunk:
 
     def record(self) -> bytes:
         """The MCAP Chunk record, with its opcode and length."""
-        header = _CHUNK_HEADER.pack(
+        return self.record_header() + self.data
+
+    def record_header(self) -> bytes:
+        """Everything of the record that comes before the data."""
+        return _CHUNK_HEADER.pack(
             Opcode.CHUNK,
             self.record_size - _PREFIX_BYTES,
             self.start_ns,
@@ -98,15 +109,29 @@ class Chunk:
             _COMPRESSION,
             len(self.data),
         )
-        return header + self.data
 
     @property
     def record_size(self) -> int:
         """Size of what `record` gives [bytes]."""
         return _CHUNK_HEADER.size + len(self.data)
 
+    @staticmethod
+    def announced_size(header: bytes) -> int:
+        """Size of the record that begins with these bytes; 0 if that is no chunk as `record` writes it.
+
+        Args:
+            header: The first `CHUNK_HEADER_BYTES` of it.
+        """
+        if len(header) != _CHUNK_HEADER.size:
+            return 0
+        opcode, length, *_, name_length, name, stored = _CHUNK_HEADER.unpack(header)
+        alike = (opcode, name_length, name, length) == (
+            Opcode.CHUNK, len(_COMPRESSION), _COMPRESSION, stored + _CHUNK_HEADER.size - _PREFIX_BYTES
+        )  # fmt: skip
+        return _CHUNK_HEADER.size + stored if alike else 0
+
     @classmethod
-    def parse(cls, record: bytes) -> Chunk:
+    def parse(cls, record: bytes | memoryview) -> Chunk:
         """Read an MCAP Chunk record as `record` writes it.
 
         Raises:
@@ -122,16 +147,32 @@ class Chunk:
             raise DatasetError(f"chunk: announces {stored} bytes of data; got {len(data)}")
         return cls(data, size, crc, start, end)
 
+    def check_size(self) -> None:
+        """Check that the announced size of the records can be believed; no contents are decompressed.
+
+        Raises:
+            DatasetError: If the data are no zstd frame of that size, or it is more than such data can hold.
+        """
+        try:
+            size = zstandard.frame_content_size(self.data)
+        except zstandard.ZstdError as error:
+            raise DatasetError(f"chunk: cannot be decompressed: {error}") from error
+        if size != self.uncompressed_size:
+            raise DatasetError(f"chunk: holds {size} bytes", expected=f"{self.uncompressed_size} as announced")
+        if size > MOST_RATIO * len(self.data):
+            raise DatasetError(
+                f"chunk: {len(self.data)} bytes of data announce {size}",
+                expected=f"at most {MOST_RATIO} times as many",
+            )
+
     def decompress(self) -> bytes:
         """The uncompressed records.
 
         Raises:
             DatasetError: If the data are not one zstd frame of the announced size, or the CRC differs.
         """
+        self.check_size()
         try:
-            size = zstandard.frame_content_size(self.data)
-            if size != self.uncompressed_size:
-                raise DatasetError(f"chunk: holds {size} bytes", expected=f"{self.uncompressed_size} as announced")
             contents = _of_this_thread.decompressor.decompress(self.data, allow_extra_data=False)
         except zstandard.ZstdError as error:
             raise DatasetError(f"chunk: cannot be decompressed: {error}") from error
@@ -252,14 +293,14 @@ class MessageTable:
         log_times: Time of each row's first record [ns], shape ``(n_samples,)``, uint64.
 
     Args:
-        contents: Uncompressed records.
+        contents: Uncompressed records; what is seen of a bytearray can be written to.
         samples: Number of samples.
 
     Raises:
         DatasetError: If the records are not such a table.
     """
 
-    def __init__(self, contents: bytes, samples: int) -> None:
+    def __init__(self, contents: bytes | bytearray, samples: int) -> None:
         if samples < 1 or len(contents) % samples or not contents:
             raise DatasetError(f"chunk: {len(contents)} bytes are not the records of {samples} samples")
         self._table: NDArray[np.uint8] = np.frombuffer(contents, np.uint8).reshape(samples, -1)
@@ -275,15 +316,20 @@ class MessageTable:
             if opcode != Opcode.MESSAGE or length < 22 or offset > width or channel in self.columns:
                 raise DatasetError(f"chunk: not one message per channel and sample at byte {column.offset}")
             self.columns[channel] = column
-            headers = self._headers(channel)
-            if any((headers[name] != headers[name][0]).any() for name in _ALIKE):
+            alike = self._table[:, column.offset : column.offset + _ALIKE_BYTES]
+            if alike.tobytes() != header[:_ALIKE_BYTES] * samples:
                 raise DatasetError(f"chunk: the records of channel {channel} are not alike")
-        self.log_times = self._headers(next(iter(self.columns)))["log_time"]
+        self.log_times = self.headers(next(iter(self.columns)))["log_time"]
 
     def __len__(self) -> int:
         return len(self._table)
 
-    def _headers(self, channel: int) -> Rows:
+    def headers(self, channel: int) -> Rows:
+        """Sequence numbers and times of one channel's records, shape ``(n_samples,)``; a view.
+
+        Raises:
+            KeyError: If the chunk has no such channel.
+        """
         column = self.columns[channel]
         return self._table[:, column.offset : column.offset + _MESSAGE_HEADERS.itemsize].view(_MESSAGE_HEADERS)[:, 0]
 
@@ -293,7 +339,7 @@ class MessageTable:
             np.array_equal(headers["sequence"], np.arange(len(self)))
             and np.array_equal(headers["log_time"], stamps_ns)
             and np.array_equal(headers["publish_time"], stamps_ns)
-            for headers in map(self._headers, self.columns)
+            for headers in map(self.headers, self.columns)
         )
 
     def messages(self, channel: int) -> NDArray[np.uint8]:
@@ -312,8 +358,8 @@ class MessageTable:
             KeyError: If the chunk has no such channel.
         """
         entries = np.empty((len(self), 2), "<u8")
-        entries[:, 0] = self._headers(channel)["log_time"]
-        entries[:, 1] = self.columns[channel].offset + self._table.shape[1] * np.arange(len(self))
+        entries[:, 0] = self.headers(channel)["log_time"]
+        entries[:, 1] = np.arange(self.columns[channel].offset, self._table.size, self._table.shape[1])
         header = _MESSAGE_INDEX_HEADER.pack(Opcode.MESSAGE_INDEX, 6 + entries.nbytes, channel, entries.nbytes)
         return header + entries.tobytes()
 

@@ -23,6 +23,9 @@ from throwcollect.interfaces import get_message
 _PARTS = ("header", "sha256", "chunk")
 _SHA256 = re.compile(rb"[0-9a-f]{64}")
 _HEADER = TypeAdapter(EpisodeHeader)
+_LATEST_NS = 2**62
+_MOST_SAMPLES = 2**32
+"""As many as sequence numbers of message records can count."""
 _COUNT = struct.Struct("<I")
 
 
@@ -104,8 +107,11 @@ def header_from_json(text: bytes | str) -> EpisodeHeader:
         first = error.errors()[0]
         place = ".".join(map(str, first["loc"]))
         raise DatasetError(f"episode header: {place}: {first['msg']}; {error.error_count()} problems in all") from error
-    if header.trial < 0 or header.samples < 1:
+    if header.trial < 0 or not 1 <= header.samples <= _MOST_SAMPLES:
         raise DatasetError(f"episode header: trial {header.trial} with {header.samples} samples")
+    instants = [header.start_ns, *(instant for each in header.contacts for instant in (each.start_ns, each.end_ns))]
+    if any(instant is not None and not 0 <= instant <= _LATEST_NS for instant in instants):
+        raise DatasetError("episode header: an instant that no clock shows", expected=f"0 to {_LATEST_NS} ns")
     return header
 
 
@@ -126,9 +132,7 @@ def pack(episode: Episode) -> bytes:
 def _prefix(sizes: list[int]) -> bytes:
     """What comes before the data: the layout, and at the end the data's size."""
     prefix = bytearray(_layout().template)
-    fields = np.frombuffer(prefix, _layout().dtype)
-    for number, size in enumerate(sizes):
-        fields[f"layout.dim.{number}.size"] = fields[f"layout.dim.{number}.stride"] = size
+    np.frombuffer(prefix, _layout().dtype)[0] = tuple(size for size in sizes for _ in ("size", "stride"))
     _COUNT.pack_into(prefix, len(prefix) - _COUNT.size, sum(sizes) % 2**32)
     return bytes(prefix)
 
@@ -146,8 +150,7 @@ def unpack(message: bytes) -> Episode:
     length = len(layout.template)
     if len(message) < length:
         raise DatasetError(f"episode: a message of {len(message)} bytes", expected=f"at least {length}")
-    fields = np.frombuffer(message, layout.dtype, count=1)[0]
-    sizes = [int(fields[f"layout.dim.{number}.size"]) for number in range(len(_PARTS))]
+    sizes = list(np.frombuffer(message, layout.dtype, count=1)[0].item()[::2])
     if message[:length] != _prefix(sizes):
         raise DatasetError(f"episode: not a UInt8MultiArray of the parts {', '.join(_PARTS)}")
     count = sum(sizes)
@@ -155,7 +158,8 @@ def unpack(message: bytes) -> Episode:
     if len(message) < length + count:
         raise DatasetError(f"episode: {len(message) - length} bytes of data", expected=f"{count} as announced")
     middle, last = length + sizes[0], length + sizes[0] + sizes[1]
-    return make_episode(message[length:middle], message[middle:last], Chunk.parse(message[last : length + count]))
+    chunk = Chunk.parse(memoryview(message)[last : length + count])
+    return make_episode(message[length:middle], message[middle:last], chunk)
 
 
 def make_episode(header: bytes | str, records_sha256: bytes, chunk: Chunk) -> Episode:

@@ -60,7 +60,7 @@ def _put_stamps(rows: Rows, prefix: str, stamps_ns: NDArray[np.int64]) -> None:
     rows[f"{prefix}.sec"], rows[f"{prefix}.nanosec"] = np.divmod(stamps_ns, _NS_PER_S)
 
 
-def _rotate(quaternion_xyzw: NDArray[np.float64], *vectors: NDArray[np.float64], inverse: bool) -> NDArray[np.float64]:
+def rotate(quaternion_xyzw: NDArray[np.float64], *vectors: NDArray[np.float64], inverse: bool) -> NDArray[np.float64]:
     """Vectors turned by unit quaternions, element by element: a row's result does not depend on other rows.
 
     Args:
@@ -75,7 +75,7 @@ def _rotate(quaternion_xyzw: NDArray[np.float64], *vectors: NDArray[np.float64],
     x, y, z, w = np.ascontiguousarray(quaternion_xyzw.T)
     if inverse:
         x, y, z = -x, -y, -z
-    a, b, c = np.stack([vector.T for vector in vectors], axis=1)
+    a, b, c = np.array([vector.T for vector in vectors]).swapaxes(0, 1)
     # v' = v + w t + u × t with t = 2 u × v, for a unit quaternion (u, w).
     ta, tb, tc = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
     turned = np.empty((len(vectors), len(x), 3))
@@ -122,7 +122,7 @@ def _fill_ball_odometry(rows: Rows, recording: Recording) -> None:
     _put_stamps(rows, "header.stamp", samples.stamps_ns)
     rows["pose.pose.position"] = samples.ball_position
     rows["pose.pose.orientation"] = orientation = samples.ball_orientation_xyzw
-    rows["twist.twist.linear"], rows["twist.twist.angular"] = _rotate(
+    rows["twist.twist.linear"], rows["twist.twist.angular"] = rotate(
         orientation, samples.ball_linear_velocity, samples.ball_angular_velocity, inverse=True
     )
 
@@ -138,7 +138,7 @@ def read_samples(joint_rows: Rows, ball_rows: Rows) -> Samples:
         The samples; joint columns and the ball's pose are views of the messages, velocities are turned back to world.
     """
     orientation = ball_rows["pose.pose.orientation"]
-    linear, angular = _rotate(
+    linear, angular = rotate(
         orientation, ball_rows["twist.twist.linear"], ball_rows["twist.twist.angular"], inverse=False
     )
     return Samples(

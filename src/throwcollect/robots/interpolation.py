@@ -40,15 +40,10 @@ def sample_quintic(
     Raises:
         ValueError: If the trajectory has fewer than two points.
     """
-    coefficients, segments, u = _segments_at(trajectory, times)
-    spans = np.diff(trajectory.times)[segments, np.newaxis]
+    coefficients, u, spans = _polynomials_at(trajectory, times)
     first = coefficients[1:] * _ORDERS[1:, np.newaxis, np.newaxis]
     second = first[1:] * _ORDERS[1:-1, np.newaxis, np.newaxis]
-    return (
-        _polynomial(coefficients, segments, u),
-        _polynomial(first, segments, u) / spans,
-        _polynomial(second, segments, u) / spans**2,
-    )
+    return _values(coefficients, u).T, (_values(first, u) / spans).T, (_values(second, u) / spans**2).T
 
 
 def sample_positions(trajectory: JointTrajectory, times: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -64,41 +59,33 @@ def sample_positions(trajectory: JointTrajectory, times: NDArray[np.float64]) ->
     Raises:
         ValueError: If the trajectory has fewer than two points.
     """
-    return _polynomial(*_segments_at(trajectory, times))
+    coefficients, u, _ = _polynomials_at(trajectory, times)
+    return _values(coefficients, u).T
 
 
-def _segments_at(
+def _polynomials_at(
     trajectory: JointTrajectory, times: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.intp], NDArray[np.float64]]:
-    """Coefficients of all segments ``(6, n_segments, n_joints)``; segment ``(n,)`` and u ``(n, 1)`` at each time."""
-    if len(trajectory.times) < 2:
-        raise ValueError(f"a curve needs at least two points, got {len(trajectory.times)}")
-    spans = np.diff(trajectory.times)
-    step = spans[:, None]
-    velocities, accelerations = trajectory.velocities, trajectory.accelerations
-    ends = np.stack(
-        [
-            trajectory.positions[:-1],
-            velocities[:-1] * step,
-            accelerations[:-1] * step**2,
-            trajectory.positions[1:],
-            velocities[1:] * step,
-            accelerations[1:] * step**2,
-        ]
-    )
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Of the segment at each time: coefficients ``(6, n_joints, n)``, and ``(n,)`` each: u, and its length [s]."""
+    knots = trajectory.times
+    if len(knots) < 2:
+        raise ValueError(f"a curve needs at least two points, got {len(knots)}")
+    spans = knots[1:] - knots[:-1]
+    scales = np.array([np.ones_like(spans), spans, spans**2])[..., np.newaxis]
+    points = np.array([trajectory.positions, trajectory.velocities, trajectory.accelerations])
+    ends = np.concatenate([points[:, :-1] * scales, points[:, 1:] * scales])
     coefficients = (_HERMITE.T @ ends.reshape(6, -1)).reshape(ends.shape)
-    last = len(spans) - 1
-    segments = np.minimum(np.maximum(trajectory.times.searchsorted(times, side="right") - 1, 0), last)
-    u = np.minimum(np.maximum((times - trajectory.times[segments]) / spans[segments], 0.0), 1.0)
-    return coefficients, segments, u[:, np.newaxis]
+    segments = knots[1:-1].searchsorted(times, side="right")
+    spans = spans[segments]
+    u = np.minimum(np.maximum((times - knots[segments]) / spans, 0.0), 1.0)
+    # With time as the last axis, arithmetic runs along memory.
+    return coefficients.swapaxes(1, 2).take(segments, axis=2), u, spans
 
 
-def _polynomial(
-    coefficients: NDArray[np.float64], segments: NDArray[np.intp], u: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Polynomials in u, lowest order first, of the segment at each time."""
-    values: NDArray[np.float64] = coefficients[-1].take(segments, axis=0)
-    for order in range(len(coefficients) - 2, -1, -1):
+def _values(coefficients: NDArray[np.float64], u: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Values of polynomials in u, ``(n_joints, n)``; coefficients ``(n_orders, n_joints, n)``, lowest order first."""
+    values: NDArray[np.float64] = coefficients[-1].copy()
+    for coefficient in coefficients[-2::-1]:
         values *= u
-        values += coefficients[order].take(segments, axis=0)
+        values += coefficient
     return values

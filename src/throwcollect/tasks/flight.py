@@ -65,16 +65,18 @@ class Flight:
         Returns:
             The knot before it and the ball at that instant; None without a crossing.
         """
-        above = self.positions[:, 2] - height
-        crossings = np.flatnonzero((above[:-1] >= 0) & (above[1:] < 0))
+        below = self.positions[:, 2] < height
+        crossings = (below[1:] > below[:-1]).nonzero()[0]
         if not len(crossings):
             return None
         knot = int(crossings[0])
-        span = float(self.times[knot + 1] - self.times[knot])
-        z0, z1 = map(float, above[knot : knot + 2])
-        m0, m1 = (float(speed) * span for speed in self.velocities[knot : knot + 2, 2])
+        both = slice(knot, knot + 2)
+        before, after = self.times[both].tolist()
+        span = after - before
+        z0, z1 = (z - height for z in self.positions[both, 2].tolist())
+        m0, m1 = (speed * span for speed in self.velocities[both, 2].tolist())
         u = _root((2 * z0 - 2 * z1 + m0 + m1, -3 * z0 + 3 * z1 - 2 * m0 - m1, m0, z0))
-        return knot, self.state_at(float(self.times[knot]) + u * span, knot=knot)
+        return knot, self.state_at(before + u * span, knot=knot)
 
     def apex(self, knots: int) -> BallState:
         """Highest point.
@@ -103,16 +105,12 @@ def flight_after(samples: Samples, *, start_ns: int, release_ns: int) -> Flight:
     after = int(np.searchsorted(samples.stamps_ns, release_ns, side="right"))
     before = max(after - 1, 0)
     times = (samples.stamps_ns[before:] - start_ns) / NS_PER_S
-    recorded = Flight(times, samples.ball_position[before:], samples.ball_linear_velocity[before:])
+    flight = Flight(times, samples.ball_position[before:].copy(), samples.ball_linear_velocity[before:].copy())
     release = (release_ns - start_ns) / NS_PER_S
-    if release <= times[0]:
-        return recorded
-    first = recorded.state_at(release, knot=0)
-    return Flight(
-        np.concatenate([[first.time_s], times[1:]]),
-        np.vstack([first.position, recorded.positions[1:]]),
-        np.vstack([first.velocity, recorded.velocities[1:]]),
-    )
+    if release > times[0]:
+        first = flight.state_at(release, knot=0)
+        flight.times[0], flight.positions[0], flight.velocities[0] = first.time_s, first.position, first.velocity
+    return flight
 
 
 def without_impact(flight: Flight, impact_s: float, *, config: Config) -> Flight:

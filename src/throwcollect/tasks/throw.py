@@ -20,6 +20,7 @@ from throwcollect.tasks.outcome import BallState, Outcome, Peak, ThrowResult
 __all__ = ["BallState", "Outcome", "Peak", "ThrowResult", "judge"]
 
 _SLACK = 1e-3
+_AT_LIMIT = 1 - _SLACK
 _FAILED_GOALS = {5: "canceled", 6: "aborted"}
 _COLUMNS = {joint: column for column, joint in enumerate(JOINTS)}
 
@@ -58,10 +59,9 @@ def judge(
         trajectory: What the controllers were sent, followed as quintic curve and then held at its end.
         limits: Limits of the robot's description; `robot.effort_scale` is applied here.
     """
-    channels = (samples.position, samples.velocity, samples.effort, samples.ball_position, samples.ball_linear_velocity)
-    if not all(math.isfinite(channel.sum()) for channel in channels):
-        return ThrowResult(Outcome.TRACKING_FAILED, reason="the samples hold numbers that are not finite")
     result = _joint_measures(samples, header.start_ns, config=config, trajectory=trajectory, limits=limits)
+    if not (result and math.isfinite(samples.ball_position.sum() + samples.ball_linear_velocity.sum())):
+        return ThrowResult(Outcome.TRACKING_FAILED, reason="the samples hold numbers that are not finite")
     release_ns = release_of(header.contacts, gap_s=config.task.recatch_gap_s)
     touched: list[Contact] | None = None
     if release_ns is not None and release_ns <= samples.stamps_ns[-1]:
@@ -147,28 +147,32 @@ def _direction(ball: BallState) -> tuple[float, float]:
 
 def _joint_measures(
     samples: Samples, start_ns: int, *, config: Config, trajectory: JointTrajectory, limits: JointLimits
-) -> ThrowResult:
-    """Result with the joints' measures alone; its outcome is yet to be decided."""
+) -> ThrowResult | None:
+    """Result with the joints' measures alone, its outcome yet to be decided; None if they are not finite."""
+    effort_limits = limits.effort * config.robot.effort_scale
+    velocity_peak = _peak(np.abs(samples.velocity).max(axis=0) / limits.velocity, JOINTS)
+    effort_peak = _peak(np.abs(samples.effort).max(axis=0) / effort_limits, JOINTS)
+    if not math.isfinite(velocity_peak.share + effort_peak.share + samples.position.sum()):
+        return None
     moving = [_COLUMNS[joint] for joint in trajectory.joints]
     lower, upper = limits.lower[moving], limits.upper[moving]
     measured = samples.position[:, moving]
     positions = np.abs(measured - (lower + upper) / 2).max(axis=0) / ((upper - lower) / 2)
-    efforts, effort_limits = np.abs(samples.effort), limits.effort * config.robot.effort_scale
-    effort_peaks = efforts.max(axis=0) / effort_limits
-    saturated = np.flatnonzero(effort_peaks >= 1 - _SLACK)
-    at_limit = (efforts[:, saturated] / effort_limits[saturated] >= 1 - _SLACK).any(axis=1)
     desired = sample_positions(trajectory, (samples.stamps_ns - start_ns) / NS_PER_S)
     errors = np.abs(measured - desired).max(axis=0)
+    saturated = 0.0
+    if effort_peak.share >= _AT_LIMIT:
+        saturated = float((np.abs(samples.effort) / effort_limits >= _AT_LIMIT).any(axis=1).mean())
     return ThrowResult(
         Outcome.LANDED,
         position_peak=_peak(positions, trajectory.joints),
-        velocity_peak=_peak(np.abs(samples.velocity).max(axis=0) / limits.velocity, JOINTS),
-        effort_peak=_peak(effort_peaks, JOINTS),
-        effort_saturated_share=float(at_limit.mean()),
+        velocity_peak=velocity_peak,
+        effort_peak=effort_peak,
+        effort_saturated_share=saturated,
         tracking_error_rad=dict(zip(trajectory.joints, errors.tolist(), strict=True)),
     )
 
 
 def _peak(shares: NDArray[np.float64], joints: tuple[str, ...]) -> Peak:
-    column = int(np.argmax(shares))
+    column = int(shares.argmax())
     return Peak(joint=joints[column], share=float(shares[column]))

@@ -20,7 +20,7 @@ from throwcollect.config.schema import (
 from throwcollect.errors import ConfigError
 
 CONFIGS = Path(__file__).parents[3] / "configs"
-KNOWN_IN_RUN = "simulations, runtime, router_port, domain_id, trial_timeout_s, start_timeout_s, retries, restarts"
+KNOWN_IN_RUN = "simulations, runtime, router_port, domain_id, trial_timeout_s, start_timeout_s, grace_s, retries, restarts"
 JOINT_LIST = "joint names, each with a number from -6.3 to 6.3 rad"
 
 
@@ -250,7 +250,8 @@ def test_samplers_get_what_they_need_and_nothing_else(problems_of, sweep, messag
 
 def test_samplers_that_draw_need_a_number_of_trials(problems_of):
     assert problems_of("sweep: {parameters: {ball.mass_kg: {min: 1, max: 2}}}") == [
-        "run.yaml: trials: missing; the sampler sobol should know how many trials to draw"
+        "run.yaml: trials: missing; the sampler sobol should know how many trials to draw, or until how many have "
+        "landed"
     ]
 
 
@@ -321,6 +322,7 @@ def test_a_default_in_the_place_of_a_wrong_value_causes_no_further_problems(prob
             "run.yaml:2: not valid YAML: but found another document, expected a single document in the stream",
         ),
         (b"a: " + 600 * b"[", "run.yaml: not valid YAML: values are nested too deeply"),
+        (b"name: " + 5_000_000 * b"x", "run.yaml: larger than 5000000 bytes"),
     ],
 )
 def test_files_that_are_no_configuration(tmp_path, content, message):
@@ -339,12 +341,12 @@ def test_files_that_cannot_be_read(tmp_path, monkeypatch):
     forbidden = tmp_path / "forbidden.yaml"
     forbidden.write_text("name: secret")
     # Root may read everything, so the refusal is played where the file is opened.
-    monkeypatch.setattr(Path, "read_bytes", _refuse)
+    monkeypatch.setattr(Path, "open", _refuse)
     with pytest.raises(ConfigError, match=r"no permission to read the file$"):
         load(forbidden)
 
 
-def _refuse(path):
+def _refuse(path, *_):
     raise PermissionError(13, "Permission denied", str(path))
 
 
@@ -461,3 +463,73 @@ def test_resolved_text_shows_every_key():
     assert "  topics: [joint_states, ball/odometry]" in lines
     assert "trials: null" in lines
     assert resolved_yaml(Config(name="on")).startswith('name: "on"\n')
+
+
+PARAMETERS = "parameters: {task.duration_s: {min: 1, max: 1.2}}"
+
+
+@pytest.mark.parametrize(
+    ("target", "message"),
+    [
+        ("{}", "distance_m: missing; at least one of distance_m, height_m and hit_angle_rad should be there"),
+        ("{distance_m: {min: -1, max: 2, bins: 4}}", "distance_m.min: should be 0 or more, got -1.0"),
+        ("{distance_m: {min: 2, max: 1, bins: 4}}", "distance_m.min: should be below max, 1.0, got 2.0"),
+        (
+            "{hit_angle_rad: {min: 1, max: 70, bins: 4}}",
+            "hit_angle_rad.max: should be from -1.5708 to 1.5708 rad, got 70.0",
+        ),
+        (
+            "{hit_angle_rad: {min: -2, max: 1, bins: 4}}",
+            "hit_angle_rad.min: should be from -1.5708 to 1.5708 rad, got -2.0",
+        ),
+        (
+            "{height_m: {min: 0, max: 1, bins: 4}}",
+            "height_m: should be left out, as scene.landing_height_m is not swept",
+        ),
+        ("{distance_m: {min: 1, max: 2}}", "distance_m.bins: missing; should be a whole number from 1 to 1000"),
+        ("{distnace_m: {min: 1, max: 2, bins: 4}}", "distnace_m: unknown key; did you mean 'distance_m'?"),
+        (
+            "{distance_m: {min: 1, max: 2, bins: 200}, hit_angle_rad: {min: 1, max: 1.2, bins: 100}}",
+            "hit_angle_rad.bins: makes 20000 cells together with the others; there may be 10000",
+        ),
+    ],
+)
+def test_targets_that_cannot_be_spread_over_are_named(problems_of, target, message):
+    assert problems_of(f"trials: 9\nsweep: {{{PARAMETERS}, target: {target}}}") == [
+        f"run.yaml:2: sweep.target.{message}"
+    ]
+
+
+def test_a_target_begins_with_sobol_and_has_parameters(problems_of):
+    target = "target: {distance_m: {min: 1, max: 2, bins: 4}}"
+    assert problems_of(f"trials: 9\nsweep: {{sampler: uniform, {PARAMETERS}, {target}}}") == [
+        "run.yaml:2: sweep.sampler: should be sobol, with which the search for target begins, got uniform"
+    ]
+    assert problems_of(f"trials: 9\nsweep: {{{target}}}") == [
+        "run.yaml:2: sweep.parameters: missing; target should have parameters to reach it with"
+    ]
+    assert problems_of(f"sweep: {{{PARAMETERS}, {target}}}") == [
+        "run.yaml: trials: missing; the sampler sobol should know how many trials to draw, or until how many have "
+        "landed"
+    ]
+
+
+def test_until_wants_a_number_and_a_sampler_that_goes_on(problems_of):
+    assert problems_of("until: 5") == ["run.yaml:1: until: should be {landed: …} or null, got 5"]
+    assert problems_of("until: {landed: 0}") == [
+        "run.yaml:1: until.landed: should be a whole number from 1 to 1000000, got 0"
+    ]
+    assert problems_of("until: {landed: 5}\nsweep: {sampler: list, file: a.csv}") == [
+        "run.yaml:1: until: should be left out, as the file of the sampler list is not part of the dataset"
+    ]
+
+
+def test_until_is_enough_for_samplers_that_draw(tmp_path):
+    path = tmp_path / "run.yaml"
+    path.write_text(f"until: {{landed: 5}}\nsweep: {{{PARAMETERS}}}")
+    config = load(path)
+    assert config.until is not None
+    assert config.until.landed == 5
+    assert config.grows
+    path.write_text(resolved_yaml(config))
+    assert load(path) == config

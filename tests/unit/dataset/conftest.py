@@ -143,7 +143,7 @@ def collection() -> Collection:
     return Collection()
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def make_collection() -> type[Collection]:
     return Collection
 

@@ -39,7 +39,7 @@ def test_a_trial_without_episode_says_why(collection: Any, tmp_path: Path) -> No
     ("name", "message"),
     [
         ("throws.parquet", r"throws\.parquet: is missing"),
-        ("plan.parquet", r"plan\.parquet: the plan is missing"),
+        ("plan.parquet", r"plan\.parquet: is missing"),
         ("metadata.yaml", "is not finished"),
     ],
 )

@@ -110,10 +110,18 @@ def test_rows_say_what_the_throw_did_with_units_and_descriptions(collection: Any
     result = collection.result(collection.episode(2))
     row = table.to_pylist()[2]
     assert row["task.duration_s"] == collection.plan.trials[2].values["task.duration_s"]
-    assert (row["landing_x_m"], row["landing_y_m"], row["landing_z_m"]) == result.landing.position
-    assert (row["release_vx_mps"], row["release_vy_mps"], row["release_vz_mps"]) == result.release.velocity
-    assert (row["effort_peak_joint"], row["effort_peak_share"]) == (result.effort_peak.joint, result.effort_peak.share)
-    assert row["arm_right_2_joint_tracking_error_rad"] == result.tracking_error_rad["arm_right_2_joint"]
+    for name in ("release", "apex", "landing"):
+        ball = getattr(result, name)
+        assert row[f"{name}_time_s"] == ball.time_s
+        assert tuple(row[f"{name}_{axis}_m"] for axis in "xyz") == ball.position
+        assert tuple(row[f"{name}_v{axis}_mps"] for axis in "xyz") == ball.velocity
+    for name in ("position_peak", "velocity_peak", "effort_peak"):
+        peak = getattr(result, name)
+        assert (row[f"{name}_joint"], row[f"{name}_share"]) == (peak.joint, peak.share)
+    same = "release_speed_mps release_elevation_rad flight_time_s hit_angle_rad recontacts effort_saturated_share"
+    assert {name: row[name] for name in same.split()} == {name: getattr(result, name) for name in same.split()}
+    errors = {f"{joint}_tracking_error_rad": error for joint, error in result.tracking_error_rad.items()}
+    assert {name: row[name] for name in errors} == errors
     assert all(field.metadata[b"description"].endswith(b".") for field in table.schema)
 
 

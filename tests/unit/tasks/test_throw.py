@@ -49,6 +49,12 @@ def test_landed_throw_has_all_its_numbers():
     assert result.velocity_peak.share == pytest.approx(0.686, abs=2e-3)
 
 
+def test_judging_leaves_the_samples_as_they_are():
+    (samples, header), (untouched, _) = episode(), episode()
+    judged(samples, header)
+    assert all((column == getattr(untouched, name)).all() for name, column in vars(samples).items())
+
+
 def test_ball_at_release_lies_between_its_neighbouring_samples():
     # Constant acceleration before the release as after it, so that the cubic is exact on the whole interval.
     samples, header = episode()

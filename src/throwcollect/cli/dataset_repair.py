@@ -1,0 +1,57 @@
+"""`throwcollect dataset rebuild` and `repair`: what is missing is made again, what is damaged is mended."""
+
+from __future__ import annotations
+
+import json as jsonlib
+from dataclasses import asdict
+from pathlib import Path
+
+import typer
+
+from throwcollect.coordinator.prepare import checked_plan
+from throwcollect.dataset.rebuild import rebuild
+from throwcollect.dataset.repair import repair
+from throwcollect.errors import LossError
+
+_MOST_NAMED = 10
+
+
+def show_rebuilt(directory: Path, *, json: bool) -> None:
+    """Write the derived files of a dataset anew and print which they are.
+
+    Raises:
+        DatasetError: If the plan or a recording is missing or damaged, or a file cannot be written.
+        ConfigError: If the configuration of the dataset is wrong.
+    """
+    rebuilt = rebuild(directory)
+    if json:
+        typer.echo(jsonlib.dumps(asdict(rebuilt), indent=2))
+        return
+    typer.echo(f"{directory}: {rebuilt.trials} trials, {rebuilt.episodes} episodes; wrote {', '.join(rebuilt.written)}")
+    if rebuilt.lost:
+        named = ", ".join(map(str, rebuilt.lost[:_MOST_NAMED]))
+        typer.echo(f"lost: {named}{' and more' if len(rebuilt.lost) > _MOST_NAMED else ''}")
+
+
+def show_repaired(directory: Path, output: Path, *, json: bool) -> None:
+    """Mend a dataset into a new directory and print what was wrong and what is lost.
+
+    Raises:
+        LossError: If trials are lost.
+        DatasetError: If configuration and plan cannot be had, or files cannot be read or written.
+        ConfigError: If the new directory holds something already.
+    """
+    repaired = repair(directory, output, remake=lambda config: checked_plan(config, directory=directory))
+    if json:
+        typer.echo(jsonlib.dumps(repaired.as_dict(), indent=2))
+    else:
+        for remark in repaired.remarks:
+            typer.echo(remark)
+        for lost in repaired.lost:
+            typer.echo(f"trial {lost.trial}: lost: {lost.reason}")
+        typer.echo(f"{output}: {repaired.episodes} episodes of {repaired.trials} trials")
+    if repaired.lost:
+        count = len(repaired.lost)
+        raise LossError(
+            f"{output}: {count} trial{'s are' if count > 1 else ' is'} lost", hint=f"throwcollect resume {output}"
+        )

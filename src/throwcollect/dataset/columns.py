@@ -1,0 +1,189 @@
+"""Columns of trajectories: which there are, where the throws of a dataset lie, and how arrays are filled from there."""
+
+from __future__ import annotations
+
+import math
+import mmap
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from operator import attrgetter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from throwcollect.dataset.mcap_reader import McapContents, opened
+from throwcollect.episode.chunk import CHUNK_HEADER_BYTES, Chunk
+from throwcollect.episode.topics import rotate
+from throwcollect.episode.trajectory_rows import (
+    BALL_ORIENTATION,
+    BALL_VELOCITIES,
+    STAMPS,
+    as_bytes,
+    places,
+    to_nanoseconds,
+    trajectory_rows,
+)
+from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.robots.talos import JOINTS
+
+TIMES = "time_s"
+_JOINT_COLUMNS = ("joints.position", "joints.velocity", "joints.effort")
+COLUMNS = (
+    TIMES,
+    STAMPS,
+    *_JOINT_COLUMNS,
+    "ball.position",
+    BALL_ORIENTATION,
+    *BALL_VELOCITIES,
+)
+"""All columns of a trajectory; ``docs/reading.md`` describes them."""
+
+Column = NDArray[Any]
+"""float64, or int64 for stamps."""
+
+_LARGE_BYTES = 4 << 20
+_NS_PER_S = 1_000_000_000
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where the episode of a throw lies.
+
+    Attributes:
+        trial: Number of the trial.
+        start_ns: Simulated time at which the trial starts [ns].
+        path: The MCAP file.
+        offset: Where its chunk begins in the file [bytes].
+        samples: Number of samples.
+    """
+
+    trial: int
+    start_ns: int
+    path: Path
+    offset: int
+    samples: int
+
+    def rows(self, contents: McapContents) -> NDArray[np.void]:
+        """The rows of the episode; see `trajectory_rows`.
+
+        Args:
+            contents: Those of the file.
+
+        Raises:
+            DatasetError: If the episode is not there, or its chunk is damaged.
+        """
+        try:
+            size = Chunk.announced_size(contents.slice(self.offset, self.offset + CHUNK_HEADER_BYTES))
+            chunk = Chunk.parse(contents.slice(self.offset, self.offset + size))
+            if chunk.start_ns != self.start_ns:
+                raise DatasetError(
+                    f"starts at {chunk.start_ns} ns", expected=f"trial {self.trial} at {self.start_ns} ns"
+                )
+            return trajectory_rows(chunk.decompress(), self.samples)
+        except DatasetError as error:
+            raise DatasetError(f"{self.path}: byte {self.offset}: {error}") from error
+
+
+def check_columns(columns: Sequence[str], joints: Sequence[str]) -> None:
+    """Check names.
+
+    Raises:
+        ConfigError: If a column is none of `COLUMNS`, or a joint none of Talos.
+    """
+    for column in columns:
+        if column not in COLUMNS:
+            raise ConfigError(f"a trajectory has no column {column!r}", expected=", ".join(COLUMNS))
+    for joint in joints:
+        if joint not in JOINTS:
+            raise ConfigError(f"Talos has no joint {joint!r}", expected=", ".join(JOINTS))
+
+
+def empty_columns(columns: Iterable[str], samples: int, joints: Sequence[str] = JOINTS) -> dict[str, Column]:
+    """Arrays to be filled, by name; shape ``(samples,)`` or ``(samples, n)``.
+
+    Args:
+        columns: Which of `COLUMNS`.
+        samples: Number of samples.
+        joints: Joints that the columns of joints have.
+    """
+    shapes = {name: (samples, place.width) if place.width else (samples,) for name, place in places().items()}
+    shapes |= {TIMES: (samples,), **dict.fromkeys(_JOINT_COLUMNS, (samples, len(joints)))}
+    return {name: _empty(shapes[name], np.int64 if name == STAMPS else np.float64) for name in columns}
+
+
+def _empty(shape: tuple[int, ...], dtype: type[np.generic]) -> Column:
+    size = math.prod(shape) * np.dtype(dtype).itemsize
+    if size < _LARGE_BYTES:
+        return np.empty(shape, dtype)
+    # numpy asks for huge pages. Where the host of a virtual machine takes back what is free, it hands them out piece by
+    # piece, which can take several times as long as everything else here.
+    memory = mmap.mmap(-1, size, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
+    return np.frombuffer(memory, dtype).reshape(shape)
+
+
+def stored_rows(throws: Iterable[Place]) -> Iterator[NDArray[np.void]]:
+    """The rows of episodes, one after the other; each file is open while its throws follow each other.
+
+    Raises:
+        DatasetError: If an episode is not where it should be, or its chunk is damaged; its CRC is compared.
+    """
+    for path, group in groupby(throws, attrgetter("path")):
+        with opened(path) as contents:
+            for place in group:
+                yield place.rows(contents)
+
+
+def fill(
+    columns: Mapping[str, Column],
+    throws: Sequence[Place],
+    tables: Iterable[NDArray[np.void]],
+    joints: Sequence[str] = JOINTS,
+) -> None:
+    """Fill columns with those of some throws, one after the other.
+
+    Args:
+        columns: Arrays with as many rows as the throws have samples, by name, as `empty_columns` makes them.
+        throws: The throws.
+        tables: Their rows, as `stored_rows` gives them.
+        joints: Joints that the columns of joints have.
+
+    Raises:
+        DatasetError: Whatever `tables` raises.
+    """
+    lengths = [place.samples for place in throws]
+    velocities = [name for name in BALL_VELOCITIES if name in columns]
+    needed = {TIMES: STAMPS, **dict.fromkeys(velocities, BALL_ORIENTATION)}
+    missing = {source for name, source in needed.items() if name in columns} - columns.keys()
+    recorded = {**columns, **empty_columns(missing, sum(lengths))}
+    chosen = [] if tuple(joints) == JOINTS else [name for name in _JOINT_COLUMNS if name in columns]
+    targets = [(as_bytes(recorded[name]), name) for name in recorded if name != TIMES and name not in chosen]
+    indexes = np.array([JOINTS.index(joint) for joint in joints], np.intp)
+    every = np.empty((max(lengths), len(JOINTS)))
+    filled = 0
+    for rows in tables:
+        span = slice(filled, filled + len(rows))
+        for target, name in targets:
+            target[span] = rows[name]
+        for name in chosen:
+            as_bytes(every)[: len(rows)] = rows[name]
+            np.take(every[: len(rows)], indexes, axis=1, out=columns[name][span], mode="clip")
+        filled += len(rows)
+        del rows  # the next ones then take its place in the caches
+    _derive(columns, recorded, velocities, np.repeat([place.start_ns for place in throws], lengths))
+
+
+def _derive(
+    columns: Mapping[str, Column], recorded: Mapping[str, Column], velocities: Sequence[str], starts: NDArray[np.int64]
+) -> None:
+    """Make columns of what is recorded."""
+    if STAMPS in recorded:
+        to_nanoseconds(recorded[STAMPS])
+    if TIMES in columns:
+        np.divide(recorded[STAMPS] - starts, _NS_PER_S, out=columns[TIMES])
+    if velocities:
+        turned = rotate(recorded[BALL_ORIENTATION], *(columns[name] for name in velocities), inverse=False)
+        for name, values in zip(velocities, turned, strict=True):
+            columns[name][:] = values

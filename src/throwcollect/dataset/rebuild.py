@@ -1,0 +1,167 @@
+"""Writes the files of a dataset anew that follow from others: table of throws, bag's metadata, data card."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from throwcollect.config.loader import load
+from throwcollect.dataset.bag import FileSummary, dataset_metadata
+from throwcollect.dataset.card import Provenance, data_card
+from throwcollect.dataset.digest import combined_digest
+from throwcollect.dataset.directory import CARD, CONFIG, METADATA, PLAN, THROWS
+from throwcollect.dataset.files import write_file
+from throwcollect.dataset.mcap_reader import StoredEpisode
+from throwcollect.dataset.throws import Row, ThrowsTable, encode_table, read_throws_table
+from throwcollect.dataset.verify_episode import EpisodeCheck, RowJudge
+from throwcollect.dataset.verify_shard import ShardCheck
+from throwcollect.dataset.verify_tables import shard_of
+from throwcollect.episode.channels import Channels
+from throwcollect.errors import DatasetError
+from throwcollect.robots.description import full_description
+from throwcollect.sweep.plan import Plan, Trial
+from throwcollect.tasks.throw import Outcome, ThrowResult
+
+NO_EPISODE = "no file holds an episode of it"
+"""Reason of a lost trial of which nothing else is known."""
+
+
+@dataclass(frozen=True)
+class Rebuilt:
+    """What a dataset was found to hold.
+
+    Attributes:
+        trials: Number of trials of the plan.
+        episodes: Number of episodes.
+        lost: Trials that should have an episode and have none.
+        written: Names of the files that were written.
+    """
+
+    trials: int
+    episodes: int
+    lost: tuple[int, ...]
+    written: tuple[str, ...]
+
+
+def rebuild(directory: Path) -> Rebuilt:
+    """Write ``throws.parquet`` and ``metadata.yaml`` anew, and the data card if it is missing.
+
+    They follow from the configuration, the plan and the recordings, which are checked as `verify` does. The table that
+    is there, if it can be read, says why trials are lost and which recordings there should be.
+
+    Args:
+        directory: Directory of a dataset.
+
+    Raises:
+        DatasetError: If the plan or a recording is missing or damaged, the dataset is still being collected, or a file
+            cannot be written.
+        ConfigError: If the ``config.yaml`` is wrong.
+    """
+    config = load(directory / CONFIG)
+    plan = Plan.read(directory / PLAN, config)
+    repair = f"throwcollect dataset repair {directory} OUTPUT"
+    if unfinished := sorted(path.name for path in directory.glob("*.part")):
+        raise DatasetError(
+            f"{directory}: holds {unfinished[0]}: it is not collected to its end",
+            hint=f"throwcollect resume {directory}, or {repair}",
+        )
+    earlier = earlier_rows(directory, plan)
+    recordings = _Recordings(plan)
+    for name in dict.fromkeys(shard_of(plan, trial.number) for trial in plan.trials):
+        if (directory / name).exists():
+            if findings := recordings.read(directory / name):
+                raise DatasetError(f"{directory}: {findings[0]}", hint=repair)
+        elif any(row["shard"] == name for row in earlier.values()):
+            raise DatasetError(f"{directory}: {name} is missing", hint=repair)
+    table = ThrowsTable(plan.keys, tuple(config.task.end))
+    rows = [
+        recordings.rows.get(trial.number) or row_without_episode(table, trial, earlier.get(trial.number), NO_EPISODE)
+        for trial in plan.trials
+    ]
+    throws = table.table(rows)
+    digest = combined_digest(row["digest"] for row in recordings.rows.values())
+    channels = recordings.channels or Channels(config, full_description(config))
+    written = [THROWS, METADATA]
+    write_file(directory / THROWS, encode_table(throws))
+    if not (directory / CARD).exists():
+        provenance = Provenance.of_this_machine(simulations=None, wall_s=None)
+        write_file(directory / CARD, data_card(config.without_run(), throws, provenance).encode())
+        written.append(CARD)
+    write_file(directory / METADATA, dataset_metadata(recordings.summaries, channels.all, digest).encode())
+    lost = tuple(row["trial"] for row in rows if row["outcome"] == Outcome.LOST.value)
+    return Rebuilt(len(rows), len(recordings.rows), lost, tuple(written))
+
+
+def earlier_rows(directory: Path, plan: Plan) -> Mapping[int, Row]:
+    """Rows of the table of throws that is there, by trial; none if it cannot be read.
+
+    Args:
+        directory: Directory of a dataset.
+        plan: Its trials.
+    """
+    with suppress(DatasetError):
+        return {row["trial"]: row for row in read_throws_table(directory / THROWS, plan).to_pylist()}
+    return {}
+
+
+def row_without_episode(table: ThrowsTable, trial: Trial, earlier: Row | None, reason: str) -> Row:
+    """Row of a trial that has no episode.
+
+    Args:
+        table: Makes it.
+        trial: The trial.
+        earlier: The row that the trial had, if that is known; one that was lost keeps its reason.
+        reason: Why there is no episode, if nothing else says so.
+    """
+    if trial.refused is not None:
+        return table.refused_row(trial.number, trial.values, trial.refused)
+    result = ThrowResult(Outcome.LOST, reason=reason_lost(earlier) or reason)
+    return table.row(trial.number, trial.values, result, None)
+
+
+def reason_lost(earlier: Row | None) -> str | None:
+    """Why a trial was lost already when a row was written; None if it was not."""
+    if earlier is None or earlier["outcome"] != Outcome.LOST.value:
+        return None
+    return str(earlier["reason"] or NO_EPISODE)
+
+
+class _Recordings:
+    """What the MCAP files of a dataset hold, read one after the other.
+
+    Attributes:
+        rows: Rows of the episodes, by trial and in order of files.
+        summaries: What the bag's metadata say of each file.
+        channels: What is recorded; None if there is no file.
+
+    Args:
+        plan: The trials.
+    """
+
+    def __init__(self, plan: Plan) -> None:
+        self.rows: dict[int, Row] = {}
+        self.summaries: list[FileSummary] = []
+        self.channels: Channels | None = None
+        self._plan = plan
+        self._check = EpisodeCheck(plan, {})
+        self._judge = RowJudge(plan)
+
+    def read(self, path: Path) -> list[Any]:
+        """Read a file; returns what is wrong with it, and if nothing is, it counts."""
+        checked = ShardCheck(path, self._plan.config, None, self._problems)
+        if not checked.findings and checked.summary is not None:
+            self.summaries.append(checked.summary)
+            self.channels = checked.channels
+        return list(checked.findings)
+
+    def _problems(self, stored: StoredEpisode, shard: str, channels: Channels | None) -> Iterator[str]:
+        problems = list(self._check.problems(stored, shard, channels))
+        yield from problems
+        if not problems:
+            trial = self._plan.trials[stored.episode.header.trial]
+            if trial.refused is not None or shard != shard_of(self._plan, trial.number):
+                yield "its episode does not belong into this file"
+            self.rows[trial.number] = self._judge.row(stored, shard)

@@ -1,0 +1,305 @@
+"""One throw as people read it: numbers in arrays of their own, read when they are looked at."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from throwcollect.dataset.columns import TIMES, Column, Place, empty_columns, fill, stored_rows
+from throwcollect.dataset.mcap_reader import opened
+from throwcollect.episode.trajectory_rows import STAMPS
+from throwcollect.errors import DatasetError
+from throwcollect.robots.talos import JOINTS
+
+_NS_PER_S = 1_000_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class BallEvent:
+    """The ball at one instant, in world.
+
+    Attributes:
+        time_s: Time since the start of the trial [s].
+        position: Centre [m], shape ``(3,)``.
+        velocity: [m/s], shape ``(3,)``.
+    """
+
+    time_s: float
+    position: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ContactInterval:
+    """An interval in which the ball was pressed against one body.
+
+    Attributes:
+        body: ``spoon``, ``ground``, or the name of the robot's link.
+        start_s: When it began, since the start of the trial [s].
+        end_s: When it ended [s]; None when it lasted to the end.
+    """
+
+    body: str
+    start_s: float
+    end_s: float | None
+
+
+class _Recording:
+    """The rows of an episode, decompressed when a column is first asked for, and kept."""
+
+    def __init__(self, place: Place) -> None:
+        self._place = place
+
+    @cached_property
+    def _rows(self) -> NDArray[np.void]:
+        (rows,) = stored_rows([self._place])
+        return rows
+
+    def column(self, name: str) -> Column:
+        """A column in an array of its own."""
+        columns = empty_columns([name], self._place.samples)
+        fill(columns, [self._place], [self._rows])
+        return columns[name]
+
+
+class _Series:
+    """Columns that share their times; each is read when it is first asked for, into an array of its own."""
+
+    _prefix = ""
+
+    def __init__(self, recording: _Recording) -> None:
+        self._recording = recording
+
+    def __len__(self) -> int:
+        return len(self.stamps_ns)
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({len(self)} samples, {self.time_s[-1]:.3f} s)"
+
+    def _column(self, name: str) -> Column:
+        return self._recording.column(f"{self._prefix}.{name}")
+
+    @cached_property
+    def time_s(self) -> NDArray[np.float64]:
+        """Time since the start of the trial [s], shape ``(n_samples,)``."""
+        return self._recording.column(TIMES)
+
+    @cached_property
+    def stamps_ns(self) -> NDArray[np.int64]:
+        """Simulated time [ns], shape ``(n_samples,)``; as in the messages."""
+        return self._recording.column(STAMPS)
+
+
+class Ball(_Series):
+    """The ball during a throw; world frame: x forward, y left, z up."""
+
+    _prefix = "ball"
+
+    @cached_property
+    def position(self) -> NDArray[np.float64]:
+        """Centre [m], shape ``(n_samples, 3)``."""
+        return self._column("position")
+
+    @cached_property
+    def velocity(self) -> NDArray[np.float64]:
+        """Of the centre [m/s], shape ``(n_samples, 3)``."""
+        return self._column("velocity")
+
+    @cached_property
+    def orientation_xyzw(self) -> NDArray[np.float64]:
+        """Unit quaternion, ball to world, shape ``(n_samples, 4)``."""
+        return self._column("orientation_xyzw")
+
+    @cached_property
+    def angular_velocity(self) -> NDArray[np.float64]:
+        """[rad/s], shape ``(n_samples, 3)``."""
+        return self._column("angular_velocity")
+
+
+class Joints(_Series):
+    """The robot's joints during a throw.
+
+    Attributes:
+        names: Their names, in the order of the columns of all arrays.
+    """
+
+    _prefix = "joints"
+    names: tuple[str, ...] = JOINTS
+
+    @cached_property
+    def position(self) -> NDArray[np.float64]:
+        """[rad], shape ``(n_samples, n_joints)``."""
+        return self._column("position")
+
+    @cached_property
+    def velocity(self) -> NDArray[np.float64]:
+        """[rad/s], shape ``(n_samples, n_joints)``."""
+        return self._column("velocity")
+
+    @cached_property
+    def effort(self) -> NDArray[np.float64]:
+        """Torques of the motors [Nm], shape ``(n_samples, n_joints)``; 0 for locked joints."""
+        return self._column("effort")
+
+
+class Events:
+    """What happened to the ball.
+
+    Attributes:
+        release: When it left the spoon; None if it never did.
+        apex: At the highest point of its flight; None without a release.
+        landing: When it crossed the landing plane; None if it never did.
+    """
+
+    def __init__(self, row: Mapping[str, Any], throw: Throw) -> None:
+        self._throw = throw
+        self.release, self.apex, self.landing = (_event(row, name) for name in ("release", "apex", "landing"))
+
+    def __repr__(self) -> str:
+        times = {"release": self.release, "apex": self.apex, "landing": self.landing}
+        return f"Events({', '.join(f'{name} at {at.time_s:.3f} s' for name, at in times.items() if at) or 'none'})"
+
+    @cached_property
+    def contacts(self) -> tuple[ContactInterval, ...]:
+        """All contacts of the ball, by start time.
+
+        Raises:
+            DatasetError: If the throw has no episode, or it is damaged.
+        """
+        place = self._throw.place
+        with opened(place.path) as contents:
+            header = contents.episode(place.offset).episode.header
+        return tuple(
+            ContactInterval(
+                contact.body,
+                (contact.start_ns - header.start_ns) / _NS_PER_S,
+                None if contact.end_ns is None else (contact.end_ns - header.start_ns) / _NS_PER_S,
+            )
+            for contact in header.contacts
+        )
+
+
+def _event(row: Mapping[str, Any], name: str) -> BallEvent | None:
+    if row[f"{name}_time_s"] is None:
+        return None
+    return BallEvent(
+        time_s=row[f"{name}_time_s"],
+        position=np.array([row[f"{name}_{axis}_m"] for axis in "xyz"]),
+        velocity=np.array([row[f"{name}_v{axis}_mps"] for axis in "xyz"]),
+    )
+
+
+class Throw:
+    """One throw; what is asked for is read then, and kept as long as the throw is.
+
+    Args:
+        table: Table of throws.
+        position: Its row there.
+        parameters: Swept keys.
+        place: Where its episode lies; None if it has none.
+        directory: Directory of the dataset.
+    """
+
+    def __init__(
+        self, table: pa.Table, position: int, parameters: tuple[str, ...], place: Place | None, directory: Path
+    ) -> None:
+        self._table = table
+        self._position = position
+        self._keys = parameters
+        self._place = place
+        self._directory = directory
+
+    def __repr__(self) -> str:
+        text = f"Throw({self.trial}: {self.outcome}"
+        if self.reason is not None:
+            text += f": {self.reason}"
+        if (landing := self.events.landing) is not None:
+            x, y, _ = landing.position
+            text += f" at x = {x:.3f} m, y = {y:.3f} m after {landing.time_s:.3f} s"
+        return f"{text}; {self._place.samples} samples)" if self._place else f"{text}; not recorded)"
+
+    def __reduce__(self) -> tuple[type[Throw], tuple[object, ...]]:
+        # Neither the whole table nor what has been read travels with it.
+        table = pa.Table.from_pylist([self.row], schema=self._table.schema)
+        return Throw, (table, 0, self._keys, self._place, self._directory)
+
+    @cached_property
+    def row(self) -> Mapping[str, Any]:
+        """Its row in the table of throws, by column; ``docs/dataset.md`` describes them."""
+        row: dict[str, Any] = self._table.slice(self._position, 1).to_pylist()[0]
+        return row
+
+    @property
+    def trial(self) -> int:
+        """Number of the trial."""
+        return int(self.row["trial"])
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Value of each swept key, in the key's unit."""
+        return {key: self.row[key] for key in self._keys}
+
+    @property
+    def outcome(self) -> str:
+        """How the trial ended: ``landed``, ``refused`` and so on."""
+        return str(self.row["outcome"])
+
+    @property
+    def reason(self) -> str | None:
+        """Why the throw did not simply land; None if it did."""
+        reason: str | None = self.row["reason"]
+        return reason
+
+    @property
+    def recorded(self) -> bool:
+        """Whether it has an episode; trials that were refused or lost have none."""
+        return self._place is not None
+
+    @cached_property
+    def events(self) -> Events:
+        """Release, apex and landing, and the contacts of the ball."""
+        return Events(self.row, self)
+
+    @property
+    def place(self) -> Place:
+        """Where its episode lies.
+
+        Raises:
+            DatasetError: If it has none.
+        """
+        if self._place is None:
+            why = self.outcome if self.reason is None else f"{self.outcome}: {self.reason}"
+            raise DatasetError(
+                f"{self._directory}: trial {self.trial} has no episode: {why}",
+                hint="leave such trials out: dataset.recorded",
+            )
+        return self._place
+
+    @cached_property
+    def _recording(self) -> _Recording:
+        return _Recording(self.place)
+
+    @cached_property
+    def ball(self) -> Ball:
+        """The ball over time.
+
+        Raises:
+            DatasetError: If the throw has no episode; its columns raise it if the episode is damaged.
+        """
+        return Ball(self._recording)
+
+    @cached_property
+    def joints(self) -> Joints:
+        """The joints over time.
+
+        Raises:
+            DatasetError: If the throw has no episode; its columns raise it if the episode is damaged.
+        """
+        return Joints(self._recording)

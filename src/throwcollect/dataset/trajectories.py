@@ -1,0 +1,132 @@
+"""Trajectories of many throws in arrays: one array for each column, throws one after the other."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
+from dataclasses import dataclass
+from typing import overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from throwcollect.dataset.columns import Column, Place, check_columns, empty_columns, fill, stored_rows
+
+_BLOCK = 16
+"""Throws that are read at once: enough to be worth an array, few enough for the caches."""
+_MOST_THREADS = 4
+"""What stays with the interpreter keeps more of them from being of use."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Trajectories:
+    """Trajectories of many throws, one after the other.
+
+    ``trajectories["ball.position"]`` is the column of all throws, ``trajectories[i]`` all columns of one, as views.
+
+    Attributes:
+        trials: Numbers of the trials, shape ``(n_throws,)``.
+        offsets: Throw i has the samples from ``offsets[i]`` to ``offsets[i + 1]``, not included; shape
+            ``(n_throws + 1,)``. A trial without an episode has none.
+        columns: Arrays of shape ``(n_samples,)`` or ``(n_samples, n)``, by name.
+        joints: Names of the joints that the columns of joints have.
+    """
+
+    trials: NDArray[np.int64]
+    offsets: NDArray[np.int64]
+    columns: Mapping[str, Column]
+    joints: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return len(self.trials)
+
+    def __repr__(self) -> str:
+        size = sum(column.nbytes for column in self.columns.values()) / 1e6
+        names = ", ".join(self.columns)
+        return f"Trajectories({len(self)} throws, {self.offsets[-1]} samples, {size:.1f} MB: {names})"
+
+    def __iter__(self) -> Iterator[dict[str, Column]]:
+        return (self[number] for number in range(len(self)))
+
+    @overload
+    def __getitem__(self, which: str) -> Column: ...
+    @overload
+    def __getitem__(self, which: int) -> dict[str, Column]: ...
+    def __getitem__(self, which: str | int) -> Column | dict[str, Column]:
+        """A column of all throws by its name, or all columns of one throw by its position.
+
+        Raises:
+            KeyError: If the column was not read.
+            IndexError: If there are not so many throws.
+        """
+        if isinstance(which, str):
+            return self.columns[which]
+        number = range(len(self))[which]
+        rows = slice(self.offsets[number], self.offsets[number + 1])
+        return {name: column[rows] for name, column in self.columns.items()}
+
+    @property
+    def lengths(self) -> NDArray[np.int64]:
+        """Number of samples of each throw, shape ``(n_throws,)``."""
+        return np.diff(self.offsets)
+
+    def padded(self, column: str, *, fill: float = np.nan) -> NDArray[np.float64]:
+        """A column in one shape for all throws: what is recorded, then as much of `fill` as the longest throw needs.
+
+        Args:
+            column: Name of the column; stamps become floating point numbers, which hold them to some hundred ns.
+            fill: What follows the samples of a throw.
+
+        Returns:
+            Shape ``(n_throws, n_longest)`` or ``(n_throws, n_longest, n)``; a copy.
+
+        Raises:
+            KeyError: If the column was not read.
+        """
+        values, lengths = self.columns[column], self.lengths
+        longest = int(lengths.max(initial=0))
+        padded = np.full((len(self), longest, *values.shape[1:]), fill)
+        padded[np.arange(longest) < lengths[:, np.newaxis]] = values
+        return padded
+
+
+def read_trajectories(
+    trials: Sequence[int],
+    places: Sequence[Place | None],
+    columns: Sequence[str],
+    joints: tuple[str, ...],
+    *,
+    threads: int | None = None,
+) -> Trajectories:
+    """Read the trajectories of many throws.
+
+    Args:
+        trials: Numbers of the trials.
+        places: Where their episodes lie; None for a trial that has none.
+        columns: Which of `COLUMNS`; nothing else is copied.
+        joints: Joints that the columns of joints have, in this order.
+        threads: How many of them work; None for one a core, up to 4.
+
+    Raises:
+        ConfigError: If there is no such column or joint.
+        DatasetError: If an episode is not where it should be, or its chunk is damaged; its CRC is compared.
+    """
+    check_columns(columns, joints)
+    stored = [place for place in places if place is not None]
+    offsets = np.zeros(len(places) + 1, np.int64)
+    np.cumsum([place.samples if place else 0 for place in places], out=offsets[1:])
+    found = empty_columns(columns, int(offsets[-1]), joints)
+    blocks = [stored[first : first + _BLOCK] for first in range(0, len(stored), _BLOCK)]
+    starts = np.cumsum([0, *(sum(place.samples for place in block) for block in blocks)]).tolist()
+
+    def read(block: Sequence[Place], start: int, stop: int) -> None:
+        fill({name: column[start:stop] for name, column in found.items()}, block, stored_rows(block), joints)
+
+    threads = threads or min(_MOST_THREADS, os.cpu_count() or 1)
+    with nullcontext() if threads == 1 else ThreadPoolExecutor(threads) as pool:
+        # Decompressing lets go of the interpreter, and so does copying.
+        for _ in (pool.map if pool else map)(read, blocks, starts[:-1], starts[1:]):
+            pass
+    return Trajectories(np.array(trials, np.int64), offsets, found, joints)

@@ -1,0 +1,140 @@
+"""Checks what describes a dataset as a whole: its configuration, its plan, and the table of throws against the plan."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from throwcollect.config.loader import load
+from throwcollect.config.schema import Config
+from throwcollect.dataset.directory import CONFIG, PLAN, THROWS, shard_name
+from throwcollect.dataset.findings import Finding
+from throwcollect.dataset.throws import REFUSED, read_throws_table
+from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError
+from throwcollect.sweep.digest import trial_digests
+from throwcollect.sweep.plan import Plan
+from throwcollect.sweep.points import Points
+from throwcollect.tasks.throw import Outcome
+
+WITHOUT_EPISODE = (REFUSED, Outcome.LOST.value)
+
+Row = Mapping[str, Any]
+
+
+@dataclass
+class Tables:
+    """What the files beside the recordings say, as far as they can be read and do not contradict each other.
+
+    Attributes:
+        config: The configuration; None if it cannot be read or is not the plan's.
+        plan: The trials; None if they cannot be read or are not the configuration's.
+        rows: Rows of the table of throws, by trial; None if it cannot be read.
+        doubtful: Trials of which the plan says what it was not made with.
+        findings: What is wrong.
+    """
+
+    config: Config | None = None
+    plan: Plan | None = None
+    rows: Mapping[int, Row] | None = None
+    doubtful: set[int] = field(default_factory=set)
+    findings: list[Finding] = field(default_factory=list)
+
+
+def check_tables(directory: Path) -> Tables:
+    """Read and check configuration, plan and table of throws.
+
+    Args:
+        directory: Directory of the dataset.
+    """
+    tables = Tables()
+    try:
+        tables.config = load(directory / CONFIG)
+    except ConfigError as error:
+        tables.findings += [
+            Finding(CONFIG, f"line {each.line}" if each.line else "", ": ".join(filter(None, [each.key, each.message])))
+            for each in error.problems
+        ]
+    if tables.config is not None:
+        try:
+            tables.plan = Plan.read(directory / PLAN, tables.config)
+        except ForeignPlanError:
+            problem = f"is not the configuration that {PLAN} was made for; one of the two was changed"
+            tables.findings.append(Finding(CONFIG, "", problem))
+            # Nothing says which of them is right, so nothing is checked that follows from one.
+            tables.config = None
+        except DatasetError as error:
+            tables.findings.append(_finding(directory, PLAN, error))
+    if tables.plan is not None:
+        tables.findings += _digest_findings(tables.plan, tables.doubtful)
+        try:
+            rows = read_throws_table(directory / THROWS, tables.plan).to_pylist()
+        except DatasetError as error:
+            tables.findings.append(_finding(directory, THROWS, error))
+        else:
+            tables.findings += _row_findings(tables.plan, rows)
+            tables.rows = {row["trial"]: row for row in rows if row["trial"] is not None}
+            tables.findings += _plan_findings(tables.plan, tables.rows, tables.doubtful)
+    return tables
+
+
+def _finding(directory: Path, name: str, error: DatasetError) -> Finding:
+    return Finding(name, "", str(error).removeprefix(f"{directory / name}: "))
+
+
+def _digest_findings(plan: Plan, doubtful: set[int]) -> Iterator[Finding]:
+    """Trials that are not what the plan was made with, as their digests tell; they join `doubtful`."""
+    values = np.array([list(trial.values.values()) for trial in plan.trials], float).reshape(len(plan.trials), -1)
+    seeds = [trial.seed for trial in plan.trials]
+    for trial, digest in zip(plan.trials, trial_digests(plan.config, Points(plan.keys, values), seeds), strict=True):
+        if trial.digest != digest:
+            doubtful.add(trial.number)
+            yield Finding(
+                PLAN, f"trial {trial.number}", f"has digest {trial.digest}, its values and seed give {digest}"
+            )
+
+
+def _row_findings(plan: Plan, rows: list[dict[str, Any]]) -> Iterator[Finding]:
+    numbers = [row["trial"] for row in rows if row["trial"] is not None]
+    if len(numbers) < len(rows):
+        yield Finding(THROWS, "", f"{len(rows) - len(numbers)} rows are of no trial")
+    known = set(numbers)
+    for trial in plan.trials:
+        if trial.number not in known:
+            yield Finding(THROWS, f"trial {trial.number}", "has no row")
+    seen: set[int] = set()
+    for number in numbers:
+        if not 0 <= number < len(plan.trials):
+            yield Finding(
+                THROWS, f"trial {number}", f"is not one of the plan, which has trials 0 to {len(plan.trials) - 1}"
+            )
+        elif number in seen:
+            yield Finding(THROWS, f"trial {number}", "has more than one row")
+        seen.add(number)
+    if numbers != sorted(numbers):
+        yield Finding(THROWS, "", "the rows are not in order of trials")
+
+
+def _plan_findings(plan: Plan, rows: Mapping[int, Row], doubtful: Collection[int]) -> Iterator[Finding]:
+    for trial in plan.trials:
+        if (row := rows.get(trial.number)) is None:
+            continue
+        place = f"trial {trial.number}"
+        for key, value in trial.values.items():
+            if row[key] != value and trial.number not in doubtful:
+                yield Finding(THROWS, place, f"has {key} = {row[key]!r}, the plan {value!r}")
+        if (row["outcome"] == REFUSED) != (trial.refused is not None):
+            yield Finding(THROWS, place, f"is {row['outcome']}, the plan says {trial.refused or 'nothing against it'}")
+        elif trial.refused is not None and row["reason"] != trial.refused:
+            yield Finding(THROWS, place, f"was refused as {row['reason']!r}, in the plan as {trial.refused!r}")
+        expected = None if row["outcome"] in WITHOUT_EPISODE else shard_of(plan, trial.number)
+        if row["shard"] != expected:
+            yield Finding(THROWS, place, f"is {row['outcome']} with shard {row['shard']}, not {expected}")
+
+
+def shard_of(plan: Plan, trial: int) -> str:
+    """Name of the file that holds the episode of a trial, if it has one."""
+    return shard_name(plan.config.name, trial // plan.config.record.trials_per_shard)

@@ -1,0 +1,97 @@
+import json
+import signal
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from tests.unit.dataset.conftest import Collection
+
+from throwcollect.cli.main import main
+
+Run = Callable[..., int]
+
+
+@pytest.fixture
+def source(tmp_path: Path) -> Path:
+    return Collection({"trials": 3}).collect(tmp_path / "source")
+
+
+def spoiled(path: Path, place: int) -> None:
+    data = bytearray(path.read_bytes())
+    data[place] ^= 1
+    path.write_bytes(data)
+
+
+@pytest.fixture
+def run(monkeypatch: pytest.MonkeyPatch) -> Run:
+    """Runs the command line; returns its exit code."""
+
+    def run(*arguments: str | Path) -> int:
+        monkeypatch.setattr(sys, "argv", ["throwcollect", *map(str, arguments)])
+        # Otherwise it would stay so for the tests that follow.
+        monkeypatch.setattr(signal, "signal", lambda *_: None)
+        with pytest.raises(SystemExit) as ended:
+            main()
+        return int(ended.value.code or 0)
+
+    return run
+
+
+def test_verify_lists_the_findings_and_ends_with_4(run: Run, source: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("dataset", "verify", source) == 0
+    assert capsys.readouterr().out == f"{source}: nothing wrong\n"
+    (source / "README.md").unlink()
+    (source / "plan.parquet").write_bytes(b"")
+    assert run("dataset", "verify", source) == 4
+    told = capsys.readouterr()
+    assert told.out.startswith("plan.parquet: is damaged: ")
+    assert told.out.endswith("README.md: is missing\n")
+    assert f"{source}: 2 findings" in told.err
+
+
+def test_rebuild_says_what_it_wrote(run: Run, source: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    before = (source / "throws.parquet").read_bytes()
+    (source / "throws.parquet").unlink()
+    assert run("dataset", "rebuild", source) == 0
+    assert capsys.readouterr().out == f"{source}: 3 trials, 3 episodes; wrote throws.parquet, metadata.yaml\n"
+    assert (source / "throws.parquet").read_bytes() == before
+    assert run("dataset", "rebuild", source, "--json") == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found == {"trials": 3, "episodes": 3, "lost": [], "written": ["throws.parquet", "metadata.yaml"]}
+
+
+def test_rebuild_of_a_damaged_dataset_hints_at_repair(
+    run: Run, source: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    spoiled(source / "quick_00000.mcap", 20_000)
+    assert run("dataset", "rebuild", source) == 4
+    assert f"try: throwcollect dataset repair {source} OUTPUT" in capsys.readouterr().err
+
+
+def test_repair_without_losses_ends_with_0(
+    run: Run, source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (source / "plan.parquet").unlink()
+    output = tmp_path / "output"
+    assert run("dataset", "repair", source, output) == 0
+    assert capsys.readouterr().out == (
+        f"plan.parquet: is missing; made again from throws.parquet\n{output}: 3 episodes of 3 trials\n"
+    )
+
+
+def test_repair_lists_what_is_lost_and_ends_with_3(
+    run: Run, source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    spoiled(source / "quick_00000.mcap", 20_000)
+    output = tmp_path / "output"
+    assert run("dataset", "repair", source, output) == 3
+    told = capsys.readouterr()
+    assert told.out == f"trial 0: lost: no whole episode of it was left\n{output}: 2 episodes of 3 trials\n"
+    assert f"{output}: 1 trial is lost" in told.err
+    assert f"try: throwcollect resume {output}" in told.err
+    assert run("dataset", "repair", source, tmp_path / "again", "--json") == 3
+    found = json.loads(capsys.readouterr().out)
+    assert found["lost"] == [{"trial": 0, "reason": "no whole episode of it was left"}]
+    assert (found["trials"], found["episodes"], found["remarks"]) == (3, 2, [])
+    assert run("dataset", "verify", output) == 0

@@ -1,0 +1,141 @@
+"""Damages files in all the ways that disks, programs and people do; run as a module, it does so until told to stop.
+
+``python -m tests.unit.dataset.mutations 20000`` damages the files of a small dataset that many times, within 4 GB of
+memory and 60 s each, and prints everything that comes out and is no error of ours.
+"""
+
+from __future__ import annotations
+
+import random
+import resource
+import shutil
+import signal
+import struct
+import sys
+import tempfile
+import traceback
+import warnings
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from throwcollect.dataset.inspect import digest, info
+from throwcollect.dataset.reader import Dataset
+from throwcollect.dataset.rebuild import rebuild
+from throwcollect.dataset.repair import repair
+from throwcollect.dataset.salvage import salvage
+from throwcollect.dataset.verify import verify
+from throwcollect.errors import ConfigError, ThrowcollectError
+from throwcollect.sweep.plan import Plan
+
+KINDS = ("flip", "delete", "repeat", "insert", "cut", "length 32", "length 64", "copy", "zero")
+LENGTHS = (0, 1, 2**16, 2**31 - 1, 2**32 - 1, 2**40, 2**63 - 1, 2**63, 2**64 - 1)
+SETTINGS = {"trials": 2, "record": {"trials_per_shard": 1, "rate_hz": 50}}
+"""A dataset that is small enough to be read thousands of times."""
+
+
+class Mutation(NamedTuple):
+    """One damage: its kind, where, how long, and a number that some kinds need; shares are of the file's size."""
+
+    kind: str
+    place: float
+    span: int
+    number: int
+
+
+def mutate(data: bytes, mutations: Sequence[Mutation]) -> bytes:
+    damaged = bytearray(data)
+    for kind, share, span, number in mutations:
+        at = min(int(share * len(damaged)), len(damaged))
+        if kind == "flip" and damaged:
+            for place in range(at, min(at + span, len(damaged)), 1 + number % 97):
+                damaged[place] ^= 1 << number % 8
+        elif kind == "delete":
+            del damaged[at : at + span]
+        elif kind == "repeat":
+            damaged[at:at] = damaged[at : at + span]
+        elif kind == "insert":
+            damaged[at:at] = random.Random(number).randbytes(span)
+        elif kind == "cut":
+            del damaged[at:]
+        elif kind == "length 32":
+            damaged[at : at + 4] = struct.pack("<I", LENGTHS[number % len(LENGTHS)] % 2**32)
+        elif kind == "length 64":
+            damaged[at : at + 8] = struct.pack("<Q", LENGTHS[number % len(LENGTHS)])
+        elif kind == "copy":
+            source = number % (len(damaged) + 1)
+            damaged[at : at + span] = damaged[source : source + span]
+        elif kind == "zero":
+            damaged[at : at + span] = bytes(len(damaged[at : at + span]))
+    return bytes(damaged)
+
+
+def no_plan(config: object) -> Plan:
+    raise ConfigError("a plan is not drawn here")
+
+
+def use(directory: Path) -> None:
+    """Read all that a user of the library reads."""
+    for episode in Dataset.open(directory):
+        episode.samples()
+        episode.check_records()
+
+
+def outcomes(directory: Path, scratch: Path, name: str) -> list[Callable[[], Any]]:
+    """Everything that reads a dataset of which a file is damaged."""
+    calls: list[Callable[[], Any]] = [
+        lambda: verify(directory),
+        lambda: use(directory),
+        lambda: (info(directory), digest(directory)),
+        lambda: repair(directory, scratch / "repaired", remake=no_plan),
+        lambda: rebuild(directory),
+    ]
+    return [lambda: list(salvage(directory / name)), *calls] if name.endswith(".mcap") else calls
+
+
+def drawn(source: random.Random) -> list[Mutation]:
+    count = source.choice((1, 1, 1, 2, 4))
+    return [
+        Mutation(source.choice(KINDS), source.random(), int(2 ** source.uniform(0, 12)), source.getrandbits(32))
+        for _ in range(count)
+    ]
+
+
+def _hang(*_: object) -> None:
+    raise TimeoutError("took more than a minute")
+
+
+def main(count: int, seed: int) -> int:
+    """Damage files `count` times; returns how many times something else than an error of ours came out."""
+    from tests.unit.dataset.conftest import Collection
+
+    warnings.simplefilter("error")
+    signal.signal(signal.SIGALRM, _hang)
+    bad = 0
+    with tempfile.TemporaryDirectory() as scratch:
+        original = Collection(SETTINGS).collect(Path(scratch) / "original")
+        resource.setrlimit(resource.RLIMIT_AS, (4 << 30, 4 << 30))
+        names = sorted(path.name for path in original.iterdir() if path.name != "README.md")
+        for number in range(seed, seed + count):
+            source = random.Random(number)
+            name, mutations = source.choice(names), drawn(source)
+            directory = Path(shutil.copytree(original, Path(scratch) / "damaged"))
+            (directory / name).write_bytes(mutate((original / name).read_bytes(), mutations))
+            for call in outcomes(directory, Path(scratch), name):
+                signal.alarm(60)
+                try:
+                    call()
+                except ThrowcollectError as error:
+                    str(error)
+                except Exception:  # noqa: BLE001 - it is what is looked for
+                    bad += 1
+                    print(f"{number}: {name}: {mutations}", traceback.format_exc(), sep="\n", flush=True)
+                signal.alarm(0)
+            shutil.rmtree(directory)
+            shutil.rmtree(Path(scratch) / "repaired", ignore_errors=True)
+    print(f"{count} damages, {bad} bad ends, {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024} MB")
+    return bad
+
+
+if __name__ == "__main__":
+    sys.exit(bool(main(int(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 0)))

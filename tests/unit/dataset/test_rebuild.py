@@ -1,0 +1,104 @@
+"""The files that follow from others come back byte for byte."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pyarrow.parquet as pq
+import pytest
+
+from throwcollect.dataset.rebuild import NO_EPISODE, rebuild
+from throwcollect.dataset.verify import verify
+from throwcollect.errors import DatasetError
+
+DERIVED = ("throws.parquet", "metadata.yaml")
+
+
+@pytest.fixture(scope="module")
+def mixed(make_module_collection: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A dataset with a refused and two lost trials, one of them alone in its file."""
+    collection = make_module_collection()
+    collection.refuse(1, "arm_right_1_joint: too fast")
+    directory = tmp_path_factory.mktemp("mixed") / "dataset"
+    return Path(collection.collect(directory, [0, 2, 3, 4, 5, 6], lost=[4, 6]))
+
+
+@pytest.fixture(scope="module")
+def make_module_collection() -> Any:
+    from tests.unit.dataset.conftest import Collection
+
+    return Collection
+
+
+@pytest.fixture
+def spoiled(mixed: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(mixed, tmp_path / "spoiled"))
+
+
+def test_derived_files_come_back_byte_for_byte(mixed: Path, spoiled: Path) -> None:
+    (spoiled / "metadata.yaml").unlink()
+    (spoiled / "README.md").unlink()
+    rebuilt = rebuild(spoiled)
+    assert (rebuilt.trials, rebuilt.episodes, rebuilt.lost) == (7, 4, (4, 6))
+    assert rebuilt.written == ("throws.parquet", "metadata.yaml", "README.md")
+    for name in DERIVED:
+        assert (spoiled / name).read_bytes() == (mixed / name).read_bytes()
+    assert "wall time" not in (spoiled / "README.md").read_text()
+    assert verify(spoiled) == []
+
+
+def test_a_stale_table_is_made_right_and_the_data_card_stays(mixed: Path, spoiled: Path) -> None:
+    table = pq.read_table(spoiled / "throws.parquet")
+    values = table["landing_x_m"].to_pylist()
+    index = table.schema.get_field_index("landing_x_m")
+    stale = table.set_column(index, table.schema.field(index), [[1.0, *values[1:]]])
+    pq.write_table(stale, spoiled / "throws.parquet")
+    (spoiled / "README.md").write_text("mine")
+    assert rebuild(spoiled).written == DERIVED
+    assert (spoiled / "throws.parquet").read_bytes() == (mixed / "throws.parquet").read_bytes()
+    assert (spoiled / "README.md").read_text() == "mine"
+
+
+def test_without_any_table_lost_trials_are_lost_without_their_reasons(mixed: Path, spoiled: Path) -> None:
+    for name in DERIVED:
+        (spoiled / name).unlink()
+    assert rebuild(spoiled).lost == (4, 6)
+    rows = pq.read_table(spoiled / "throws.parquet").to_pylist()
+    assert [row["outcome"] for row in rows] == ["landed", "refused", "landed", "landed", "lost", "landed", "lost"]
+    assert rows[4]["reason"] == NO_EPISODE
+    assert rows[1]["reason"] == "arm_right_1_joint: too fast"
+    assert (spoiled / "metadata.yaml").read_bytes() == (mixed / "metadata.yaml").read_bytes()
+    assert verify(spoiled) == []
+
+
+def test_a_damaged_recording_is_refused_and_nothing_is_written(spoiled: Path) -> None:
+    data = bytearray((spoiled / "quick_00001.mcap").read_bytes())
+    data[len(data) // 2] ^= 1
+    (spoiled / "quick_00001.mcap").write_bytes(data)
+    (spoiled / "throws.parquet").unlink()
+    with pytest.raises(DatasetError, match=r"quick_00001\.mcap: .*\n  try: throwcollect dataset repair .* OUTPUT"):
+        rebuild(spoiled)
+    assert not (spoiled / "throws.parquet").exists()
+
+
+def test_a_missing_recording_is_refused(spoiled: Path) -> None:
+    (spoiled / "quick_00001.mcap").unlink()
+    with pytest.raises(DatasetError, match=r"quick_00001\.mcap is missing\n  try: throwcollect dataset repair"):
+        rebuild(spoiled)
+
+
+def test_recordings_under_each_others_names_are_refused(dataset: Path) -> None:
+    first, second = dataset / "quick_00000.mcap", dataset / "quick_00001.mcap"
+    one, other = first.read_bytes(), second.read_bytes()
+    first.write_bytes(other)
+    second.write_bytes(one)
+    with pytest.raises(DatasetError, match=r"quick_00000\.mcap: trial 3: its episode does not belong into this file"):
+        rebuild(dataset)
+
+
+def test_an_unfinished_collection_is_refused(spoiled: Path) -> None:
+    (spoiled / "quick_00002.mcap.part").write_bytes(b"")
+    with pytest.raises(DatasetError, match=r"not collected to its end\n  try: throwcollect resume"):
+        rebuild(spoiled)

@@ -1,0 +1,221 @@
+"""A damaged dataset becomes a sound one, and what is lost is said."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pyarrow.parquet as pq
+import pytest
+
+from throwcollect.config.schema import Config
+from throwcollect.dataset.mcap_reader import opened
+from throwcollect.dataset.repair import LostTrial, repair
+from throwcollect.dataset.salvage import salvage
+from throwcollect.dataset.verify import verify
+from throwcollect.dataset.writer import DatasetWriter
+from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.sweep.plan import Plan, make_plan
+
+SHARD = "quick_00001.mcap"
+NO_PLAN = "there is no such file to draw from"
+
+
+def never(config: Config) -> Plan:
+    raise ConfigError(NO_PLAN)
+
+
+@pytest.fixture
+def output(tmp_path: Path) -> Path:
+    return tmp_path / "output"
+
+
+def spoil(path: Path, place: int) -> None:
+    data = bytearray(path.read_bytes())
+    data[place] ^= 1
+    path.write_bytes(data)
+
+
+def chunk_of(directory: Path, trial: int) -> int:
+    offset = pq.read_table(directory / "throws.parquet")["chunk_offset"].to_pylist()[trial]
+    assert isinstance(offset, int)
+    return offset
+
+
+def same_files(one: Path, other: Path) -> bool:
+    names = {path.name for path in one.iterdir()} - {"README.md"}
+    return names == {path.name for path in other.iterdir()} - {"README.md"} and all(
+        (one / name).read_bytes() == (other / name).read_bytes() for name in names
+    )
+
+
+def no_summary(directory: Path) -> None:
+    data = (directory / SHARD).read_bytes()
+    (directory / SHARD).write_bytes(data[:-300])
+
+
+def damaged_index(directory: Path) -> None:
+    with opened(directory / SHARD) as contents:
+        index = contents.episode(chunk_of(directory, 4)).indexes[4]
+    spoil(directory / SHARD, index.offset + 100)
+
+
+def damaged_latched_topics(directory: Path) -> None:
+    spoil(directory / SHARD, 6000)
+
+
+def swapped(directory: Path) -> None:
+    one, other = (directory / "quick_00000.mcap").read_bytes(), (directory / SHARD).read_bytes()
+    (directory / "quick_00000.mcap").write_bytes(other)
+    (directory / SHARD).write_bytes(one)
+
+
+def no_tables(directory: Path) -> None:
+    (directory / "throws.parquet").unlink()
+    (directory / "metadata.yaml").unlink()
+
+
+def renamed_to_part(directory: Path) -> None:
+    (directory / SHARD).rename(directory / f"{SHARD}.part")
+
+
+@pytest.mark.parametrize(
+    "damage", [no_summary, damaged_index, damaged_latched_topics, swapped, no_tables, renamed_to_part]
+)
+def test_what_can_be_mended_is_as_if_nothing_had_happened(
+    collected: Path, dataset: Path, output: Path, damage: Callable[[Path], None]
+) -> None:
+    damage(dataset)
+    repaired = repair(dataset, output, remake=never)
+    assert (repaired.trials, repaired.episodes, repaired.lost) == (7, 7, ())
+    assert same_files(output, collected)
+
+
+def test_an_episode_that_is_damaged_is_lost_and_the_others_are_kept(
+    collection: Any, dataset: Path, output: Path, tmp_path: Path
+) -> None:
+    spoil(dataset / SHARD, chunk_of(dataset, 4) + 3000)
+    before = {path.name: path.read_bytes() for path in dataset.iterdir()}
+    repaired = repair(dataset, output, remake=never)
+    assert repaired.lost == (LostTrial(4, "no whole episode of it was left"),)
+    assert repaired.episodes == 6
+    assert verify(output) == []
+    assert {path.name: path.read_bytes() for path in dataset.iterdir()} == before
+    writer = DatasetWriter.create(tmp_path / "same", collection.plan)
+    collection.fill(writer, [0, 1, 2, 3, 5, 6])
+    writer.append_lost(4, "no whole episode of it was left")
+    writer.finish(wall_s=1.0)
+    assert same_files(output, tmp_path / "same")
+
+
+def test_a_missing_file_costs_its_trials(dataset: Path, output: Path) -> None:
+    (dataset / SHARD).unlink()
+    assert [lost.trial for lost in repair(dataset, output, remake=never).lost] == [3, 4, 5]
+    assert verify(output) == []
+
+
+def test_trials_that_were_lost_before_keep_their_reasons_and_do_not_count(
+    collection: Any, tmp_path: Path, output: Path
+) -> None:
+    collection.refuse(6, "too fast")
+    dataset = collection.collect(tmp_path / "dataset", range(6), lost=[2])
+    assert repair(dataset, output, remake=never).lost == ()
+    assert same_files(output, dataset)
+
+
+def test_an_unfinished_collection_is_mended_too(collection: Any, tmp_path: Path, output: Path) -> None:
+    directory = tmp_path / "begun"
+    writer = DatasetWriter.create(directory, collection.plan)
+    collection.fill(writer, [5, 0, 2, 1, 3])
+    writer.close()
+    repaired = repair(directory, output, remake=never)
+    assert [lost.trial for lost in repaired.lost] == [4, 6]
+    assert repaired.episodes == 5
+    assert verify(output) == []
+
+
+def test_the_first_of_several_episodes_of_a_trial_is_taken_and_that_is_said(dataset: Path, output: Path) -> None:
+    (dataset / "quick_00003.mcap").write_bytes((dataset / SHARD).read_bytes())
+    repaired = repair(dataset, output, remake=never)
+    assert repaired.lost == ()
+    assert len(repaired.remarks) == 3
+    assert all(
+        f"the same episode of trial {trial} was taken from {SHARD} already" in remark
+        for trial, remark in zip((3, 4, 5), repaired.remarks, strict=True)
+    )
+
+
+def test_an_episode_that_contradicts_physics_is_lost(collection: Any, tmp_path: Path, output: Path) -> None:
+    def early(samples: Any, header: Any) -> Any:
+        shifted = samples.ball_position + (header.trial == 2) * 1e-3 * (samples.stamps_ns % 7 == 0)[:, None]
+        return type(samples)(**{**vars(samples), "ball_position": shifted}), header
+
+    dataset = collection.collect(tmp_path / "dataset", change=early)
+    (lost,) = repair(dataset, output, remake=never).lost
+    assert lost.trial == 2
+    assert "departs from ballistic motion" in lost.reason
+    assert verify(output) == []
+
+
+def test_an_episode_of_no_trial_of_the_plan_is_left_out(make_collection: Any, dataset: Path, output: Path) -> None:
+    more = make_collection({"trials": 9}).collect(dataset.parent / "more")
+    (dataset / "quick_00002.mcap").write_bytes((more / "quick_00002.mcap").read_bytes())
+    repaired = repair(dataset, output, remake=never)
+    assert [remark.partition(": ")[0] for remark in repaired.remarks] == ["quick_00002.mcap"] * 2
+    assert "an episode of trial 8, which the plan does not run" in repaired.remarks[1]
+    assert repaired.lost == ()
+
+
+def test_the_plan_is_made_again_from_the_table_of_throws(collected: Path, dataset: Path, output: Path) -> None:
+    spoil(dataset / "plan.parquet", 60)
+    repaired = repair(dataset, output, remake=never)
+    assert len(repaired.remarks) == 1
+    assert repaired.remarks[0].startswith("plan.parquet: is damaged: ")
+    assert repaired.remarks[0].endswith("made again from throws.parquet")
+    assert same_files(output, collected)
+
+
+def test_the_plan_is_drawn_again_if_the_table_is_damaged_too(collected: Path, dataset: Path, output: Path) -> None:
+    spoil(dataset / "plan.parquet", 60)
+    (dataset / "throws.parquet").unlink()
+    repaired = repair(dataset, output, remake=make_plan)
+    assert repaired.remarks[0].endswith("made again from config.yaml")
+    assert same_files(output, collected)
+
+
+def test_a_plan_that_cannot_be_had_is_said(dataset: Path, output: Path) -> None:
+    (dataset / "plan.parquet").unlink()
+    (dataset / "throws.parquet").unlink()
+    with pytest.raises(DatasetError, match=f"it cannot be drawn again either\n  evidence: {NO_PLAN}"):
+        repair(dataset, output, remake=never)
+    assert not output.exists()
+
+
+def test_a_configuration_that_cannot_be_had_is_said(dataset: Path, output: Path) -> None:
+    (dataset / "config.yaml").write_text("trials: many\n")
+    with pytest.raises(DatasetError, match=r"nothing else holds the configuration[^$]*copy the YAML file"):
+        repair(dataset, output, remake=never)
+
+
+def test_a_configuration_that_is_not_the_plans_is_said(dataset: Path, output: Path) -> None:
+    text = (dataset / "config.yaml").read_text()
+    (dataset / "config.yaml").write_text(text.replace("seed: 0", "seed: 1"))
+    with pytest.raises(DatasetError, match="one of the two was changed"):
+        repair(dataset, output, remake=never)
+
+
+def test_what_is_there_already_is_not_touched(dataset: Path, output: Path) -> None:
+    output.mkdir()
+    (output / "mine").write_text("")
+    with pytest.raises(ConfigError, match="new or empty"):
+        repair(dataset, output, remake=never)
+    assert [path.name for path in output.iterdir()] == ["mine"]
+
+
+def test_all_that_salvage_finds_is_kept(dataset: Path, output: Path) -> None:
+    data = (dataset / SHARD).read_bytes()
+    (dataset / SHARD).write_bytes(data[: len(data) * 2 // 3])
+    found = [each.stored.episode.header.trial for each in salvage(dataset / SHARD)]
+    assert found == [3, 4]
+    assert [lost.trial for lost in repair(dataset, output, remake=never).lost] == [5]

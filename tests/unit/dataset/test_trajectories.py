@@ -1,0 +1,167 @@
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pytest
+
+import throwcollect
+from throwcollect.dataset.columns import COLUMNS
+from throwcollect.dataset.throw_dataset import ThrowDataset
+from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.robots.talos import JOINTS
+
+
+@pytest.fixture(scope="module")
+def loaded(collected: Path) -> ThrowDataset:
+    return throwcollect.load(collected)
+
+
+def column_of(throw: Any, name: str) -> np.ndarray:
+    owner, _, attribute = name.rpartition(".")
+    return getattr(getattr(throw, owner or "ball"), attribute)
+
+
+@pytest.mark.parametrize("threads", [None, 1, 3])
+def test_they_are_the_throws_one_after_the_other(loaded: ThrowDataset, threads: int | None) -> None:
+    many = loaded.select(list(range(7)) * 6)  # more than are read at once
+    found = many.trajectories(threads=threads)
+    assert tuple(found.columns) == COLUMNS
+    assert len(found) == len(many)
+    assert found.trials.tolist() == list(range(7)) * 6
+    for position, (throw, one) in enumerate(zip(many, found, strict=True)):
+        assert found.lengths[position] == throw.row["samples"]
+        for name in COLUMNS:
+            expected = column_of(throw, name)
+            assert np.array_equal(one[name], expected), name
+            assert one[name].base is not None, "a view"
+            rows = slice(found.offsets[position], found.offsets[position + 1])
+            assert np.array_equal(found[name][rows], expected)
+            assert found[name].dtype == expected.dtype
+            assert found[name].flags.c_contiguous
+            assert found[name].flags.writeable
+
+
+@pytest.mark.parametrize("name", COLUMNS)
+def test_a_column_does_not_depend_on_the_others(loaded: ThrowDataset, name: str) -> None:
+    alone = loaded.trajectories([name])
+    assert list(alone.columns) == [name]
+    assert np.array_equal(alone[name], loaded.trajectories()[name])
+
+
+def test_large_arrays_are_no_different(loaded: ThrowDataset, monkeypatch: pytest.MonkeyPatch) -> None:
+    small = loaded.trajectories()
+    monkeypatch.setattr("throwcollect.dataset.columns._LARGE_BYTES", 1)
+    large = loaded.trajectories()
+    for name in COLUMNS:
+        assert np.array_equal(large[name], small[name])
+        assert large[name].flags.writeable
+
+
+def test_columns_of_chosen_joints(loaded: ThrowDataset) -> None:
+    every = loaded.trajectories()
+    for joints in (loaded.moving_joints, ("leg_left_1_joint",), ()):
+        some = loaded.trajectories(["joints.position", "joints.effort", "ball.position"], joints=joints)
+        assert some.joints == joints
+        indexes = [JOINTS.index(joint) for joint in joints]
+        for name in ("joints.position", "joints.effort"):
+            assert np.array_equal(some[name], every[name][:, indexes])
+        assert np.array_equal(some["ball.position"], every["ball.position"])
+    assert set(loaded.moving_joints) == {"torso_1_joint", *(f"arm_right_{n}_joint" for n in (1, 2, 4, 7))}
+
+
+def test_trials_without_an_episode_have_no_samples(collection: Any, tmp_path: Path) -> None:
+    collection.refuse(0, "too fast")
+    dataset = throwcollect.load(collection.collect(tmp_path / "dataset", range(1, 7), lost=[6]))
+    found = dataset.trajectories(["ball.position", "stamps_ns"])
+    assert (found.lengths > 0).tolist() == [False, *[True] * 5, False]
+    assert np.array_equal(found[3]["ball.position"], dataset[3].ball.position)
+    assert found[0]["ball.position"].shape == (0, 3)
+    nothing = dataset.select([6, 0]).trajectories()
+    assert nothing["joints.position"].shape == (0, 32)
+    assert nothing.padded("ball.position").shape == (2, 0, 3)
+    assert len(dataset.select([]).trajectories()) == 0
+
+
+def test_padding_gives_one_shape(loaded: ThrowDataset) -> None:
+    found = loaded.trajectories(["time_s", "ball.position"])
+    assert len(set(found.lengths)) > 1
+    for name, rest in (("time_s", ()), ("ball.position", (3,))):
+        padded = found.padded(name)
+        assert padded.shape == (7, found.lengths.max(), *rest)
+        for one, row, length in zip(found, padded, found.lengths, strict=True):
+            assert np.array_equal(row[:length], one[name])
+            assert np.isnan(row[length:]).all()
+    assert found.padded("time_s", fill=-1).min() == -1
+
+
+def test_it_says_what_it_is(loaded: ThrowDataset) -> None:
+    found = loaded.trajectories(["time_s", "ball.position"])
+    samples = sum(loaded.throws["samples"].to_pylist())
+    size = samples * (8 + 3 * 8) / 1e6
+    assert repr(found) == f"Trajectories(7 throws, {samples} samples, {size:.1f} MB: time_s, ball.position)"
+
+
+def test_what_is_not_there_is_named(loaded: ThrowDataset) -> None:
+    with pytest.raises(ConfigError, match=r"no column 'ball\.colour'"):
+        loaded.trajectories(["ball.colour"])
+    with pytest.raises(ConfigError, match="Talos has no joint 'elbow'"):
+        loaded.trajectories(joints=["elbow"])
+    found = loaded.trajectories(["time_s"])
+    with pytest.raises(KeyError, match="stamps_ns"):
+        found["stamps_ns"]
+    with pytest.raises(IndexError, match="out of range"):
+        found[7]
+
+
+def with_column(dataset: ThrowDataset, name: str, values: list[Any]) -> ThrowDataset:
+    index = dataset.throws.schema.get_field_index(name)
+    throws = dataset.throws.set_column(index, dataset.throws.schema.field(name), pa.array(values))
+    return ThrowDataset(dataset.directory, dataset.config, dataset.parameters, throws)
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_a_row_that_leads_to_another_trial_is_an_error(loaded: ThrowDataset, threads: int) -> None:
+    offsets = loaded.throws["chunk_offset"].to_pylist()
+    wrong = with_column(loaded, "chunk_offset", [offsets[1], offsets[0], *offsets[2:]])
+    with pytest.raises(DatasetError, match=r"quick_00000\.mcap: byte \d+: starts at \d+ ns(.|\n)*expected: trial 0 at"):
+        wrong.trajectories(threads=threads)
+
+
+@pytest.mark.parametrize(("change", "message"), [(3, "chunk: "), (10**9, "chunk: ")])
+def test_a_row_that_leads_nowhere_is_an_error(loaded: ThrowDataset, change: int, message: str) -> None:
+    offsets = loaded.throws["chunk_offset"].to_pylist()
+    with pytest.raises(DatasetError, match=message):
+        with_column(loaded, "chunk_offset", [offset + change for offset in offsets]).trajectories()
+
+
+def test_a_wrong_number_of_samples_is_an_error(loaded: ThrowDataset) -> None:
+    samples = loaded.throws["samples"].to_pylist()
+    for change in (1, -1):
+        with pytest.raises(DatasetError, match="are not the records of"):
+            with_column(loaded, "samples", [each + change for each in samples]).trajectories()
+
+
+def test_a_flipped_bit_is_an_error(dataset: Path) -> None:
+    loaded = throwcollect.load(dataset)
+    path, start = dataset / "quick_00002.mcap", loaded[6].row["chunk_offset"]
+    whole = path.read_bytes()
+    for place in range(start + 60, start + 5000, 397):
+        contents = bytearray(whole)
+        contents[place] ^= 1
+        path.write_bytes(contents)
+        with pytest.raises(DatasetError, match=rf"quick_00002\.mcap: byte {start}: chunk: "):
+            loaded.trajectories(["time_s"])
+
+
+@pytest.mark.parametrize("topics", [["clock"], ["clock", "tf", "controller_state"]])
+def test_more_topics_change_nothing(
+    make_collection: Any, loaded: ThrowDataset, tmp_path: Path, topics: list[str]
+) -> None:
+    record = {"trials_per_shard": 3, "topics": ["joint_states", "ball/odometry", *topics]}
+    more = throwcollect.load(make_collection({"record": record}).collect(tmp_path / "dataset"))
+    found, expected = more.trajectories(), loaded.trajectories()
+    for name in COLUMNS:
+        assert np.array_equal(found[name], expected[name])

@@ -1,0 +1,66 @@
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from throwcollect.config.schema import Config
+from throwcollect.episode.channels import Channels
+from throwcollect.episode.chunk import ChunkEncoder
+from throwcollect.episode.trajectory_rows import STAMPS, as_bytes, places, to_nanoseconds, trajectory_rows
+from throwcollect.errors import DatasetError
+from throwcollect.robots.description import full_description
+
+
+@pytest.fixture(scope="module")
+def contents(make_samples: Any) -> bytes:
+    config = Config.model_validate({"name": "rows", "sweep": {"parameters": {"task.duration_s": {"min": 1, "max": 2}}}})
+    return ChunkEncoder(Channels(config, full_description(config)), level=1).encode(make_samples(20))[0].decompress()
+
+
+def test_every_column_lies_where_it_was_written(contents: bytes, make_samples: Any) -> None:
+    samples = make_samples(20)
+    rows = trajectory_rows(contents, 20)
+    for name, expected in {
+        "joints.position": samples.position,
+        "joints.velocity": samples.velocity,
+        "joints.effort": samples.effort,
+        "ball.position": samples.ball_position,
+        "ball.orientation_xyzw": samples.ball_orientation_xyzw,
+    }.items():
+        assert rows[name].tobytes() == expected.tobytes()
+        assert places()[name].width == expected.shape[1]
+    stamps = np.empty(20, np.int64)
+    as_bytes(stamps)[:] = rows[STAMPS]
+    to_nanoseconds(stamps)
+    assert np.array_equal(stamps, samples.stamps_ns)
+
+
+def test_stamps_use_all_their_bits() -> None:
+    pairs = [(0, 0), (1, 999_999_999), (2**31 - 1, 999_999_999), (5, 2**31 + 1)]
+    stamps = np.array(pairs, [("sec", "<i4"), ("nanosec", "<u4")]).view(np.int64).ravel().copy()
+    to_nanoseconds(stamps)
+    assert stamps.tolist() == [sec * 10**9 + nanosec for sec, nanosec in pairs]
+
+
+@pytest.mark.parametrize("samples", [0, -1, 3, 40, 21])
+def test_another_number_of_samples_is_refused(contents: bytes, samples: int) -> None:
+    with pytest.raises(DatasetError, match=f"are not the records of {samples} samples"):
+        trajectory_rows(contents, samples)
+
+
+def test_another_layout_is_refused(contents: bytes) -> None:
+    varying = {position for place in places().values() for position in range(place.offset, place.offset + place.size)}
+    width = len(contents) // 20
+    refused = 0
+    for position in range(width):
+        changed = bytearray(contents)
+        changed[position] ^= 1
+        try:
+            trajectory_rows(bytes(changed), 20)
+        except DatasetError:
+            refused += 1
+            assert position not in varying
+    # What else varies: number and two times of each of two records, and the stamp of the odometry.
+    assert refused == width - len(varying) - 2 * (4 + 8 + 8) - 8
