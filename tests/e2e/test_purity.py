@@ -33,6 +33,12 @@ def test_a_collection_is_whole(reference: Path) -> None:
     )
 
 
+def test_stored_throws_come_out_of_the_simulation_again(reference: Path) -> None:
+    said = call("dataset", "replay", reference, "--all", "--sample", "5")
+    assert (said.returncode, said.stderr) == (0, "")
+    assert said.stdout == f"{reference}: 5 throws replayed, the same bit for bit\n"
+
+
 @pytest.mark.parametrize("simulations", [1, 2, 4])
 def test_every_file_is_the_same_for_any_number_of_simulations(
     simulations: int, config: Path, reference: Path, tmp_path: Path

@@ -82,7 +82,8 @@ def _stored_plan(directory: Path, stored: Config | None, config: Config) -> Plan
     except DatasetError as error:
         if stored is None:
             # A power cut may have cost the configuration; then only the plan can tell that it was this one.
-            raise DatasetError(error.message, hint=f"throwcollect up CONFIG --resume {directory}, as at first") from error
+            hint = f"throwcollect up CONFIG --resume {directory}, as at first"
+            raise DatasetError(error.message, hint=hint) from error
         return None
 
 

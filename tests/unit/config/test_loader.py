@@ -20,7 +20,9 @@ from throwcollect.config.schema import (
 from throwcollect.errors import ConfigError
 
 CONFIGS = Path(__file__).parents[3] / "configs"
-KNOWN_IN_RUN = "simulations, runtime, router_port, domain_id, trial_timeout_s, start_timeout_s, grace_s, retries, restarts"
+KNOWN_IN_RUN = (
+    "simulations, runtime, router_port, domain_id, trial_timeout_s, start_timeout_s, grace_s, retries, restarts"
+)
 JOINT_LIST = "joint names, each with a number from -6.3 to 6.3 rad"
 
 
