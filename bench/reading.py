@@ -26,6 +26,8 @@ import pyarrow as pa
 import zstandard
 from isal.isal_zlib import crc32
 from mcap.reader import make_reader
+from mcap.records import Chunk
+from mcap.stream_reader import StreamReader, get_chunk_data_stream
 
 from throwcollect import load
 from throwcollect.dataset.throw_dataset import ThrowDataset
@@ -58,6 +60,7 @@ class Reading:
         arrays_mb: Size of the arrays [MB].
         raw: Decompressing.
         raw_crc: Decompressing and comparing CRCs.
+        mcap_chunks: The `mcap` library's way to the contents of all chunks, which compares CRCs.
         one_thread: `ThrowDataset.trajectories` with one thread, which compares CRCs.
         moving: The same with the columns of those joints only that the task moves.
         threads: All joints, with as many threads as by default.
@@ -70,6 +73,7 @@ class Reading:
     arrays_mb: float
     raw: list[Times]
     raw_crc: list[Times]
+    mcap_chunks: list[Times]
     one_thread: list[Times]
     moving: list[Times]
     threads: list[Times]
@@ -95,6 +99,7 @@ def measure(directory: Path, *, rounds: int, throws: int = THROWS) -> Reading:
             for name, read in {
                 "raw": lambda: _decompress(files, crc=False),
                 "raw_crc": lambda: _decompress(files, crc=True),
+                "mcap_chunks": lambda: _decompress_with_mcap(files),
                 "one_thread": lambda: dataset.trajectories(COLUMNS, threads=1),
                 "moving": lambda: dataset.trajectories(COLUMNS, joints=dataset.moving_joints, threads=1),
                 "threads": lambda: dataset.trajectories(COLUMNS),
@@ -148,6 +153,14 @@ def _decompress(files: Sequence[Path], *, crc: bool) -> tuple[int, int]:
     return before, after
 
 
+def _decompress_with_mcap(files: Sequence[Path]) -> None:
+    for path in files:
+        with path.open("rb") as file:
+            for record in StreamReader(file, emit_chunks=True).records:
+                if isinstance(record, Chunk):
+                    get_chunk_data_stream(record, validate_crc=True)
+
+
 def _by_messages(path: Path, throws: int) -> None:
     """Read messages of the first throws of a file with the `mcap` library, and leave them as bytes."""
     with path.open("rb") as file:
@@ -164,6 +177,7 @@ def show(found: Reading) -> None:
     ways = {
         "decompressing alone, one thread": found.raw,
         "decompressing and CRC, one thread": found.raw_crc,
+        "decompressing and CRC by `mcap`": found.mcap_chunks,
         "`trajectories(threads=1)`": found.one_thread,
         "the same with the moving joints only": found.moving,
         "`trajectories()`": found.threads,
@@ -172,12 +186,13 @@ def show(found: Reading) -> None:
     print(f"\n## Reading {found.throws} throws, medians of {len(found.raw)}\n")
     print(f"{found.compressed_mb:.0f} MB of chunks, {found.uncompressed_mb:.0f} MB uncompressed, ", end="")
     print(f"{found.arrays_mb:.0f} MB of arrays ({', '.join(COLUMNS)})\n")
-    print("| what | episodes/s | uncompressed MB/s | ratio to decompressing, processor time (wall) | with CRC |")
-    print("|---|---|---|---|---|")
+    print("| what | episodes/s | uncompressed MB/s | ratio to decompressing: processor time (wall) ", end="")
+    print("| with CRC | by `mcap` |")
+    print("|---|---|---|---|---|---|")
     for what, times in ways.items():
         wall_s = statistics.median(each.wall_s for each in times)
         print(f"| {what} | {found.throws / wall_s:.0f} | {found.uncompressed_mb / wall_s:.0f} ", end="")
-        for limit in (found.raw, found.raw_crc):
+        for limit in (found.raw, found.raw_crc, found.mcap_chunks):
             print(f"| {ratio(times, limit).processor_s:.2f} ({ratio(times, limit).wall_s:.2f}) ", end="")
         print("|", flush=True)
 

@@ -12,7 +12,7 @@ from throwcollect.config.schema import Config
 from throwcollect.config.values import differences
 from throwcollect.coordinator.prepare import checked_plan
 from throwcollect.dataset.directory import CONFIG, METADATA, PLAN
-from throwcollect.dataset.files import write_file
+from throwcollect.dataset.files import remove, write_file
 from throwcollect.dataset.reader import read_throws
 from throwcollect.errors import ConfigError, DatasetError, Problem
 from throwcollect.sweep.plan import Plan, Trial
@@ -46,6 +46,9 @@ def resume(config: Config, directory: Path, *, sweep_directory: Path) -> Plan:
         plan = _extended(directory, old, checked_plan(config, directory=sweep_directory))
     else:
         plan = replace(old, config=config)
+    if stored is not None and stored.without_run() != config.without_run():
+        # It was perhaps finished by the configuration that it had; by this one it is not.
+        remove(directory / METADATA)
     # A finished dataset stays as it is, and says nothing of how it is run.
     kept = config.without_run() if finished(directory, plan) else config
     if stored != kept:
@@ -92,10 +95,18 @@ def _refuse_changes(directory: Path, stored: Config, config: Config) -> None:
     problems = [
         Problem(f"{directory} was begun with {quoted(before)}, got {quoted(after)}", key=key)
         for key, (before, after) in changed.items()
-        if key not in _MAY_GROW
+        if key not in _MAY_GROW or not _grows(before, after, config)
     ]
     if problems:
         raise ConfigError(problems, expected="the same configuration, but for `run`, `containers` and more `trials`")
+
+
+def _grows(before: int | None, after: int | None, config: Config) -> bool:
+    """Whether a number of trials or throws may take the place of another; none is the largest."""
+    if not config.grows:
+        # Its trials are counted.
+        return True
+    return after is None or (before is not None and after >= before)
 
 
 def _extended(directory: Path, old: Plan | None, new: Plan) -> Plan:

@@ -124,3 +124,23 @@ def test_a_directory_without_either_is_not_begun(directory: Path, tmp_path_facto
 
 def test_a_dataset_without_metadata_is_not_finished(directory: Path) -> None:
     assert not finished(directory, resume(config_with(), directory, sweep_directory=directory))
+
+
+def test_what_was_finished_is_not_so_with_more_trials(directory: Path) -> None:
+    (directory / "metadata.yaml").write_text("whole")
+    resume(config_with(trials=5), directory, sweep_directory=directory)
+    assert not (directory / "metadata.yaml").exists()
+
+
+def test_a_plan_that_grows_may_be_asked_for_more_but_not_for_less(tmp_path: Path) -> None:
+    few, more = (config_with(trials=trials, until={"landed": landed}) for trials, landed in ((70, 60), (80, 65)))
+    directory = tmp_path / "data"
+    begun_with = prepare(few, directory, sweep_directory=tmp_path)
+    (directory / "metadata.yaml").write_text("whole")
+    plan = resume(more, directory, sweep_directory=tmp_path)
+    assert plan.trials[: len(begun_with.trials)] == begun_with.trials
+    assert load(directory / "config.yaml").until == more.until
+    assert not (directory / "metadata.yaml").exists()
+    with pytest.raises(ConfigError, match="the same configuration") as raised:
+        resume(few, directory, sweep_directory=tmp_path)
+    assert [problem.key for problem in raised.value.problems] == ["trials", "until.landed"]
