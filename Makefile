@@ -21,8 +21,10 @@ $(READY_DEV): pyproject.toml | $(VENV)/bin/python
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev]'
 	touch $(READY) $@
 
+# What starts no other process runs on all cores at once.
 test: check
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n logical tests/architecture tests/unit tests/physics
+	$(BIN)/python -m pytest tests/integration tests/e2e tests/docker tests/ros
 
 # Format, lint, types and the direction of imports.
 check: $(READY_DEV)

@@ -67,8 +67,7 @@ class FileContents:
         """
         offsets = {channel: start + offset for channel, offset in index.message_index_offsets.items()}
         self._chunk_indexes.append(replace(index, chunk_start_offset=start, message_index_offsets=offsets))
-        for channel in offsets:
-            self._counts[channel] += messages
+        self._counts.update(dict.fromkeys(offsets, messages))
 
     def add_metadata(self, name: str, start: int, length: int) -> None:
         """Count a Metadata record."""

@@ -18,7 +18,7 @@ from throwcollect.dataset.mcap_reader import StoredEpisode
 from throwcollect.dataset.throws import Row, ThrowsTable, encode_table, read_throws_table
 from throwcollect.dataset.verify_episode import EpisodeCheck, RowJudge
 from throwcollect.dataset.verify_shard import ShardCheck
-from throwcollect.dataset.verify_tables import shard_of
+from throwcollect.dataset.verify_tables import shard_of, wrong_trials
 from throwcollect.episode.channels import Channels
 from throwcollect.errors import DatasetError
 from throwcollect.robots.description import full_description
@@ -68,6 +68,8 @@ def rebuild(directory: Path) -> Rebuilt:
             f"{directory}: holds {unfinished[0]}: it is not collected to its end",
             hint=f"throwcollect resume {directory}, or {repair}",
         )
+    if wrong := wrong_trials(plan):
+        raise DatasetError(f"{directory / PLAN}: trial {min(wrong)}: was changed since the plan was made", hint=repair)
     earlier = earlier_rows(directory, plan)
     recordings = _Recordings(plan)
     for name in dict.fromkeys(shard_of(plan, trial.number) for trial in plan.trials):

@@ -18,6 +18,7 @@ from throwcollect.dataset.rebuild import earlier_rows, reason_lost
 from throwcollect.dataset.salvage import Salvaged, salvage
 from throwcollect.dataset.throws import REFUSED, Row, ThrowsTable
 from throwcollect.dataset.verify_episode import EpisodeCheck
+from throwcollect.dataset.verify_tables import wrong_trials
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.episode.channels import Channels
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError
@@ -83,10 +84,6 @@ def repair(directory: Path, output: Path, *, remake: Remake) -> Repaired:
     remarks: list[str] = []
     plan = _plan(directory, config, remake, remarks)
     earlier = earlier_rows(directory, plan)
-    for trial in plan.trials:
-        row = earlier.get(trial.number)
-        if row is not None and any(row[key] != value for key, value in trial.values.items()):
-            raise DatasetError(f"{directory}: throws.parquet and the plan differ in the values of trial {trial.number}")
     with new_directory(output) as beside:
         writer = DatasetWriter.create(beside, plan)
         try:
@@ -115,7 +112,10 @@ def _configuration(directory: Path) -> Config:
 def _plan(directory: Path, config: Config, remake: Remake, remarks: list[str]) -> Plan:
     path = directory / PLAN
     try:
-        return Plan.read(path, config)
+        plan = Plan.read(path, config)
+        if not (wrong := wrong_trials(plan)):
+            return plan
+        reason = f"trial {min(wrong)} has another digest than its values and seed"
     except ForeignPlanError as error:
         raise DatasetError(
             f"{error.message} than {CONFIG}; one of the two was changed, and nothing says which",

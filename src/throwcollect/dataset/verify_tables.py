@@ -69,7 +69,10 @@ def check_tables(directory: Path) -> Tables:
         except DatasetError as error:
             tables.findings.append(_finding(directory, PLAN, error))
     if tables.plan is not None:
-        tables.findings += _digest_findings(tables.plan, tables.doubtful)
+        for trial, digest in wrong_trials(tables.plan).items():
+            problem = f"has digest {tables.plan.trials[trial].digest}, its values and seed give {digest}"
+            tables.findings.append(Finding(PLAN, f"trial {trial}", problem))
+            tables.doubtful.add(trial)
         try:
             rows = read_throws_table(directory / THROWS, tables.plan).to_pylist()
         except DatasetError as error:
@@ -85,16 +88,15 @@ def _finding(directory: Path, name: str, error: DatasetError) -> Finding:
     return Finding(name, "", str(error).removeprefix(f"{directory / name}: "))
 
 
-def _digest_findings(plan: Plan, doubtful: set[int]) -> Iterator[Finding]:
-    """Trials that are not what the plan was made with, as their digests tell; they join `doubtful`."""
+def wrong_trials(plan: Plan) -> dict[int, str]:
+    """Trials that are not what a plan was made with, and the digests that their values and seeds give.
+
+    Args:
+        plan: The plan.
+    """
     values = np.array([list(trial.values.values()) for trial in plan.trials], float).reshape(len(plan.trials), -1)
-    seeds = [trial.seed for trial in plan.trials]
-    for trial, digest in zip(plan.trials, trial_digests(plan.config, Points(plan.keys, values), seeds), strict=True):
-        if trial.digest != digest:
-            doubtful.add(trial.number)
-            yield Finding(
-                PLAN, f"trial {trial.number}", f"has digest {trial.digest}, its values and seed give {digest}"
-            )
+    digests = trial_digests(plan.config, Points(plan.keys, values), [trial.seed for trial in plan.trials])
+    return {trial.number: digest for trial, digest in zip(plan.trials, digests, strict=True) if trial.digest != digest}
 
 
 def _row_findings(plan: Plan, rows: list[dict[str, Any]]) -> Iterator[Finding]:

@@ -95,7 +95,6 @@ class MessageLayout:
                 "itemsize": len(self.template),
             }
         )
-        self._bytes = np.frombuffer(self.template, np.uint8)
         self._varies = np.zeros(len(self.template), bool)
         for place in places:
             self._varies[_ENCAPSULATION_BYTES + place.offset : _ENCAPSULATION_BYTES + place.end] = True
@@ -108,7 +107,7 @@ class MessageLayout:
         """
         if rows.shape[1] != len(self.template):
             return False
-        return bool(((rows == self._bytes) | self._varies).all())
+        return bool(((rows == np.frombuffer(self.template, np.uint8)) | self._varies).all())
 
 
 def _merged(numbers: Sequence[_Numbers], path: str, type_name: str) -> _Numbers:

@@ -65,18 +65,16 @@ class Flight:
         Returns:
             The knot before it and the ball at that instant; None without a crossing.
         """
-        below = self.positions[:, 2] < height
-        crossings = (below[1:] > below[:-1]).nonzero()[0]
+        above = self.positions[:, 2] - height
+        crossings = np.flatnonzero((above[:-1] >= 0) & (above[1:] < 0))
         if not len(crossings):
             return None
         knot = int(crossings[0])
-        both = slice(knot, knot + 2)
-        before, after = self.times[both].tolist()
-        span = after - before
-        z0, z1 = (z - height for z in self.positions[both, 2].tolist())
-        m0, m1 = (speed * span for speed in self.velocities[both, 2].tolist())
+        span = float(self.times[knot + 1] - self.times[knot])
+        z0, z1 = map(float, above[knot : knot + 2])
+        m0, m1 = (float(speed) * span for speed in self.velocities[knot : knot + 2, 2])
         u = _root((2 * z0 - 2 * z1 + m0 + m1, -3 * z0 + 3 * z1 - 2 * m0 - m1, m0, z0))
-        return knot, self.state_at(before + u * span, knot=knot)
+        return knot, self.state_at(float(self.times[knot]) + u * span, knot=knot)
 
     def apex(self, knots: int) -> BallState:
         """Highest point.

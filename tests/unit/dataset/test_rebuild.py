@@ -6,6 +6,7 @@ import shutil
 from pathlib import Path
 from typing import Any
 
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
@@ -81,6 +82,14 @@ def test_a_damaged_recording_is_refused_and_nothing_is_written(spoiled: Path) ->
     with pytest.raises(DatasetError, match=r"quick_00001\.mcap: .*\n  try: throwcollect dataset repair .* OUTPUT"):
         rebuild(spoiled)
     assert not (spoiled / "throws.parquet").exists()
+
+
+def test_a_plan_that_was_changed_is_refused(spoiled: Path) -> None:
+    table = pq.read_table(spoiled / "plan.parquet")
+    seeds = pa.array(range(7), pa.uint64())
+    pq.write_table(table.set_column(2, table.schema.field(2), seeds), spoiled / "plan.parquet")
+    with pytest.raises(DatasetError, match=r"plan\.parquet: trial 0: was changed since the plan was made\n  try: "):
+        rebuild(spoiled)
 
 
 def test_a_missing_recording_is_refused(spoiled: Path) -> None:

@@ -176,6 +176,28 @@ def test_the_plan_is_made_again_from_the_table_of_throws(collected: Path, datase
     assert same_files(output, collected)
 
 
+def test_a_plan_that_was_changed_is_made_again(collected: Path, dataset: Path, output: Path) -> None:
+    table = pq.read_table(dataset / "plan.parquet")
+    values = table["task.duration_s"].to_pylist()
+    changed = table.set_column(4, table.schema.field(4), [[*values[:5], 1.0, *values[6:]]])
+    pq.write_table(changed, dataset / "plan.parquet")
+    repaired = repair(dataset, output, remake=never)
+    (remark,) = repaired.remarks
+    assert remark.startswith(
+        "plan.parquet: trial 5 has another digest than its values and seed; made again from throws"
+    )
+    assert same_files(output, collected)
+
+
+def test_a_plan_that_is_made_again_still_refuses_trials(collection: Any, tmp_path: Path, output: Path) -> None:
+    collection.refuse(6, "too fast")
+    dataset = collection.collect(tmp_path / "dataset", range(6))
+    kept = tmp_path / "kept.parquet"
+    (dataset / "plan.parquet").rename(kept)
+    assert repair(dataset, output, remake=never).lost == ()
+    assert (output / "plan.parquet").read_bytes() == kept.read_bytes()
+
+
 def test_the_plan_is_drawn_again_if_the_table_is_damaged_too(collected: Path, dataset: Path, output: Path) -> None:
     spoil(dataset / "plan.parquet", 60)
     (dataset / "throws.parquet").unlink()

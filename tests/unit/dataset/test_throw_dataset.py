@@ -96,7 +96,6 @@ def test_trials_without_an_episode_have_a_row_and_say_why_they_have_no_more(with
         (pa.array([6]), [6]),
         ([], []),
     ],
-    ids=str,
 )
 def test_selecting(loaded: ThrowDataset, which: Any, found: list[int]) -> None:
     some = loaded.select(which)

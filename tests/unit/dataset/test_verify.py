@@ -434,6 +434,11 @@ def config_value(directory: Path) -> None:
     replace_text(directory / "config.yaml", "mass_kg: 0.045", "mass_kg: 0.05")
 
 
+def config_height(directory: Path) -> None:
+    """The recordings would be wrong by this configuration, but they are not."""
+    replace_text(directory / "config.yaml", "base_height_m: 1.01927", "base_height_m: 1.1")
+
+
 def bag_no_yaml(directory: Path) -> None:
     (directory / "metadata.yaml").write_text("rosbag2_bagfile_information: [")
 
@@ -534,6 +539,7 @@ DEFECTS: dict[Callable[[Path], None], tuple[str, str, str]] = {
     plan_damaged: ("plan.parquet", "", "is damaged"),
     plan_gone: ("plan.parquet", "", "is missing"),
     config_value: ("config.yaml", "", "not the configuration that plan.parquet was made for"),
+    config_height: ("config.yaml", "", "one of the two was changed"),
     bag_no_yaml: ("metadata.yaml", "", "cannot be read"),
     bag_files: ("metadata.yaml", "relative_file_paths", "the files give"),
     bag_file_count: ("metadata.yaml", "files", "the files give"),
