@@ -11,9 +11,14 @@ import pkgutil
 import throwcollect
 from throwcollect.ros.backend import uses_rclpy
 
+EXTRAS = {"plotly", "matplotlib", "h5py"}
 for module in pkgutil.walk_packages(throwcollect.__path__, "throwcollect."):
     if not module.name.endswith("__main__") and (uses_rclpy() or module.name != "throwcollect.ros.genuine"):
-        importlib.import_module(module.name)
+        try:
+            importlib.import_module(module.name)
+        except ModuleNotFoundError as missing:
+            if (missing.name or "").partition(".")[0] not in EXTRAS:
+                raise
 PYTHON
 throwcollect --help > help
 throwcollect up -n 1 --runtime local --trials 4 --output dataset "$(dirname "$0")/quickstart.yaml"

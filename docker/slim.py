@@ -40,11 +40,10 @@ DROPPED = (
     "pyarrow/_s3fs*",
     "pyarrow/_substrait*",
     "pyarrow/src/*",
-    # Parts that the samplers do not use.
+    # Parts that samplers and exports do not use.
     "scipy/cluster/*",
     "scipy/datasets/*",
     "scipy/fftpack/*",
-    "scipy/io/*",
     "scipy/odr/*",
     "scipy/signal/*",
     # Recordings in the formats of rosbags: of that package, the interface definitions alone are used.
