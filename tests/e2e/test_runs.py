@@ -185,7 +185,7 @@ def test_stopping_drains_as_ctrl_c_does(config: Path, records: Records, say: Say
     assert_gone(processes)
     assert (tmp_path / "data" / "small_00000.mcap.part").exists()
     ending = f"throwcollect: interrupted; finished throws are in {tmp_path / 'data'}, the dataset is not complete\n"
-    assert say("wait") == (130, "", ending)
+    assert say("wait") == (130, "", f"{ending}  try: throwcollect resume {tmp_path / 'data'}\n")
     hint = "  try: throwcollect ps lists those that live\n"
     assert say("stop", "--run", run) == (2, "", f"throwcollect: run {run} has ended\n{hint}")
 
@@ -217,7 +217,8 @@ def test_a_killed_launcher_takes_its_processes_along_and_is_told(
         code, out, err = say(*verb)
         assert (verb, code, out) == (verb, 3, "")
         assert f"throwcollect: run {run}: its launcher died; finished throws are in {tmp_path / 'data'}" in err
-        assert f"try: throwcollect down --run {run} cleans up" in err
+        assert f"try: throwcollect resume {tmp_path / 'data'} goes on where it ended" in err
+        assert f"throwcollect down --run {run} cleans up" in err
     code, _, err = say("up", config, "--output", tmp_path / "data")
     assert (code, f"{tmp_path / 'data'}: holds config.yaml, logs, plan.parquet" in err) == (2, True)
     assert say("down") == (0, f"{run}: ended and forgotten\n", "")
