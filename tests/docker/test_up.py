@@ -52,7 +52,7 @@ def containers_of(client: docker.DockerClient, directory: Path) -> dict[str, doc
     return {each.labels["throwcollect.node"]: each for each in client.containers.list(filters=filters)}
 
 
-@pytest.mark.parametrize("simulations", [1, 8])
+@pytest.mark.parametrize("simulations", [8])
 def test_the_files_are_those_of_processes(
     config: Path, expected: dict[str, str], engine: docker.DockerClient, tmp_path: Path, simulations: int
 ) -> None:

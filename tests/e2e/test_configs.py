@@ -10,10 +10,8 @@ from throwcollect.dataset.verify import verify
 
 pytestmark = pytest.mark.e2e
 CONFIGS = sorted((Path(__file__).parents[2] / "configs").glob("*.yaml"))
-WHOLE = {"grid": 84, "reference": 2}
-"""Trials of those that have as many as their points."""
-LONG = {"targets": 132}
-"""Trials of those that need more than a few to show what they are for."""
+WHOLE = {"reference": 2}
+"""Trials of those that have as many as their points, and few of them."""
 
 
 def test_there_are_configurations() -> None:
@@ -22,7 +20,7 @@ def test_there_are_configurations() -> None:
 
 @pytest.mark.parametrize("config", CONFIGS, ids=lambda path: path.stem)
 def test_a_configuration_is_collected_and_verified(config: Path, tmp_path: Path) -> None:
-    trials = WHOLE.get(config.stem, LONG.get(config.stem, 3))
+    trials = WHOLE.get(config.stem, 3)
     options = [] if config.stem in WHOLE else ["--trials", str(trials)]
     collected = call("up", "-n", "2", config, "--output", tmp_path / "data", "--json", *options)
     assert collected.returncode == 0, collected.stderr

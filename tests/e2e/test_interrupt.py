@@ -186,18 +186,6 @@ def test_a_killed_coordinator_is_started_again_and_takes_in_what_is_there(
     assert next(event["episodes"] for event in events(tmp_path / "data") if event["event"] == "recovered") > 0
 
 
-def test_a_coordinator_that_cannot_be_kept_alive_ends_the_run(
-    config: Path, reference: Path, tmp_path: Path, started: list[Running]
-) -> None:
-    running, nodes = begin(started, config, tmp_path / "data", "--set", "run.restarts=0")
-    in_the_middle(running, whole=reference)
-    running.node("coordinator", str(tmp_path / "data")).kill()
-    code, out, err = running.finish()
-    assert (code, out) == (3, "")
-    assert "throwcollect: the coordinator stopped: ended by SIGKILL\n" in err
-    assert_gone(nodes)
-
-
 def test_a_power_cut_costs_what_had_not_reached_the_disk(
     config: Path, reference: Path, tmp_path: Path, started: list[Running]
 ) -> None:
