@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -71,19 +72,20 @@ class Running:
         return self.process.returncode, out, err
 
 
-def start(config: Path, directory: Path, simulations: int, *options: str) -> Running:
+def start(config: Path, directory: Path, simulations: int, *options: str, **environment: str) -> Running:
     process = subprocess.Popen(
         command("up", "-n", str(simulations), "--runtime", "local", config, "--output", directory, *options),
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
+        env={**os.environ, **environment},
     )
     return Running(process, directory)
 
 
-def collect(config: Path, directory: Path, simulations: int) -> dict[str, object]:
+def collect(config: Path, directory: Path, simulations: int, *options: str, **environment: str) -> dict[str, object]:
     """A whole collection; returns its summary."""
-    code, out, err = start(config, directory, simulations, "--json").finish()
+    code, out, err = start(config, directory, simulations, "--json", *options, **environment).finish()
     assert code == 0, err
     summary: dict[str, object] = json.loads(out)
     return summary

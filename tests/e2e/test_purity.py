@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from tests import processors
 from tests.e2e.collection import call, collect, fingerprints, start, write_config
 from throwcollect.dataset.verify import verify
 
@@ -69,6 +70,14 @@ def test_every_file_is_the_same_when_a_simulation_is_killed(config: Path, refere
     assert code == 0, err
     assert "sim_1 was lost (ended by SIGKILL)" in err
     assert fingerprints(tmp_path / "data") == fingerprints(reference)
+
+
+def test_every_file_is_the_same_on_another_processor(tmp_path: Path) -> None:
+    config = Path(__file__).parents[2] / "configs" / "dmp.yaml"
+    options = ("--trials", "3", "--set", "record.topics=[joint_states, ball/odometry, controller_state, tf, clock]")
+    collect(config, tmp_path / "here", 1, *options)
+    collect(config, tmp_path / "there", 1, *options, **processors.PLAIN)
+    assert fingerprints(tmp_path / "there") == fingerprints(tmp_path / "here")
 
 
 def test_another_seed_gives_another_digest(config: Path, reference: Path, tmp_path: Path) -> None:

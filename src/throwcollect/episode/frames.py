@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.errors import ConfigError
+from throwcollect.portable import cos, sin
 
 WORLD = "world"
 """Name of the fixed frame: x forward, y left, z up, on the ground."""
@@ -46,8 +47,8 @@ class MovingFrame(Frame):
 
     def rotation_at(self, angle: NDArray[np.float64]) -> NDArray[np.float64]:
         """Unit quaternions (x, y, z, w), frame to parent, shape ``(n, 4)``, at angles [rad] of shape ``(n,)``."""
-        half = np.ascontiguousarray(angle) / 2
-        sine, w2 = np.sin(half), np.cos(half)
+        half = angle / 2
+        sine, w2 = sin(half), cos(half)
         x2, y2, z2 = (component * sine for component in self.axis)
         x1, y1, z1, w1 = self.rotation_xyzw
         return np.stack(

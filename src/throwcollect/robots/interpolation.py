@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from throwcollect.portable import matmul
 from throwcollect.robots.trajectory import JointTrajectory
 
 # Row k: coefficients of u^0 ... u^5 in the k-th of the curve's values at both ends of a segment, u = 0 ... 1:
@@ -74,7 +75,7 @@ def _polynomials_at(
     scales = np.array([np.ones_like(spans), spans, spans**2])[..., np.newaxis]
     points = np.array([trajectory.positions, trajectory.velocities, trajectory.accelerations])
     ends = np.concatenate([points[:, :-1] * scales, points[:, 1:] * scales])
-    coefficients = (_HERMITE.T @ ends.reshape(6, -1)).reshape(ends.shape)
+    coefficients = matmul(_HERMITE.T, ends.reshape(6, -1)).reshape(ends.shape)
     segments = knots[1:-1].searchsorted(times, side="right")
     spans = spans[segments]
     u = np.minimum(np.maximum((times - knots[segments]) / spans, 0.0), 1.0)

@@ -126,4 +126,4 @@ class Thinness:
 
 
 def _futile(missed: NDArray[np.int64]) -> NDArray[np.float64]:
-    return np.exp2(np.clip(missed - 1, 0, _MOST_DOUBLINGS)) - 1
+    return np.ldexp(1.0, np.clip(missed - 1, 0, _MOST_DOUBLINGS)) - 1

@@ -6,6 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from throwcollect.portable import matmul, solve
+
 _BASES = 8
 """Landed throws near a goal from which a way to it is looked for."""
 _NEIGHBOURS_PER_PARAMETER = 3
@@ -90,8 +92,7 @@ class InverseModel:
         along = _ALONG_NOISE * randomness.standard_normal(step.shape)
         along -= _product(inverse, _product(slope, along))
         ends = start + step + along + _NOISE * randomness.standard_normal(step.shape)
-        # Few digits, so that processors that round sums differently agree.
-        ends = np.clip(ends, 0.0, 1.0 - 1e-9).round(9)
+        ends = np.clip(ends, 0.0, 1.0 - 1e-9)
         missing = landing + _product(slope, ends - start) - goal
         error = np.sqrt((missing**2).sum(axis=-1))
         near = _nearest(self._by_all_parameters, ends.reshape(-1, ends.shape[-1]), _JUDGES)
@@ -115,12 +116,12 @@ class InverseModel:
         moved = self._parameters[neighbours] - self._parameters[bases][:, np.newaxis]
         caused = self._places[neighbours] - self._places[bases][:, np.newaxis]
         transposed = np.swapaxes(moved, 1, 2)
-        spread = transposed @ moved
+        spread = matmul(transposed, moved)
         ridge = _RIDGE * np.trace(spread, axis1=1, axis2=2) / dimensions + _LEAST
-        slopes_t = np.linalg.solve(spread + ridge[:, np.newaxis, np.newaxis] * np.eye(dimensions), transposed @ caused)
-        slopes = np.swapaxes(slopes_t, 1, 2)
-        damped = slopes @ slopes_t + _DAMPING_BINS**2 * np.eye(slopes.shape[1])
-        return slopes, slopes_t @ np.linalg.inv(damped)
+        ridged = spread + ridge[:, np.newaxis, np.newaxis] * np.eye(dimensions)
+        slopes = np.swapaxes(solve(ridged, matmul(transposed, caused)), 1, 2)
+        damped = matmul(slopes, np.swapaxes(slopes, 1, 2)) + _DAMPING_BINS**2 * np.eye(slopes.shape[1])
+        return slopes, np.swapaxes(solve(damped, slopes), 1, 2)
 
 
 def _nearest(tree: cKDTree, points: NDArray[np.float64], count: int) -> NDArray[np.int64]:
@@ -130,5 +131,4 @@ def _nearest(tree: cKDTree, points: NDArray[np.float64], count: int) -> NDArray[
 
 
 def _product(matrices: NDArray[np.float64], vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    product: NDArray[np.float64] = (matrices @ vectors[..., np.newaxis])[..., 0]
-    return product
+    return matmul(matrices, vectors[..., np.newaxis])[..., 0]

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config, Parameter, Range, Values
 from throwcollect.errors import PlanError, Problem
+from throwcollect.portable import exp, log
 from throwcollect.sweep.points import Points
 from throwcollect.sweep.table import read_points
 
@@ -92,7 +93,7 @@ def spread(parameter: Parameter, unit: NDArray[np.float64]) -> NDArray[np.float6
         return np.array(parameter.values)[(unit * len(parameter.values)).astype(np.int64)]
     if parameter.scale == "log":
         low, high = math.log(parameter.min), math.log(parameter.max)
-        spread = np.exp(low + unit * (high - low))
+        spread = exp(np.minimum(low + unit * (high - low), high))
     else:
         spread = parameter.min + unit * (parameter.max - parameter.min)
     return np.clip(spread, parameter.min, parameter.max)
@@ -107,7 +108,7 @@ def places(parameter: Parameter, values: NDArray[np.float64]) -> NDArray[np.floa
     if low == high:
         return np.zeros(len(values))
     if parameter.scale == "log":
-        values, low, high = np.log(values), math.log(low), math.log(high)
+        values, low, high = log(values), math.log(low), math.log(high)
     return (values - low) / (high - low)
 
 
@@ -127,8 +128,11 @@ def _grid(parameters: dict[str, Parameter], trials: int | None) -> Points:
 def _axis(parameter: Parameter) -> NDArray[np.float64]:
     if isinstance(parameter, Values):
         return np.array(parameter.values)
-    spaced = np.geomspace if parameter.scale == "log" else np.linspace
-    return spaced(parameter.min, parameter.max, _count(parameter))
+    if parameter.scale == "linear":
+        return np.linspace(parameter.min, parameter.max, _count(parameter))
+    axis = spread(parameter, np.linspace(0, 1, _count(parameter)))
+    axis[[0, -1]] = parameter.min, parameter.max
+    return axis
 
 
 def _count(parameter: Range) -> int:

@@ -17,12 +17,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from itertools import accumulate
 
 import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import DynamicMovementPrimitive
 from throwcollect.errors import ConfigError
+from throwcollect.portable import exp, matmul
 from throwcollect.robots.trajectory import JointTrajectory
 
 _SETTLED_RAD = 1e-3
@@ -116,23 +118,29 @@ def roll_out(
     spacing = float(times[1] - times[0])
     rate = max(250.0, 5 * family.alpha_z, 8 * family.basis_functions)
     substeps = refinement * math.ceil(spacing / tau * rate)
-    halves = np.arange(2 * substeps * (len(times) - 1) + 1) * (spacing / (2 * substeps))
-    phase = np.exp(-family.alpha_x / tau * halves)
-    forcing = basis(phase, count=family.basis_functions, alpha_x=family.alpha_x) @ weights.T
+    halves = np.arange(2.0 * substeps * (len(times) - 1) + 1) * (spacing / (2 * substeps))
+    phase = exp(-family.alpha_x / tau * halves)
+    forcing = matmul(basis(phase, count=family.basis_functions, alpha_x=family.alpha_x), weights.T)
     # With the state (y - g, tau y') and the step in units of tau the system is linear and constant.
     system = np.array([[0.0, 1.0], [-(family.alpha_z**2) / 4, -family.alpha_z]])
     step = system * (spacing / tau / substeps)
-    square, cube = step @ step, step @ step @ step
+    square = matmul(step, step)
+    cube, fourth = matmul(square, step), matmul(square, square)
     unit = np.eye(2)
-    transition = unit + step + square / 2 + cube / 6 + square @ square / 24
-    input_weights = np.array([unit + step + square / 2 + cube / 4, 4 * unit + 2 * step + square / 2, unit])[:, :, 1]
-    samples = np.stack([forcing[:-1:2], forcing[1::2], forcing[2::2]])
-    drive = np.einsum("ki,knj->nij", input_weights * (spacing / tau / substeps / 6), samples)
-    states = np.empty((len(drive) + 1, 2, len(goal)))
-    state = states[0] = np.stack([start - goal, np.zeros_like(goal)])
-    for index, push in enumerate(drive, start=1):
-        state = states[index] = transition @ state + push
-    offsets, speeds = states[::substeps, 0], states[::substeps, 1]
+    transition = unit + step + square / 2 + cube / 6 + fourth / 24
+    inputs = np.stack([unit + step + square / 2 + cube / 4, 4 * unit + 2 * step + square / 2, unit], axis=1)[..., 1]
+    samples = np.stack([forcing[:-1:2], forcing[1::2], forcing[2::2]], axis=1)
+    drive = matmul(inputs * (spacing / tau / substeps / 6), samples)
+    (yy, yz), (zy, zz) = transition.tolist()
+
+    def following(state: tuple[float, float], push: list[float]) -> tuple[float, float]:
+        y, z = state
+        return yy * y + yz * z + push[0], zy * y + zz * z + push[1]
+
+    # Joint by joint, as two numbers are not worth an array.
+    pushes = zip(drive.transpose(2, 0, 1).tolist(), (start - goal).tolist(), strict=True)
+    states = np.array([list(accumulate(each, following, initial=(offset, 0.0))) for each, offset in pushes])
+    offsets, speeds = np.moveaxis(states[:, ::substeps], (0, 1, 2), (2, 1, 0))
     push = forcing[:: 2 * substeps] - family.alpha_z * (family.alpha_z / 4 * offsets + speeds)
     return goal + offsets, speeds / tau, push / tau**2
 
@@ -151,7 +159,7 @@ def basis(phase: NDArray[np.float64], *, count: int, alpha_x: float) -> NDArray[
     centres, variances = kernels(count=count, alpha_x=alpha_x)
     exponents = (phase[:, None] - centres) ** 2 / (-2 * variances)
     # Far from all centres every psi underflows; their ratios do not.
-    psi = np.exp(exponents - exponents.max(axis=1, keepdims=True))
+    psi = exp(exponents - exponents.max(axis=1, keepdims=True))
     weighted: NDArray[np.float64] = psi * (phase / psi.sum(axis=1))[:, None]
     return weighted
 
@@ -163,7 +171,7 @@ def kernels(*, count: int, alpha_x: float) -> tuple[NDArray[np.float64], NDArray
         count: Number of basis functions, at least 2.
         alpha_x: Decay constant of the phase.
     """
-    centres = np.exp(-alpha_x * np.linspace(0, 1, count))
+    centres = exp(-alpha_x * np.linspace(0, 1, count))
     widths = (0.75 * np.diff(centres)) ** 2
     return centres, np.append(widths, widths[-1])
 
@@ -219,7 +227,7 @@ def fit_dmp(
     if accelerations is None:
         accelerations = np.gradient(velocities, since, axis=0, edge_order=2)
     target = tau**2 * accelerations - alpha_z * (alpha_z / 4 * (positions[-1] - positions) - tau * velocities)
-    features = basis(np.exp(-alpha_x / tau * since), count=basis_functions, alpha_x=alpha_x)
+    features = basis(exp(-alpha_x / tau * since), count=basis_functions, alpha_x=alpha_x)
     weights = np.linalg.lstsq(features, target, rcond=None)[0]
     return DynamicMovementPrimitive(
         family="dmp",

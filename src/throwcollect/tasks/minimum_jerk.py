@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import MinimumJerk
+from throwcollect.portable import power
 from throwcollect.robots.trajectory import JointTrajectory
 
 
@@ -33,10 +34,10 @@ def minimum_jerk_trajectory(
     times = point_times(duration_s, points_hz=points_hz)
     gamma = family.gamma
     u = times / duration_s
-    x = u**gamma
-    path = x**3 * (10 + x * (6 * x - 15))
-    speed = 30 * gamma * u ** (exponent + 1) * (1 - x) ** 2
-    acceleration = 30 * gamma * u**exponent * (1 - x) * ((3 * gamma - 1) * (1 - x) - 2 * gamma * x)
+    x = power(u, gamma)
+    path = x * x * x * (10 + x * (6 * x - 15))
+    speed = 30 * gamma * power(u, exponent + 1) * (1 - x) ** 2
+    acceleration = 30 * gamma * power(u, exponent) * (1 - x) * ((3 * gamma - 1) * (1 - x) - 2 * gamma * x)
     origin = np.array([start[joint] for joint in end])
     target = np.array(list(end.values()))
     stroke = target - origin

@@ -1,0 +1,94 @@
+"""Arithmetic with the same result, bit for bit, on every x86-64 processor.
+
+NumPy chooses its code for exponentials, logarithms, powers and sines by the processor (with AVX-512 they differ in the
+last bits), and BLAS and LAPACK do so for products and solutions of matrices. What the bytes of a dataset depend on
+takes these functions instead, and of NumPy's only what IEEE 754 determines: + - * /, square roots, comparisons. The C
+library behind `math` has one code for all processors with fused multiply-add (Intel since 2013, AMD since 2012).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def _each(function: Callable[[float], float], values: Array) -> Array:
+    return np.fromiter(map(function, values.ravel().tolist()), np.float64, values.size).reshape(values.shape)
+
+
+def exp(values: Array) -> Array:
+    """Exponential of each value.
+
+    Raises:
+        OverflowError: If a result is too large.
+    """
+    return _each(math.exp, values)
+
+
+def log(values: Array) -> Array:
+    """Natural logarithm of each value.
+
+    Raises:
+        ValueError: If a value is not above 0.
+    """
+    return _each(math.log, values)
+
+
+def power(bases: Array, exponent: float) -> Array:
+    """Each base to the power of one exponent.
+
+    Raises:
+        ValueError: If a base is negative, or 0 where the exponent is.
+        OverflowError: If a result is too large.
+    """
+    return _each(lambda base: math.pow(base, exponent), bases)
+
+
+def sin(angles: Array) -> Array:
+    """Sine of each angle [rad]."""
+    return _each(math.sin, angles)
+
+
+def cos(angles: Array) -> Array:
+    """Cosine of each angle [rad]."""
+    return _each(math.cos, angles)
+
+
+def matmul(left: Array, right: Array) -> Array:
+    """Products of matrices, each element summed up in order; the leading axes are broadcast.
+
+    Args:
+        left: Shape ``(..., n, k)``.
+        right: Shape ``(..., k, m)``, k at least 1.
+
+    Returns:
+        Shape ``(..., n, m)``.
+    """
+    product: Array = left[..., :, :1] * right[..., :1, :]
+    for inner in range(1, left.shape[-1]):
+        product += left[..., :, inner, np.newaxis] * right[..., np.newaxis, inner, :]
+    return product
+
+
+def solve(matrices: Array, right: Array) -> Array:
+    """Solutions X of A X = B by elimination without exchange of rows.
+
+    Args:
+        matrices: A, symmetric and positive definite, shape ``(..., n, n)``.
+        right: B, shape ``(..., n, m)``.
+
+    Returns:
+        Shape ``(..., n, m)``.
+    """
+    size = matrices.shape[-1]
+    rows = np.concatenate([matrices, right], axis=-1)
+    for pivot in range(size):
+        chosen = rows[..., pivot : pivot + 1, :] / rows[..., pivot : pivot + 1, pivot : pivot + 1]
+        rows -= rows[..., :, pivot : pivot + 1] * chosen
+        rows[..., pivot : pivot + 1, :] = chosen
+    return rows[..., size:]

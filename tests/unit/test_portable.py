@@ -1,0 +1,104 @@
+"""Arithmetic that does not depend on the processor."""
+
+import math
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from tests import processors
+
+from throwcollect.portable import cos, exp, log, matmul, power, sin, solve
+
+ROOT = Path(__file__).parents[2]
+
+COMPUTED = """
+import hashlib
+from pathlib import Path
+
+import numpy as np
+from tests.unit.sweep.thrower import collected, configuration
+
+from throwcollect.config.loader import load
+from throwcollect.episode.frames import MovingFrame
+from throwcollect.robots.interpolation import sample_quintic
+from throwcollect.sweep.plan import make_plan
+from throwcollect.tasks.trajectory import throw_trajectory
+
+
+def show(name, *arrays):
+    print(name, *(hashlib.sha256(np.array(array, np.float64).tobytes()).hexdigest()[:16] for array in arrays))
+
+
+for path in sorted(Path("configs").glob("*.yaml")):
+    plan = make_plan(load(path), directory=path.parent)
+    show(path.name, *([*trial.values.values()] for trial in plan.trials[:100]))
+    for trial in plan.trials[:20]:
+        trajectory = throw_trajectory(plan.config_of(trial))
+        show("sent", trajectory.times, trajectory.positions, trajectory.velocities, trajectory.accelerations)
+        show("desired", *sample_quintic(trajectory, np.linspace(0, 2, 500)))
+show("grown", *([*trial.values.values()] for trial in collected(configuration(trials=384))))
+frame = MovingFrame("a", "b", (0.0, 0.0, 0.0), (0.0, 0.6, 0.0, 0.8), "j", (0.36, 0.48, 0.8))
+show("frame", frame.rotation_at(np.linspace(-7, 7, 5000)))
+"""
+
+
+def computed(**environment: str) -> list[str]:
+    """Hashes of everything that is computed with numbers before a simulation gets it."""
+    whole = {**os.environ, "PYTHONPATH": str(ROOT), **environment}
+    script = [sys.executable, "-c", COMPUTED]
+    done = subprocess.run(script, cwd=ROOT, env=whole, capture_output=True, text=True, timeout=120, check=True)
+    return done.stdout.splitlines()
+
+
+def test_plans_and_motions_are_the_same_on_another_processor() -> None:
+    here, there = computed(), computed(**processors.PLAIN)
+    assert len(here) > 200
+    assert here == there
+
+
+@pytest.mark.parametrize(
+    ("ours", "numpys", "values"),
+    [
+        (exp, np.exp, np.linspace(-700, 700, 999)),
+        (log, np.log, np.geomspace(1e-300, 1e300, 999)),
+        (sin, np.sin, np.linspace(-20, 20, 999)),
+        (cos, np.cos, np.linspace(-20, 20, 999)),
+        (lambda bases: power(bases, 1.7), lambda bases: bases**1.7, np.linspace(0, 50, 999)),
+    ],
+)
+def test_functions_are_those_of_numpy_up_to_rounding(
+    ours: Callable[..., NDArray[np.float64]], numpys: Callable[..., NDArray[np.float64]], values: NDArray[np.float64]
+) -> None:
+    np.testing.assert_allclose(ours(values), numpys(values), rtol=1e-15, atol=1e-15)
+    grid = values.reshape(27, 37)[::2].T
+    np.testing.assert_array_equal(ours(grid), ours(grid.ravel()).reshape(grid.shape))
+    assert ours(values[:0]).shape == (0,)
+
+
+def test_powers_of_zero() -> None:
+    np.testing.assert_array_equal(power(np.array([0.0, 1.0]), 0.0), [1.0, 1.0])
+    np.testing.assert_array_equal(power(np.array([0.0, 2.0]), 3.0), [0.0, 8.0])
+
+
+def test_products_of_matrices_are_broadcast() -> None:
+    randomness = np.random.default_rng(0)
+    left, right = randomness.random((2, 3)), randomness.random((7, 3, 4))
+    np.testing.assert_allclose(matmul(left, right), left @ right, rtol=1e-14)
+    np.testing.assert_array_equal(matmul(left, right[2]), matmul(left, right)[2])
+    assert matmul(left, right[:0]).shape == (0, 2, 4)
+
+
+def test_solutions_of_symmetric_positive_definite_systems() -> None:
+    randomness = np.random.default_rng(0)
+    roots = randomness.standard_normal((9, 4, 6))
+    matrices, right = roots @ roots.swapaxes(1, 2), randomness.standard_normal((9, 4, 2))
+    kept = matrices.copy()
+    np.testing.assert_allclose(matrices @ solve(matrices, right), right, atol=1e-10)
+    np.testing.assert_array_equal(matrices, kept)
+    tiny = np.full((1, 1), 1e-300)
+    assert math.isclose(solve(tiny, np.ones((1, 1))).item(), 1e300)
