@@ -231,8 +231,8 @@ class RecordConfig(Section):
         "ball/odometry",
     ]
     """Recorded topics; the first two are always needed, as throws are judged from them."""
-    zstd_level: Annotated[int, Field(ge=1, le=19)] = 1
-    """Compression level of the MCAP chunks."""
+    zstd_level: Annotated[int, Field(ge=-7, le=19)] = -1
+    """Compression level of the MCAP chunks; with -1 they are as small as with 1, and sooner written and read."""
     trials_per_shard: PositiveInt = 1000
     """Trials in one MCAP file."""
 

@@ -72,17 +72,23 @@ def rotate(quaternion_xyzw: NDArray[np.float64], *vectors: NDArray[np.float64], 
         Shape ``(len(vectors), n, 3)``.
     """
     # Recorded columns lie far apart in memory; everything below reads them many times.
-    x, y, z, w = np.ascontiguousarray(quaternion_xyzw.T)
-    if inverse:
-        x, y, z = -x, -y, -z
-    a, b, c = np.array([vector.T for vector in vectors]).swapaxes(0, 1)
+    *axis, w = np.ascontiguousarray(quaternion_xyzw.T)
+    u = _twice((np.negative(axis) if inverse else np.array(axis))[:, np.newaxis])
+    v = _twice(np.array([vector.T for vector in vectors]).swapaxes(0, 1))
     # v' = v + w t + u × t with t = 2 u × v, for a unit quaternion (u, w).
-    ta, tb, tc = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
-    turned = np.empty((len(vectors), len(x), 3))
-    turned[..., 0] = a + w * ta + (y * tc - z * tb)
-    turned[..., 1] = b + w * tb + (z * ta - x * tc)
-    turned[..., 2] = c + w * tc + (x * tb - y * ta)
-    return turned
+    t = _twice(2 * _cross(u, v))
+    return np.ascontiguousarray((v[:3] + w * t[:3] + _cross(u, t)).transpose(1, 2, 0))
+
+
+def _twice(axes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """x, y, z, x, y, z along the first axis, so that the next axes but one are slices."""
+    return np.concatenate([axes, axes])
+
+
+def _cross(left: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Cross products of what `_twice` gives."""
+    crossed: NDArray[np.float64] = left[1:4] * right[2:5] - left[2:5] * right[1:4]
+    return crossed
 
 
 @cache

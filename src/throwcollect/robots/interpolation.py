@@ -5,21 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.portable import matmul
 from throwcollect.robots.trajectory import JointTrajectory
 
-# Row k: coefficients of u^0 ... u^5 in the k-th of the curve's values at both ends of a segment, u = 0 ... 1:
-# position, velocity, acceleration at u = 0, then the same at u = 1.
-_HERMITE = np.array(
-    [
-        [1, 0, 0, -10, 15, -6],
-        [0, 1, 0, -6, 8, -3],
-        [0, 0, 0.5, -1.5, 1.5, -0.5],
-        [0, 0, 0, 10, -15, 6],
-        [0, 0, 0, -4, 7, -3],
-        [0, 0, 0, 0.5, -1, 0.5],
-    ]
-)
 _ORDERS = np.arange(6)
 
 
@@ -72,15 +59,20 @@ def _polynomials_at(
     if len(knots) < 2:
         raise ValueError(f"a curve needs at least two points, got {len(knots)}")
     spans = knots[1:] - knots[:-1]
-    scales = np.array([np.ones_like(spans), spans, spans**2])[..., np.newaxis]
-    points = np.array([trajectory.positions, trajectory.velocities, trajectory.accelerations])
-    ends = np.concatenate([points[:, :-1] * scales, points[:, 1:] * scales])
-    coefficients = matmul(_HERMITE.T, ends.reshape(6, -1)).reshape(ends.shape)
+    scale = spans[:, np.newaxis]
+    origin, moved = trajectory.positions[:-1], trajectory.positions[1:] - trajectory.positions[:-1]
+    v0, v1 = trajectory.velocities[:-1] * scale, trajectory.velocities[1:] * scale
+    a0, a1 = trajectory.accelerations[:-1] * scale**2, trajectory.accelerations[1:] * scale**2
+    third = 10 * moved - 6 * v0 - 4 * v1 - 1.5 * a0 + 0.5 * a1
+    fourth = -15 * moved + 8 * v0 + 7 * v1 + 1.5 * a0 - a1
+    fifth = 6 * moved - 3 * v0 - 3 * v1 - 0.5 * a0 + 0.5 * a1
+    coefficients = np.stack([origin, v0, 0.5 * a0, third, fourth, fifth], axis=1)
     segments = knots[1:-1].searchsorted(times, side="right")
     spans = spans[segments]
     u = np.minimum(np.maximum((times - knots[segments]) / spans, 0.0), 1.0)
+    rows = coefficients.reshape(len(coefficients), -1).take(segments, axis=0)
     # With time as the last axis, arithmetic runs along memory.
-    return coefficients.swapaxes(1, 2).take(segments, axis=2), u, spans
+    return np.ascontiguousarray(rows.T).reshape(*coefficients.shape[1:], len(times)), u, spans
 
 
 def _values(coefficients: NDArray[np.float64], u: NDArray[np.float64]) -> NDArray[np.float64]:

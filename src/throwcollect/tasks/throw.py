@@ -155,11 +155,12 @@ def _joint_measures(
     if not math.isfinite(velocity_peak.share + effort_peak.share + samples.position.sum()):
         return None
     moving = [_COLUMNS[joint] for joint in trajectory.joints]
-    lower, upper = limits.lower[moving], limits.upper[moving]
-    measured = samples.position[:, moving]
-    positions = np.abs(measured - (lower + upper) / 2).max(axis=0) / ((upper - lower) / 2)
-    desired = sample_positions(trajectory, (samples.stamps_ns - start_ns) / NS_PER_S)
-    errors = np.abs(measured - desired).max(axis=0)
+    middle = (limits.lower[moving] + limits.upper[moving]) / 2
+    # A row a joint, so that arithmetic runs along memory.
+    measured = samples.position.T[moving]
+    positions = np.abs(measured - middle[:, np.newaxis]).max(axis=1) / (limits.upper[moving] - middle)
+    desired = sample_positions(trajectory, (samples.stamps_ns - start_ns) / NS_PER_S).T
+    errors = np.abs(measured - desired).max(axis=1)
     saturated = 0.0
     if effort_peak.share >= _AT_LIMIT:
         saturated = float((np.abs(samples.effort) / effort_limits >= _AT_LIMIT).any(axis=1).mean())

@@ -82,7 +82,9 @@ class Collection:
     def __init__(self, settings: dict[str, Any] | None = None) -> None:
         self.config = Config.model_validate({**SETTINGS, **(settings or {})})
         self.plan: Plan = make_plan(self.config)
-        self.encoder = ChunkEncoder(Channels(self.config, full_description(self.config)), level=1)
+        self.encoder = ChunkEncoder(
+            Channels(self.config, full_description(self.config)), level=self.config.record.zstd_level
+        )
 
     def episode(self, trial: int, change: Change | None = None) -> Episode:
         samples, header = throw(self.plan.config_of(self.plan.trials[trial]), trial)

@@ -7,7 +7,7 @@ import pytest
 from throwcollect.config.containers import ContainersConfig, NodeContainerConfig
 from throwcollect.config.controllers import ControllersConfig
 from throwcollect.config.run import RunConfig
-from throwcollect.config.schema import Config, Range, SweepConfig, UntilConfig
+from throwcollect.config.schema import Config, Range, RecordConfig, SweepConfig, UntilConfig
 from throwcollect.config.sweep import TargetConfig
 from throwcollect.config.values import leaves, with_values
 from throwcollect.sweep.digest import config_digest, trial_digests
@@ -17,6 +17,7 @@ WITHOUT_EFFECT = {"name", "trials", "until", "sim.real_time_factor", "record.zst
 POINTS = Points(("ball.mass_kg", "task.duration_s"), np.array([[0.1, 1.0], [0.2, 1.0]]))
 
 TARGET = TargetConfig.model_validate({"distance_m": {"min": 1, "max": 2, "bins": 4}})
+RECORD_OF_OLD = RecordConfig(zstd_level=1)
 
 
 def digests(config: Config, points: Points = POINTS, seeds: tuple[int, ...] = (5, 6)) -> list[str]:
@@ -92,13 +93,15 @@ def test_the_digest_of_a_configuration_is_over_everything_but_how_it_is_run():
 
 def test_a_plan_made_before_the_section_controllers_still_belongs_to_its_configuration():
     before = "09626b408b776e79ab4ff485411deb75f2b6615377a41e80b715b04bdb842333"
-    assert config_digest(Config(name="old")) == before
-    assert config_digest(Config(name="old", controllers=ControllersConfig(hold="command"))) != before
+    assert config_digest(Config(name="old", record=RECORD_OF_OLD)) == before
+    other = ControllersConfig(hold="command")
+    assert config_digest(Config(name="old", record=RECORD_OF_OLD, controllers=other)) != before
 
 
 def test_a_plan_made_before_targets_still_belongs_to_its_configuration():
     sweep = SweepConfig(parameters={"ball.mass_kg": Range(min=0.1, max=0.2)})
     before = "ad57f77989d00389417c918c12a5291022ea27e8bca7c3da9f188a4a58b1b461"
-    assert config_digest(Config(name="old", sweep=sweep)) == before
-    assert config_digest(Config(name="old", sweep=sweep.model_copy(update={"target": TARGET}))) != before
-    assert config_digest(Config(name="old", sweep=sweep, until=UntilConfig(landed=5))) != before
+    config = Config(name="old", sweep=sweep, record=RECORD_OF_OLD)
+    assert config_digest(config) == before
+    assert config_digest(config.model_copy(update={"sweep": sweep.model_copy(update={"target": TARGET})})) != before
+    assert config_digest(config.model_copy(update={"until": UntilConfig(landed=5)})) != before

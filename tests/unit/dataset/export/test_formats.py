@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import pyarrow.parquet as pq
 import pytest
 from ruamel.yaml import YAML
 from tests.unit.dataset.export.conftest import MOVING, Export
@@ -77,7 +78,8 @@ def test_nothing_is_left_of_an_export_that_fails(to: str, source: Path, tmp_path
     broken = Path(shutil.copytree(source, tmp_path / "in" / "dataset"))
     last = sorted(broken.glob("*.mcap"))[-1]
     contents = bytearray(last.read_bytes())
-    contents[-len(contents) // 2] ^= 0xFF
+    chunk = pq.read_table(broken / "throws.parquet")["chunk_offset"].drop_null()[-1].as_py()
+    contents[chunk + 1000] ^= 0xFF
     last.write_bytes(contents)
     with pytest.raises(DatasetError, match=r"trial \d: chunk: |quick_00001\.mcap"):
         export(broken, tmp_path / "out" / "export", to=to)
