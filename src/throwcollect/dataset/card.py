@@ -77,6 +77,12 @@ def count_outcomes(throws: pa.Table) -> dict[str, int]:
     return dict(sorted(counts.items(), key=lambda item: (-item[1], item[0])))
 
 
+def outcome_lines(throws: pa.Table) -> list[str]:
+    """The table of outcomes of a data card, in Markdown."""
+    counts = count_outcomes(throws).items()
+    return ["| outcome | trials |", "|---|---|", *(f"| {outcome} | {count} |" for outcome, count in counts)]
+
+
 def data_card(config: Config, throws: pa.Table, provenance: Provenance) -> str:
     """README.md of a dataset, with the YAML header that dataset hubs read.
 
@@ -103,9 +109,7 @@ def data_card(config: Config, throws: pa.Table, provenance: Provenance) -> str:
         f"{len(throws)} simulated throws of a ball by the humanoid robot Talos, each with the joint states of the "
         f"robot and the odometry of the ball at {config.record.rate_hz} Hz. Made with throwcollect.",
         "",
-        "| outcome | trials |",
-        "|---|---|",
-        *(f"| {outcome} | {count} |" for outcome, count in count_outcomes(throws).items()),
+        *outcome_lines(throws),
         "",
         "## Files",
         "",

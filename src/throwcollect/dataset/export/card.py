@@ -10,7 +10,7 @@ import pyarrow as pa
 
 import throwcollect
 from throwcollect.dataset.bag import to_yaml
-from throwcollect.dataset.card import count_outcomes
+from throwcollect.dataset.card import outcome_lines
 from throwcollect.dataset.directory import CONFIG
 from throwcollect.dataset.export.source import Source
 from throwcollect.robots.talos import JOINTS
@@ -55,9 +55,7 @@ def card(source: Source, layout: Layout) -> str:
         f"have time series, at {source.rate_hz} Hz. Exported by throwcollect {throwcollect.__version__} from the "
         f"dataset with the digest `{source.digest}`.",
         "",
-        "| outcome | trials |",
-        "|---|---|",
-        *(f"| {outcome} | {count} |" for outcome, count in count_outcomes(source.table).items()),
+        *outcome_lines(source.table),
         "",
         "## Files",
         "",

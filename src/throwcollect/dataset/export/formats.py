@@ -20,7 +20,9 @@ class Format:
     """One format.
 
     Attributes:
-        write: Writes the data files of a source into a directory.
+        write: Writes the data files of a source into a directory. Raises `DatasetError` if an episode is damaged or
+            what it writes would be too large for the format, `ConfigError` if a library that it needs is not
+            installed, `OSError` if a file cannot be written.
         layout: Says how they are laid out.
     """
 

@@ -53,17 +53,7 @@ landing_x_m = file["throws/landing_x_m"][:]""",
 
 
 def write(source: Source, directory: Path) -> None:
-    """Write a dataset as one HDF5 file.
-
-    Args:
-        source: What to write.
-        directory: Where.
-
-    Raises:
-        ConfigError: If h5py is not installed.
-        DatasetError: If an episode is damaged.
-        OSError: If the file cannot be written.
-    """
+    """Write a dataset as one HDF5 file; see `formats.Format`."""
     h5py = _h5py()
     config = source.dataset.config
     with _Output(directory / "throws.hdf5") as output, h5py.File(output, "w") as file:

@@ -118,16 +118,7 @@ landed = LeRobotDataset("me/throws", root=".", episode_filter=lambda episode: ep
 
 
 def write(source: Source, directory: Path) -> None:
-    """Write a dataset in LeRobot's format.
-
-    Args:
-        source: What to write.
-        directory: Where.
-
-    Raises:
-        DatasetError: If an episode is damaged.
-        OSError: If a file cannot be written.
-    """
+    """Write a dataset in LeRobot's format; see `formats.Format`."""
     features = features_of(source.moving)
     table = _with_episode_index(source)
     (directory / THROWS).write_bytes(encode_table(table))

@@ -76,16 +76,7 @@ _FIELDS = (
 
 
 def write(source: Source, directory: Path) -> None:
-    """Write a dataset as MATLAB files of version 5.
-
-    Args:
-        source: What to write.
-        directory: Where.
-
-    Raises:
-        DatasetError: If an episode is damaged, or the throws of one recording are too many for a file.
-        OSError: If a file cannot be written.
-    """
+    """Write a dataset as MATLAB files of version 5; see `formats.Format`."""
     columns = {_field(field.name): _column(source.table[field.name]) for field in source.table.schema}
     units = {_field(field.name): (field.metadata or {}).get(b"unit", b"").decode() for field in source.table.schema}
     _save(directory / "throws.mat", {"throws": columns, "units": units, "digest_of_dataset": source.digest})

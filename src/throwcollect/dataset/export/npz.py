@@ -44,16 +44,7 @@ time_s, ball_position_m = archive["time_s"][rows], archive["ball_position_m"][ro
 
 
 def write(source: Source, directory: Path) -> None:
-    """Write a dataset as NumPy archives.
-
-    Args:
-        source: What to write.
-        directory: Where.
-
-    Raises:
-        DatasetError: If an episode is damaged.
-        OSError: If a file cannot be written.
-    """
+    """Write a dataset as NumPy archives; see `formats.Format`."""
     columns = {field.name: as_array(source.table[field.name]) for field in source.table.schema}
     with _archive(directory / "throws.npz") as archive:
         for name, values in {**columns, "digest_of_dataset": np.array(source.digest)}.items():

@@ -47,16 +47,7 @@ samples = pd.read_parquet("{_TRAJECTORIES}", filters=[("trial", "==", {source.en
 
 
 def write(source: Source, directory: Path) -> None:
-    """Write a dataset as Parquet.
-
-    Args:
-        source: What to write.
-        directory: Where.
-
-    Raises:
-        DatasetError: If an episode is damaged.
-        OSError: If a file cannot be written.
-    """
+    """Write a dataset as Parquet; see `formats.Format`."""
     facts = {"throwcollect.digest": source.digest}
     table = source.table.replace_schema_metadata(facts)
     (directory / THROWS).write_bytes(encode_table(table))
