@@ -33,7 +33,7 @@ class ContradictionError(ValueError):
 def _known_joint(name: str) -> str:
     if name not in JOINT_NAMES:
         near = get_close_matches(name, JOINT_NAMES, 1)
-        raise ValueError("Talos has no such joint" + (f"; did you mean '{near[0]}'?" if near else ""))
+        raise ValueError(f"Talos has no joint {name!r}" + (f"; did you mean '{near[0]}'?" if near else ""))
     return name
 
 

@@ -65,7 +65,7 @@ def quoted(value: Any) -> str:
     if isinstance(value, Mapping):
         return "keys and values"
     if isinstance(value, list):
-        return "a list"
+        return "a list" if value else "an empty list"
     if value is None:
         return "nothing"
     return str(value).lower() if isinstance(value, bool) else str(value)

@@ -109,14 +109,17 @@ def test_the_family_of_a_trajectory_may_be_left_out(write):
         ),
         (
             "robot: {locked: [torso_2_joint, torso_3_joint]}",
-            ["run.yaml:1: robot.locked.1: Talos has no such joint; did you mean 'torso_2_joint'?"],
+            ["run.yaml:1: robot.locked.1: Talos has no joint 'torso_3_joint'; did you mean 'torso_2_joint'?"],
         ),
         ("task:\n  end: [1]", [f"run.yaml:2: task.end: should be {JOINT_LIST}, got a list"]),
         (
             "task:\n  end:\n    arm_rihgt_4_joint: 1",
-            ["run.yaml:3: task.end.arm_rihgt_4_joint: Talos has no such joint; did you mean 'arm_right_4_joint'?"],
+            [
+                "run.yaml:3: task.end.arm_rihgt_4_joint: Talos has no joint 'arm_rihgt_4_joint'; "
+                "did you mean 'arm_right_4_joint'?"
+            ],
         ),
-        ("robot: {posture: {knee: 1}}", ["run.yaml:1: robot.posture.knee: Talos has no such joint"]),
+        ("robot: {posture: {knee: 1}}", ["run.yaml:1: robot.posture.knee: Talos has no joint 'knee'"]),
         (
             "task:\n  end:\n    arm_right_4_joint: -60",
             [
@@ -191,7 +194,10 @@ def test_wrong_values_are_named_with_place_and_expectation(problems_of, text, me
         ("task.duration_s: {min: 1}", ["task.duration_s.max: missing; should be a number in s"]),
         ("task.duration_s: {min: 1, mx: 2}", ["task.duration_s.mx: unknown key; did you mean 'max'?"]),
         ("task.duration_s: {min: 2, max: 1}", ["task.duration_s.min: should be at most max, 1.0, got 2.0"]),
-        ("task.duration_s: {values: []}", ["task.duration_s.values: should be a list of numbers in s, got a list"]),
+        (
+            "task.duration_s: {values: []}",
+            ["task.duration_s.values: should be a list of numbers in s, got an empty list"],
+        ),
         (
             "ball.drag_coefficient: {min: 0, max: 1, scale: log}",
             ["ball.drag_coefficient.min: should be above 0 on a logarithmic scale, got 0.0"],
