@@ -94,9 +94,11 @@ def _checked(values: dict[str, Any]) -> tuple[Config | None, list[Finding]]:
 
 def _about(finding: Finding, location: Location) -> bool:
     """Whether a finding may be about a default that stands at a location, not about what was written."""
-    words = re.findall(r"\w+", finding.sentence)
-    within = finding.location[: len(location)] == location
-    return within or location[-1] in words or (finding.unknown and dotted(location) in finding.key)
+    if finding.location[: len(location)] == location:
+        return True
+    if finding.unknown:
+        return str(finding.location[-1]).startswith(f"{dotted(location)}.")
+    return location[-1] in re.findall(r"\w+", finding.sentence)
 
 
 def _remove(values: dict[str, Any], location: Location) -> bool:

@@ -295,6 +295,21 @@ def test_all_problems_are_reported_at_once_and_unknown_keys_first(problems_of):
 
 
 @pytest.mark.parametrize(
+    ("text", "swept", "meant"),
+    [
+        ("task: {duration_s: 100}", "task.durations_s", "task.duration_s"),
+        ("ball: {mass_kg: 0}", "ball.mas_kg", "ball.mass_kg"),
+        ("ball: {mass_kg: 0}", "ball.mass_kgs", "ball.mass_kg"),
+    ],
+)
+def test_a_misspelt_swept_key_is_found_beside_a_wrong_value_of_the_right_one(problems_of, text, swept, meant):
+    found = problems_of(f"trials: 1\n{text}\nsweep: {{parameters: {{{swept}: {{values: [1]}}}}}}")
+    assert len(found) == 2
+    assert found[0] == f"run.yaml:3: sweep.parameters.{swept}: unknown key; did you mean '{meant}'?"
+    assert found[1].startswith(f"run.yaml:2: {meant}: should be ")
+
+
+@pytest.mark.parametrize(
     "text",
     [
         "sim: {physics_hz: fast}\nrecord: {rate_hz: 300}",
