@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import csv
 import math
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +18,15 @@ from throwcollect.errors import ConfigError, Problem
 from throwcollect.sweep.points import Points
 
 _MOST_PROBLEMS = 20
+
+
+@dataclass(frozen=True)
+class _Rows:
+    """The rows that hold numbers throughout, where each of them is in the file, and what is wrong with the others."""
+
+    points: Points
+    numbers: NDArray[np.intp]
+    problems: list[Problem]
 
 
 def read_points(path: Path, config: Config) -> Points:
@@ -35,14 +46,16 @@ def read_points(path: Path, config: Config) -> Points:
     if not path.is_file():
         problem = "is a directory, not a file" if path.is_dir() else "no such file"
         raise ConfigError([Problem(problem, "sweep.file", path)])
-    points, lines = readers[path.suffix](path, config)
-    if not len(points.values):
+    rows = readers[path.suffix](path, config)
+    problems = [*rows.problems, *_value_problems(rows, path, config)]
+    if problems:
+        raise ConfigError(sorted(problems, key=lambda problem: problem.line or 0)[:_MOST_PROBLEMS])
+    if not len(rows.numbers):
         raise ConfigError([Problem("the file has no rows", "sweep.file", path)])
-    _check_values(points, lines, path, config)
-    return points
+    return rows.points
 
 
-def _read_csv(path: Path, config: Config) -> tuple[Points, list[int] | None]:
+def _read_csv(path: Path, config: Config) -> _Rows:
     problems: list[Problem] = []
     rows: list[list[float]] = []
     lines: list[int] = []
@@ -56,8 +69,9 @@ def _read_csv(path: Path, config: Config) -> tuple[Points, list[int] | None]:
                     continue
                 row, wrong = _row(keys, cells, path, reader.line_num)
                 problems += wrong
-                rows.append(row)
-                lines.append(reader.line_num)
+                if not wrong:
+                    rows.append(row)
+                    lines.append(reader.line_num)
                 if len(problems) >= _MOST_PROBLEMS:
                     break
     except UnicodeDecodeError as error:
@@ -66,9 +80,7 @@ def _read_csv(path: Path, config: Config) -> tuple[Points, list[int] | None]:
         raise ConfigError([Problem(f"not valid CSV: {error}", "sweep.file", path)]) from error
     except OSError as error:
         raise ConfigError([Problem(f"cannot be read: {error.strerror}", "sweep.file", path)]) from error
-    if problems:
-        raise ConfigError(problems[:_MOST_PROBLEMS])
-    return Points(keys, np.array(rows).reshape(len(rows), len(keys))), lines
+    return _Rows(Points(keys, np.array(rows).reshape(len(rows), len(keys))), np.array(lines), problems)
 
 
 def _row(keys: tuple[str, ...], cells: list[str], path: Path, line: int) -> tuple[list[float], list[Problem]]:
@@ -90,7 +102,7 @@ def _number(cell: str) -> float:
         return math.nan
 
 
-def _read_parquet(path: Path, config: Config) -> tuple[Points, None]:
+def _read_parquet(path: Path, config: Config) -> _Rows:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -98,18 +110,22 @@ def _read_parquet(path: Path, config: Config) -> tuple[Points, None]:
         table: Any = pq.ParquetFile(path).read()
     except (pa.ArrowException, OSError) as error:
         raise ConfigError([Problem(f"cannot be read as Parquet: {error}", "sweep.file", path)]) from error
-    keys = tuple(table.column_names)
-    _check_keys(keys, path, config, line=None)
-    problems = []
-    for key, field in zip(keys, table.schema, strict=True):
+    _check_keys(tuple(table.column_names), path, config, line=None)
+    problems: list[Problem] = []
+    columns: dict[str, Any] = {}
+    good = np.ones(len(table), dtype=bool)
+    for field in table.schema:
+        column = table[field.name]
         if not (pa.types.is_floating(field.type) or pa.types.is_integer(field.type)):
-            problems.append(Problem(f"should be a column of numbers, got {field.type}", key, path))
-        elif table[key].null_count:
-            problems.append(Problem(f"should have a number in each row, got {table[key].null_count} nulls", key, path))
-    if problems:
-        raise ConfigError(problems)
-    columns = [np.asarray(table[key].to_numpy(), dtype=np.float64) for key in keys]
-    return Points(keys, np.column_stack(columns)), None
+            problems.append(Problem(f"should be a column of numbers, got {field.type}", field.name, path))
+            continue
+        if nulls := column.null_count:
+            problems.append(Problem(f"should have a number in each row, got {nulls} nulls", field.name, path))
+        good &= column.is_valid().to_numpy()
+        columns[field.name] = column.to_numpy()
+    values = np.array([column[good] for column in columns.values()], dtype=np.float64)
+    points = Points(tuple(columns), values.reshape(len(columns), np.count_nonzero(good)).T)
+    return _Rows(points, np.flatnonzero(good) + 1, problems)
 
 
 def _check_keys(keys: tuple[str, ...], path: Path, config: Config, *, line: int | None) -> None:
@@ -125,17 +141,19 @@ def _check_keys(keys: tuple[str, ...], path: Path, config: Config, *, line: int 
         raise ConfigError(problems, expected="dotted configuration keys as columns")
 
 
-def _check_values(points: Points, lines: list[int] | None, path: Path, config: Config) -> None:
-    problems: list[Problem] = []
-    for key, column in zip(points.keys, points.values.T, strict=True):
+def _value_problems(rows: _Rows, path: Path, config: Config) -> Iterator[Problem]:
+    if not len(rows.numbers):
+        return
+    for key, column in zip(rows.points.keys, rows.points.values.T, strict=True):
         # What a key allows is an interval, so when both ends fit, all do.
         if not _refusals(config, key, np.array([column.min(), column.max()])):
             continue
         for row, sentence in _refusals(config, key, column):
-            where = "" if lines else f"row {row + 1}: "
-            problems.append(Problem(where + sentence, key, path, lines[row] if lines else None))
-    if problems:
-        raise ConfigError(sorted(problems, key=lambda problem: problem.line or 0)[:_MOST_PROBLEMS])
+            number = int(rows.numbers[row])
+            if path.suffix == ".csv":
+                yield Problem(sentence, key, path, number)
+            else:
+                yield Problem(f"row {number}: {sentence}", key, path)
 
 
 def _refusals(config: Config, key: str, column: NDArray[np.float64]) -> list[tuple[int, str]]:

@@ -85,6 +85,15 @@ def test_parquet_holds_the_same(parquet):
                 "list.csv:6: ball.mass_kg: should be a number above 0 and up to 2 kg, got -1.0",
             ],
         ),
+        (
+            HEADER + "3,1\n0.1,x\n0.1\n0.1,0\n0.1,1\n",
+            [
+                "list.csv:2: ball.mass_kg: should be a number above 0 and up to 2 kg, got 3.0",
+                "list.csv:3: task.duration_s: should be a number, got 'x'",
+                "list.csv:4: should have 2 values, got 1",
+                "list.csv:5: task.duration_s: should be a number from 0.1 to 10 s, got 0.0",
+            ],
+        ),
     ],
 )
 def test_wrong_tables_are_named_with_their_lines(csv, content, messages):
@@ -101,6 +110,22 @@ def test_a_long_table_of_nonsense_is_not_listed_in_full(csv):
     [
         ({"ball.mass_kg": ["0.1"]}, ["list.parquet: ball.mass_kg: should be a column of numbers, got string"]),
         ({"ball.mass_kg": [0.1, None]}, ["list.parquet: ball.mass_kg: should have a number in each row, got 1 nulls"]),
+        (
+            {
+                "ball.mass_kg": [0.1, None, 0.1],
+                "task.duration_s": [1.0, 1.0, float("nan")],
+                "ball.friction": ["1", "1", "1"],
+            },
+            [
+                "list.parquet: ball.mass_kg: should have a number in each row, got 1 nulls",
+                "list.parquet: ball.friction: should be a column of numbers, got string",
+                "list.parquet: task.duration_s: row 3: should be a number from 0.1 to 10 s, got nan",
+            ],
+        ),
+        (
+            {"ball.mass_kg": pa.array([None], pa.float64())},
+            ["list.parquet: ball.mass_kg: should have a number in each row, got 1 nulls"],
+        ),
         ({"ball.mass_kg": pa.array([], pa.float64())}, ["list.parquet: sweep.file: the file has no rows"]),
         ({"ball.mas_kg": [0.1]}, ["list.parquet: ball.mas_kg: unknown key; did you mean 'ball.mass_kg'?"]),
         (
