@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +19,8 @@ from throwcollect.errors import ConfigError, Problem
 from throwcollect.sweep.points import Points
 
 _MOST_PROBLEMS = 20
+_UNNAMED_INDEX = re.compile(r"__index_level_\d+__")
+"""Column in which pandas keeps the numbers of rows of which some were taken out; an index with a name may be a key."""
 
 
 @dataclass(frozen=True)
@@ -110,6 +113,7 @@ def _read_parquet(path: Path, config: Config) -> _Rows:
         table: Any = pq.ParquetFile(path).read()
     except (pa.ArrowException, OSError) as error:
         raise ConfigError([Problem(f"cannot be read as Parquet: {error}", "sweep.file", path)]) from error
+    table = table.drop_columns([name for name in table.column_names if _UNNAMED_INDEX.fullmatch(name)])
     _check_keys(tuple(table.column_names), path, config, line=None)
     problems: list[Problem] = []
     columns: dict[str, Any] = {}

@@ -48,6 +48,17 @@ def test_parquet_holds_the_same(parquet):
     assert points.values.tolist() == [[0.1, 1.0], [0.2, 2.0]]
 
 
+def test_what_pandas_numbers_rows_by_is_no_key(tmp_path):
+    pandas = pytest.importorskip("pandas")
+    frame = pandas.DataFrame({"ball.mass_kg": [0.1, 0.9, 0.2, 0.3], "task.duration_s": [1.0, 1.0, 1.5, 2.0]})
+    path = tmp_path / "list.parquet"
+    frame[frame["ball.mass_kg"] < 0.5].set_index("task.duration_s", append=True).to_parquet(path)
+    assert "__index_level_0__" in pq.read_schema(path).names
+    points = read_points(path, Config())
+    assert points.keys == ("ball.mass_kg", "task.duration_s")
+    assert points.values.tolist() == [[0.1, 1.0], [0.2, 1.5], [0.3, 2.0]]
+
+
 @pytest.mark.parametrize(
     ("content", "messages"),
     [
