@@ -205,6 +205,10 @@ def test_no_permission_to_read(small: Path) -> None:
     [
         (None, "talos_data: the robot's description is missing"),
         ("<robot name='talos'><link", "talos_reduced.urdf: cannot be read as robot description"),
+        (
+            "<robot name='talos'><link name='base_link'/></robot>",
+            "talos_reduced.urdf: joint arm_left_1_joint is missing",
+        ),
     ],
 )
 def test_a_robot_that_cannot_be_read(urdf: str | None, message: str, small: Path, tmp_path: Path) -> None:
@@ -221,6 +225,7 @@ def test_a_robot_that_cannot_be_read(urdf: str | None, message: str, small: Path
     run = partial(subprocess.run, capture_output=True, text=True, timeout=60, env=environment, check=False)
     said = run(command("up", small, "--output", tmp_path / "data"))
     assert said.returncode == 2
+    assert said.stderr.startswith("throwcollect: ")
     assert message in said.stderr
     assert "Traceback" not in said.stderr
     assert not (tmp_path / "data").exists()

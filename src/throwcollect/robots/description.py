@@ -13,7 +13,7 @@ import pinocchio
 
 from throwcollect.config.schema import Config, ToolConfig
 from throwcollect.errors import ConfigError, Problem
-from throwcollect.robots.model import half_sitting, share_directory, urdf_path
+from throwcollect.robots.model import half_sitting, joint_limits, share_directory, urdf_path
 from throwcollect.robots.spoon import boxes, inertia
 from throwcollect.robots.talos import JOINTS
 
@@ -98,6 +98,18 @@ def full_description(config: Config) -> str:
     return _text(robot)
 
 
+def joint_model() -> pinocchio.Model:
+    """Talos without the spoon as a model of its 32 joints.
+
+    Raises:
+        ConfigError: If Talos' files cannot be read, or lack something.
+    """
+    # What they lack is looked for before the URDF's parser prints it in its own words.
+    joint_limits()
+    half_sitting()
+    return _whole(_talos())
+
+
 def physics_description(config: Config) -> Description:
     """URDF of Talos with the spoon in which every fixed or locked joint is merged away, except the spoon's own.
 
@@ -155,13 +167,18 @@ def _talos() -> ElementTree.Element:
     return robot
 
 
-def _reduced(source: ElementTree.Element, locked: Mapping[str, float]) -> pinocchio.Model:
+def _whole(source: ElementTree.Element) -> pinocchio.Model:
     try:
         model = pinocchio.buildModelFromXML(ElementTree.tostring(source, encoding="unicode"))
     except (ValueError, RuntimeError) as error:
         raise ConfigError(f"{urdf_path()}: cannot be read as robot description: {error}") from error
     if missing := set(JOINTS) ^ set(model.names[1:]):
         raise ConfigError(f"{urdf_path()}: has other movable joints than Talos: {', '.join(sorted(missing))}")
+    return model
+
+
+def _reduced(source: ElementTree.Element, locked: Mapping[str, float]) -> pinocchio.Model:
+    model = _whole(source)
     configuration = pinocchio.neutral(model)
     numbers = [model.getJointId(joint) for joint in locked]
     for number, angle in zip(numbers, locked.values(), strict=True):

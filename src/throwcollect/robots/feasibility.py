@@ -9,11 +9,10 @@ import pinocchio
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config, ToolConfig
-from throwcollect.errors import ConfigError
 from throwcollect.robots.clearance import GRIPPER, MARGIN_M, Clearance, spoon_mount
-from throwcollect.robots.description import locked_joints, start_posture
+from throwcollect.robots.description import joint_model, locked_joints, start_posture
 from throwcollect.robots.interpolation import sample_quintic
-from throwcollect.robots.model import joint_limits, urdf_path
+from throwcollect.robots.model import joint_limits
 from throwcollect.robots.spoon import ball_seat, inertia
 from throwcollect.robots.talos import JOINTS
 from throwcollect.robots.trajectory import JointTrajectory
@@ -36,14 +35,11 @@ class Feasibility:
         config: Configuration of the collection.
 
     Raises:
-        ConfigError: If Talos' files cannot be read.
+        ConfigError: If Talos' files cannot be read, or lack something.
     """
 
     def __init__(self, config: Config) -> None:
-        try:
-            self._model = pinocchio.buildModelFromUrdf(str(urdf_path()))
-        except (ValueError, RuntimeError) as error:
-            raise ConfigError(f"{urdf_path()}: cannot be read as robot description: {error}") from error
+        self._model = joint_model()
         self._data = self._model.createData()
         self._columns = np.array([self._model.idx_qs[self._model.getJointId(joint)] for joint in JOINTS])
         gripper = self._model.frames[self._model.getFrameId(GRIPPER, pinocchio.BODY)]

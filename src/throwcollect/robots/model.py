@@ -111,4 +111,7 @@ def half_sitting() -> Mapping[str, float]:
     if state is None:
         raise ConfigError(f"{path}: no group_state half_sitting")
     angles = {joint.get("name"): joint.get("value", "0") for joint in state.iter("joint")}
-    return MappingProxyType({name: float(angles.get(name, "0")) for name in JOINTS})
+    try:
+        return MappingProxyType({name: float(angles.get(name, "0")) for name in JOINTS})
+    except ValueError as error:
+        raise ConfigError(f"{path}: group_state half_sitting is not readable: {error}") from error

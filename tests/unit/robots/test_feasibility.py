@@ -1,19 +1,24 @@
 from __future__ import annotations
 
+import re
+from importlib.metadata import PathDistribution
+
 import numpy as np
 import pinocchio
 import pytest
 
 from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError
+from throwcollect.robots import model
 from throwcollect.robots.clearance import MARGIN_M, Clearance, spoon_mount
 from throwcollect.robots.feasibility import Feasibility
 from throwcollect.robots.interpolation import sample_quintic
-from throwcollect.robots.model import half_sitting, joint_limits, urdf_path
+from throwcollect.robots.model import half_sitting, joint_limits, share_directory, urdf_path
 from throwcollect.robots.spoon import ball_seat
 from throwcollect.robots.talos import JOINTS
 from throwcollect.tasks.trajectory import throw_trajectory
 
+TALOS = "example-robot-data/robots/talos_data"
 TASK = Config().task
 
 
@@ -214,3 +219,56 @@ def test_broad_phase_finds_what_all_distances_find():
             found += 1
             assert approach.distance_m == pytest.approx(closest, abs=1e-5)
     assert found > 10
+
+
+@pytest.fixture
+def talos(tmp_path, monkeypatch):
+    """Talos' directory with copies of its descriptions, and its own meshes."""
+    real = share_directory() / TALOS
+    fake = tmp_path / "cmeel.prefix" / "share" / TALOS
+    for part in ("robots/talos_reduced.urdf", "srdf/talos.srdf"):
+        (fake / part).parent.mkdir(parents=True)
+        (fake / part).write_text((real / part).read_text())
+    (fake / "meshes").symlink_to(real / "meshes")
+    monkeypatch.setattr(model, "distribution", lambda _: PathDistribution(tmp_path / "example_robot_data.dist-info"))
+    joint_limits.cache_clear()
+    half_sitting.cache_clear()
+    yield fake
+    joint_limits.cache_clear()
+    half_sitting.cache_clear()
+
+
+@pytest.mark.parametrize(
+    ("file", "text", "instead", "message"),
+    [
+        (
+            "talos_reduced.urdf",
+            'joint name="arm_left_3_joint"',
+            'joint name="elbow"',
+            "joint arm_left_3_joint is missing",
+        ),
+        (
+            "talos_reduced.urdf",
+            'joint name="arm_left_3_joint" type="revolute"',
+            'joint name="arm_left_3_joint" type="fixed"',
+            "has other movable joints than Talos: arm_left_3_joint",
+        ),
+        ("talos_reduced.urdf", "gripper_right_base_link", "hand", "link gripper_right_base_link is missing"),
+        ("talos_reduced.urdf", 'parent link="base_link"', "parent", "cannot be read as robot description"),
+        ("talos_reduced.urdf", "talos_data/meshes/torso/base_link", "x", "its meshes cannot be read"),
+        ("talos.srdf", "</robot>", "", "cannot be read as robot description"),
+        ("talos.srdf", 'name="half_sitting"', 'name="sitting"', "no group_state half_sitting"),
+        ("talos.srdf", 'value="-0.0002"', 'value="?"', "group_state half_sitting is not readable: .*'\\?'"),
+        ("talos.srdf", None, None, "cannot be read as robot description"),
+    ],
+)
+def test_a_description_that_lacks_something_is_named(talos, file, text, instead, message):
+    (path,) = talos.glob(f"*/{file}")
+    if text is None:
+        path.unlink()
+    else:
+        whole = path.read_text()
+        assert text in whole
+        path.write_text(whole.replace(text, instead))
+    with pytest.raises(ConfigError, match=f"^{re.escape(str(path))}: {message}"):
+        Feasibility(Config())
