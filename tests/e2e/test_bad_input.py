@@ -85,8 +85,15 @@ def small(tmp_path: Path) -> Path:
         (["config", "broken.yaml"], "broken.yaml:2: not valid YAML: expected ',' or ']', but got '<stream end>'"),
         (["plan", "empty.yaml"], "empty.yaml: the file is empty"),
         (["plan", "list.yaml"], "list.yaml:1: the file should hold keys and values"),
-        (["plan", "bare.yaml"], "sweep.parameters: nothing is swept"),
-        (["plan", *LIST, "sweep.file=no.csv", "bare.yaml"], "no.csv: sweep.file: no such file"),
+        (["plan", "bare.yaml"], "bare.yaml: sweep.parameters: nothing is swept"),
+        (["plan", "grid.yaml"], "grid.yaml:1: trials: should be at most 1, as the sweep has no more points, got 4\n"),
+        (["up", "grid.yaml"], "grid.yaml:1: trials: should be at most 1, as the sweep has no more points, got 4\n"),
+        (["up", "grid.yaml", "--trials", "3"], "trials: should be at most 1, as the sweep has no more points, got 3\n"),
+        (
+            ["coordinator", "data", "--config", "grid.yaml"],
+            "grid.yaml:1: trials: should be at most 1, as the sweep has no more points, got 4\n",
+        ),
+        (["plan", *LIST, "sweep.file=no.csv", "bare.yaml"], "sweep.file: there is no file no.csv"),
         (
             ["plan", *LIST, "sweep.file=torn.parquet", "bare.yaml"],
             "torn.parquet: sweep.file: cannot be read as Parquet",
@@ -102,6 +109,8 @@ def test_a_wrong_request_is_one_message(
     (tmp_path / "empty.yaml").write_text("")
     (tmp_path / "list.yaml").write_text("- 1\n")
     (tmp_path / "bare.yaml").write_text("trials: 2\n")
+    grid = "{sampler: grid, parameters: {ball.mass_kg: {values: [0.04]}}}"
+    (tmp_path / "grid.yaml").write_text(f"trials: 4\nsweep: {grid}\n")
     (tmp_path / "torn.parquet").write_bytes(b"PAR1")
     (tmp_path / "bad.csv").write_text("ball.mass_kg\n0.04\nx\n")
     before = sorted(tmp_path.iterdir())
@@ -148,13 +157,23 @@ def test_a_taken_output_directory_is_left_alone(
     assert sorted(path.name for path in tmp_path.rglob("*")) == ["file", "notes.txt", "small.yaml", "used"]
 
 
-def test_a_busy_port_is_found_before_anything_is_written(say: Callable[..., Said], small: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("arguments", "where"),
+    [
+        (lambda port: ["small.yaml", "--set", f"run.router_port={port}"], ""),
+        (lambda _: ["busy.yaml"], "busy.yaml:9: "),
+    ],
+)
+def test_a_busy_port_is_found_before_anything_is_written(
+    arguments: Callable[[int], list[str]], where: str, say: Callable[..., Said], small: Path, tmp_path: Path
+) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
-        said = say("up", "small.yaml", "--set", f"run.router_port={port}", "--output", "data")
+        (tmp_path / "busy.yaml").write_text(small.read_text().replace("{runtime", f"{{router_port: {port}, runtime"))
+        said = say("up", *arguments(port), "--output", "data")
     assert said.code == 2
     assert said.err == (
-        f"throwcollect: run.router_port: port {port} of 127.0.0.1 cannot be used: Address already in use\n"
+        f"throwcollect: {where}run.router_port: port {port} of 127.0.0.1 cannot be used: Address already in use\n"
         "  try: --set run.router_port=0 takes a free one\n"
     )
     assert not (tmp_path / "data").exists()
@@ -163,7 +182,10 @@ def test_a_busy_port_is_found_before_anything_is_written(say: Callable[..., Said
 def test_a_sweep_that_the_robot_cannot_do_is_refused(say: Callable[..., Said], small: Path, tmp_path: Path) -> None:
     said = say("up", "small.yaml", "--set", "sweep.parameters.task.duration_s={min: 0.2, max: 0.2}", "--output", "data")
     assert said.code == 2
-    assert "throwcollect: sweep: all 2 trials are refused: 2 × arm_right_7_joint moves at 6.034 rad/s" in said.err
+    assert (
+        "throwcollect: small.yaml:4: sweep: all 2 trials are refused: 2 × arm_right_7_joint moves at 6.034 rad/s"
+        in said.err
+    )
     assert not (tmp_path / "data").exists()
 
 

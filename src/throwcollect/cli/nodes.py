@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 from throwcollect.cli.dataset import describe
-from throwcollect.config.loader import load
+from throwcollect.config.loader import loaded
 from throwcollect.coordinator.main import run
 from throwcollect.coordinator.prepare import more_trials, prepare
 from throwcollect.coordinator.resume import begun, resume
@@ -30,7 +30,8 @@ def coordinate(directory: Path, *, config: Path | None) -> None:
         run(directory)
         return
     freeze = resume if begun(directory) else prepare
-    plan = freeze(load(config), directory, sweep_directory=config.parent)
+    with loaded(config) as read:
+        plan = freeze(read, directory, sweep_directory=config.parent)
     print(f"plan: {len(plan.trials)} trials{more_trials(plan)}; dataset: {directory}", flush=True)
     run(directory)
     sys.stdout.write(describe(info(directory).as_dict()))

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import typer
 
-from throwcollect.config.loader import load, resolved_yaml
+from throwcollect.config.loader import load, loaded, resolved_yaml
 from throwcollect.config.reference import json_schema
 
 
@@ -36,7 +36,8 @@ def show_plan(path: Path, overrides: Sequence[str], *, json: bool) -> None:
     """
     from throwcollect.coordinator.prepare import checked_plan, more_trials
 
-    plan = checked_plan(load(path, overrides), directory=path.parent)
+    with loaded(path, overrides) as config:
+        plan = checked_plan(config, directory=path.parent)
     if json:
         rows = [
             {

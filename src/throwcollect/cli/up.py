@@ -15,7 +15,7 @@ import typer
 from throwcollect.cli.interruptions import Interruptions
 from throwcollect.cli.summary import print_summary
 from throwcollect.cli.terminal import Display, display
-from throwcollect.config.loader import load
+from throwcollect.config.loader import load, loaded
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.prepare import more_trials, prepare
 from throwcollect.coordinator.resume import begun, finished, resume
@@ -63,9 +63,9 @@ def collect(path: Path, *, overrides: Sequence[str], output: Path | None, detach
         Interrupted: If the user stopped the collection.
     """
     started = datetime.now(timezone.utc)
-    config = load(path, overrides)
-    directory = output or Path("datasets") / f"{config.name}-{datetime.now():%Y%m%d-%H%M%S}"
-    _collect(_Request(config, path.parent, directory, started, resumed=False), detach=detach, json=json)
+    with loaded(path, overrides) as config:
+        directory = output or Path("datasets") / f"{config.name}-{datetime.now():%Y%m%d-%H%M%S}"
+        _collect(_Request(config, path.parent, directory, started, resumed=False), detach=detach, json=json)
 
 
 def go_on(directory: Path, *, path: Path | None, overrides: Sequence[str], detach: bool, json: bool) -> None:
@@ -87,13 +87,14 @@ def go_on(directory: Path, *, path: Path | None, overrides: Sequence[str], detac
     started = datetime.now(timezone.utc)
     if not begun(directory):
         raise ConfigError(f"{directory}: holds no dataset", expected="a directory that throwcollect up has made")
-    try:
-        config = load(path or directory / CONFIG, overrides)
-    except ConfigError as error:
-        hint = f"throwcollect up CONFIG --resume {directory}, if the dataset's own file is damaged"
-        raise ConfigError(error.problems, hint=error.hint if path else hint) from error
-    sweep_directory = directory if path is None else path.parent
-    _collect(_Request(config, sweep_directory, directory, started, resumed=True), detach=detach, json=json)
+    with ExitStack() as places:
+        try:
+            config = places.enter_context(loaded(path or directory / CONFIG, overrides))
+        except ConfigError as error:
+            hint = f"throwcollect up CONFIG --resume {directory}, if the dataset's own file is damaged"
+            raise ConfigError(error.problems, hint=error.hint if path else hint) from error
+        sweep_directory = directory if path is None else path.parent
+        _collect(_Request(config, sweep_directory, directory, started, resumed=True), detach=detach, json=json)
 
 
 def _collect(request: _Request, *, detach: bool, json: bool) -> None:

@@ -61,6 +61,18 @@ class Document:
                 return Problem(sentence, dotted(location), self._path if line else None, line)
         return Problem(sentence, dotted(location), self._path)
 
+    def placed(self, problem: Problem) -> Problem:
+        """A problem with the place where its key was written, if it has a key and does not name a place itself."""
+        if problem.path or not problem.key:
+            return problem
+        location: Location = ()
+        holder: Any = self.values
+        for part in _parts(problem.key):
+            index = _index(holder, part)
+            location = (*location, index)
+            holder = holder[index] if _holds(holder, index) else None
+        return self.problem(location, problem.message)
+
     def override(self, assignment: str) -> None:
         """Replace one key; what is wrong with the override joins the problems.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from copy import deepcopy
 from pathlib import Path
 from typing import Any
@@ -36,6 +37,21 @@ def load(path: Path, overrides: Sequence[str] = ()) -> Config:
     Raises:
         ConfigError: If the file cannot be read or anything in it is wrong; it holds all problems, unknown keys first.
     """
+    with loaded(path, overrides) as config:
+        return config
+
+
+@contextmanager
+def loaded(path: Path, overrides: Sequence[str] = ()) -> Iterator[Config]:
+    """Read a configuration file as `load` does, and have errors that are raised inside say where their keys stand.
+
+    Args:
+        path: YAML 1.2 file.
+        overrides: ``key=value`` pairs that win over the file.
+
+    Raises:
+        ConfigError: If the file cannot be read or anything in it is wrong, or what is done inside finds so later.
+    """
     document = Document(path)
     for assignment in overrides:
         document.override(assignment)
@@ -45,7 +61,11 @@ def load(path: Path, overrides: Sequence[str] = ()) -> Config:
     rest = sorted([*document.problems, *problems[unknown:]], key=lambda problem: problem.line or 0)
     if rest or unknown or config is None:
         raise ConfigError([*problems[:unknown], *rest])
-    return config
+    try:
+        yield config
+    except ConfigError as error:
+        problems = [document.placed(problem) for problem in error.problems]
+        raise type(error)(problems, expected=error.expected, hint=error.hint) from error
 
 
 def resolved_yaml(config: Config) -> str:

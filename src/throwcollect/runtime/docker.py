@@ -15,7 +15,7 @@ from docker.client import DockerClient
 from docker.errors import NotFound
 
 from throwcollect.config.schema import Config
-from throwcollect.errors import ConfigError, Interrupted, WorkerError
+from throwcollect.errors import ConfigError, Interrupted, Problem, WorkerError
 from throwcollect.runtime.docker_checks import check
 from throwcollect.runtime.docker_engine import ENGINE_ERRORS, connect, engine_errors
 from throwcollect.runtime.docker_node import NodeContainer
@@ -80,7 +80,7 @@ class DockerRuntime:
     ) -> None:
         source = config.containers.volume if directory is None else str(directory.resolve())
         if source is None:
-            raise ConfigError("containers.volume: missing, as the dataset has no directory either")
+            raise ConfigError([Problem("missing, as the dataset has no directory either", "containers.volume")])
         self.listen = ROUTER_ENDPOINT
         self._place = RunPlace(run_id, source)
         self.data = self._place.data

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import socket
 
-from throwcollect.errors import ConfigError
+from throwcollect.errors import ConfigError, Problem
 
 LOOPBACK = "127.0.0.1"
 
@@ -25,7 +25,7 @@ def reserved_port(wanted: int) -> socket.socket:
     except OSError as error:
         probe.close()
         raise ConfigError(
-            f"run.router_port: port {wanted} of {LOOPBACK} cannot be used: {error.strerror}",
+            [Problem(f"port {wanted} of {LOOPBACK} cannot be used: {error.strerror}", "run.router_port")],
             hint="--set run.router_port=0 takes a free one",
         ) from error
     return probe

@@ -47,8 +47,8 @@ def read_points(path: Path, config: Config) -> Points:
     if path.suffix not in readers:
         raise ConfigError([Problem(f"should end in .csv or .parquet, got '{path.name}'", "sweep.file")])
     if not path.is_file():
-        problem = "is a directory, not a file" if path.is_dir() else "no such file"
-        raise ConfigError([Problem(problem, "sweep.file", path)])
+        problem = f"should be a file, got the directory {path}" if path.is_dir() else f"there is no file {path}"
+        raise ConfigError([Problem(problem, "sweep.file")])
     rows = readers[path.suffix](path, config)
     problems = [*rows.problems, *_value_problems(rows, path, config)]
     if problems:

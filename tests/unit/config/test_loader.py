@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from throwcollect.config.loader import load, resolved_yaml
+from throwcollect.config.loader import load, loaded, resolved_yaml
 from throwcollect.config.schema import (
     BallConfig,
     Config,
@@ -17,7 +17,7 @@ from throwcollect.config.schema import (
     ThrowConfig,
     Values,
 )
-from throwcollect.errors import ConfigError
+from throwcollect.errors import ConfigError, PlanError, Problem
 
 CONFIGS = Path(__file__).parents[3] / "configs"
 KNOWN_IN_RUN = (
@@ -426,6 +426,42 @@ def test_problems_carry_their_facts_as_fields(write):
         load(path)
     problem = caught.value.problems[0]
     assert (problem.path, problem.line, problem.key) == (path, 3, "ball.mass_kg")
+
+
+@pytest.mark.parametrize(
+    ("key", "where"),
+    [
+        ("trials", "run.yaml:1: "),
+        ("sweep.parameters.task.duration_s.max", "run.yaml:4: "),
+        ("sweep.parameters.task.duration_s", "run.yaml:4: "),
+        ("record.topics.1", "run.yaml:7: "),
+        ("ball.mass_kg", "run.yaml: "),
+        ("run.router_port", ""),
+        ("sweep", "run.yaml:2: "),
+    ],
+)
+def test_what_is_found_later_is_named_with_the_place_of_its_key(write, key, where):
+    path = write("""
+        trials: 3
+        sweep:
+          parameters:
+            task.duration_s: {min: 1, max: 2}
+        record:
+          topics: [joint_states,
+                   ball/odometry]
+        """)
+    found = PlanError([Problem("all too fast", key)], expected="slower ones", hint="slow down")
+    with pytest.raises(PlanError, match="all too fast") as caught, loaded(path, ["run.router_port=7447"]):
+        raise found
+    assert caught.value.message.replace(f"{path.parent}/", "") == f"{where}{key}: all too fast"
+    assert (caught.value.expected, caught.value.hint) == (found.expected, found.hint)
+
+
+@pytest.mark.parametrize("problem", [Problem("torn", "trials", Path("list.csv"), 8), Problem("torn")])
+def test_what_has_another_place_or_none_keeps_it(write, problem):
+    with pytest.raises(ConfigError, match="torn") as caught, loaded(write("trials: 3")):
+        raise ConfigError([problem])
+    assert caught.value.problems == [problem]
 
 
 angles = st.floats(-6.3, 6.3)

@@ -153,7 +153,9 @@ def test_wrong_parquet_is_named_with_its_columns(parquet, columns, messages):
 
 
 def test_files_that_are_no_table(tmp_path):
-    assert problems(tmp_path / "missing.csv") == ["missing.csv: sweep.file: no such file"]
+    assert problems(tmp_path / "missing.csv") == ["sweep.file: there is no file missing.csv"]
+    (tmp_path / "directory.csv").mkdir()
+    assert problems(tmp_path / "directory.csv") == ["sweep.file: should be a file, got the directory directory.csv"]
     assert problems(tmp_path / "list.json") == ["sweep.file: should end in .csv or .parquet, got 'list.json'"]
     broken = tmp_path / "broken.parquet"
     broken.write_bytes(b"PAR1 but not much more")
