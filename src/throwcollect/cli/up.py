@@ -17,9 +17,9 @@ from throwcollect.cli.summary import print_summary
 from throwcollect.cli.terminal import Display, display
 from throwcollect.config.loader import load, loaded
 from throwcollect.config.schema import Config
-from throwcollect.coordinator.prepare import more_trials, prepare
+from throwcollect.coordinator.prepare import more_trials, prepare, self_contained
 from throwcollect.coordinator.resume import begun, finished, resume
-from throwcollect.dataset.directory import CONFIG, PLAN
+from throwcollect.dataset.directory import CONFIG, PLAN, TRIALS
 from throwcollect.dataset.inspect import info
 from throwcollect.dataset.journal import collected_s
 from throwcollect.errors import ConfigError, Problem
@@ -194,8 +194,8 @@ def _prepared(records: Records, request: _Request, plan: Plan | None, shown: Dis
 
 def _remove_plan(directory: Path, *, made: bool) -> None:
     with suppress(OSError):
-        for name in (CONFIG, PLAN):
-            (directory / name).unlink()
+        for name in (CONFIG, PLAN, TRIALS):
+            (directory / name).unlink(missing_ok=True)
         if made:
             directory.rmdir()
 
@@ -204,7 +204,7 @@ def _taken_over(records: Records, left: Run, config: Config) -> tuple[OpenRun, C
     """A run whose launcher died, with its own configuration."""
     record = left.record
     own = load(Path(record.directory) / CONFIG)
-    if own.without_run() != config.without_run():
+    if own.without_run() != self_contained(config).without_run():
         raise ConfigError(
             f"{record.directory}: run {record.run} collects into it, with another configuration",
             hint=f"throwcollect down --run {record.run} ends that run",

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from throwcollect.config.schema import Config
+from throwcollect.dataset.directory import TRIALS
 from throwcollect.dataset.writer import create
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.robots.feasibility import Feasibility
 from throwcollect.sweep.plan import Check, Plan, make_plan
+from throwcollect.sweep.points import Points
 from throwcollect.sweep.rounds import Rounds
+from throwcollect.sweep.table import read_points
 from throwcollect.tasks.trajectory import throw_trajectory
 
 
@@ -45,6 +49,26 @@ def more_trials(plan: Plan) -> str:
     return f"; more follow from their results{until}, at most {rounds.limit} in all"
 
 
+def self_contained(config: Config) -> Config:
+    """The configuration as a dataset has it: a list of trials lies beside it."""
+    if config.sweep.file is None:
+        return config
+    return config.model_copy(update={"sweep": config.sweep.model_copy(update={"file": TRIALS})})
+
+
+def listed_points(config: Config, *, directory: Path) -> Points | None:
+    """All points of the list that a configuration names, whether its plan takes them or not; None if it names none.
+
+    Args:
+        config: The configuration.
+        directory: Where a relative `sweep.file` is looked for.
+
+    Raises:
+        ConfigError: If the list cannot be used.
+    """
+    return None if config.sweep.file is None else read_points(directory / config.sweep.file, config)
+
+
 def prepare(config: Config, directory: Path, *, sweep_directory: Path) -> Plan:
     """Freeze the plan: write a dataset directory that holds the resolved configuration and all trials.
 
@@ -56,9 +80,9 @@ def prepare(config: Config, directory: Path, *, sweep_directory: Path) -> Plan:
     Raises:
         ConfigError: If the sweep or the directory cannot be used; nothing is left behind then.
     """
-    plan = checked_plan(config, directory=sweep_directory)
+    plan = replace(checked_plan(config, directory=sweep_directory), config=self_contained(config))
     try:
-        create(directory, plan)
+        create(directory, plan, listed=listed_points(config, directory=sweep_directory))
     except DatasetError as error:
         # Nothing has been started yet, so what is wrong is the choice of the directory.
         raise ConfigError(error.message, hint=error.hint) from error

@@ -10,12 +10,13 @@ from throwcollect.config.loader import load, resolved_yaml
 from throwcollect.config.problems import quoted
 from throwcollect.config.schema import Config
 from throwcollect.config.values import differences
-from throwcollect.coordinator.prepare import checked_plan
-from throwcollect.dataset.directory import CONFIG, METADATA, PLAN
+from throwcollect.coordinator.prepare import checked_plan, listed_points, self_contained
+from throwcollect.dataset.directory import CONFIG, METADATA, PLAN, TRIALS
 from throwcollect.dataset.files import remove, write_file
 from throwcollect.dataset.reader import read_throws
 from throwcollect.errors import ConfigError, DatasetError, Problem
 from throwcollect.sweep.plan import Plan, Trial
+from throwcollect.sweep.table import encode_points
 from throwcollect.tasks.throw import Outcome
 
 _MAY_GROW = ("trials", "until.landed")
@@ -38,12 +39,16 @@ def resume(config: Config, directory: Path, *, sweep_directory: Path) -> Plan:
         ConfigError: If the configuration is another one, or has fewer trials, or other ones.
         DatasetError: If files cannot be written, or both the stored configuration and the plan are damaged.
     """
+    given, config = config, self_contained(config)
     stored = _stored(directory)
     if stored is not None:
         _refuse_changes(directory, stored, config)
     old = _stored_plan(directory, stored, config)
     if old is None or old.config.without_run() != config.without_run():
-        plan = _extended(directory, old, checked_plan(config, directory=sweep_directory))
+        drawn = replace(checked_plan(given, directory=sweep_directory), config=config)
+        plan = _extended(directory, old, drawn)
+        if (listed := listed_points(given, directory=sweep_directory)) is not None:
+            write_file(directory / TRIALS, encode_points(listed))
     else:
         plan = replace(old, config=config)
     if stored is not None and stored.without_run() != config.without_run():

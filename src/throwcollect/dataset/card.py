@@ -19,6 +19,7 @@ import pyarrow.compute as pc
 import throwcollect
 from throwcollect.config.schema import Config
 from throwcollect.dataset.bag import to_yaml
+from throwcollect.dataset.directory import TRIALS
 from throwcollect.sweep.plan import FIRST_TRIALS
 
 _LIBRARIES = ("pybullet", "numpy", "rosbags", "mcap", "zstandard", "pyarrow", "pin", "example-robot-data")
@@ -91,7 +92,8 @@ def data_card(config: Config, throws: pa.Table, provenance: Provenance) -> str:
         throws: One row a trial.
         provenance: How the collection was run.
     """
-    size = next((label for limit, label in _SIZES if len(throws) < limit), _MORE)
+    episodes = len(throws) - throws["digest"].null_count
+    size = next((label for limit, label in _SIZES if episodes < limit), _MORE)
     header = {
         "license": "apache-2.0",
         "pretty_name": config.name,
@@ -106,8 +108,8 @@ def data_card(config: Config, throws: pa.Table, provenance: Provenance) -> str:
         "",
         f"# {config.name}",
         "",
-        f"{len(throws)} simulated throws of a ball by the humanoid robot Talos, each with the joint states of the "
-        f"robot and the odometry of the ball at {config.record.rate_hz} Hz. Made with throwcollect.",
+        f"{episodes} simulated throws of a ball by the humanoid robot Talos, each with the joint states of the robot "
+        f"and the odometry of the ball at {config.record.rate_hz} Hz. Made with throwcollect.",
         "",
         *outcome_lines(throws),
         "",
@@ -117,6 +119,7 @@ def data_card(config: Config, throws: pa.Table, provenance: Provenance) -> str:
         "- `throws.parquet`: one row a trial: swept values, outcome, release, apex, landing, place of its recording.",
         "- `plan.parquet`: the trials, each as it was drawn before it ran.",
         "- `config.yaml`: the configuration; collecting with it again yields the same data.",
+        *([f"- `{TRIALS}`: the list of points that the configuration reads."] if config.sweep.file else []),
         "",
         *_ranges(config, throws),
         "## Limits",

@@ -11,13 +11,14 @@ import numpy as np
 
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
-from throwcollect.dataset.directory import CONFIG, PLAN, THROWS, shard_name
+from throwcollect.dataset.directory import CONFIG, PLAN, THROWS, TRIALS, shard_name
 from throwcollect.dataset.findings import Finding
 from throwcollect.dataset.throws import REFUSED, read_throws_table
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError
 from throwcollect.sweep.digest import trial_digests
 from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.points import Points
+from throwcollect.sweep.table import read_points
 from throwcollect.tasks.throw import Outcome
 
 WITHOUT_EPISODE = (REFUSED, Outcome.LOST.value)
@@ -68,6 +69,8 @@ def check_tables(directory: Path) -> Tables:
             tables.config = None
         except DatasetError as error:
             tables.findings.append(_finding(directory, PLAN, error))
+    if tables.plan is not None and tables.plan.config.sweep.file == TRIALS:
+        tables.findings += _list_findings(directory, tables.plan)
     if tables.plan is not None:
         for trial, digest in wrong_trials(tables.plan).items():
             problem = f"has digest {tables.plan.trials[trial].digest}, its values and seed give {digest}"
@@ -86,6 +89,21 @@ def check_tables(directory: Path) -> Tables:
 
 def _finding(directory: Path, name: str, error: DatasetError) -> Finding:
     return Finding(name, "", str(error).removeprefix(f"{directory / name}: "))
+
+
+def _list_findings(directory: Path, plan: Plan) -> Iterator[Finding]:
+    """Whether a plan takes the first points of the list that lies beside it."""
+    if not (directory / TRIALS).exists():
+        yield Finding(TRIALS, "", "is missing")
+        return
+    try:
+        points = read_points(directory / TRIALS, plan.config).first(len(plan.trials))
+    except ConfigError as error:
+        yield Finding(TRIALS, "", error.problems[0].message)
+        return
+    drawn = [dict(zip(points.keys, row, strict=True)) for row in points.values.tolist()]
+    if drawn != [dict(trial.values) for trial in plan.trials]:
+        yield Finding(TRIALS, "", f"begins with other points than those of {PLAN}")
 
 
 def wrong_trials(plan: Plan) -> dict[int, str]:

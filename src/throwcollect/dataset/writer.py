@@ -20,7 +20,7 @@ from throwcollect.config.schema import Config
 from throwcollect.dataset.bag import FileSummary, dataset_metadata
 from throwcollect.dataset.card import Provenance, data_card
 from throwcollect.dataset.digest import combined_digest
-from throwcollect.dataset.directory import CARD, CONFIG, METADATA, PLAN, THROWS, shard_name
+from throwcollect.dataset.directory import CARD, CONFIG, METADATA, PLAN, THROWS, TRIALS, shard_name
 from throwcollect.dataset.files import remove, write_file
 from throwcollect.dataset.journal import Event, Journal
 from throwcollect.dataset.recovery import recover_shard
@@ -31,18 +31,21 @@ from throwcollect.episode.message import Episode
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.robots.description import full_description
 from throwcollect.sweep.plan import Plan, Trial
+from throwcollect.sweep.points import Points
+from throwcollect.sweep.table import encode_points
 from throwcollect.tasks.throw import Outcome, ThrowResult
 
 Tell = Callable[[int, ThrowResult], None]
 """Told a trial and what came of it."""
 
 
-def create(directory: Path, plan: Plan) -> None:
+def create(directory: Path, plan: Plan, *, listed: Points | None = None) -> None:
     """Write the directory of a dataset of which no trial has run yet.
 
     Args:
         directory: Must not exist, or be empty.
         plan: The trials and their configuration.
+        listed: Points that the sampler of the configuration is to find in ``trials.parquet``; None if it does not.
 
     Raises:
         ConfigError: If the directory holds files already, or cannot be made.
@@ -64,6 +67,8 @@ def create(directory: Path, plan: Plan) -> None:
     with ExitStack() as undo:
         undo.callback(_clear, directory, remove=made)
         write_file(directory / CONFIG, resolved_yaml(plan.config).encode())
+        if listed is not None:
+            write_file(directory / TRIALS, encode_points(listed))
         plan.write(directory / PLAN)
         undo.pop_all()
 
@@ -110,14 +115,14 @@ class DatasetWriter:
         self._expect(plan.trials)
 
     @classmethod
-    def create(cls, directory: Path, plan: Plan) -> DatasetWriter:
-        """Create a dataset and open it.
+    def create(cls, directory: Path, plan: Plan, *, listed: Points | None = None) -> DatasetWriter:
+        """Create a dataset and open it; see the function `create`.
 
         Raises:
             ConfigError: If the directory holds files already, or cannot be made.
             DatasetError: If the files cannot be written; nothing is left behind then.
         """
-        create(directory, plan)
+        create(directory, plan, listed=listed)
         return cls(directory, plan)
 
     @classmethod

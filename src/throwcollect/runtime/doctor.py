@@ -50,7 +50,8 @@ class Check:
 def _python() -> Check:
     found = ".".join(map(str, sys.version_info[:3]))
     if not (3, 10) <= sys.version_info[:2] <= (3, 11):
-        return Check("python", "problem", f"{found}; pybullet has wheels for Python 3.10 and 3.11")
+        lacking = find_spec("pybullet") is None
+        return Check("python", "problem" if lacking else "note", f"{found}; pybullet has wheels for 3.10 and 3.11")
     return Check("python", "ok", found)
 
 

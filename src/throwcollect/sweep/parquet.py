@@ -31,6 +31,8 @@ def read_parquet(path: Path) -> Any:
         table.validate(full=True)
     except FileNotFoundError as error:
         raise DatasetError(f"{path}: is missing") from error
+    except PermissionError as error:
+        raise DatasetError(f"{path}: may not be read", hint="check who may read it") from error
     except (OSError, ValueError, MemoryError, pa.ArrowException) as error:
         # Whatever the bytes of a name or a text are not valid as ends as one of these, at the latest when validated.
         raise DatasetError(f"{path}: is damaged: {_first_line(error)}") from error

@@ -144,3 +144,42 @@ def test_a_plan_that_grows_may_be_asked_for_more_but_not_for_less(tmp_path: Path
     with pytest.raises(ConfigError, match="the same configuration") as raised:
         resume(few, directory, sweep_directory=tmp_path)
     assert [problem.key for problem in raised.value.problems] == ["trials", "until.landed"]
+
+
+LISTED = {"name": "listed", "sweep": {"sampler": "list", "file": "lists/points.csv"}}
+
+
+@pytest.fixture
+def listed(tmp_path: Path) -> Path:
+    """A directory with a list of three points."""
+    (tmp_path / "lists").mkdir()
+    (tmp_path / "lists" / "points.csv").write_text("task.duration_s,ball.mass_kg\n1.0,0.03\n1.1,0.04\n1.2,0.05\n")
+    return tmp_path
+
+
+def test_a_dataset_has_its_list_beside_its_configuration(listed: Path) -> None:
+    plan = prepare(Config.model_validate(LISTED), listed / "data", sweep_directory=listed)
+    (listed / "lists" / "points.csv").unlink()
+    own = load(listed / "data" / "config.yaml")
+    assert own.sweep.file == "trials.parquet"
+    again = prepare(own, listed / "again", sweep_directory=listed / "data")
+    assert again == plan
+    assert contents(listed / "again") == contents(listed / "data")
+
+
+def test_a_list_of_which_the_first_points_were_taken_goes_on_with_more(listed: Path) -> None:
+    prepare(Config.model_validate({**LISTED, "trials": 2}), listed / "data", sweep_directory=listed)
+    more = load(listed / "data" / "config.yaml").model_copy(update={"trials": 3})
+    plan = resume(more, listed / "data", sweep_directory=listed / "data")
+    assert [trial.values["task.duration_s"] for trial in plan.trials] == [1.0, 1.1, 1.2]
+
+
+def test_a_list_that_has_grown_is_taken_over(listed: Path) -> None:
+    prepare(Config.model_validate({**LISTED, "trials": 3}), listed / "data", sweep_directory=listed)
+    with (listed / "lists" / "points.csv").open("a") as file:
+        file.write("1.25,0.06\n")
+    plan = resume(Config.model_validate({**LISTED, "trials": 4}), listed / "data", sweep_directory=listed)
+    assert len(plan.trials) == 4
+    fresh = prepare(Config.model_validate({**LISTED, "trials": 4}), listed / "fresh", sweep_directory=listed)
+    assert plan == fresh
+    assert contents(listed / "data") == contents(listed / "fresh")

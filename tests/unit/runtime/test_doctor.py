@@ -64,3 +64,13 @@ def test_a_docker_engine_and_its_image_are_found(tmp_path: Path, monkeypatch: py
         monkeypatch.setattr(Engine, "images", (default_tag(),))
         assert found() == ("ok", f"Docker 27.1 answers at unix://{path}, with the image {default_tag()}")
         server.shutdown()
+
+
+@pytest.mark.parametrize(("installed", "status"), [(True, "note"), (False, "problem")])
+def test_another_python_is_a_problem_only_where_pybullet_is_missing(
+    installed: bool, status: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sys.version_info", (3, 12, 3))
+    monkeypatch.setattr("throwcollect.runtime.doctor.find_spec", lambda _: object() if installed else None)
+    (python,) = [check for check in examine(tmp_path) if check.name == "python"]
+    assert (python.status, python.finding) == (status, "3.12.3; pybullet has wheels for 3.10 and 3.11")

@@ -13,11 +13,11 @@ from pathlib import Path
 from typing import Any
 
 from throwcollect.config.schema import Config
-from throwcollect.dataset.derive.records import encode_sources, encode_trials, sources_section
+from throwcollect.dataset.derive.records import encode_sources, sources_section
 from throwcollect.dataset.derive.row_result import row_result
 from throwcollect.dataset.derive.source import Source
 from throwcollect.dataset.derive.union import list_of_trials
-from throwcollect.dataset.directory import CARD, SOURCES, TRIALS
+from throwcollect.dataset.directory import CARD, SOURCES
 from throwcollect.dataset.files import write_file
 from throwcollect.dataset.inspect import info
 from throwcollect.dataset.new_directory import new_directory
@@ -93,8 +93,7 @@ def write(sources: Sequence[Source], directory: Path, *, name: str | None = None
         config = config.model_copy(update={"name": name})
     # Every trial has been run before, so none is to be checked.
     plan = Plan(config, tuple(make_trials(config, points)))
-    with closing(DatasetWriter.create(directory, plan)) as writer:
-        write_file(directory / TRIALS, encode_trials(points))
+    with closing(DatasetWriter.create(directory, plan, listed=points)) as writer:
         write_file(directory / SOURCES, encode_sources(sources))
         joints = tuple(config.task.end)
         for episode, row in _episodes(sources, config):

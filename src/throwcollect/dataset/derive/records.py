@@ -1,4 +1,4 @@
-"""What a derived dataset says of its trials: their points, and where they come from."""
+"""What a derived dataset says of where its trials come from."""
 
 from __future__ import annotations
 
@@ -8,12 +8,6 @@ import pyarrow as pa
 
 from throwcollect.dataset.derive.source import Source
 from throwcollect.dataset.throws import encode_table
-from throwcollect.sweep.points import Points
-
-
-def encode_trials(points: Points) -> bytes:
-    """Parquet bytes of points, as the sampler `list` reads them."""
-    return encode_table(pa.table({key: points.values[:, column] for column, key in enumerate(points.keys)}))
 
 
 def encode_sources(sources: Sequence[Source]) -> bytes:

@@ -153,3 +153,15 @@ def test_an_episode_that_is_not_the_one_of_the_table_is_refused(
         shutil.copy(shard, dataset / shard.name)
     with pytest.raises(DatasetError, match=r"trial 0: digest .*\n.* as throws.parquet says"):
         filtered(dataset, tmp_path / "some", where="trial == 0")
+
+
+def test_a_list_that_is_not_the_one_of_the_plan_is_found(collected: Path, tmp_path: Path) -> None:
+    filtered(collected, tmp_path / "some", where="trial > 3")
+    path = tmp_path / "some" / "trials.parquet"
+    table = pq.read_table(path)
+    pq.write_table(table.take([1, 0, *range(2, len(table))]), path)
+    assert list(map(str, verify(tmp_path / "some"))) == [
+        "trials.parquet: begins with other points than those of plan.parquet"
+    ]
+    path.unlink()
+    assert list(map(str, verify(tmp_path / "some"))) == ["trials.parquet: is missing"]
