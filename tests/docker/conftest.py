@@ -8,7 +8,7 @@ from docker.errors import ImageNotFound
 
 from throwcollect.errors import WorkerError
 from throwcollect.runtime.docker_engine import connect
-from throwcollect.runtime.image import default_tag
+from throwcollect.runtime.image import default_tag, is_outdated
 
 UNAVAILABLE = Path(__file__).parents[2] / "build" / "engine-unavailable"
 
@@ -26,4 +26,6 @@ def client() -> Iterator[DockerClient]:
             found.images.get(default_tag())
         except ImageNotFound:
             pytest.skip(f"the engine has no image {default_tag()}; throwcollect image build makes it")
+        if is_outdated(found, default_tag()):
+            pytest.skip(f"the image {default_tag()} is of other sources; throwcollect image build makes it anew")
         yield found

@@ -152,7 +152,7 @@ def _prepared(records: Records, request: _Request, plan: Plan | None, shown: Dis
         # Getting an image may take minutes, so all that may be wrong is found before; but where there is a volume, it
         # is the runtime that decides where the dataset is.
         volume = config.containers.volume
-        runtime = choose(config, say=shown.say) if volume else None
+        runtime = choose(config, say=shown.say, warn=shown.warn) if volume else None
         if runtime == "local":
             volume = None
         if volume and plan is not None:
@@ -167,7 +167,7 @@ def _prepared(records: Records, request: _Request, plan: Plan | None, shown: Dis
             made = not directory.exists()
             plan = prepare(config, directory, sweep_directory=request.sweep_directory)
             undo.callback(_remove_plan, directory, made=made)
-        runtime = runtime or choose(config, say=shown.say)
+        runtime = runtime or choose(config, say=shown.say, warn=shown.warn)
         record = Record(
             run=run.run,
             name=config.name,

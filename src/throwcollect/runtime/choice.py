@@ -6,21 +6,24 @@ from collections.abc import Callable
 from contextlib import closing
 from typing import Literal
 
+from docker.client import DockerClient
+
 from throwcollect.config.schema import Config
 from throwcollect.errors import WorkerError
 from throwcollect.runtime.docker_engine import connect
 from throwcollect.runtime.docker_options import image
-from throwcollect.runtime.image import ensure
+from throwcollect.runtime.image import build, ensure, is_outdated
 
 _PROBE_S = 3.0
 
 
-def choose(config: Config, *, say: Callable[[str], None]) -> Literal["local", "docker"]:
+def choose(config: Config, *, say: Callable[[str], None], warn: Callable[[str], None]) -> Literal["local", "docker"]:
     """The runtime that a configuration asks for; with ``auto``, containers where they can be had.
 
     Args:
         config: The configuration.
         say: Told in one line what was chosen, and before that what is done to get the image.
+        warn: Told in one line if the image is not that of the sources that run here.
 
     Raises:
         WorkerError: If containers are asked for, and no engine answers or the image cannot be had.
@@ -32,6 +35,8 @@ def choose(config: Config, *, say: Callable[[str], None]) -> Literal["local", "d
     try:
         with closing(connect(timeout_s=_PROBE_S)) as client:
             ensure(client, image(config), say=say)
+            if is_outdated(client, image(config)):
+                _settle(client, config, warn)
     except WorkerError as error:
         if wanted == "docker":
             raise
@@ -39,3 +44,16 @@ def choose(config: Config, *, say: Callable[[str], None]) -> Literal["local", "d
         return "local"
     say(f"runtime: Docker containers of {image(config)}{' (auto)' if wanted == 'auto' else ''}")
     return "docker"
+
+
+def _settle(client: DockerClient, config: Config, warn: Callable[[str], None]) -> None:
+    """Decide about an image of other sources: it may collect other bytes than these, so it is used on demand only."""
+    name = image(config)
+    finding = f"the image {name} was made from other sources than these"
+    if config.containers.image is not None:
+        warn(f"{finding}; it is used, as containers.image names it")
+    elif config.run.runtime == "auto":
+        raise WorkerError(f"{finding}; throwcollect image build makes it anew")
+    else:
+        warn(f"{finding}; building it anew, which takes minutes")
+        build(client, name, say=lambda _line: None)

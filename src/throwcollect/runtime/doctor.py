@@ -19,7 +19,7 @@ from docker.errors import ImageNotFound
 from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.robots.model import half_sitting, joint_limits, urdf_path
 from throwcollect.runtime.docker_engine import connect, engine_address, engine_errors
-from throwcollect.runtime.image import default_tag
+from throwcollect.runtime.image import default_tag, is_outdated
 
 _GIB = 1024**3
 _SIMULATION_MEMORY_GIB = 0.3
@@ -97,6 +97,9 @@ def _docker() -> Check:
             except ImageNotFound:
                 lacking = f"the image {default_tag()} is not there yet; throwcollect image build makes it"
                 return Check("docker", "note", f"{found}; {lacking}")
+            if is_outdated(client, default_tag()):
+                old = f"the image {default_tag()} was made from other sources than these"
+                return Check("docker", "note", f"{found}; {old}; throwcollect image build makes it anew")
     except WorkerError as error:
         return Check("docker", "note", f"{error.message}; runs use processes")
     return Check("docker", "ok", f"{found}, with the image {default_tag()}")

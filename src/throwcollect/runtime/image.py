@@ -71,7 +71,7 @@ def build(
     if wheelhouse is not None and not any(wheelhouse.glob("*.whl")):
         raise ConfigError(f"{wheelhouse}: holds no wheels", hint=f"python {root}/docker/wheelhouse.py {wheelhouse}")
     if not _is_there(client, base):
-        hint = "--base IMAGE names another one; docker/base.sh makes one from Debian packages"
+        hint = "throwcollect image build --base IMAGE takes another one; docker/base.sh makes one from Debian packages"
         say(f"pulling {base}")
         with engine_errors(f"the base image {base} is not here and cannot be pulled", hint=hint):
             client.images.pull(base)
@@ -89,14 +89,12 @@ def ensure(client: DockerClient, tag: str, *, say: Callable[[str], None]) -> Non
     Args:
         client: Client of the engine.
         tag: Name of the image.
-        say: Called with one line before anything that takes long, and if the default image is not that of the clone.
+        say: Called with one line before anything that takes long.
 
     Raises:
         WorkerError: If the image is missing and cannot be had.
     """
     if _is_there(client, tag):
-        if tag == default_tag() and _is_outdated(client, tag):
-            say(f"image {tag} was made from other sources than these; throwcollect image build makes it anew")
         return
     if tag != default_tag():
         say(f"image {tag} is not here; pulling it")
@@ -113,6 +111,25 @@ def ensure(client: DockerClient, tag: str, *, say: Callable[[str], None]) -> Non
         raise WorkerError(
             f"the image {tag} is not here and cannot be built: {error.message}", hint=error.hint
         ) from error
+
+
+def is_outdated(client: DockerClient, tag: str) -> bool:
+    """Whether the label of an image says that it was made from other sources than those of the clone.
+
+    Args:
+        client: Client of the engine.
+        tag: Name of the image, which the engine has.
+
+    Raises:
+        WorkerError: If the engine does not answer.
+    """
+    try:
+        root = source_root()
+    except ConfigError:
+        return False
+    with engine_errors(f"the engine does not say what the image {tag} holds"):
+        label = client.images.get(tag).labels.get(SOURCES_LABEL, _UNKNOWN)
+    return label not in (_UNKNOWN, _digest_of(root))
 
 
 def source_root() -> Path:
@@ -137,17 +154,6 @@ def _is_there(client: DockerClient, image: str) -> bool:
         except ImageNotFound:
             return False
         return True
-
-
-def _is_outdated(client: DockerClient, tag: str) -> bool:
-    """Whether the label of an image says that it holds other sources than the clone."""
-    try:
-        root = source_root()
-    except ConfigError:
-        return False
-    with engine_errors(f"the engine does not say what the image {tag} holds"):
-        label = client.images.get(tag).labels.get(SOURCES_LABEL, _UNKNOWN)
-    return label not in (_UNKNOWN, _digest_of(root))
 
 
 def _digest_of(root: Path) -> str:
@@ -216,7 +222,7 @@ def _failure(tag: str, error: str, missing: str | None, wheelhouse: Path | None,
     if missing is None:
         return WorkerError(f"{tag}: cannot be built: {error}", evidence=log)
     if wheelhouse is None:
-        hint = "--wheelhouse DIR takes wheels from a directory; docker/wheelhouse.py fills one"
+        hint = "throwcollect image build --wheelhouse DIR takes wheels from there; docker/wheelhouse.py fills one"
         return WorkerError(f"{tag}: cannot be built: the package index gives no {missing}", evidence=log, hint=hint)
     hint = f"python docker/wheelhouse.py {wheelhouse}"
     return WorkerError(f"{tag}: cannot be built: {wheelhouse} lacks {missing}", evidence=log, hint=hint)

@@ -4,6 +4,7 @@ from unittest.mock import Mock
 
 import pytest
 
+from throwcollect.config.containers import ContainersConfig
 from throwcollect.config.run import RunConfig
 from throwcollect.config.schema import Config
 from throwcollect.errors import WorkerError
@@ -12,10 +13,13 @@ from throwcollect.runtime.image import default_tag
 
 
 @pytest.fixture
-def choose() -> Callable[[str], tuple[str, list[str]]]:
-    def choose(runtime: str) -> tuple[str, list[str]]:
+def choose() -> Callable[..., tuple[str, list[str]]]:
+    """Chooses the runtime; what was warned of begins with an exclamation mark."""
+
+    def choose(runtime: str, image: str | None = None) -> tuple[str, list[str]]:
         said: list[str] = []
-        return choice.choose(Config(run=RunConfig(runtime=runtime)), say=said.append), said
+        config = Config(run=RunConfig(runtime=runtime), containers=ContainersConfig(image=image))
+        return choice.choose(config, say=said.append, warn=lambda line: said.append(f"! {line}")), said
 
     return choose
 
@@ -28,6 +32,17 @@ def no_engine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def engine(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(choice, "connect", lambda **_: Mock())
+    monkeypatch.setattr(choice, "is_outdated", lambda *_: False)
+
+
+@pytest.fixture
+def outdated(engine, monkeypatch: pytest.MonkeyPatch) -> Mock:
+    """An engine whose images are all there, and of other sources; what it is told to build."""
+    monkeypatch.setattr(choice, "ensure", lambda *_, **__: None)
+    monkeypatch.setattr(choice, "is_outdated", lambda *_: True)
+    build = Mock()
+    monkeypatch.setattr(choice, "build", build)
+    return build
 
 
 def lacks_image(*_: object, **__: object) -> None:
@@ -72,3 +87,39 @@ def test_an_image_that_cannot_be_had_counts_like_no_engine(choose, engine, monke
 def test_processes_need_no_engine(choose, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(choice, "connect", lacks_image)
     assert choose("local") == ("local", ["runtime: local processes"])
+
+
+def test_auto_takes_processes_where_the_image_is_of_other_sources_and_says_how_to_get_it(choose, outdated) -> None:
+    assert choose("auto") == (
+        "local",
+        [
+            f"runtime: local processes (auto, as the image {default_tag()} was made from other sources than these; "
+            "throwcollect image build makes it anew)"
+        ],
+    )
+    outdated.assert_not_called()
+
+
+def test_containers_that_are_asked_for_get_an_image_of_these_sources(choose, outdated) -> None:
+    runtime, (warning, _) = choose("docker")
+    assert (runtime, outdated.call_args.args[1]) == ("docker", default_tag())
+    assert warning == (
+        f"! the image {default_tag()} was made from other sources than these; building it anew, which takes minutes"
+    )
+
+
+def test_an_image_of_other_sources_that_cannot_be_built_anew_is_an_error(choose, outdated) -> None:
+    outdated.side_effect = WorkerError("cannot be built")
+    with pytest.raises(WorkerError, match="cannot be built"):
+        choose("docker")
+
+
+@pytest.mark.parametrize("runtime", ["auto", "docker"])
+@pytest.mark.parametrize("image", ["lab/throws:2", default_tag()])
+def test_an_image_that_the_user_names_is_used_with_a_warning(choose, outdated, runtime: str, image: str) -> None:
+    chosen, (warning, _) = choose(runtime, image)
+    assert chosen == "docker"
+    assert warning == (
+        f"! the image {image} was made from other sources than these; it is used, as containers.image names it"
+    )
+    outdated.assert_not_called()

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from throwcollect.runtime.doctor import examine
-from throwcollect.runtime.image import default_tag
+from throwcollect.runtime.image import SOURCES_LABEL, default_tag
 
 
 def test_a_machine_that_runs_the_tests_has_no_problem(tmp_path: Path) -> None:
@@ -21,17 +21,18 @@ class Engine(BaseHTTPRequestHandler):
     """As much of a Docker engine as says its version, and whether it has an image."""
 
     images: tuple[str, ...] = ()
+    sources = "unknown"
 
     def do_GET(self) -> None:
         path = self.path.removeprefix("/v1.41")
         if path == "/version":
             self.answer(200, {"Version": "27.1", "ApiVersion": "1.41"})
         elif path in [f"/images/{image}/json" for image in self.images]:
-            self.answer(200, {"Id": "sha256:0"})
+            self.answer(200, {"Id": "sha256:0", "Config": {"Labels": {SOURCES_LABEL: self.sources}}})
         else:
             self.answer(404, {"message": f"No such image: {path}"})
 
-    def answer(self, code: int, document: dict[str, str]) -> None:
+    def answer(self, code: int, document: dict[str, object]) -> None:
         body = json.dumps(document).encode()
         self.send_response(code)
         self.send_header("Content-Length", str(len(body)))
@@ -63,6 +64,13 @@ def test_a_docker_engine_and_its_image_are_found(tmp_path: Path, monkeypatch: py
         assert found() == ("note", f"Docker 27.1 answers at unix://{path}; {lacking}")
         monkeypatch.setattr(Engine, "images", (default_tag(),))
         assert found() == ("ok", f"Docker 27.1 answers at unix://{path}, with the image {default_tag()}")
+        monkeypatch.setattr(Engine, "sources", "0" * 64)
+        outdated = f"the image {default_tag()} was made from other sources than these"
+        status, finding = found()
+        assert (status, finding.partition("; ")[2]) == (
+            "note",
+            f"{outdated}; throwcollect image build makes it anew",
+        )
         server.shutdown()
 
 

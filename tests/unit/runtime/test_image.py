@@ -17,7 +17,7 @@ from docker.errors import APIError, ImageNotFound
 import throwcollect
 from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.runtime import image
-from throwcollect.runtime.image import DEFAULT_BASE, build, default_tag, ensure, source_root
+from throwcollect.runtime.image import DEFAULT_BASE, build, default_tag, ensure, is_outdated, source_root
 
 DOCKERFILE = (Path(__file__).parents[3] / "docker" / "Dockerfile").read_text(encoding="utf-8")
 
@@ -129,7 +129,7 @@ def test_a_wheel_that_is_missing_is_named_together_with_the_place_that_lacks_it(
     with pytest.raises(WorkerError, match=r"the package index gives no scipy>=1.11") as caught:
         build(Engine("base", answers=answers), "mine", base="base", say=said.append)
     assert caught.value.hint is not None
-    assert caught.value.hint.startswith("--wheelhouse DIR")
+    assert "--wheelhouse DIR" in caught.value.hint
 
 
 @pytest.mark.parametrize("exists", [True, False])
@@ -226,19 +226,17 @@ def test_the_source_is_the_address_of_the_clone_without_what_is_secret_in_it(tmp
     assert image._provenance(tmp_path)["SOURCE"] == "https://example.org/lab/throws.git"
 
 
-def test_an_image_of_other_sources_than_the_clone_is_used_and_told(said: list[str]) -> None:
-    engine = Engine("base", default_tag())
-    build(engine, default_tag(), base="base", say=lambda _line: None)
-    engine.labels = {image.SOURCES_LABEL: engine.options["buildargs"]["SOURCES"]}
-    ensure(engine, default_tag(), say=said.append)
-    engine.labels = {image.SOURCES_LABEL: "unknown"}
-    ensure(engine, default_tag(), say=said.append)
-    assert not said
-    engine.labels = {image.SOURCES_LABEL: "0" * 64}
-    ensure(engine, default_tag(), say=said.append)
-    assert said == [
-        f"image {default_tag()} was made from other sources than these; throwcollect image build makes it anew"
-    ]
+def test_an_image_is_outdated_if_its_label_names_other_sources_than_those_of_the_clone(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    engine = Engine("base")
+    build(engine, "mine", base="base", say=lambda _line: None)
+    own = engine.options["buildargs"]["SOURCES"]
+    for labels, outdated in (({}, False), ("unknown", False), (own, False), ("0" * 64, True)):
+        engine.labels = labels and {image.SOURCES_LABEL: labels}
+        assert is_outdated(engine, "mine") == outdated
+    monkeypatch.setattr(throwcollect, "__path__", [str(tmp_path / "lib" / "throwcollect")])
+    assert not is_outdated(engine, "mine")
 
 
 def test_whatever_is_installed_changes_the_label_of_the_sources(said: list[str], tmp_path: Path) -> None:
