@@ -150,7 +150,7 @@ def test_a_router_that_comes_back_at_another_address_is_found_again(
         collection.until(lambda: collection.runtime.router_address() not in (address, None))
         assert collection.finish() == digest
         assert collection.news == [
-            "router was lost (ended by SIGKILL) and is started again; it said last: router listening on tcp/router:7447"
+            "router was lost (ended by SIGKILL) and is started again; its log ends: router listening on tcp/router:7447"
         ]
 
 

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import shutil
 from collections import deque
 from pathlib import Path
 
 _TAIL_LINES = 40
+_FULL_BYTES = 64 * 1024
+"""With less than this a disk counts as full: what could not be written may have been larger than what is free."""
 
 
 class NodeLogs:
@@ -23,12 +26,16 @@ class NodeLogs:
         return self._directory / f"{name}.log"
 
     def tail(self, name: str) -> str:
-        """Last lines that a node printed."""
+        """Last lines that a node printed and, if it may have failed to print more, that the disk is full."""
         try:
             with self.path(name).open(encoding="utf-8", errors="replace") as log:
-                return "".join(deque(log, _TAIL_LINES)).strip()
+                said = "".join(deque(log, _TAIL_LINES)).strip() + "\n"
+            free = shutil.disk_usage(self._directory).free
         except OSError:
             return ""
+        if free < _FULL_BYTES:
+            said += f"the disk of {self._directory} is full: {free} bytes are free; free space, and resume"
+        return said.strip()
 
     def said_ready(self, name: str) -> bool:
         """Whether a simulation has ever printed that it is ready for trials."""

@@ -256,4 +256,4 @@ def _killed(node: NodeExit) -> bool:
 
 def _last_words(node: NodeExit) -> str:
     lines = node.log.splitlines()
-    return f"; it said last: {lines[-1]}" if lines else ""
+    return f"; its log ends: {lines[-1]}" if lines else ""

@@ -149,7 +149,7 @@ def test_a_lost_node_is_started_again_and_told(runtime: FakeRuntime, clock: Cloc
     runtime.die("sim_1", log="first\nlast words")
     end, news = supervisor.poll()
     assert end is None
-    assert news == ["sim_1 was lost (exit code 3) and is started again; it said last: last words"]
+    assert news == ["sim_1 was lost (exit code 3) and is started again; its log ends: last words"]
     assert state(supervisor, "sim_1") == NodeState("sim_1", "restarting", 1, None, "exit code 3")
     wait_for_start(supervisor, runtime, clock, "sim_1")
     assert state(supervisor, "sim_1") == NodeState("sim_1", "running", 1, "id of sim_1", "exit code 3")
