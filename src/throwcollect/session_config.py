@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from collections.abc import Mapping
 
 import zenoh
@@ -38,7 +39,7 @@ def client_config() -> zenoh.Config:
         try:
             config = zenoh.Config.from_file(path)
         except zenoh.ZError as error:
-            raise ConfigError(f"{CONFIG_FILE_VARIABLE}: {path} is no Zenoh configuration: {error}") from error
+            raise ConfigError(f"{CONFIG_FILE_VARIABLE}: {path} is no Zenoh configuration: {in_words(error)}") from error
     else:
         config = zenoh.Config()
         _apply(config, {"mode": "client", "connect/endpoints": [DEFAULT_ENDPOINT], **_SETTINGS}, "default")
@@ -69,6 +70,11 @@ def router_config(endpoint: str) -> zenoh.Config:
     return config
 
 
+def in_words(error: zenoh.ZError) -> str:
+    """What Zenoh says is wrong, without the names and places of its sources."""
+    return re.sub(r'^\w+\([^"]*"', "", re.split(r' at /| \(os error|", location: |"\)', str(error))[0])
+
+
 def _apply(config: zenoh.Config, settings: Mapping[str, object], where: str) -> None:
     for key, value in settings.items():
         _insert(config, key, json.dumps(value), where)
@@ -78,4 +84,4 @@ def _insert(config: zenoh.Config, key: str, value: str, where: str) -> None:
     try:
         config.insert_json5(key, value)
     except zenoh.ZError as error:
-        raise ConfigError(f"{where}: {key} cannot be {value}: {error}") from error
+        raise ConfigError(f"{where}: {key} cannot be {value}: {in_words(error)}") from error

@@ -16,7 +16,7 @@ from queue import Empty, SimpleQueue
 import zenoh
 
 from throwcollect.errors import ConfigError, ThrowcollectError
-from throwcollect.session_config import router_config
+from throwcollect.session_config import in_words, router_config
 
 DEFAULT_LISTEN = "tcp/127.0.0.1:7447"
 """Reachable from this host alone, at the port that nodes connect to by default."""
@@ -37,8 +37,7 @@ def router(listen: str = DEFAULT_LISTEN) -> Iterator[str]:
         The endpoint that nodes connect to.
 
     Raises:
-        ConfigError: If the endpoint is malformed.
-        ThrowcollectError: If the router cannot listen on it.
+        ConfigError: If the endpoint is malformed, or the router cannot listen on it.
     """
     session, endpoint = _open(listen)
     try:
@@ -57,12 +56,12 @@ def _open(listen: str) -> tuple[zenoh.Session, str]:
         except zenoh.ZError as error:
             # Somebody may have taken the free port in between.
             if not wants_any or attempt == _PORT_ATTEMPTS - 1:
-                raise ThrowcollectError(
-                    f"the router cannot listen on {endpoint}",
-                    evidence=str(error),
-                    hint="if another router listens there, use it; otherwise choose another port with --listen",
+                raise ConfigError(
+                    f"the router cannot listen on {endpoint}: {in_words(error).rpartition(': ')[2]}",
+                    expected="an address of this machine with a free port, such as tcp/127.0.0.1:0, which takes any",
+                    hint="if another router listens there, use that one",
                 ) from error
-    raise ThrowcollectError(f"no free port for {listen}")
+    raise ConfigError(f"no free port for {listen}")
 
 
 def _free_port(address: str) -> int:
@@ -83,8 +82,7 @@ def serve(listen: str = DEFAULT_LISTEN) -> None:
         listen: Endpoint to listen on; port 0 takes a free one.
 
     Raises:
-        ConfigError: If the endpoint is malformed.
-        ThrowcollectError: If the router cannot listen on it.
+        ConfigError: If the endpoint is malformed, or the router cannot listen on it.
     """
     # Not `sigwait`: libraries start threads when they are imported, and one of those would take the signal and die.
     stop: SimpleQueue[int] = SimpleQueue()

@@ -7,7 +7,7 @@ import time
 import zenoh
 
 from throwcollect.errors import ThrowcollectError
-from throwcollect.session_config import OVERRIDE_VARIABLE, client_config
+from throwcollect.session_config import OVERRIDE_VARIABLE, client_config, in_words
 
 _PATIENCE_S, _RETRY_S = 5.0, 0.1
 
@@ -33,7 +33,7 @@ def open_session() -> zenoh.Session:
                 endpoints = config.get_json("connect/endpoints")
                 raise ThrowcollectError(
                     f"no Zenoh session within {_PATIENCE_S:g} s; connecting to {endpoints}",
-                    evidence=str(error),
+                    evidence=in_words(error),
                     hint="start a router: python -m throwcollect.ros.router, or ros2 run rmw_zenoh_cpp rmw_zenohd; "
                     f"or name another one in {OVERRIDE_VARIABLE}",
                 ) from error

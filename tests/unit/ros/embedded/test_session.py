@@ -11,11 +11,16 @@ def test_without_a_router_the_error_says_where_it_was_looked_for_and_what_to_do(
     with pytest.raises(ThrowcollectError, match=r"connecting to .*tcp/127.0.0.1:1") as caught:
         open_session()
     assert "python -m throwcollect.ros.router" in caught.value.hint
+    assert ".rs" not in caught.value.evidence
 
 
 @pytest.mark.parametrize(
     ("override", "match"),
-    [("mode", "has no '='"), ('mode="nonsense"', "mode cannot be"), ("no/such/key=1", "no/such/key")],
+    [
+        ("mode", "has no '='"),
+        ('mode="nonsense"', r"mode cannot be \"nonsense\": unknown variant"),
+        ("no/such/key=1", "no/such/key cannot be 1: unknown key$"),
+    ],
 )
 def test_overrides_that_zenoh_does_not_understand_are_refused(environment, monkeypatch, override, match):
     monkeypatch.setenv("ZENOH_CONFIG_OVERRIDE", override)
