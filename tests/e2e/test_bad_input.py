@@ -183,7 +183,7 @@ def test_a_sweep_that_the_robot_cannot_do_is_refused(say: Callable[..., Said], s
     said = say("up", "small.yaml", "--set", "sweep.parameters.task.duration_s={min: 0.2, max: 0.2}", "--output", "data")
     assert said.code == 2
     assert (
-        "throwcollect: small.yaml:4: sweep: all 2 trials are refused: 2 × arm_right_7_joint moves at 6.034 rad/s"
+        "throwcollect: small.yaml:4: sweep: 2 trials, all refused: 2 × arm_right_7_joint moves at 6.034 rad/s"
         in said.err
     )
     assert not (tmp_path / "data").exists()

@@ -309,7 +309,7 @@ def test_mistakes_are_seen_in_the_foreground_and_leave_nothing_behind(
     for arguments, message in (
         (["none.yaml"], "none.yaml: no such file"),
         ([config, "--output", "used"], "used: holds notes.txt"),
-        ([config, "--set", "sweep.parameters.task.duration_s={min: 0.2, max: 0.2}"], "are refused"),
+        ([config, "--set", "sweep.parameters.task.duration_s={min: 0.2, max: 0.2}"], "all refused"),
     ):
         code, out, err = say("up", "-d", *arguments)
         assert (code, out) == (2, "")

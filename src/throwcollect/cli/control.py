@@ -10,6 +10,7 @@ from throwcollect.runtime.control import down, stop
 from throwcollect.runtime.records import Records
 from throwcollect.runtime.runs import died, failure, find, living
 from throwcollect.runtime.scaling import scale
+from throwcollect.wording import counted
 
 
 def change_scale(named: str | None, simulations: int) -> None:
@@ -21,7 +22,7 @@ def change_scale(named: str | None, simulations: int) -> None:
     """
     run = find(Records(), named)
     scale(run, simulations)
-    typer.echo(f"{run.record.run}: {run.record.simulations} -> {simulations} simulations")
+    typer.echo(f"{run.record.run}: {run.record.simulations} -> {counted(simulations, 'simulation')}")
 
 
 def stop_run(named: str | None) -> None:

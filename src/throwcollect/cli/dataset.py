@@ -12,6 +12,7 @@ import typer
 from throwcollect.dataset.inspect import digest, info
 from throwcollect.dataset.verify import verify
 from throwcollect.errors import DatasetError
+from throwcollect.wording import counted
 
 
 def show_info(directory: Path, *, json: bool) -> None:
@@ -37,7 +38,7 @@ def show_verification(directory: Path, *, json: bool) -> None:
         for finding in findings:
             typer.echo(str(finding))
     if findings:
-        raise DatasetError(f"{directory}: {len(findings)} finding{'s' if len(findings) > 1 else ''}")
+        raise DatasetError(f"{directory}: {counted(len(findings), 'finding')}")
     if not json:
         typer.echo(f"{directory}: nothing wrong")
 

@@ -13,6 +13,7 @@ from throwcollect.dataset.derive.choice import filtered, merge, sample
 from throwcollect.dataset.derive.derivation import Derived
 from throwcollect.dataset.derive.split import SQUARES, split
 from throwcollect.dataset.derive.statistics import Statistics, statistics
+from throwcollect.wording import counted
 
 _COLUMNS = ("count", "nulls", "min", "q05", "q50", "q95", "max", "mean", "std")
 _MOMENTS = ("min", "max", "mean", "std")
@@ -63,7 +64,7 @@ def show_split(
         return
     for name, part in found.parts.items():
         elsewhere = f", {part.uncelled} in no cell" if part.uncelled else ""
-        typer.echo(f"{output / name}: {_trials(part.dataset)} in {part.cells} cells{elsewhere}")
+        typer.echo(f"{output / name}: {_trials(part.dataset)} in {counted(part.cells, 'cell')}{elsewhere}")
         typer.echo(f"  digest  {part.dataset.digest}")
     _tell_left_out(found.without_episode)
 
@@ -88,7 +89,7 @@ def _show(output: Path, derived: Derived, *, json: bool) -> None:
 
 
 def _trials(derived: Derived) -> str:
-    return f"{derived.trials} of {derived.offered} trials"
+    return f"{derived.trials} of {counted(derived.offered, 'trial')}"
 
 
 def _tell_left_out(without_episode: Mapping[str, int]) -> None:
@@ -101,10 +102,10 @@ def _tables(found: Statistics) -> str:
     outcomes = ", ".join(f"{count} {outcome}" for outcome, count in found.outcomes.items())
     omitted = f", {found.samples_not_finite} more are not finite" if found.samples_not_finite else ""
     columns = {name: {**vars(column), **column.quantiles} for name, column in found.columns.items()}
-    text = f"{found.trials} trials: {outcomes}\n\n" + _table("throws", columns, _COLUMNS)
+    text = f"{counted(found.trials, 'trial')}: {outcomes}\n\n" + _table("throws", columns, _COLUMNS)
     for group, signals in found.signals.items():
         text += "\n" + _table(group, {name: vars(signal) for name, signal in signals.items()}, _MOMENTS)
-    return f"{text}\nsignals over {found.samples} samples of {found.episodes} episodes{omitted}\n"
+    return f"{text}\nsignals over {counted(found.samples, 'sample')} of {counted(found.episodes, 'episode')}{omitted}\n"
 
 
 def _table(title: str, rows: Mapping[str, Mapping[str, Any]], columns: Sequence[str]) -> str:

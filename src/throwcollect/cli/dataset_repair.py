@@ -12,6 +12,7 @@ from throwcollect.coordinator.prepare import checked_plan
 from throwcollect.dataset.rebuild import rebuild
 from throwcollect.dataset.repair import repair
 from throwcollect.errors import LossError
+from throwcollect.wording import counted
 
 _MOST_NAMED = 10
 
@@ -27,7 +28,8 @@ def show_rebuilt(directory: Path, *, json: bool) -> None:
     if json:
         typer.echo(jsonlib.dumps(asdict(rebuilt), indent=2))
         return
-    typer.echo(f"{directory}: {rebuilt.trials} trials, {rebuilt.episodes} episodes; wrote {', '.join(rebuilt.written)}")
+    found = f"{counted(rebuilt.trials, 'trial')}, {counted(rebuilt.episodes, 'episode')}"
+    typer.echo(f"{directory}: {found}; wrote {', '.join(rebuilt.written)}")
     if rebuilt.lost:
         named = ", ".join(map(str, rebuilt.lost[:_MOST_NAMED]))
         typer.echo(f"lost: {named}{' and more' if len(rebuilt.lost) > _MOST_NAMED else ''}")
@@ -49,7 +51,7 @@ def show_repaired(directory: Path, output: Path, *, json: bool) -> None:
             typer.echo(remark)
         for lost in repaired.lost:
             typer.echo(f"trial {lost.trial}: lost: {lost.reason}")
-        typer.echo(f"{output}: {repaired.episodes} episodes of {repaired.trials} trials")
+        typer.echo(f"{output}: {counted(repaired.episodes, 'episode')} of {counted(repaired.trials, 'trial')}")
     if repaired.lost:
         count = len(repaired.lost)
         raise LossError(

@@ -9,6 +9,7 @@ from pathlib import Path
 import typer
 
 from throwcollect.dataset.export.formats import export
+from throwcollect.wording import counted
 
 
 def export_dataset(directory: Path, output: Path, *, to: str, rate_hz: int | None, json: bool) -> None:
@@ -23,6 +24,6 @@ def export_dataset(directory: Path, output: Path, *, to: str, rate_hz: int | Non
         typer.echo(jsonlib.dumps(asdict(exported), indent=2))
         return
     typer.echo(
-        f"{exported.directory}: {exported.episodes} throws of {exported.trials} trials, {exported.samples} samples at "
-        f"{exported.rate_hz} Hz, {exported.size_bytes / 1e6:.1f} MB"
+        f"{exported.directory}: {counted(exported.episodes, 'throw')} of {counted(exported.trials, 'trial')}, "
+        f"{counted(exported.samples, 'sample')} at {exported.rate_hz} Hz, {exported.size_bytes / 1e6:.1f} MB"
     )

@@ -11,6 +11,7 @@ from throwcollect.coordinator.main import run
 from throwcollect.coordinator.prepare import more_trials, prepare
 from throwcollect.coordinator.resume import begun, resume
 from throwcollect.dataset.inspect import info
+from throwcollect.wording import counted
 
 
 def coordinate(directory: Path, *, config: Path | None) -> None:
@@ -32,6 +33,6 @@ def coordinate(directory: Path, *, config: Path | None) -> None:
     freeze = resume if begun(directory) else prepare
     with loaded(config) as read:
         plan = freeze(read, directory, sweep_directory=config.parent)
-    print(f"plan: {len(plan.trials)} trials{more_trials(plan)}; dataset: {directory}", flush=True)
+    print(f"plan: {counted(len(plan.trials), 'trial')}{more_trials(plan)}; dataset: {directory}", flush=True)
     run(directory)
     sys.stdout.write(describe(info(directory).as_dict()))

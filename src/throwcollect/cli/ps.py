@@ -14,6 +14,7 @@ from throwcollect.errors import ConfigError
 from throwcollect.runtime.records import Records, Run
 from throwcollect.runtime.runs import on_engine
 from throwcollect.runtime.supervisor import NodeState
+from throwcollect.wording import counted
 
 if TYPE_CHECKING:
     from throwcollect.runtime.docker_runs import FoundRun
@@ -80,7 +81,7 @@ def _node_lines(run: Run) -> list[tuple[str, ...]]:
 
 def _node_line(node: NodeState, runtime: str) -> tuple[str, ...]:
     place = "pid" if runtime == "local" else "container"
-    again = f"{node.restarts} restart{'' if node.restarts == 1 else 's'}" if node.restarts else ""
+    again = counted(node.restarts, "restart") if node.restarts else ""
     return (
         node.name,
         node.status,

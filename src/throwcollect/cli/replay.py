@@ -12,6 +12,7 @@ import typer
 from throwcollect.dataset.reader import Dataset
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.replay.audit import chosen_trials, replayed
+from throwcollect.wording import counted
 
 
 def show_replay(directory: Path, trials: Sequence[int], *, everything: bool, sample: int | None, json: bool) -> None:
@@ -47,8 +48,8 @@ def show_replay(directory: Path, trials: Sequence[int], *, everything: bool, sam
     differ = sum(bool(comparison.differences) for comparison in found)
     if differ:
         raise DatasetError(
-            f"{directory}: {differ} of {len(found)} throws came out otherwise",
+            f"{directory}: {differ} of {counted(len(found), 'throw')} came out otherwise",
             hint="README.md in it says with which processor and versions it was made",
         )
     if not json:
-        typer.echo(f"{directory}: {len(found)} throw{'s' if len(found) > 1 else ''} replayed, the same bit for bit")
+        typer.echo(f"{directory}: {counted(len(found), 'throw')} replayed, the same bit for bit")

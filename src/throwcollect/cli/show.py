@@ -11,6 +11,7 @@ import typer
 
 from throwcollect.config.loader import load, loaded, resolved_yaml
 from throwcollect.config.reference import json_schema
+from throwcollect.wording import counted
 
 
 def show_schema() -> None:
@@ -58,7 +59,7 @@ def show_plan(path: Path, overrides: Sequence[str], *, json: bool) -> None:
         note = f"  refused: {trial.refused}" if trial.refused else ""
         typer.echo("  ".join([str(trial.number).rjust(len("trial")), *numbers]) + note)
     refused = Counter(trial.refused for trial in plan.trials if trial.refused)
-    typer.echo(f"{len(plan.trials)} trials, {refused.total()} refused{more_trials(plan)}", err=True)
+    typer.echo(f"{counted(len(plan.trials), 'trial')}, {refused.total()} refused{more_trials(plan)}", err=True)
 
 
 def show_doctor(*, json: bool) -> None:

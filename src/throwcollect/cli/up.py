@@ -30,6 +30,7 @@ from throwcollect.runtime.ports import reserved_port
 from throwcollect.runtime.records import OpenRun, Record, Records, Run
 from throwcollect.runtime.runs import busy, left_in
 from throwcollect.sweep.plan import Plan
+from throwcollect.wording import counted
 
 _MANY_TRIALS = 1000
 """From here on the plan takes long enough to be announced."""
@@ -188,7 +189,7 @@ def _prepared(records: Records, request: _Request, plan: Plan | None, shown: Dis
     refused = sum(trial.refused is not None for trial in plan.trials)
     note = f", {refused} refused by calculation (see `throwcollect plan`)" if refused else ""
     where = f"volume {volume}" if volume else directory
-    shown.say(f"plan: {len(plan.trials)} trials{note}{more_trials(plan)}; dataset: {where}")
+    shown.say(f"plan: {counted(len(plan.trials), 'trial')}{note}{more_trials(plan)}; dataset: {where}")
     return run
 
 

@@ -13,6 +13,7 @@ from throwcollect.coordinator.node import Coordinator
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.errors import Interrupted
 from throwcollect.tasks.throw import ThrowResult
+from throwcollect.wording import counted
 
 _IDLE_S = 0.05
 _SYNC_EVERY_S = 1.0
@@ -37,7 +38,7 @@ def run(directory: Path) -> None:
     # All of that before there is a node: a large dataset takes its time, in which nobody would get an answer.
     there: list[tuple[int, ThrowResult]] = []
     if found := writer.recover(lambda trial, result: there.append((trial, result))):
-        print(f"{found} episodes of an earlier collection are whole", flush=True)
+        print(f"keeps {counted(found, 'episode')} of an earlier collection", flush=True)
     ros.init()
     node = Coordinator(writer.plan, writer)
     for trial, result in there:

@@ -13,6 +13,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from throwcollect import ros
 from throwcollect.ros import DurabilityPolicy, get_message
+from throwcollect.wording import counted
 
 String: Any = get_message("std_msgs/msg/String")
 
@@ -74,13 +75,13 @@ class Progress:
     def line(self) -> str:
         """All of it that people want to see, in one line."""
         if self.wanted is None:
-            return f"{self.ended}/{self.total} throws: {self.counts}"
-        return f"{self.ended} throws: {', '.join([f'{self.landed}/{self.wanted} landed', *self._others])}"
+            return f"{self.ended}/{counted(self.total, 'throw')}: {self.counts}"
+        return f"{counted(self.ended, 'throw')}: {', '.join([f'{self.landed}/{self.wanted} landed', *self._others])}"
 
     @property
     def _others(self) -> list[str]:
         lost = [f"{self.lost} lost"] if self.lost else []
-        simulations = f"{self.simulations} simulation{'' if self.simulations == 1 else 's'}"
+        simulations = counted(self.simulations, "simulation")
         return [f"{self.failed} failed", *lost, simulations, f"{self.throws_per_s:.1f} throws/s"]
 
     def message(self) -> Any:

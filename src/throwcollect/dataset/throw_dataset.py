@@ -20,6 +20,7 @@ from throwcollect.dataset.throw import Throw
 from throwcollect.dataset.trajectories import Trajectories, read_trajectories
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.robots.talos import JOINTS
+from throwcollect.wording import counted
 
 _SELECTION = "a condition, an Arrow expression, a mask, or numbers of trials"
 
@@ -71,7 +72,7 @@ class ThrowDataset(Sequence[Throw]):
     def __repr__(self) -> str:
         outcomes = ", ".join(f"{count} {outcome}" for outcome, count in count_outcomes(self.throws).items())
         swept = ", ".join(self.parameters)
-        return f"ThrowDataset({str(self.directory)!r}: {len(self)} throws: {outcomes}; swept: {swept})"
+        return f"ThrowDataset({str(self.directory)!r}: {counted(len(self), 'throw')}: {outcomes}; swept: {swept})"
 
     @property
     def recorded(self) -> ThrowDataset:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.dataset.columns import Column, Place, check_columns, empty_columns, fill, stored_rows
+from throwcollect.wording import counted
 
 _BLOCK = 16
 """Throws that are read at once: enough to be worth an array, few enough for the caches."""
@@ -45,7 +46,7 @@ class Trajectories:
     def __repr__(self) -> str:
         size = sum(column.nbytes for column in self.columns.values()) / 1e6
         names = ", ".join(self.columns)
-        return f"Trajectories({len(self)} throws, {self.offsets[-1]} samples, {size:.1f} MB: {names})"
+        return f"Trajectories({counted(len(self), 'throw')}, {self.offsets[-1]} samples, {size:.1f} MB: {names})"
 
     def __iter__(self) -> Iterator[dict[str, Column]]:
         return (self[number] for number in range(len(self)))

@@ -19,6 +19,7 @@ from throwcollect.episode.record import Samples
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.sweep.plan import Plan
 from throwcollect.tasks.flight import flight_residual
+from throwcollect.wording import counted
 
 BALLISTIC_TOLERANCE_M = 1e-9
 """A recorded flight and the computed one differ by rounding, below 1e-12 m; the smallest kick moves a ball by more."""
@@ -119,7 +120,7 @@ class EpisodeCheck:
         if self._plan is None or episode.header.trial in self._doubtful:
             return
         if episode.header.trial >= len(self._plan.trials):
-            yield f"the plan has {len(self._plan.trials)} trials"
+            yield f"the plan has {counted(len(self._plan.trials), 'trial')}"
             return
         try:
             config = self._plan.config_of(self._plan.trials[episode.header.trial])

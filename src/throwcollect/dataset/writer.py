@@ -34,6 +34,7 @@ from throwcollect.sweep.plan import Plan, Trial
 from throwcollect.sweep.points import Points
 from throwcollect.sweep.table import encode_points
 from throwcollect.tasks.throw import Outcome, ThrowResult
+from throwcollect.wording import counted
 
 Tell = Callable[[int, ThrowResult], None]
 """Told a trial and what came of it."""
@@ -268,7 +269,7 @@ class DatasetWriter:
         if self._shards:
             missing = sorted(number for shard in self._shards.values() for number in shard.missing)
             example = f", such as {missing[0]}" if missing else ""
-            raise DatasetError(f"{self._directory}: {len(missing)} trials are missing{example}")
+            raise DatasetError(f"{self._directory}: lacks {counted(len(missing), 'trial')}{example}")
         finished = [self._finished[shard] for shard in sorted(self._finished)]
         throws = pa.concat_tables([each.rows for each in finished])
         digest = combined_digest(throws["digest"].drop_null().to_pylist())

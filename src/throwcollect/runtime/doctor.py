@@ -20,6 +20,7 @@ from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.robots.model import half_sitting, joint_limits, urdf_path
 from throwcollect.runtime.docker_engine import connect, engine_address, engine_errors
 from throwcollect.runtime.image import default_tag, is_outdated
+from throwcollect.wording import counted
 
 _GIB = 1024**3
 _SIMULATION_MEMORY_GIB = 0.3
@@ -57,7 +58,7 @@ def _python() -> Check:
 
 def _cores() -> Check:
     cores = len(os.sched_getaffinity(0))
-    return Check("cores", "ok", f"{cores}; up to {cores} simulations run side by side (`-n {cores}`)")
+    return Check("cores", "ok", f"{cores}; up to {counted(cores, 'simulation')} side by side (`-n {cores}`)")
 
 
 def _memory() -> Check:
@@ -66,7 +67,7 @@ def _memory() -> Check:
             available = int(line.split()[1]) * 1024 / _GIB
             room = int(available / _SIMULATION_MEMORY_GIB)
             status: Literal["ok", "problem"] = "ok" if room >= 1 else "problem"
-            return Check("memory", status, f"{available:.1f} GiB available, enough for {room} simulations")
+            return Check("memory", status, f"{available:.1f} GiB available, enough for {counted(room, 'simulation')}")
     return Check("memory", "note", "/proc/meminfo does not say what is available")
 
 

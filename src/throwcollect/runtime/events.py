@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Literal
 
 from throwcollect.runtime.supervisor import NodeState
+from throwcollect.wording import counted
 
 EVENTS = "events.jsonl"
 
@@ -51,7 +52,7 @@ class Event:
     def __str__(self) -> str:
         """The event for people."""
         details = [self.reason.partition("\n")[0] if self.reason else None]
-        details += [f"{self.simulations} simulations" if self.simulations is not None else None]
+        details += [counted(self.simulations, "simulation") if self.simulations is not None else None]
         details += [f"exit code {self.exit_code}" if self.exit_code else None, self.handle and self.handle[:12]]
         told = ", ".join(filter(None, details))
         return f"{self.node or self.run} {self.event}" + (f": {told}" if told else "")

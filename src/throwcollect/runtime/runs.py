@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 _ENGINE_S = 2.0
 _SOCKET = "/var/run/docker.sock"
+_MOST_LISTED = 5
 
 
 def find(records: Records, named: str | None, *, ended: bool = False) -> Run:
@@ -35,10 +36,12 @@ def find(records: Records, named: str | None, *, ended: bool = False) -> Run:
     if len(living) == 1:
         return living[0]
     if living:
-        raise ConfigError(f"{len(living)} runs live", expected=_listed(living), hint="name one of them with --run")
+        raise ConfigError(
+            f"{len(living)} runs live", expected=_listed(_latest_first(living)), hint="name one of them with --run"
+        )
     if ended and runs:
         return runs[-1]
-    over = f"; of those that are over, there is {_listed(runs)}" if runs else ""
+    over = f"; of those that are over, there is {_listed(_latest_first(runs))}" if runs else ""
     raise ConfigError(f"no run lives{over}", hint="throwcollect up -d starts one" if not runs else "name it with --run")
 
 
@@ -57,12 +60,19 @@ def id_of(records: Records, named: str) -> str:
     if len(alike) == 1:
         return alike[0]
     if alike:
-        raise ConfigError(f"{len(alike)} runs begin with {named!r}", expected=f"one of {', '.join(alike)}")
-    raise ConfigError(f"no run {named!r}", expected=f"one of {', '.join(ids)}" if ids else None)
+        raise ConfigError(f"{len(alike)} runs begin with {named!r}", expected=f"one of {_listed(alike)}")
+    known = _listed(_latest_first(records.all()))
+    hint = "throwcollect ps -a lists all" if known else None
+    raise ConfigError(f"no run {named!r}", expected=f"one of {known}" if known else None, hint=hint)
 
 
-def _listed(runs: Sequence[Run]) -> str:
-    return ", ".join(run.record.run for run in runs)
+def _latest_first(runs: Sequence[Run]) -> list[str]:
+    return [run.record.run for run in reversed(runs)]
+
+
+def _listed(runs: Sequence[str]) -> str:
+    more = len(runs) - _MOST_LISTED
+    return ", ".join(runs[:_MOST_LISTED]) + (f" and {more} more" if more > 0 else "")
 
 
 def left_in(records: Records, directory: Path) -> Run | None:

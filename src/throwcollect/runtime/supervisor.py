@@ -14,6 +14,7 @@ from typing import Literal
 from throwcollect.config.run import RunConfig
 from throwcollect.errors import Interrupted, WorkerError
 from throwcollect.runtime.nodes import COORDINATOR, ROUTER, NodeExit, Runtime, simulation_name
+from throwcollect.wording import counted
 
 _FIRST_BACKOFF_S = 0.2
 _LONGEST_BACKOFF_S = 10.0
@@ -237,7 +238,7 @@ class Supervisor:
             restarts = self._restarts.get(last.name, 0)
             what = "the router" if router else f"no simulation can be kept alive; the last, {last.name},"
             raise WorkerError(
-                f"{what} ended again after {restarts} restart{'' if restarts == 1 else 's'}: {last.reason}",
+                f"{what} ended again after {counted(restarts, 'restart')}: {last.reason}",
                 evidence=last.log or None,
                 hint=hint,
             )

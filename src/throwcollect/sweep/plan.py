@@ -19,6 +19,7 @@ from throwcollect.sweep.digest import config_digest, trial_digests
 from throwcollect.sweep.parquet import read_parquet
 from throwcollect.sweep.points import Points
 from throwcollect.sweep.samplers import draw_points
+from throwcollect.wording import counted
 
 _FORMAT = "1"
 _FORMAT_KEY = b"throwcollect.plan_format"
@@ -196,7 +197,7 @@ def _check_some_left(reasons: list[str], trials: int) -> None:
     examples = dict(zip(reversed(kinds), reversed(reasons), strict=True))
     listed = [f"{count} × {examples[kind]}" for kind, count in Counter(kinds).most_common(_MOST_REASONS)]
     raise PlanError(
-        [Problem(f"all {trials} trials are refused: {'; '.join(listed)}", key="sweep")],
+        [Problem(f"{counted(trials, 'trial')}, all refused: {'; '.join(listed)}", key="sweep")],
         hint="sweep over smaller ranges or slower motions",
     )
 

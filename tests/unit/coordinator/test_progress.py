@@ -26,6 +26,8 @@ def test_progress_with_a_wrong_part_is_left_alone() -> None:
 
 
 def test_the_line_counts_trials_or_throws_that_should_land() -> None:
+    alone = replace(PROGRESS, total=1, ended=1, outcomes={"landed": 1}, simulations=1)
+    assert alone.line == "1/1 throw: 1 landed, 0 failed, 1 simulation, 7.5 throws/s"
     assert PROGRESS.line == "4/10 throws: 2 landed, 1 failed, 1 lost, 2 simulations, 7.5 throws/s"
     assert PROGRESS.steps == (4, 10)
     until = replace(PROGRESS, wanted=5)

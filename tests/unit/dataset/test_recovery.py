@@ -264,7 +264,7 @@ def test_a_shard_that_may_still_get_trials_is_not_finished(
     writer.extend(trials.plan.trials[3:])
     assert Plan.read(directory / "plan.parquet", trials.plan.config) == trials.plan
     writer.close_plan()
-    with pytest.raises(DatasetError, match="1 trials are missing, such as 3"):
+    with pytest.raises(DatasetError, match="lacks 1 trial, such as 3"):
         writer.finish(wall_s=1.0)
     trials.append(writer, 3)
     writer.finish(wall_s=1.0)

@@ -219,7 +219,7 @@ def test_a_damaged_episode_is_not_written(collection: Any, tmp_path: Path) -> No
 def test_a_dataset_with_missing_trials_is_not_finished(collection: Any, tmp_path: Path) -> None:
     writer = DatasetWriter.create(tmp_path / "dataset", collection.plan)
     collection.fill(writer, [0, 1, 3, 4, 5, 6])
-    with pytest.raises(DatasetError, match="1 trials are missing, such as 2"):
+    with pytest.raises(DatasetError, match="lacks 1 trial, such as 2"):
         writer.finish(wall_s=1.0)
     assert not (tmp_path / "dataset" / "metadata.yaml").exists()
     writer.close()

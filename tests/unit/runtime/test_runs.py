@@ -84,8 +84,17 @@ def test_a_name_of_several_or_of_none_is_refused_with_what_there_is(records: Rec
     make("ac", "ended")
     with pytest.raises(ConfigError, match=r"2 runs begin with 'a'\n  expected: one of ab-0123, ac-0123"):
         find(records, "a")
-    with pytest.raises(ConfigError, match=r"no run 'x'\n  expected: one of ab-0123, ac-0123"):
+    with pytest.raises(ConfigError, match=r"no run 'x'\n  expected: one of ac-0123, ab-0123\n  try: .* ps -a"):
         find(records, "x")
+
+
+def test_of_many_runs_the_latest_are_named(records: Records, make: Make) -> None:
+    for age_h in range(8):
+        make(f"a{age_h}", "ended", age_h=age_h)
+    latest = "a0-0123, a1-0123, a2-0123, a3-0123, a4-0123 and 3 more"
+    for named, said in (("x", f"one of {latest}\n"), ("a", f"one of {latest}$"), (None, f"there is {latest}\n")):
+        with pytest.raises(ConfigError, match=said):
+            find(records, named)
 
 
 def test_without_a_name_it_is_the_only_one_that_lives(records: Records, make: Make) -> None:
@@ -93,12 +102,12 @@ def test_without_a_name_it_is_the_only_one_that_lives(records: Records, make: Ma
         find(records, None)
     make("a", "ended")
     make("b", "died")
-    with pytest.raises(ConfigError, match="no run lives; of those that are over, there is a-0123, b-0123"):
+    with pytest.raises(ConfigError, match="no run lives; of those that are over, there is b-0123, a-0123"):
         find(records, None)
     only = make("c", "lives")
     assert find(records, None).record == only
     make("d", "lives")
-    with pytest.raises(ConfigError, match=r"2 runs live\n  expected: c-0123, d-0123\n  try: name one of them"):
+    with pytest.raises(ConfigError, match=r"2 runs live\n  expected: d-0123, c-0123\n  try: name one of them"):
         find(records, None)
 
 

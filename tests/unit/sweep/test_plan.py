@@ -76,7 +76,7 @@ def test_a_plan_of_refused_trials_is_an_error_that_lists_the_commonest_reasons()
     config = Config(sweep=SweepConfig(sampler="grid", parameters={"ball.mass_kg": masses}))
     with pytest.raises(
         PlanError,
-        match=r"^sweep: all 5 trials are refused: 3 × the ball of 0\.200 kg is too heavy; "
+        match=r"^sweep: 5 trials, all refused: 3 × the ball of 0\.200 kg is too heavy; "
         r"2 × arm_right_4_joint needs 0\.01 Nm\n  try: sweep over smaller ranges",
     ):
         make_plan(config, check=check)
