@@ -24,7 +24,8 @@ $(READY_DEV): pyproject.toml | $(VENV)/bin/python
 # Collections wait for processes to start half of the time, so two run side by side, however many cores there are.
 test: check
 	$(BIN)/python -m pytest -n logical tests/architecture tests/unit tests/physics
-	$(BIN)/python -m pytest -n 2 --dist loadgroup tests/docker tests/integration tests/e2e tests/ros
+	$(BIN)/python -m pytest tests/integration tests/ros
+	$(BIN)/python -m pytest -n 2 --dist loadgroup tests/docker tests/e2e
 
 # Format, lint, types and the direction of imports.
 check: $(READY_DEV)

@@ -44,7 +44,7 @@ record:
   zstd_level: 3
 run: {runtime: local}
 """
-OF_DERIVED_ONLY = {"trials.parquet", "sources.parquet"}
+OF_DERIVED_ONLY = {"sources.parquet"}
 
 
 @pytest.fixture(scope="module")

@@ -155,7 +155,7 @@ def test_scaling_and_losses_do_not_change_the_dataset(config: Path, records: Rec
     os.kill(int(first), signal.SIGKILL)
     until(lambda: handle(records, run, "sim_0") not in ("", first))
     removed = nodes(records, run)["sim_2"]
-    assert call("scale", "2", "--run", run[:7]).returncode == 0
+    assert call("scale", "2", "--run", run[:-1]).returncode == 0
     assert_gone({"sim_2": removed})
     assert call("wait").returncode == 0
     assert fingerprints(tmp_path / "data") == fingerprints(tmp_path / "reference")
