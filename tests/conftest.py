@@ -8,9 +8,7 @@ import pytest
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-@pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+def pytest_itemcollected(item: pytest.Item) -> None:
     """Where tests run side by side, one worker gets all that share fixtures, or look at everything on the engine."""
-    for item in items:
-        shared = item.path.parent if item.path.parent.name == "docker" else item.path
-        item.add_marker(pytest.mark.xdist_group(str(shared)))
+    shared = item.path.parent if item.path.parent.name == "docker" else item.path
+    item.add_marker(pytest.mark.xdist_group(shared.name))
