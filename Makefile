@@ -21,11 +21,11 @@ $(READY_DEV): pyproject.toml | $(VENV)/bin/python
 	$(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check -e '.[dev]'
 	touch $(READY) $@
 
-# Collections wait for processes to start half of the time, so two run side by side, however many cores there are.
+# Collections wait for processes to start half of the time, so two run side by side; what shares a robot or an engine does not.
 test: check
 	$(BIN)/python -m pytest -n logical tests/architecture tests/unit tests/physics
-	$(BIN)/python -m pytest tests/integration tests/ros
-	$(BIN)/python -m pytest -n 2 --dist loadgroup tests/docker tests/e2e
+	$(BIN)/python -m pytest -n 2 --dist loadfile tests/e2e
+	$(BIN)/python -m pytest tests/integration tests/docker tests/ros
 
 # Format, lint, types and the direction of imports.
 check: $(READY_DEV)
