@@ -22,8 +22,10 @@ from throwcollect.runtime.records import STATE_VARIABLE, Record, Records
 
 pytestmark = pytest.mark.e2e
 TRIALS = 40
-SLOWLY = ("--set", "sim.real_time_factor=2")
+SLOWLY = ("--set", "sim.real_time_factor=1")
 """Long enough to look at it."""
+UNTIL_STOPPED = ("--trials", "200", *SLOWLY)
+"""Longer than any test: minutes, however long the commands in between take to start."""
 
 Say = Callable[..., tuple[object, str, str]]
 
@@ -175,7 +177,7 @@ def test_scaling_and_losses_do_not_change_the_dataset(config: Path, records: Rec
 
 
 def test_stopping_drains_as_ctrl_c_does(config: Path, records: Records, say: Say, tmp_path: Path) -> None:
-    run = detach(config, tmp_path / "data", "-n", "1", *SLOWLY)
+    run = detach(config, tmp_path / "data", "-n", "1", *UNTIL_STOPPED)
     in_the_middle(records, run)
     processes = nodes(records, run)
     stopped = call("stop")
@@ -192,7 +194,7 @@ def test_stopping_drains_as_ctrl_c_does(config: Path, records: Records, say: Say
 
 
 def test_down_ends_everything_and_keeps_the_directory(config: Path, records: Records, tmp_path: Path) -> None:
-    run = detach(config, tmp_path / "data", "-n", "1", *SLOWLY)
+    run = detach(config, tmp_path / "data", "-n", "1", *UNTIL_STOPPED)
     in_the_middle(records, run)
     processes = nodes(records, run)
     said = call("down", "-v")
@@ -206,14 +208,14 @@ def test_down_ends_everything_and_keeps_the_directory(config: Path, records: Rec
 def test_a_killed_launcher_takes_its_processes_along_and_is_told(
     config: Path, records: Records, say: Say, tmp_path: Path
 ) -> None:
-    run = detach(config, tmp_path / "data", "-n", "1", *SLOWLY)
+    run = detach(config, tmp_path / "data", "-n", "1", *UNTIL_STOPPED)
     in_the_middle(records, run, 1)
     processes = nodes(records, run)
     os.kill(records.get(run).record.launcher, signal.SIGKILL)
     assert_gone(processes)
     code, table, _ = say("ps")
     assert code == 0
-    assert re.search(rf"^{run} +local +1 +\d+/{TRIALS} +died +{tmp_path / 'data'}$", table, flags=re.MULTILINE)
+    assert re.search(rf"^{run} +local +1 +\d+/200 +died +{tmp_path / 'data'}$", table, flags=re.MULTILINE)
     for verb in (["wait"], ["stop", "--run", run], ["scale", "3", "--run", run]):
         code, out, err = say(*verb)
         assert (verb, code, out) == (verb, 3, "")
@@ -227,7 +229,7 @@ def test_a_killed_launcher_takes_its_processes_along_and_is_told(
 
 
 def test_a_run_in_the_foreground_is_a_run_like_any_other(config: Path, records: Records, tmp_path: Path) -> None:
-    running = start(config, tmp_path / "data", 2, *SLOWLY)
+    running = start(config, tmp_path / "data", 2, *UNTIL_STOPPED)
     running.wait_until(lambda: bool(records.ids()))
     (run,) = records.ids()
     in_the_middle(records, run)
@@ -263,13 +265,13 @@ def test_a_run_whose_record_cannot_be_written_goes_on(config: Path, records: Rec
 
 
 def test_ctrl_c_leaves_a_run_that_is_only_watched(config: Path, records: Records, tmp_path: Path) -> None:
-    run = detach(config, tmp_path / "data", "-n", "1", *SLOWLY)
+    run = detach(config, tmp_path / "data", "-n", "1", *UNTIL_STOPPED)
     watchers = [
         subprocess.Popen(command("wait"), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) for _ in range(2)
     ]
     for watcher in watchers:
         assert watcher.stderr is not None
-        assert f"/{TRIALS} throws: " in watcher.stderr.readline()
+        assert "/200 throws: " in watcher.stderr.readline()
     for watcher in watchers:
         watcher.send_signal(signal.SIGINT)
     for watcher in watchers:
