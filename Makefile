@@ -23,11 +23,11 @@ $(READY_DEV): pyproject.toml | $(VENV)/bin/python
 	$(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check -e '.[dev]'
 	touch $(READY) $@
 
-# Collections wait for processes to start half of the time, so two run side by side; what shares a robot or an engine does not.
+# Tests that wait for processes run two files at a time; those with an engine look at all that is on it, so one by one.
 test: check
 	$(BIN)/python -m pytest -n logical tests/architecture tests/unit tests/physics
-	$(BIN)/python -m pytest -n 2 --dist loadfile tests/e2e
-	$(BIN)/python -m pytest tests/integration tests/docker tests/ros
+	$(BIN)/python -m pytest -n 2 --dist loadfile tests/e2e tests/integration
+	$(BIN)/python -m pytest tests/docker tests/ros
 
 # Format, lint, types and the direction of imports.
 check: $(READY_DEV)
