@@ -20,12 +20,14 @@ name: small
 trials: {trials}
 seed: 7
 sweep:
+  sampler: uniform
   parameters:
     task.end.arm_right_4_joint: {{min: -0.7, max: -0.4}}
     task.duration_s: {{min: 1.0, max: 1.2}}
     ball.mass_kg: {{min: 0.03, max: 0.06}}
 run: {{runtime: local}}
 """
+"""Its sampler draws without a library that takes each command a second to import."""
 
 
 def command(*arguments: str | Path) -> list[str]:

@@ -161,7 +161,7 @@ def test_a_taken_output_directory_is_left_alone(
     ("arguments", "where"),
     [
         (lambda port: ["small.yaml", "--set", f"run.router_port={port}"], ""),
-        (lambda _: ["busy.yaml"], "busy.yaml:9: "),
+        (lambda _: ["busy.yaml"], "busy.yaml:10: "),
     ],
 )
 def test_a_busy_port_is_found_before_anything_is_written(

@@ -146,8 +146,7 @@ def test_a_run_goes_on_by_itself_and_is_waited_for_elsewhere(
 
 def test_scaling_and_losses_do_not_change_the_dataset(config: Path, records: Records, tmp_path: Path) -> None:
     few = ("--trials", "24", *SLOWLY)
-    undisturbed = start(config, tmp_path / "reference", 2, *few)
-    assert undisturbed.finish()[0] == 0
+    undisturbed = start(config, tmp_path / "reference", 2, *few, **{STATE_VARIABLE: str(tmp_path / "elsewhere")})
     run = detach(config, tmp_path / "data", "-n", "1", *few)
     assert call("scale", "3").stdout == f"{run}: 1 -> 3 simulations\n"
     until(lambda: status(records, run, "sim_2") == "running")
@@ -161,6 +160,7 @@ def test_scaling_and_losses_do_not_change_the_dataset(config: Path, records: Rec
     waited = call("wait")
     assert waited.returncode == 0, waited.stderr
     assert "24/24 throws: 24 landed, 0 failed" in waited.stderr
+    assert undisturbed.finish()[0] == 0
     assert fingerprints(tmp_path / "data") == fingerprints(tmp_path / "reference")
     told = [re.sub(r": \d+$", "", line.split("  ", 1)[1]) for line in call("events").stdout.splitlines()]
     for line in (
