@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Hashable
 from typing import Any
 
@@ -33,7 +32,8 @@ class ControllerAction:
         self._aborts_refused = aborts_refused
         self._count = 0
         self._told_ns = 0
-        self._considered: deque[int] = deque()
+        self._considered: dict[Hashable, list[Any]] = {}
+        """Goals that have no handle yet, the oldest first, and the feedback that waits for it."""
         self._keys: dict[bytes, int] = {}
         self._handles: dict[Hashable, Any] = {}
         self._results: dict[Hashable, Future] = {}
@@ -75,17 +75,20 @@ class ControllerAction:
         feedback = feedback_message(state)
         for handle in self._handles.values():
             handle.publish_feedback(feedback)
+        for key, waiting in self._considered.items():
+            if not self._results[key].done():
+                waiting.append(feedback)
 
     def _consider(self, request: Any) -> GoalResponse:
         # The controller takes the goal here, as it alone can tell whether it is acceptable. Its handle follows in the
-        # same order, but perhaps after the next goal, or after its own end.
+        # same order, but perhaps after the next goal, after time has passed, or after its own end.
         refusal = self._simulation.submit(self._controller, self._count + 1, read_goal(request))
         if refusal is not None and not self._aborts_refused:
             return GoalResponse.REJECT
         self._count += 1
         # There is nothing to tell of a goal before time has passed.
         self._told_ns = self._simulation.now_ns
-        self._considered.append(self._count)
+        self._considered[self._count] = []
         self._results[self._count] = Future()
         if refusal is not None:
             self.finish(self._aborted(self._count, refusal))
@@ -95,9 +98,12 @@ class ControllerAction:
         return GoalResult(key, GoalStatus.ABORTED, refusal.error_code, refusal.text, self._simulation.now_ns)
 
     def _accept(self, handle: Any) -> None:
-        key = self._considered.popleft()
+        key = next(iter(self._considered))
         self._keys[_uuid(handle)] = key
-        self._handles[key] = handle
+        for feedback in self._considered.pop(key):
+            handle.publish_feedback(feedback)
+        if not self._results[key].done():
+            self._handles[key] = handle
         handle.execute()
 
     def _cancel(self, handle: Any) -> CancelResponse:

@@ -1,0 +1,85 @@
+"""What goals hear of their progress, whenever the action server gets round to making their handles."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from tests.integration.robot import ARM, goal, stamp_ns
+
+from throwcollect.config.schema import Config
+from throwcollect.ros import GoalResponse
+from throwcollect.sim import controller_action
+from throwcollect.sim.controller_action import ControllerAction
+from throwcollect.sim.simulation import Simulation
+
+
+class Server:
+    """Holds the callbacks of an action server, to be called in any order."""
+
+    def __init__(self, *_: Any, **callbacks: Any) -> None:
+        self.consider, self.accept = callbacks["goal_callback"], callbacks["handle_accepted_callback"]
+
+
+class Handle:
+    def __init__(self, number: int) -> None:
+        self.goal_id = SimpleNamespace(uuid=[number] * 16)
+        self.told: list[int] = []
+
+    def publish_feedback(self, feedback: Any) -> None:
+        self.told.append(stamp_ns(feedback.header.stamp) // 1_000_000)
+
+    def execute(self) -> None:
+        pass
+
+
+@pytest.fixture
+def simulation() -> Any:
+    simulation = Simulation(Config())
+    yield simulation
+    simulation.world.close()
+
+
+@pytest.fixture
+def action(simulation: Simulation, monkeypatch: pytest.MonkeyPatch) -> ControllerAction:
+    monkeypatch.setattr(controller_action, "ActionServer", Server)
+    node: Any = SimpleNamespace(get_name=lambda: ARM, count_subscribers=lambda _topic: 1)
+    return ControllerAction(node, simulation, ARM, aborts_refused=False)
+
+
+def advance(simulation: Simulation, action: ControllerAction) -> None:
+    """A slice of 50 ms, and what is told after it."""
+    assert action.watched
+    simulation.advance(watched=True)
+    for _, result in simulation.pop_results():
+        action.finish(result)
+    action.publish_feedback(simulation.controller_state(ARM))
+
+
+@pytest.mark.parametrize("slices_before", [0, 1, 3])
+def test_nothing_is_lost_for_a_goal_whose_handle_comes_after_time_has_passed(
+    slices_before: int, simulation: Simulation, action: ControllerAction
+) -> None:
+    server: Any = action._server
+    assert server.consider(goal(ARM, 1.0, arm_right_4_joint=-1.7)) is GoalResponse.ACCEPT
+    handle = Handle(1)
+    for number in range(5):
+        if number == slices_before:
+            server.accept(handle)
+        advance(simulation, action)
+    assert handle.told == [50, 100, 150, 200, 250]
+
+
+def test_a_goal_that_ended_before_its_handle_came_hears_of_its_own_time_alone(
+    simulation: Simulation, action: ControllerAction
+) -> None:
+    server: Any = action._server
+    server.consider(goal(ARM, 1.0, arm_right_4_joint=-1.7))
+    advance(simulation, action)
+    server.consider(goal(ARM, 1.0, arm_right_4_joint=-1.5))
+    advance(simulation, action)
+    first, second = Handle(1), Handle(2)
+    server.accept(first)
+    server.accept(second)
+    advance(simulation, action)
+    # The first goal ends with the update after the second came, and a slice of time with a goal.
+    assert (first.told, second.told) == ([50], [52, 102])
