@@ -72,7 +72,7 @@ def run(environment: dict[str, str], *arguments: str | Path, cwd: Path = ROOT) -
 
 
 @pytest.mark.parametrize(
-    ("environment", "numbers"), [("v2", ("1", "4")), ("1.29", ("3",))], indirect=["environment"], ids=["v2", "1.29"]
+    ("environment", "numbers"), [("v2", ("1", "8")), ("1.29", ("4",))], indirect=["environment"], ids=["v2", "1.29"]
 )
 def test_the_files_are_those_of_processes_for_any_number(
     environment: dict[str, str], numbers: tuple[str, ...], tmp_path: Path

@@ -24,7 +24,8 @@ pytestmark = pytest.mark.e2e
 TRIALS = 40
 SLOWLY = ("--set", "sim.real_time_factor=1")
 """Long enough to look at it."""
-UNTIL_STOPPED = ("--trials", "200", *SLOWLY)
+MANY = 200
+UNTIL_STOPPED = ("--trials", str(MANY), *SLOWLY)
 """Longer than any test: minutes, however long the commands in between take to start."""
 
 Say = Callable[..., tuple[object, str, str]]
@@ -215,7 +216,7 @@ def test_a_killed_launcher_takes_its_processes_along_and_is_told(
     assert_gone(processes)
     code, table, _ = say("ps")
     assert code == 0
-    assert re.search(rf"^{run} +local +1 +\d+/200 +died +{tmp_path / 'data'}$", table, flags=re.MULTILINE)
+    assert re.search(rf"^{run} +local +1 +\d+/{MANY} +died +{tmp_path / 'data'}$", table, flags=re.MULTILINE)
     for verb in (["wait"], ["stop", "--run", run], ["scale", "3", "--run", run]):
         code, out, err = say(*verb)
         assert (verb, code, out) == (verb, 3, "")
@@ -271,7 +272,7 @@ def test_ctrl_c_leaves_a_run_that_is_only_watched(config: Path, records: Records
     ]
     for watcher in watchers:
         assert watcher.stderr is not None
-        assert "/200 throws: " in watcher.stderr.readline()
+        assert f"/{MANY} throws: " in watcher.stderr.readline()
     for watcher in watchers:
         watcher.send_signal(signal.SIGINT)
     for watcher in watchers:
