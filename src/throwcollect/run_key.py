@@ -1,0 +1,141 @@
+"""The key of a run: whoever has it may join the run, and only what is signed with it is taken into the dataset.
+
+A key is a directory of two files, which only its owner can read: a private key, and the certificate that belongs to it.
+Every run makes its own. The router and all nodes of a run show each other this certificate (mutual TLS), and no other
+one is trusted. Mutual TLS is chosen because it is the one way of keeping others out that the Zenoh library inside the
+genuine rmw_zenoh_cpp was built with: that has no user/password, and no Unix sockets.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import hmac
+import os
+from dataclasses import dataclass
+from datetime import datetime, timedelta, timezone
+from pathlib import Path
+
+from throwcollect.errors import ConfigError
+
+KEY_VARIABLE = "THROWCOLLECT_KEY"
+"""Names the directory of the key of the run that a process belongs to."""
+
+_PRIVATE_KEY, _CERTIFICATE = "key.pem", "certificate.pem"
+_NAME = "throwcollect"
+_LASTS = timedelta(days=3650)
+_CLOCKS_DIFFER_BY = timedelta(days=1)
+"""Machines of one run may disagree about the time."""
+_PURPOSE = b"throwcollect signature 1\0"
+
+
+@dataclass(frozen=True)
+class RunKey:
+    """The key of a run.
+
+    Attributes:
+        directory: Where its two files lie.
+    """
+
+    directory: Path
+
+    @property
+    def private_key(self) -> Path:
+        """File of the private key, in PEM."""
+        return self.directory / _PRIVATE_KEY
+
+    @property
+    def certificate(self) -> Path:
+        """File of the certificate, in PEM."""
+        return self.directory / _CERTIFICATE
+
+    @property
+    def exists(self) -> bool:
+        """Whether both files are there."""
+        return self.private_key.is_file() and self.certificate.is_file()
+
+    def create(self) -> None:
+        """Make a new key; the directory is made if it is missing.
+
+        Raises:
+            ConfigError: If the files cannot be written.
+        """
+        private_key, certificate = _new_pair()
+        try:
+            self.directory.mkdir(mode=0o700, parents=True, exist_ok=True)
+            # The private key comes last: whoever waits for a key waits for that file.
+            for path, data in ((self.certificate, certificate), (self.private_key, private_key)):
+                beside = path.with_suffix(".new")
+                beside.unlink(missing_ok=True)
+                with open(os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
+                    file.write(data)
+                beside.replace(path)
+        except OSError as error:
+            raise ConfigError(f"{self.directory}: the key of the run cannot be written: {error.strerror}") from error
+
+
+class Signer:
+    """Signs what nodes of one run hand each other, and checks it.
+
+    Args:
+        secret: What only the run's nodes know; empty for nodes that were started by hand without a key, which take
+            each other's signatures and are protected from nobody.
+    """
+
+    def __init__(self, secret: bytes) -> None:
+        self._secret = secret
+
+    @classmethod
+    def of_environment(cls) -> Signer:
+        """The signer of the run that this process belongs to.
+
+        Raises:
+            ConfigError: If the environment names a key that cannot be read.
+        """
+        named = os.environ.get(KEY_VARIABLE)
+        if not named:
+            return cls(b"")
+        path = RunKey(Path(named)).private_key
+        try:
+            return cls(hashlib.sha256(_PURPOSE + path.read_bytes()).digest())
+        except OSError as error:
+            raise ConfigError(f"{KEY_VARIABLE}: {path}: cannot be read: {error.strerror}") from error
+
+    def sign(self, *parts: bytes | memoryview) -> str:
+        """Signature (HMAC-SHA256, in hexadecimal) of the parts one after the other."""
+        signature = hmac.new(self._secret, digestmod=hashlib.sha256)
+        for part in parts:
+            signature.update(part)
+        return signature.hexdigest()
+
+    def has_signed(self, signature: str, *parts: bytes | memoryview) -> bool:
+        """Whether a signature is that of the parts."""
+        return hmac.compare_digest(signature.encode(), self.sign(*parts).encode())
+
+
+def _new_pair() -> tuple[bytes, bytes]:
+    """Private key and self-signed certificate, both in PEM."""
+    # Imported here, as only the process that makes a key needs it.
+    from cryptography import x509
+    from cryptography.hazmat.primitives import hashes, serialization
+    from cryptography.hazmat.primitives.asymmetric import ec
+    from cryptography.x509.oid import NameOID
+
+    key = ec.generate_private_key(ec.SECP256R1())
+    name = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, _NAME)])
+    now = datetime.now(timezone.utc)
+    certificate = (
+        x509.CertificateBuilder()
+        .subject_name(name)
+        .issuer_name(name)
+        .public_key(key.public_key())
+        .serial_number(x509.random_serial_number())
+        .not_valid_before(now - _CLOCKS_DIFFER_BY)
+        .not_valid_after(now + _LASTS)
+        .add_extension(x509.SubjectAlternativeName([x509.DNSName(_NAME)]), critical=False)
+        .add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
+        .sign(key, hashes.SHA256())
+    )
+    private = key.private_bytes(
+        serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8, serialization.NoEncryption()
+    )
+    return private, certificate.public_bytes(serialization.Encoding.PEM)

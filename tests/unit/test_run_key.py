@@ -1,0 +1,85 @@
+"""The key of a run."""
+
+import json
+import socket
+import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+import zenoh
+
+from throwcollect.errors import ConfigError
+from throwcollect.run_key import KEY_VARIABLE, RunKey, Signer
+
+TLS = "transport/link/tls/"
+
+
+def settings(key: RunKey) -> dict[str, object]:
+    return {
+        f"{TLS}root_ca_certificate": str(key.certificate),
+        f"{TLS}listen_private_key": str(key.private_key),
+        f"{TLS}listen_certificate": str(key.certificate),
+        f"{TLS}connect_private_key": str(key.private_key),
+        f"{TLS}connect_certificate": str(key.certificate),
+        f"{TLS}enable_mtls": True,
+        f"{TLS}verify_name_on_connect": False,
+    }
+
+
+@contextmanager
+def session(mode: str, changes: dict[str, object]) -> Iterator[zenoh.Session]:
+    config = zenoh.Config()
+    fixed = {"mode": mode, "scouting/multicast/enabled": False, "transport/unicast/open_timeout": 2000}
+    for name, value in {**fixed, **changes}.items():
+        config.insert_json5(name, json.dumps(value))
+    opened = zenoh.open(config)
+    try:
+        yield opened
+    finally:
+        opened.close()
+
+
+def made(directory: Path) -> RunKey:
+    key = RunKey(directory)
+    key.create()
+    return key
+
+
+def test_a_key_is_for_its_owner_alone(tmp_path: Path) -> None:
+    key = made(tmp_path / "key")
+    assert stat.S_IMODE(key.directory.stat().st_mode) == 0o700
+    assert stat.S_IMODE(key.private_key.stat().st_mode) == 0o600
+    assert sorted(path.name for path in key.directory.iterdir()) == ["certificate.pem", "key.pem"]
+
+
+def test_only_who_has_the_key_of_a_router_is_let_in(tmp_path: Path) -> None:
+    key, other = made(tmp_path / "one"), made(tmp_path / "other")
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        endpoint = f"tls/127.0.0.1:{probe.getsockname()[1]}"
+    with session("router", {"listen/endpoints": [endpoint], **settings(key)}):
+        connect = {"connect/endpoints": [endpoint]}
+        with session("client", {**connect, **settings(key)}):
+            pass
+        for changes in (settings(other), {}, {f"{TLS}root_ca_certificate": str(key.certificate)}):
+            with pytest.raises(zenoh.ZError), session("client", {**connect, **changes}):
+                pass
+
+
+def test_signatures_are_of_one_key_and_one_text(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(KEY_VARIABLE, str(made(tmp_path / "one").directory))
+    signer = Signer.of_environment()
+    signature = signer.sign(b"an ", b"episode")
+    assert signer.has_signed(signature, b"an episode")
+    assert not signer.has_signed(signature, b"an episodf")
+    monkeypatch.setenv(KEY_VARIABLE, str(made(tmp_path / "other").directory))
+    assert not Signer.of_environment().has_signed(signature, b"an episode")
+    assert not Signer(b"").has_signed(signature, b"an episode")
+
+
+def test_a_key_that_is_not_there_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(KEY_VARIABLE, str(tmp_path / "gone"))
+    with pytest.raises(ConfigError, match=r"THROWCOLLECT_KEY: .*gone/key.pem: cannot be read: No such file"):
+        Signer.of_environment()
