@@ -320,6 +320,14 @@ def coordinator(
     coordinate(directory, config=config)
 
 
+@app.command(hidden=True)
+def simulate(directory: DatasetArgument, trials: list[int]) -> None:
+    """Simulate trials of a plan and print the digests of their episodes, as a coordinator wants to know them."""
+    from throwcollect.cli.nodes import simulate as simulate_trials
+
+    simulate_trials(directory, trials)
+
+
 @app.command(rich_help_panel="Nodes, as `up` starts them")
 def health(
     node: Annotated[

@@ -117,11 +117,13 @@ def _collect(request: _Request, *, detach: bool, json: bool) -> None:
             run = _prepared(records, request, plan, shown)
         if not detach:
             with Interruptions() as interruptions:
-                summary = launch(run, config, onlooker=shown, interruptions=lambda: interruptions.count)
+                summary, lost = launch(run, config, onlooker=shown, interruptions=lambda: interruptions.count)
     if detach:
         _detach(records, run, json=json)
-    else:
-        print_summary(summary, None if run.record.volume else directory, as_json=json)
+        return
+    print_summary(summary, None if run.record.volume else directory, as_json=json)
+    if lost is not None:
+        raise lost
 
 
 def serve(run: str, lock: int) -> None:

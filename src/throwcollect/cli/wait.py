@@ -41,6 +41,7 @@ def wait_for(named: str | None, *, json: bool) -> None:
     if run.status == "died":
         raise died(record)
     error = failure(record)
+    if record.summary is not None:
+        print_summary(record.summary, None if record.volume else Path(record.directory), as_json=json)
     if error is not None:
         raise error
-    print_summary(record.summary or {}, None if record.volume else Path(record.directory), as_json=json)

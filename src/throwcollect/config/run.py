@@ -30,5 +30,7 @@ class RunConfig(Section):
     """Real time that running trials get to end in after Ctrl-C or SIGTERM; what is dropped then is run when resumed."""
     retries: Annotated[int, Field(ge=0, le=100)] = 3
     """How often a trial is given to another simulation before it is recorded as failed."""
+    replay: Annotated[int, Field(ge=0)] = 3
+    """How many trials, chosen by the seed, a fresh process simulates again at the end, to be compared bit for bit."""
     restarts: Annotated[int, Field(ge=0, le=1000)] = 10
     """How often one simulation is restarted before it is given up."""

@@ -1,14 +1,14 @@
-"""What a simulation is sent for one trial: parameters and joint trajectory goals."""
+"""The joint trajectory goals of a trial, and the messages that carry them."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from throwcollect.control import Trajectory, TrajectoryGoal, TrajectoryPoint
 from throwcollect.robots.talos import CONTROLLERS, controller_of
 from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.ros import get_action, get_message
@@ -18,21 +18,8 @@ JointTrajectoryPoint: Any = get_message("trajectory_msgs/msg/JointTrajectoryPoin
 Duration: Any = get_message("builtin_interfaces/msg/Duration")
 
 
-@dataclass(frozen=True)
-class TrialGoals:
-    """The goals of one trial.
-
-    Attributes:
-        controllers: Controllers that get a goal, in the robot's order.
-        goals: One FollowJointTrajectory goal for each of them.
-    """
-
-    controllers: tuple[str, ...]
-    goals: tuple[Any, ...]
-
-
-def trial_goals(trajectory: JointTrajectory, posture: Mapping[str, float]) -> TrialGoals:
-    """Split a joint trajectory into one goal per controller.
+def trial_goals(trajectory: JointTrajectory, posture: Mapping[str, float]) -> dict[str, TrajectoryGoal]:
+    """Split a joint trajectory into one goal for each controller that moves, in the robot's order.
 
     Controllers refuse partial goals by default, so joints of a moving limb that do not move are sent where they are.
 
@@ -40,27 +27,34 @@ def trial_goals(trajectory: JointTrajectory, posture: Mapping[str, float]) -> Tr
         trajectory: Trajectory of the moving joints.
         posture: Angle of all 32 joints at the start of the trial [rad].
     """
-    controllers = tuple(name for name in CONTROLLERS if name in {controller_of(joint) for joint in trajectory.joints})
-    return TrialGoals(controllers, tuple(_goal(trajectory, CONTROLLERS[name], posture) for name in controllers))
+    moved = {controller_of(joint) for joint in trajectory.joints}
+    return {name: _goal(trajectory, joints, posture) for name, joints in CONTROLLERS.items() if name in moved}
 
 
-def _goal(trajectory: JointTrajectory, joints: tuple[str, ...], posture: Mapping[str, float]) -> Any:
+def goal_message(goal: TrajectoryGoal) -> Any:
+    """The goal of a FollowJointTrajectory action that `trial_goals` gives."""
+    message = FollowJointTrajectory.Goal()
+    message.trajectory.joint_names = list(goal.trajectory.joint_names)
+    message.trajectory.points = [
+        JointTrajectoryPoint(
+            positions=point.positions,
+            velocities=point.velocities,
+            accelerations=point.accelerations,
+            time_from_start=Duration(sec=point.time_from_start_ns // 10**9, nanosec=point.time_from_start_ns % 10**9),
+        )
+        for point in goal.trajectory.points
+    ]
+    return message
+
+
+def _goal(trajectory: JointTrajectory, joints: tuple[str, ...], posture: Mapping[str, float]) -> TrajectoryGoal:
     positions = _columns(trajectory.joints, trajectory.positions, joints, [posture[joint] for joint in joints])
     still = [0.0] * len(joints)
     velocities = _columns(trajectory.joints, trajectory.velocities, joints, still)
     accelerations = _columns(trajectory.joints, trajectory.accelerations, joints, still)
-    goal = FollowJointTrajectory.Goal()
-    goal.trajectory.joint_names = list(joints)
-    goal.trajectory.points = [
-        JointTrajectoryPoint(
-            positions=positions[row],
-            velocities=velocities[row],
-            accelerations=accelerations[row],
-            time_from_start=Duration(sec=stamp // 10**9, nanosec=stamp % 10**9),
-        )
-        for row, stamp in enumerate(np.rint(trajectory.times * 1e9).astype(np.int64).tolist())
-    ]
-    return goal
+    stamps = np.rint(trajectory.times * 1e9).astype(np.int64).tolist()
+    points = map(TrajectoryPoint, stamps, positions, velocities, accelerations)
+    return TrajectoryGoal(Trajectory(joints, tuple(points)))
 
 
 def _columns(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import shlex
 import signal
 import time
 from pathlib import Path
@@ -10,8 +11,10 @@ from types import FrameType
 
 from throwcollect import ros
 from throwcollect.coordinator.node import Coordinator
+from throwcollect.coordinator.replay_check import check_by_replay
+from throwcollect.dataset.inspect import info, loss
 from throwcollect.dataset.writer import DatasetWriter
-from throwcollect.errors import Interrupted
+from throwcollect.errors import Interrupted, WorkerError
 from throwcollect.tasks.throw import ThrowResult
 from throwcollect.wording import counted
 
@@ -31,7 +34,10 @@ def run(directory: Path) -> None:
         directory: Directory of the dataset, as `prepare` or `resume` left it.
 
     Raises:
-        DatasetError: If the directory holds no plan, or cannot be written.
+        DatasetError: If the directory holds no plan, or cannot be written, or a trial came out otherwise when it was
+            simulated again.
+        WorkerError: If every simulation refuses every trial, or trials cannot be simulated again.
+        LossError: If the dataset is finished, and trials of it are lost.
         Interrupted: If a signal ended the collection before its last trial.
     """
     writer = DatasetWriter.open(directory)
@@ -61,6 +67,8 @@ def run(directory: Path) -> None:
             executor.spin_once(timeout_sec=0.0 if waiting else _IDLE_S)
             if node.backlog:
                 node.write_one()
+            if (reason := node.hopeless) is not None:
+                raise WorkerError("every simulation refuses its trials, and none was ever done", evidence=reason)
             now = time.monotonic()
             if now >= synced + _SYNC_EVERY_S:
                 synced = now
@@ -73,8 +81,20 @@ def run(directory: Path) -> None:
             raise Interrupted(
                 f"interrupted; what is finished is in {directory}", hint=f"throwcollect resume {directory}"
             )
+        said = check_by_replay(
+            directory,
+            writer.digests(),
+            count=writer.plan.config.run.replay,
+            seed=writer.plan.config.seed,
+            meanwhile=lambda: executor.spin_once(timeout_sec=_IDLE_S),
+        )
+        if said is not None:
+            print(said, flush=True)
         writer.finish(wall_s=time.monotonic() - started)
     finally:
         writer.close()
         node.destroy_node()
         ros.shutdown()
+    lost = loss(info(directory).outcomes, hint=f"throwcollect resume {shlex.quote(str(directory))} runs them again")
+    if lost is not None:
+        raise lost

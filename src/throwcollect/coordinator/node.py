@@ -5,12 +5,9 @@ from __future__ import annotations
 import math
 import time
 from collections import Counter, deque
-from collections.abc import Mapping
-from dataclasses import dataclass
 
-from throwcollect.config.schema import Config
-from throwcollect.config.values import is_physics
-from throwcollect.coordinator.goals import FollowJointTrajectory, TrialGoals, trial_goals
+from throwcollect.coordinator.acceptance import Acceptance, Assignment
+from throwcollect.coordinator.goals import FollowJointTrajectory
 from throwcollect.coordinator.growth import Growth
 from throwcollect.coordinator.leases import Leases
 from throwcollect.coordinator.progress import PROGRESS_QOS, PROGRESS_TOPIC, Progress, String
@@ -18,14 +15,12 @@ from throwcollect.coordinator.simulation_client import EPISODE_TOPIC, Simulation
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.episode.message import Episode, unpack
 from throwcollect.errors import DatasetError
-from throwcollect.robots.description import start_posture
 from throwcollect.robots.model import joint_limits
 from throwcollect.robots.talos import CONTROLLERS, controller_of, graph_name
-from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.ros import Node, graph_changes
+from throwcollect.run_key import Signer
 from throwcollect.sweep.plan import Plan, Trial
 from throwcollect.tasks.throw import Outcome, ThrowResult, judge
-from throwcollect.tasks.trajectory import throw_trajectory
 
 _DISCOVERY_PERIOD_S = 0.1
 _REPORT_PERIOD_S = 0.2
@@ -33,16 +28,6 @@ _UNREADABLE_PERIOD_S = 10.0
 """Whoever publishes garbage may do so often."""
 _RATE_WINDOW_S = 10.0
 """Throws per second are averaged over this time."""
-
-
-@dataclass(frozen=True)
-class _Setup:
-    """Everything that is worked out of a trial before it is leased."""
-
-    config: Config
-    trajectory: JointTrajectory
-    goals: TrialGoals
-    physics: Mapping[str, float]
 
 
 class Coordinator(Node):
@@ -64,8 +49,10 @@ class Coordinator(Node):
         self._limits = joint_limits()
         self._simulations: dict[str, SimulationClient] = {}
         self._discovered_changes = -1
-        self._setups: dict[int, _Setup] = {}
-        self._backlog: deque[tuple[Episode, _Setup]] = deque()
+        self._signer = Signer.of_environment()
+        self._acceptance = Acceptance(plan.config)
+        self._assignments: dict[int, Assignment] = {}
+        self._backlog: deque[tuple[Episode, Assignment]] = deque()
         self._outcomes: Counter[str] = Counter()
         self._ends: deque[tuple[float, int]] = deque([(time.monotonic(), 0)])
         self._draining = False
@@ -102,6 +89,11 @@ class Coordinator(Node):
         """Whether every trial of the plan has ended, and none will be added to it."""
         return self._leases.finished and self._growth is None
 
+    @property
+    def hopeless(self) -> str | None:
+        """Why no simulation will ever do a trial; None if there is hope."""
+        return self._leases.hopeless(self._simulations)
+
     def drain(self) -> None:
         """Lease no more trials; those that run may end within `run.grace_s`."""
         if not self._draining:
@@ -120,17 +112,30 @@ class Coordinator(Node):
         self._ends = deque([(time.monotonic(), self._leases.ended)])
 
     def write_one(self) -> None:
-        """Judge and write the oldest episode of the backlog.
+        """Check, judge and write the oldest episode of the backlog.
 
         Raises:
             DatasetError: If the dataset cannot be written.
         """
-        episode, setup = self._backlog.popleft()
+        episode, assignment = self._backlog.popleft()
+        trial = episode.header.trial
+        if (problem := self._acceptance.unsound(self._writer.plan, episode)) is not None:
+            simulation = self._leases.deliverer(trial)
+            self._assignments[trial] = assignment
+            self._give_back(
+                simulation, trial, f"its episode is refused: {problem}", self._leases.reject(trial, problem)
+            )
+            return
         result = judge(
-            episode.samples(), episode.header, config=setup.config, trajectory=setup.trajectory, limits=self._limits
+            episode.samples(),
+            episode.header,
+            config=assignment.config,
+            trajectory=assignment.trajectory,
+            limits=self._limits,
         )
         self._writer.append(episode, result)
-        self._note(episode.header.trial, result)
+        self._leases.complete(trial)
+        self._note(trial, result)
 
     def prepare_one(self) -> bool:
         """Do a piece of work that can wait, of some milliseconds, so that no simulation will wait for it.
@@ -144,8 +149,8 @@ class Coordinator(Node):
             DatasetError: If the plan, or a shard that is complete without further trials, cannot be written.
         """
         for trial in self._leases.upcoming(len(self._simulations)):
-            if trial not in self._setups:
-                self._setups[trial] = self._setup(trial)
+            if trial not in self._assignments:
+                self._assignments[trial] = self._assign(trial)
                 return True
         return self._growth is not None and self._grow(self._growth)
 
@@ -190,6 +195,9 @@ class Coordinator(Node):
             throws_per_s=(ended - before) / (now - since) if now > since else 0.0,
             hung=[name.strip("/") for name, simulation in self._simulations.items() if simulation.hung],
             wanted=self._config.until.landed if self._config.until else None,
+            set_aside={
+                name.strip("/"): reason for name in self._simulations if (reason := self._leases.set_aside(name))
+            },
         )
         self._progress.publish(progress.message())
         return progress
@@ -220,10 +228,11 @@ class Coordinator(Node):
                 controllers=self._controllers,
                 action_type=FollowJointTrajectory,
                 on_episode=self._receive,
-                on_refusal=self._take_back,
+                on_refusal=lambda name, reason: self._take_back(name, reason, refused=True),
             )
         for namespace in self._simulations.keys() - offered:
             self._take_back(namespace, "left the ROS graph")
+            self._leases.forget(namespace)
             self._simulations.pop(namespace).destroy()
 
     def _lease(self, namespace: str) -> None:
@@ -232,51 +241,59 @@ class Coordinator(Node):
             return
         if not simulation.ready():
             return
-        trial = self._leases.lease(namespace)
+        trial = self._leases.lease(namespace, others=self._simulations)
         if trial is None:
             return
-        setup = self._setups.get(trial) or self._setup(trial)
-        self._setups[trial] = setup
+        assignment = self._assignments.get(trial) or self._assign(trial)
+        self._assignments[trial] = assignment
         simulation.deadline = time.monotonic() + self._patience_s
         self._writer.note("lease", trial=trial, simulation=namespace.strip("/"))
-        simulation.begin(trial, setup.physics, setup.goals)
+        lease = assignment.lease(namespace, trial)
+        simulation.begin(lease, lease.sign(self._signer), assignment.messages)
 
-    def _setup(self, number: int) -> _Setup:
-        trial = self._trials[number]
-        config = self._plan.config_of(trial)
-        trajectory = throw_trajectory(config)
-        physics = {key: value for key, value in trial.values.items() if is_physics(key)}
-        return _Setup(config, trajectory, trial_goals(trajectory, start_posture(config)), physics)
+    def _assign(self, number: int) -> Assignment:
+        return self._acceptance.assign(self._plan, self._trials[number])
 
     def _receive(self, namespace: str, message: bytes) -> None:
         try:
-            episode = unpack(message)
-            # Somebody else may publish here, too: what cannot be read must not end the collection later.
-            episode.samples()
+            delivery = unpack(message, self._signer)
+            # What cannot be read must not end the collection later.
+            delivery.episode.samples()
         except DatasetError as error:
+            # Anybody may have sent it, so it says nothing about the simulation.
             self.get_logger().warning(
-                f"{namespace}: unreadable episode: {error}", throttle_duration_sec=_UNREADABLE_PERIOD_S
+                f"{namespace}: an episode is dropped: {error}", throttle_duration_sec=_UNREADABLE_PERIOD_S
             )
             return
-        trial = episode.header.trial
-        self._simulations[namespace].hung = False
-        if not self._leases.complete(namespace, trial):
+        trial = delivery.episode.header.trial
+        simulation = self._simulations[namespace]
+        simulation.hung = False
+        if self._leases.held_by(namespace) != trial:
             self.get_logger().warning(f"{namespace}: trial {trial} came too late and was dropped")
             return
-        self._simulations[namespace].abandon()
+        assignment = self._assignments[trial]
+        if (reason := self._acceptance.foreign(delivery, assignment, simulation.token)) is not None:
+            self._take_back(namespace, f"its episode is refused: {reason}", refused=True)
+            return
+        self._leases.deliver(namespace, trial)
+        simulation.abandon()
         self._lease(namespace)
-        self._backlog.append((episode, self._setups.pop(trial)))
+        self._backlog.append((delivery.episode, self._assignments.pop(trial)))
 
-    def _take_back(self, namespace: str, reason: str) -> None:
+    def _take_back(self, namespace: str, reason: str, *, refused: bool = False) -> None:
         self._simulations[namespace].abandon()
         trial = self._leases.held_by(namespace)
-        if trial is None:
-            return
+        if trial is not None:
+            given_up = self._leases.fail(namespace, reason, refused=refused)
+            self._give_back(namespace, trial, reason, given_up and given_up[1])
+
+    def _give_back(self, namespace: str, trial: int, reason: str, given_up: list[str] | None) -> None:
+        """Tell of a trial that goes to another simulation, or write that it is lost, with the reasons."""
         self.get_logger().warning(f"{namespace}: trial {trial} is given to another simulation: {reason}")
         self._writer.note("fail", trial=trial, simulation=namespace.strip("/"), reason=reason)
-        if (given_up := self._leases.fail(namespace, reason)) is not None:
-            number, reasons = given_up
-            self._setups.pop(number)
-            result = ThrowResult(Outcome.LOST, reason="; ".join(reasons))
-            self._writer.append_lost(number, "; ".join(reasons))
-            self._note(number, result)
+        if (aside := self._leases.set_aside(namespace)) is not None:
+            self.get_logger().warning(f"{namespace}: gets no more trials, as others could do what it refused: {aside}")
+        if given_up is not None:
+            del self._assignments[trial]
+            self._writer.append_lost(trial, "; ".join(given_up))
+            self._note(trial, ThrowResult(Outcome.LOST, reason="; ".join(given_up)))

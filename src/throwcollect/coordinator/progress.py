@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field
 from types import TracebackType
 from typing import Any
 
@@ -33,6 +33,7 @@ class Progress:
         throws_per_s: Trials that ended per second of the last ten seconds.
         hung: Names of the simulations that took too long for a trial and have not been heard of since.
         wanted: Number of throws that are to land; None if the collection ends with its plan.
+        set_aside: Why simulations get no more trials, by their names.
     """
 
     total: int
@@ -42,6 +43,7 @@ class Progress:
     throws_per_s: float
     hung: list[str]
     wanted: int | None = None
+    set_aside: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def landed(self) -> int:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from throwcollect.coordinator.goals import TrialGoals
 from throwcollect.ros import (
     ActionClient,
     Future,
@@ -17,11 +16,10 @@ from throwcollect.ros import (
     get_message,
     get_service,
 )
+from throwcollect.trial.lease import CONTROLLERS, LEASE, NUMBER, Lease
 
-ResetSimulation: Any = get_service("simulation_interfaces/srv/ResetSimulation")
 SetParametersAtomically: Any = get_service("rcl_interfaces/srv/SetParametersAtomically")
 UInt8MultiArray: Any = get_message("std_msgs/msg/UInt8MultiArray")
-_OK = get_message("simulation_interfaces/msg/Result").RESULT_OK
 
 EPISODE_TOPIC = "episode"
 EPISODE_QOS = QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy.RELIABLE)
@@ -54,12 +52,13 @@ class SimulationClient:
         """Monotonic time [s] at which the running trial counts as lost."""
         self.hung = False
         """Whether a trial was lost that way and nothing has come from the simulation since."""
+        self.token = ""
+        """Signature of the lease of the running trial, or of the last one."""
         self._node = node
         self._on_refusal = on_refusal
         self._generation = 0
         name = namespace.strip("/")
         self._parameters = node.create_client(SetParametersAtomically, f"{namespace}/{name}/set_parameters_atomically")
-        self._reset = node.create_client(ResetSimulation, f"{namespace}/reset_simulation")
         self._actions = {
             controller: ActionClient(node, action_type, f"{namespace}/{shown}/follow_joint_trajectory")
             for controller, shown in controllers.items()
@@ -74,46 +73,39 @@ class SimulationClient:
 
     def ready(self) -> bool:
         """Whether everything that a trial needs is offered."""
-        return (
-            self._parameters.service_is_ready()
-            and self._reset.service_is_ready()
-            and all(action.server_is_ready() for action in self._actions.values())
+        return self._parameters.service_is_ready() and all(
+            action.server_is_ready() for action in self._actions.values()
         )
 
-    def begin(self, trial: int, physics: Mapping[str, float], goals: TrialGoals) -> None:
+    def begin(self, lease: Lease, token: str, goals: Mapping[str, Any]) -> None:
         """Start a trial.
 
-        Each request leaves when the one before has been answered, as nothing in ROS 2 says in which order a node
-        handles requests to different services and actions.
+        The goals leave when the lease has been accepted, as nothing in ROS 2 says in which order a node handles
+        requests to different services and actions.
 
         Args:
-            trial: Number of the trial.
-            physics: Swept parameters of the simulation under their dotted keys.
-            goals: Joint trajectory goals.
+            lease: The trial.
+            token: Its signature.
+            goals: Joint trajectory goal of each controller, as a message.
         """
         self._generation += 1
+        self.token = token
         parameters = [
-            Parameter("trial.number", value=trial),
-            Parameter("trial.controllers", value=list(goals.controllers)),
-            *(Parameter(key, value=float(value)) for key, value in physics.items()),
+            Parameter(NUMBER, value=lease.trial),
+            Parameter(CONTROLLERS, value=list(lease.controllers)),
+            Parameter(LEASE, value=token),
+            *(Parameter(key, value=float(value)) for key, value in lease.values.items()),
         ]
         request = SetParametersAtomically.Request(parameters=[item.to_parameter_msg() for item in parameters])
 
-        def reset() -> None:
-            self._expect(
-                self._reset.call_async(ResetSimulation.Request(scope=ResetSimulation.Request.SCOPE_ALL)),
-                lambda response: None if response.result.result == _OK else f"reset: {response.result.error_message}",
-                send_goals,
-            )
-
         def send_goals() -> None:
-            for controller, goal in zip(goals.controllers, goals.goals, strict=True):
+            for controller, goal in goals.items():
                 self._expect(self._actions[controller].send_goal_async(goal), _refusal_of(controller))
 
         self._expect(
             self._parameters.call_async(request),
             lambda response: None if response.result.successful else f"parameters: {response.result.reason}",
-            reset,
+            send_goals,
         )
 
     def abandon(self) -> None:
@@ -127,7 +119,6 @@ class SimulationClient:
         for action in self._actions.values():
             action.destroy()
         self._node.destroy_subscription(self._episodes)
-        self._node.destroy_client(self._reset)
         self._node.destroy_client(self._parameters)
 
     def _expect(

@@ -12,7 +12,9 @@ import pyarrow.compute as pc
 from throwcollect.dataset.card import count_outcomes
 from throwcollect.dataset.digest import combined_digest
 from throwcollect.dataset.reader import Dataset
-from throwcollect.errors import DatasetError
+from throwcollect.errors import DatasetError, LossError
+from throwcollect.tasks.throw import Outcome
+from throwcollect.wording import counted
 
 
 @dataclass(frozen=True)
@@ -102,6 +104,20 @@ def summary(dataset: Dataset) -> Info:
         topics=topics,
         digest=digest,
     )
+
+
+def loss(outcomes: Mapping[str, int], *, hint: str | None) -> LossError | None:
+    """The error that says that trials of a finished dataset are lost; None if none is.
+
+    Args:
+        outcomes: Number of trials of each outcome.
+        hint: How to go on.
+    """
+    lost, all_of_them = outcomes.get(Outcome.LOST.value, 0), sum(outcomes.values())
+    if not lost:
+        return None
+    verb = "is" if lost == 1 else "are"
+    return LossError(f"{lost} of {counted(all_of_them, 'trial')} {verb} lost; throws.parquet says why", hint=hint)
 
 
 def _landing(throws: pa.Table) -> Mapping[str, tuple[float, float]] | None:

@@ -255,6 +255,14 @@ class DatasetWriter:
         for shard in self._shards.values():
             shard.sync()
 
+    def digests(self) -> dict[int, str]:
+        """Digest of each episode of the shards that are finished, by trial."""
+        digests: dict[int, str] = {}
+        for shard in self._finished.values():
+            pairs = zip(shard.rows["trial"].to_pylist(), shard.rows["digest"].to_pylist(), strict=True)
+            digests |= {trial: digest for trial, digest in pairs if digest is not None}
+        return digests
+
     def finish(self, *, wall_s: float | None, simulations: int | None = None) -> None:
         """Write everything that describes the dataset as a whole; ``metadata.yaml`` comes last.
 

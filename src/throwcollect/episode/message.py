@@ -1,15 +1,18 @@
 """The one message that carries an episode from a simulation to whoever collects: std_msgs/UInt8MultiArray.
 
-Its layout names three parts of its data: ``header``, an `EpisodeHeader` in JSON; ``sha256``, that of the uncompressed
-message records in hexadecimal; and ``chunk``, an MCAP Chunk record.
+Its layout names the parts of its data: ``header``, an `EpisodeHeader` in JSON; ``sha256``, that of the uncompressed
+message records in hexadecimal; ``conditions``, what it was simulated with, in JSON; ``chunk``, an MCAP Chunk record;
+``signature``, that of everything before it.
 """
 
 from __future__ import annotations
 
 import hashlib
+import itertools
 import re
 import struct
 from functools import cache, cached_property
+from typing import NamedTuple
 
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
@@ -19,13 +22,18 @@ from throwcollect.episode.layout import MessageLayout
 from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.errors import DatasetError
 from throwcollect.interfaces import get_message
+from throwcollect.run_key import Signer
 
-_PARTS = ("header", "sha256", "chunk")
+_PARTS = ("header", "sha256", "conditions", "chunk", "signature")
 _SHA256 = re.compile(rb"[0-9a-f]{64}")
 _HEADER = TypeAdapter(EpisodeHeader)
 _LATEST_NS = 2**62
 _MOST_SAMPLES = 2**32
 """As many as sequence numbers of message records can count."""
+_LONGEST_NAME, _LONGEST_TEXT = 256, 10_000
+"""Characters in names and messages; Talos' names and the controllers' messages stay far below."""
+_STATUSES = range(7)
+"""Of action_msgs/msg/GoalStatus."""
 _COUNT = struct.Struct("<I")
 
 
@@ -112,6 +120,18 @@ def header_from_json(text: bytes | str) -> EpisodeHeader:
     instants = [header.start_ns, *(instant for each in header.contacts for instant in (each.start_ns, each.end_ns))]
     if any(instant is not None and not 0 <= instant <= _LATEST_NS for instant in instants):
         raise DatasetError("episode header: an instant that no clock shows", expected=f"0 to {_LATEST_NS} ns")
+    for contact in header.contacts:
+        if not 1 <= len(contact.body) <= _LONGEST_NAME:
+            raise DatasetError(f"episode header: a contact with a body whose name has {len(contact.body)} characters")
+        if contact.end_ns is not None and contact.end_ns < contact.start_ns:
+            raise DatasetError(f"episode header: a contact with {contact.body} that ends before it begins")
+    for goal in header.goals:
+        if (
+            len(goal.controller) > _LONGEST_NAME
+            or len(goal.error_string) > _LONGEST_TEXT
+            or goal.status not in _STATUSES
+        ):
+            raise DatasetError(f"episode header: goal of {goal.controller[:_LONGEST_NAME]!r}: cannot be")
     return header
 
 
@@ -123,10 +143,23 @@ def _layout() -> MessageLayout:
     return MessageLayout(message, [f"layout.dim.{n}.{key}" for n in range(len(_PARTS)) for key in ("size", "stride")])
 
 
-def pack(episode: Episode) -> bytes:
+class Delivery(NamedTuple):
+    """What a simulation hands over.
+
+    Attributes:
+        episode: The episode.
+        conditions: What it was simulated with, in JSON.
+    """
+
+    episode: Episode
+    conditions: str
+
+
+def pack(episode: Episode, conditions: str, signer: Signer) -> bytes:
     """The CDR bytes of the message that carries an episode."""
-    parts = (episode.header_json.encode(), episode.records_sha256.encode(), episode.chunk.record())
-    return b"".join((_prefix([len(part) for part in parts]), *parts))
+    parts = [episode.header_json.encode(), episode.records_sha256.encode(), conditions.encode(), episode.chunk.record()]
+    signature = signer.sign(*parts).encode()
+    return b"".join((_prefix([*map(len, parts), len(signature)]), *parts, signature))
 
 
 def _prefix(sizes: list[int]) -> bytes:
@@ -137,14 +170,16 @@ def _prefix(sizes: list[int]) -> bytes:
     return bytes(prefix)
 
 
-def unpack(message: bytes) -> Episode:
+def unpack(message: bytes, signer: Signer) -> Delivery:
     """Read the message that carries an episode.
 
     Args:
         message: CDR bytes of a std_msgs/UInt8MultiArray.
+        signer: That of the run.
 
     Raises:
-        DatasetError: If it is not what `pack` writes; the contents of the chunk are not looked at yet.
+        DatasetError: If it is not what `pack` writes, or is signed with another key; the contents of the chunk are not
+            looked at yet.
     """
     layout = _layout()
     length = len(layout.template)
@@ -153,13 +188,19 @@ def unpack(message: bytes) -> Episode:
     sizes = list(np.frombuffer(message, layout.dtype, count=1)[0].item()[::2])
     if message[:length] != _prefix(sizes):
         raise DatasetError(f"episode: not a UInt8MultiArray of the parts {', '.join(_PARTS)}")
-    count = sum(sizes)
     # Some RMWs hand over what they have padded.
-    if len(message) < length + count:
-        raise DatasetError(f"episode: {len(message) - length} bytes of data", expected=f"{count} as announced")
-    middle, last = length + sizes[0], length + sizes[0] + sizes[1]
-    chunk = Chunk.parse(memoryview(message)[last : length + count])
-    return make_episode(message[length:middle], message[middle:last], chunk)
+    if len(message) < length + sum(sizes):
+        raise DatasetError(f"episode: {len(message) - length} bytes of data", expected=f"{sum(sizes)} as announced")
+    whole = memoryview(message)
+    ends = list(itertools.accumulate(sizes, initial=length))
+    header, sha256, conditions, chunk, signature = (whole[start:end] for start, end in itertools.pairwise(ends))
+    if not signer.has_signed(bytes(signature).decode(errors="replace"), whole[length : ends[-2]]):
+        raise DatasetError("episode: is not signed with the key of this run")
+    try:
+        text = bytes(conditions).decode()
+    except UnicodeDecodeError as error:
+        raise DatasetError("episode: its conditions are no UTF-8 text") from error
+    return Delivery(make_episode(bytes(header), bytes(sha256), Chunk.parse(chunk)), text)
 
 
 def make_episode(header: bytes | str, records_sha256: bytes, chunk: Chunk) -> Episode:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,6 +94,10 @@ class GoalOutcome:
     error_string: str
 
 
+EndReason = Literal["landed", "rest", "timeout"]
+"""Why a trial ended: the ball has crossed the landing plane; it and the arm rest; the longest duration is over."""
+
+
 @dataclass(frozen=True)
 class EpisodeHeader:
     """What is known of an episode besides its samples.
@@ -100,7 +105,7 @@ class EpisodeHeader:
     Attributes:
         trial: Number of the trial.
         start_ns: Simulated time of the first sample [ns].
-        end_reason: ``landed`` (crossed the landing plane), ``rest``, or ``timeout``.
+        end_reason: Why it ended.
         contacts: All contacts of the ball, by start time.
         goals: One entry per controller that had a goal.
         samples: Number of samples.
@@ -108,7 +113,7 @@ class EpisodeHeader:
 
     trial: int
     start_ns: int
-    end_reason: str
+    end_reason: EndReason
     contacts: tuple[Contact, ...]
     goals: tuple[GoalOutcome, ...]
     samples: int

@@ -9,11 +9,10 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-import numpy as np
-
 from throwcollect.dataset.reader import Dataset
 from throwcollect.errors import DatasetError
 from throwcollect.replay.comparison import Comparison, compare
+from throwcollect.trial.choice import chosen
 
 _AT_ONCE = 4
 """Trials that a process fetches at a time."""
@@ -32,10 +31,7 @@ def chosen_trials(dataset: Dataset, *, sample: int | None) -> list[int]:
     trials = [row["trial"] for row in dataset.throws.select(["trial", "shard"]).to_pylist() if row["shard"]]
     if not trials:
         raise DatasetError(f"{dataset.directory}: no trial has an episode")
-    if sample is None or sample >= len(trials):
-        return trials
-    picked = np.random.default_rng(dataset.config.seed).choice(len(trials), size=sample, replace=False)
-    return [trials[index] for index in sorted(picked.tolist())]
+    return trials if sample is None else chosen(trials, count=sample, seed=dataset.config.seed)
 
 
 def replayed(directory: Path, trials: Sequence[int]) -> Iterator[Comparison]:

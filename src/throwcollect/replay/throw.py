@@ -10,8 +10,8 @@ from throwcollect.episode.chunk import ChunkEncoder
 from throwcollect.episode.message import Episode
 from throwcollect.errors import ThrowcollectError
 from throwcollect.robots.description import full_description, start_posture
-from throwcollect.sim.controller_messages import read_goal
-from throwcollect.sim.simulation import Simulation, TrialSetup
+from throwcollect.sim.present_trial import TrialSetup
+from throwcollect.sim.simulation import Simulation
 from throwcollect.sweep.plan import Plan
 from throwcollect.tasks.trajectory import throw_trajectory
 
@@ -46,13 +46,12 @@ class Replayer:
         simulation = self._simulation
         values = plan.trials[trial].values
         config = plan.config_of(plan.trials[trial])
-        posture = start_posture(config)
-        sent = trial_goals(throw_trajectory(config), posture)
+        goals = trial_goals(throw_trajectory(config), start_posture(config))
         physics = with_values(self._config, {key: value for key, value in values.items() if is_physics(key)})
-        simulation.setup = TrialSetup(trial, sent.controllers, physics)
+        simulation.trial.setup = TrialSetup(trial, tuple(goals), physics)
         simulation.reset()
-        for controller, goal in zip(sent.controllers, sent.goals, strict=True):
-            refusal = simulation.submit(controller, trial, read_goal(goal))
+        for controller, goal in goals.items():
+            refusal = simulation.submit(controller, trial, goal)
             if refusal is not None:
                 raise ThrowcollectError(f"trial {trial}: {controller} refuses its goal: {refusal}")
         while (ended := simulation.episode()) is None:

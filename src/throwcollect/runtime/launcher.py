@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any, Protocol, Union
 from throwcollect import ros
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.progress import Progress
-from throwcollect.dataset.inspect import info
-from throwcollect.errors import ConfigError, DatasetError, Interrupted, ThrowcollectError, WorkerError
+from throwcollect.dataset.inspect import info, loss
+from throwcollect.errors import ConfigError, DatasetError, Interrupted, LossError, ThrowcollectError, WorkerError
 from throwcollect.runtime.events import EventLog, RunEvent
 from throwcollect.runtime.listening import Listening
 from throwcollect.runtime.local import LocalRuntime
@@ -70,7 +70,7 @@ def launch(
     *,
     onlooker: Onlooker,
     interruptions: Callable[[], int],
-) -> Mapping[str, Any]:
+) -> tuple[Mapping[str, Any], LossError | None]:
     """Run a prepared collection until its coordinator ends, or go on with one whose launcher died.
 
     Args:
@@ -80,7 +80,8 @@ def launch(
         interruptions: How often the user has asked to stop: at first running trials are finished, then no more.
 
     Returns:
-        What the dataset holds, and ``wall_s``: the time since the run was started, and of earlier runs into it [s].
+        What the dataset holds, and ``wall_s``: the time since the run was started, and of earlier runs into it [s]; and
+        the error that says that trials of it are lost, if some are.
 
     Raises:
         ConfigError: If the configuration cannot be used after all.
@@ -92,8 +93,9 @@ def launch(
     code, message, summary = 1, "internal error", None
     try:
         summary = _Launcher(run, config, notes, onlooker, interruptions).run_to_the_end()
-        code, message = 0, ""
-        return summary
+        lost = loss(summary["outcomes"], hint=goes_on(run.record))
+        code, message = (0, "") if lost is None else (lost.exit_code, str(lost))
+        return summary, lost
     except ThrowcollectError as error:
         code, message = error.exit_code, str(error)
         raise
@@ -171,6 +173,7 @@ class _Launcher:
         self._onlooker = onlooker
         self._interruptions = interruptions
         self._simulations = self._wanted = run.record.simulations
+        self._set_aside: set[str] = set()
         self._place = place_of(run.record, config)
         self._supervisor = Supervisor(self._place, config.run, simulations=self._simulations)
         self._listening = Listening(
@@ -223,11 +226,12 @@ class _Launcher:
         return end
 
     def _check(self, end: NodeExit | None) -> None:
-        if self._interruptions() and (end is None or end.code != 0):
+        finished = end is not None and end.code in (0, LossError.exit_code)
+        if self._interruptions() and not finished:
             dataset = self._run.record.dataset
             message = f"interrupted; finished throws are in {dataset}, the dataset is not complete"
             raise Interrupted(message, hint=goes_on(self._run.record))
-        if end is not None and end.code != 0:
+        if end is not None and not finished:
             kind = DatasetError if end.code == DatasetError.exit_code else WorkerError
             hint = goes_on(self._run.record) if kind is WorkerError else None
             raise kind(f"the coordinator stopped: {end.reason}", evidence=end.log or None, hint=hint)
@@ -245,6 +249,11 @@ class _Launcher:
         self._notes.progress(progress)
         self._onlooker.update(progress)
         self._supervisor.replace(progress.hung)
+        for name in progress.set_aside.keys() - self._set_aside:
+            self._set_aside.add(name)
+            self._onlooker.warn(
+                f"{name} gets no more trials, as others could do what it refused: {progress.set_aside[name]}"
+            )
 
     def _offer_scaling(self, node: ros.Node) -> None:
         offer_scaling(node, self._simulations, self._want)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from throwcollect.errors import ConfigError, DatasetError, Interrupted, ThrowcollectError, WorkerError
+from throwcollect.errors import ConfigError, DatasetError, Interrupted, LossError, ThrowcollectError, WorkerError
 from throwcollect.runtime.records import Record, Records, Run
 
 if TYPE_CHECKING:
@@ -112,7 +112,7 @@ def failure(record: Record) -> ThrowcollectError | None:
     """The error that an ended run ended with; None if it finished its dataset."""
     if record.exit_code == 0:
         return None
-    kinds = (ConfigError, WorkerError, DatasetError, Interrupted)
+    kinds = (ConfigError, WorkerError, DatasetError, LossError, Interrupted)
     kind = next((each for each in kinds if each.exit_code == record.exit_code), ThrowcollectError)
     return kind(record.message)
 

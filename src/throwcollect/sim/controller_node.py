@@ -44,7 +44,7 @@ class ControllerNode(Node):
         self._limb = limb
         self._log = _LogHandler(self)
         limb.controller.logger.addHandler(self._log)
-        ParameterFace(self, limb)
+        ParameterFace(self, limb, simulation.trial)
         self._action = ControllerAction(
             self, simulation, controller, aborts_refused=simulation.config.controllers.refused_goals == "abort"
         )
@@ -98,6 +98,9 @@ class ControllerNode(Node):
         self._simulation.follow(self.controller, read_trajectory(message))
 
     def _scale_speed(self, message: Any) -> None:
+        if self._simulation.trial.leased:
+            self.get_logger().warning(f"the speed is not scaled: {self._simulation.trial.lease_in_words}")
+            return
         self._limb.controller.scale_speed(message.factor)
 
     def _query(self, request: Any, response: Any) -> Any:

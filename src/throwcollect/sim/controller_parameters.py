@@ -10,6 +10,7 @@ from throwcollect.control import ControllerParameters
 from throwcollect.errors import ConfigError
 from throwcollect.ros import Node, Parameter, ParameterDescriptor, SetParametersResult
 from throwcollect.sim.limb import Limb
+from throwcollect.sim.present_trial import PresentTrial
 
 _READ_ONLY = {
     "joints": "Joint names of the system",
@@ -37,16 +38,20 @@ class ParameterFace:
     Args:
         node: Node of the controller.
         limb: The limb.
+        trial: The simulation's trial; while it is leased, nothing is changed.
     """
 
-    def __init__(self, node: Node, limb: Limb) -> None:
+    def __init__(self, node: Node, limb: Limb, trial: PresentTrial) -> None:
         self._limb = limb
+        self._trial = trial
         for name, value, description, read_only in _declared(limb.controller.parameters):
             node.declare_parameter(name, value, ParameterDescriptor(description=description, read_only=read_only))
         node.add_on_set_parameters_callback(self._check)
         node.add_post_set_parameters_callback(self._apply)
 
     def _check(self, parameters: list[Parameter]) -> Any:
+        if self._trial.leased:
+            return SetParametersResult(successful=False, reason=self._trial.lease_in_words)
         try:
             _changed(self._limb.controller.parameters, _values(parameters))
         except ConfigError as error:

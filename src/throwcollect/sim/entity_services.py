@@ -67,6 +67,7 @@ class EntityServices:
 
     def _set_state(self, request: Any, response: Any) -> None:
         del response
+        self._simulation.trial.require_free()
         state, acceleration = request.state, request.state.acceleration
         accelerations = (acceleration.linear, acceleration.angular)
         self._entities.place(
@@ -97,6 +98,7 @@ class EntityServices:
 
     def _delete(self, request: Any, response: Any) -> None:
         del response
+        self._simulation.trial.require_free()
         self._entities.remove(request.entity)
 
 

@@ -45,9 +45,12 @@ class Limb:
         self.name = graph_name(name, config.names)
         """Name of the controller in the ROS graph."""
         brakes = config.hold == "decelerate"
+        self._configured = ControllerParameters.talos(
+            joints, max_deceleration=config.max_deceleration_radps2 if brakes else None
+        )
         self._controller = JointTrajectoryController(
             self.name,
-            ControllerParameters.talos(joints, max_deceleration=config.max_deceleration_radps2 if brakes else None),
+            self._configured,
             period_ns=period_ns,
             deviations=Deviations(
                 hold="command" if config.hold == "command" else "measured", topic_aborts_goal=config.topic_aborts_goal
@@ -91,6 +94,13 @@ class Limb:
         self._elapsed_ns, self._points, self._states = [], [], []
         if self._controller.goal_id is not None:
             self._wake()
+
+    def restore(self) -> None:
+        """Undo whatever clients have changed of the controller: its parameters and the speed of its clock."""
+        if self._controller.parameters != self._configured:
+            self._controller.parameters = self._configured
+        if self._controller.speed_scaling_factor != 1.0:
+            self._controller.scale_speed(1.0)
 
     def pop_results(self) -> tuple[GoalResult, ...]:
         """Results of the goals that have ended since the last call, oldest first."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Mapping
 from typing import Any
 
 from throwcollect.config.schema import Config
@@ -19,6 +20,7 @@ from throwcollect.ros import (
     DurabilityPolicy,
     HistoryPolicy,
     Node,
+    Parameter,
     ParameterDescriptor,
     Publisher,
     QoSProfile,
@@ -27,10 +29,13 @@ from throwcollect.ros import (
     graph_changes,
     provide_time,
 )
+from throwcollect.run_key import Signer
 from throwcollect.sim.controller_manager import ControllerManager
 from throwcollect.sim.controller_node import ControllerNode
-from throwcollect.sim.simulation import Simulation, State, TrialSetup
+from throwcollect.sim.present_trial import TrialSetup
+from throwcollect.sim.simulation import Simulation, State
 from throwcollect.sim.simulation_control import SimulationControl
+from throwcollect.trial.lease import CONTROLLERS, LEASE, NUMBER, Lease
 
 SetParametersResult: Any = get_message("rcl_interfaces/msg/SetParametersResult")
 _CLOCK = "rosgraph_msgs/msg/Clock"
@@ -48,6 +53,7 @@ _IDLE_S = 0.2
 _REPEAT_S = 0.02
 """Real time between two messages on a topic of samples while time stands still; that of the robot's joint states."""
 
+_FACTOR = "sim.real_time_factor"
 _NO_LIMIT = 0.0
 _SHOWN = ("robot.", "tool.", "sim.", "controllers.", "task.", "record.")
 """Sections of the configuration that can be read as parameters, besides the physics, which can be set."""
@@ -85,6 +91,8 @@ class SimulationNode(Node):
         self._noticed_changes = -1
         self._published_at = 0.0
         self._told_ns = -1
+        self._signer = Signer.of_environment()
+        self._restoring = False
         self._control = SimulationControl(self, simulation)
         # Last, as coordinators take its presence for that of the whole simulation.
         self._episodes = self.create_publisher(UInt8MultiArray, "episode", _WHOLE)
@@ -125,7 +133,8 @@ class SimulationNode(Node):
             controller.publish_state()
         if (episode := simulation.episode()) is not None:
             header, samples, states = episode
-            self._episodes.publish(pack(Episode(header, *self._encoder.encode(samples, states))))
+            whole = Episode(header, *self._encoder.encode(samples, states))
+            self._episodes.publish(pack(whole, simulation.trial.conditions().to_json(), self._signer))
         self._control.follow_up()
 
     def _publish_samples(self) -> None:
@@ -149,7 +158,7 @@ class SimulationNode(Node):
     def _rests(self) -> bool:
         """Whether time stands still for want of anything to do; in a collection every sample is told once."""
         simulation = self._simulation
-        return simulation.state == State.PLAYING and not simulation.running and simulation.setup.number < 0
+        return simulation.state == State.PLAYING and not simulation.running and simulation.trial.setup.number < 0
 
     def _publish_steps(self, samples: Samples) -> None:
         """Publish the time that steps have led to, as they may end between two samples."""
@@ -183,41 +192,88 @@ class SimulationNode(Node):
 
     def _declare_parameters(self, config: Config) -> None:
         values = dict(leaves(config))
-        self._physics = [key for key in sweepable_keys(config) if is_physics(key)]
-        self.declare_parameter("trial.number", self._simulation.setup.number)
-        self.declare_parameter("trial.controllers", [""])
-        self.declare_parameter("sim.real_time_factor", config.sim.real_time_factor or _NO_LIMIT)
-        for key in self._physics:
-            self.declare_parameter(key, float(values[key]))
+        self._physics = {key: float(values[key]) for key in sweepable_keys(config) if is_physics(key)}
+        self.declare_parameter(NUMBER, self._simulation.trial.setup.number)
+        self.declare_parameter(CONTROLLERS, [""])
+        self.declare_parameter(LEASE, "")
+        self.declare_parameter(_FACTOR, config.sim.real_time_factor or _NO_LIMIT)
+        for key, value in self._physics.items():
+            self.declare_parameter(key, value)
         fixed = ParameterDescriptor(read_only=True, description="of the configuration")
         for key, value in values.items():
             if isinstance(value, str | int | float) and key.startswith(_SHOWN) and not self.has_parameter(key):
                 self.declare_parameter(key, value, fixed)
         self.add_on_set_parameters_callback(self._set_up)
+        self.add_post_set_parameters_callback(self._restore_physics)
 
     def _set_up(self, parameters: Any) -> Any:
-        """Take over parameters: those of the trial and the physics take effect with the next reset."""
-        setup = self._simulation.setup
+        """Take over parameters: a lease begins its trial at once, others take effect with the next reset."""
         values = {parameter.name: parameter.value for parameter in parameters}
-        number = int(values.get("trial.number", setup.number))
-        controllers = tuple(filter(None, values.get("trial.controllers", setup.controllers)))
-        if number >= _MOST_TRIALS:
-            reason = f"trial.number: should be below {_MOST_TRIALS}, got {number}"
-            return SetParametersResult(successful=False, reason=reason)
-        if unknown := [name for name in controllers if name not in self._simulation.limbs]:
-            return SetParametersResult(successful=False, reason=f"no controller {unknown[0]!r}")
         try:
-            config = with_values(setup.config, {key: values[key] for key in self._physics if key in values})
+            self._check_factor(values.get(_FACTOR, _NO_LIMIT))
+            if values.get(LEASE):
+                self._lease(values)
+            elif not self._restoring:
+                self._prepare(values)
         except ConfigError as error:
             return SetParametersResult(successful=False, reason=str(error))
-        factor = values.get("sim.real_time_factor", _NO_LIMIT)
-        if not 0 <= factor < math.inf:
-            reason = f"sim.real_time_factor: should be a finite number, 0 for no limit, got {factor}"
-            return SetParametersResult(successful=False, reason=reason)
-        if "sim.real_time_factor" in values:
-            self._simulation.real_time_factor = factor or None
-        self._simulation.setup = TrialSetup(number, controllers, config)
+        if _FACTOR in values:
+            self._simulation.real_time_factor = values[_FACTOR] or None
         return SetParametersResult(successful=True)
+
+    def _lease(self, values: Mapping[str, Any]) -> None:
+        """Begin the trial of a lease; what it does not say is as configured, whatever was set before."""
+        if missing := [name for name in (NUMBER, CONTROLLERS) if name not in values]:
+            raise ConfigError(f"{LEASE}: comes without {missing[0]}")
+        number, controllers = self._checked_trial(values)
+        physics = {key: values[key] for key in self._physics if key in values}
+        lease = Lease(self.get_namespace(), number, controllers, physics)
+        if not lease.is_signed(values[LEASE], self._signer):
+            raise ConfigError(f"{LEASE}: is not signed with the key of this run")
+        config = with_values(self._simulation.config, physics)
+        self._simulation.lease(TrialSetup(number, controllers, config, values[LEASE]))
+
+    def _prepare(self, values: Mapping[str, Any]) -> None:
+        """Set up what the next reset prepares, unless the simulation is leased; a negative number ends the lease."""
+        trial = self._simulation.trial
+        changed = [name for name in values if name != _FACTOR]
+        if trial.leased and changed == [NUMBER] and values[NUMBER] < 0:
+            trial.set_up_nothing()
+        elif trial.leased and changed:
+            raise ConfigError(f"{changed[0]}: {trial.lease_in_words}")
+        number, controllers = self._checked_trial(values)
+        config = with_values(trial.setup.config, {key: values[key] for key in self._physics if key in values})
+        if changed:
+            trial.setup = TrialSetup(number, controllers, config)
+
+    def _checked_trial(self, values: Mapping[str, Any]) -> tuple[int, tuple[str, ...]]:
+        setup = self._simulation.trial.setup
+        number = int(values.get(NUMBER, setup.number))
+        controllers = tuple(filter(None, values.get(CONTROLLERS, setup.controllers)))
+        if number >= _MOST_TRIALS:
+            raise ConfigError(f"{NUMBER}: should be below {_MOST_TRIALS}, got {number}")
+        if unknown := [name for name in controllers if name not in self._simulation.limbs]:
+            raise ConfigError(f"no controller {unknown[0]!r}")
+        return number, controllers
+
+    @staticmethod
+    def _check_factor(factor: float) -> None:
+        if not 0 <= factor < math.inf:
+            raise ConfigError(f"{_FACTOR}: should be a finite number, 0 for no limit, got {factor}")
+
+    def _restore_physics(self, parameters: Any) -> None:
+        """Have parameters that a lease leaves as configured show that, should somebody have set them before."""
+        given = {parameter.name for parameter in parameters}
+        if LEASE not in given or not self._simulation.trial.leased:
+            return
+        stray = [key for key, value in self._physics.items() if key not in given and self._shown(key) != value]
+        if stray:
+            self._restoring = True
+            self.set_parameters([Parameter(key, value=self._physics[key]) for key in stray])
+            self._restoring = False
+
+    def _shown(self, key: str) -> Any:
+        return self.get_parameter(key).value
 
 
 def _everything(config: Config) -> Config:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Hashable, Iterable, Mapping
-from dataclasses import dataclass
 from enum import IntEnum, IntFlag
 
 import numpy as np
@@ -22,24 +21,21 @@ from throwcollect.control import (
     TrajectoryGoal,
     TrajectoryState,
 )
-from throwcollect.episode.record import ControllerSamples, EpisodeHeader, GoalOutcome, Samples
+from throwcollect.episode.record import ControllerSamples, EpisodeHeader, Samples
 from throwcollect.errors import RequestError
 from throwcollect.robots.description import start_posture
 from throwcollect.robots.talos import CONTROLLERS
 from throwcollect.sim.entities import Entities
 from throwcollect.sim.limb import Limb
+from throwcollect.sim.present_trial import PresentTrial, TrialSetup
 from throwcollect.sim.step_request import StepRequest
 from throwcollect.sim.world import World
 
-_NO_TRIAL = -1
 _SLICE_S = 0.5
 """Simulated time between two looks at the inputs within a trial or many steps: about 20 ms of real time."""
 
 _WATCHED_SLICE_S = 0.05
 """The same while somebody watches, and otherwise: the period of action feedback, as upstream."""
-
-_EXECUTING = 2
-"""action_msgs/msg/GoalStatus.STATUS_EXECUTING."""
 
 
 class State(IntEnum):
@@ -60,21 +56,6 @@ class Scope(IntFlag):
     ALL = TIME | STATE | SPAWNED
 
 
-@dataclass(frozen=True)
-class TrialSetup:
-    """What the next reset prepares.
-
-    Attributes:
-        number: Number of the trial; negative for none.
-        controllers: Controllers that must have a goal before the clock runs; with none, any goal starts it.
-        config: Configuration with the trial's values.
-    """
-
-    number: int
-    controllers: tuple[str, ...]
-    config: Config
-
-
 class Simulation:
     """Steps one world as fast as it can while a run goes on.
 
@@ -88,7 +69,7 @@ class Simulation:
 
     def __init__(self, config: Config) -> None:
         self.config = config
-        self.setup = TrialSetup(_NO_TRIAL, (), config)
+        self.trial = PresentTrial(config)
         self.state = State.PLAYING
         self.world = World(config)
         self.entities = Entities(self.world, config.robot.name)
@@ -104,7 +85,6 @@ class Simulation:
         self._keeps_states = "controller_state" in config.record.topics
         self.real_time_factor = config.sim.real_time_factor
         self._results: list[tuple[str, GoalResult]] = []
-        self._goals: dict[str, GoalOutcome] = {}
         self.reset()
 
     @property
@@ -117,12 +97,31 @@ class Simulation:
         """Whether there is something to `advance`: the clock runs, or steps are left to be taken."""
         return self._steps is not None or (self._running and self.state == State.PLAYING)
 
+    def lease(self, setup: TrialSetup) -> None:
+        """Begin a trial for a coordinator, with controllers as they are configured.
+
+        Args:
+            setup: The trial, with its lease.
+
+        Raises:
+            ConfigError: If there is no such start state.
+        """
+        self.trial.leased = False
+        for limb in self.limbs.values():
+            limb.restore()
+        self.trial.setup = setup
+        self.reset()
+        self.trial.leased = True
+
     def set_state(self, state: State) -> None:
         """Play, pause, stop or quit; stopping resets everything.
 
         Raises:
             ConfigError: If there is no start state to go back to; the state is set all the same.
+            RequestError: ``RESULT_INCORRECT_STATE`` if it is to be stopped while it is leased.
         """
+        if state == State.STOPPED:
+            self.trial.require_free()
         self.state = state
         self._interrupt_steps(f"the simulation is {state.name} now")
         if state == State.STOPPED:
@@ -148,21 +147,22 @@ class Simulation:
             return
         self._interrupt_steps("the simulation was reset")
         self._running = False
-        setup = self.setup
+        setup = self.trial.setup
         start_ns = self.now_ns
         if of_time:
             start_ns = 0 if setup.number < 0 else setup.config.trial_start_ns(setup.number)
         if of_state:
+            self.trial.begin(setup.config)
             self.world.reset(setup.config, start_ns=start_ns)
             posture = start_posture(setup.config)
         else:
+            self.trial.begin(None)
             self.world.restart_clock(start_ns)
             posture = self.world.posture()
         for limb in self.limbs.values():
             limb.reset(start_ns, posture)
         self._collect_results()
         self._command = np.array([posture[joint] for joint in self.world.moving])
-        self._goals = {}
         self._in_trial = setup.number >= 0 and of_time and of_state
         self._published = 0
 
@@ -172,10 +172,12 @@ class Simulation:
         Returns:
             None if the goal is accepted, else the reason of the refusal.
         """
+        if (leased := self.trial.refusal(controller, goal=True)) is not None:
+            return leased
         refusal = self.limbs[controller].submit(goal_id, goal, self.now_ns)
         self._collect_results()
         if refusal is None:
-            self._goals[controller] = GoalOutcome(controller, _EXECUTING, 0, "")
+            self.trial.note_goal(controller, goal)
             self._run_unless_awaiting()
         return refusal
 
@@ -183,8 +185,11 @@ class Simulation:
         """Cancel a goal.
 
         Returns:
-            Whether it was being executed.
+            Whether it was being executed, and may be cancelled.
         """
+        if self.trial.refusal(controller, goal=False) is not None:
+            return False
+        self.trial.note_other_input(controller)
         cancelled = self._observed(controller).controller.cancel(goal_id)
         self._collect_results()
         return cancelled
@@ -195,9 +200,12 @@ class Simulation:
         Returns:
             None if it is accepted, else the reason of the refusal.
         """
+        if (leased := self.trial.refusal(controller, goal=False)) is not None:
+            return leased
         refusal = self.limbs[controller].follow(trajectory, self.now_ns)
         self._collect_results()
         if refusal is None:
+            self.trial.note_other_input(controller)
             self._run_unless_awaiting()
         return refusal
 
@@ -289,14 +297,14 @@ class Simulation:
         """What the trial yielded, once it has ended; then never again until the next reset."""
         if not self._in_trial or self.world.end_reason is None:
             return None
-        self._in_trial = False
+        self._in_trial = self.trial.leased = False
         samples = self.world.samples()
         header = EpisodeHeader(
-            trial=self.setup.number,
+            trial=self.trial.setup.number,
             start_ns=int(samples.stamps_ns[0]),
             end_reason=self.world.end_reason,
             contacts=self.world.contacts(),
-            goals=tuple(self._goals[name] for name in self.limbs if name in self._goals),
+            goals=self.trial.outcomes(self.limbs),
             samples=len(samples),
         )
         states = {}
@@ -323,7 +331,7 @@ class Simulation:
                 limb.pop_states()
 
     def _run_unless_awaiting(self) -> None:
-        self._running |= all(name in self._goals for name in self.setup.controllers)
+        self._running |= self.trial.has_all_goals
 
     def _take_steps(self, request: StepRequest, most: int) -> None:
         request.taken += self.step(min(most, request.wanted - request.taken))
@@ -383,5 +391,4 @@ class Simulation:
         for name, limb in self.limbs.items():
             for result in limb.pop_results():
                 self._results.append((name, result))
-                if name in self._goals:
-                    self._goals[name] = GoalOutcome(name, result.status, result.error_code, result.error_string)
+                self.trial.note_result(name, result)

@@ -100,6 +100,7 @@ class SimulationControl:
 
     def _reset(self, request: Any, response: Any) -> None:
         del response
+        self._simulation.trial.require_free()
         if request.scope in _WHOLE_SCOPES:
             self._simulation.reset()
             return

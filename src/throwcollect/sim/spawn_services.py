@@ -31,6 +31,7 @@ class SpawnServices:
     """
 
     def __init__(self, node: Node, simulation: Simulation) -> None:
+        self._simulation = simulation
         self._entities = simulation.entities
         for service, name, fill in (
             (SpawnEntity, "spawn_entity", self._spawn_one),
@@ -40,9 +41,11 @@ class SpawnServices:
             node.create_service(service, name, answering(service, fill))
 
     def _spawn_one(self, request: Any, response: Any) -> None:
+        self._simulation.trial.require_free()
         response.entity_name = self._spawn(request, request)
 
     def _spawn_all(self, request: Any, response: Any) -> None:
+        self._simulation.trial.require_free()
         if len(request.spawn_requests) > _MOST_REQUESTS:
             message = f"{len(request.spawn_requests)} requests in one call; at most {_MOST_REQUESTS}"
             raise RequestError("RESULT_OPERATION_FAILED", message)

@@ -11,7 +11,7 @@ import pybullet
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
-from throwcollect.episode.record import Contact, Samples
+from throwcollect.episode.record import Contact, EndReason, Samples
 from throwcollect.robots.description import locked_joints, physics_description, start_posture
 from throwcollect.robots.spoon import ball_seat
 from throwcollect.sim.bullet import BASE, Box, boxes, connect, load_ball, load_scenery, renew_pairs, set_physics
@@ -58,7 +58,7 @@ class World:
     _ball: int
     _steps: int
     _contacts: ContactLog
-    _end_reason: str | None
+    _end_reason: EndReason | None
     _settled: Row
     _settled_pressing: set[Surface]
     _pressing: set[Surface]
@@ -146,7 +146,7 @@ class World:
         self._begin(start_ns, self._joint_states())
 
     @property
-    def end_reason(self) -> str | None:
+    def end_reason(self) -> EndReason | None:
         """Why the trial ended: ``landed``, ``rest`` or ``timeout``; None while it goes on."""
         return self._end_reason
 
@@ -344,7 +344,7 @@ class World:
     def _stamp_ns(self, step: int) -> int:
         return self._start_ns + step * _NS_PER_S // self._hz
 
-    def _judge(self, target: Sequence[float]) -> str | None:
+    def _judge(self, target: Sequence[float]) -> EndReason | None:
         """Whether the trial ends with the sample just recorded, and why."""
         before, now = self._rows[-2:]
         if now[BALL_HEIGHT] < self._landing_height <= before[BALL_HEIGHT] and "spoon" not in self._contacts.bodies:

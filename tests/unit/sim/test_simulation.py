@@ -38,7 +38,7 @@ def shared() -> Iterator[Simulation]:
 
 @pytest.fixture
 def simulation(shared: Simulation) -> Simulation:
-    shared.setup = TrialSetup(-1, (), CONFIG)
+    shared.trial.setup = TrialSetup(-1, (), CONFIG)
     shared.state = State.PLAYING
     shared.reset()
     shared.pop_results()
@@ -54,7 +54,7 @@ def run(simulation: Simulation) -> None:
 
 
 def trial(simulation: Simulation, number: int = 0) -> None:
-    simulation.setup = TrialSetup(number, (ARM, TORSO), CONFIG)
+    simulation.trial.setup = TrialSetup(number, (ARM, TORSO), CONFIG)
     simulation.reset()
     assert simulation.submit(ARM, 1, swing()) is None
     assert not simulation.running
@@ -68,7 +68,7 @@ def test_the_clock_stands_still_until_every_awaited_controller_has_a_goal(simula
 
 
 def test_a_trajectory_that_is_no_goal_waits_for_the_awaited_goals(simulation: Simulation) -> None:
-    simulation.setup = TrialSetup(0, (ARM,), CONFIG)
+    simulation.trial.setup = TrialSetup(0, (ARM,), CONFIG)
     simulation.reset()
     assert simulation.follow(HEAD, goal(HEAD).trajectory) is None
     assert not simulation.running

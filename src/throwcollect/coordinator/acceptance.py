@@ -1,0 +1,113 @@
+"""Whether an episode that arrives is the one that was asked for, and whether it is sound."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+
+from throwcollect.build import build_digest
+from throwcollect.config.schema import Config
+from throwcollect.config.values import is_physics
+from throwcollect.coordinator.goals import goal_message, trial_goals
+from throwcollect.dataset.verify_episode import EpisodeCheck
+from throwcollect.episode.channels import Channels
+from throwcollect.episode.message import Delivery, Episode
+from throwcollect.errors import DatasetError
+from throwcollect.robots.description import full_description, start_posture
+from throwcollect.robots.trajectory import JointTrajectory
+from throwcollect.sweep.plan import Plan, Trial
+from throwcollect.tasks.trajectory import throw_trajectory
+from throwcollect.trial.conditions import Conditions, Settings, conditions_from_json
+from throwcollect.trial.lease import Lease
+
+_MOST_TOLD = 3
+"""Differences that are told of one episode."""
+
+
+@dataclass(frozen=True)
+class Assignment:
+    """Everything that is worked out of a trial before it is leased.
+
+    Attributes:
+        config: Configuration of the trial.
+        trajectory: What the joints are to follow.
+        physics: What the trial replaces of the simulation's configuration, by dotted key.
+        messages: Goal of each controller that moves, as a message.
+        conditions: What the episode has to be simulated with; its lease is not known yet.
+    """
+
+    config: Config
+    trajectory: JointTrajectory
+    physics: Mapping[str, float]
+    messages: Mapping[str, Any]
+    conditions: Conditions
+
+    def lease(self, simulation: str, trial: int) -> Lease:
+        """The lease of the trial for one simulation."""
+        return Lease(simulation, trial, tuple(self.messages), self.physics)
+
+
+class Acceptance:
+    """Knows what each trial of a plan has to be simulated with, and checks what simulations hand over.
+
+    Args:
+        config: Configuration of the collection.
+    """
+
+    def __init__(self, config: Config) -> None:
+        self._config = config
+        self._settings = Settings(config)
+        self._channels = Channels(config, full_description(config))
+
+    def assign(self, plan: Plan, trial: Trial) -> Assignment:
+        """Work out a trial."""
+        config = plan.config_of(trial)
+        trajectory = throw_trajectory(config)
+        goals = trial_goals(trajectory, start_posture(config))
+        physics = {key: value for key, value in trial.values.items() if is_physics(key)}
+        conditions = Conditions(
+            build=build_digest(),
+            settings=self._settings.digest,
+            values=self._settings.replaced_by(config),
+            inputs={controller: goal.digest for controller, goal in goals.items()},
+            lease="",
+        )
+        messages = {controller: goal_message(goal) for controller, goal in goals.items()}
+        return Assignment(config, trajectory, physics, messages, conditions)
+
+    @staticmethod
+    def foreign(delivery: Delivery, assignment: Assignment, token: str) -> str | None:
+        """Why an episode is not the one that was asked for; None if it is.
+
+        Args:
+            delivery: The episode, with what the simulation says of it.
+            assignment: Its trial.
+            token: Signature of the lease.
+        """
+        try:
+            conditions = conditions_from_json(delivery.conditions)
+        except DatasetError as error:
+            return error.message
+        expected = replace(assignment.conditions, lease=token)
+        differences = list(conditions.differences(expected))
+        more = f" and {len(differences) - _MOST_TOLD} more" if len(differences) > _MOST_TOLD else ""
+        return "; ".join(differences[:_MOST_TOLD]) + more or None
+
+    def unsound(self, plan: Plan, episode: Episode) -> str | None:
+        """What is wrong with an episode that nobody could want in a dataset; None if nothing is.
+
+        Args:
+            plan: The plan that has its trial.
+            episode: The episode.
+        """
+        return next(self._problems(plan, episode), None)
+
+    def _problems(self, plan: Plan, episode: Episode) -> Iterator[str]:
+        yield from EpisodeCheck(plan, {}).content_problems(episode, self._channels)
+        samples = episode.samples()
+        for column in fields(samples):
+            if not np.isfinite(getattr(samples, column.name)).all():
+                yield f"{column.name} holds numbers that are not finite"

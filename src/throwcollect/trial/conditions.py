@@ -1,0 +1,121 @@
+"""Everything that an episode was simulated with besides its start: worked out twice, and compared.
+
+The coordinator works the conditions of a trial out from the plan, the simulation from what it really used. An episode
+whose conditions differ is not one of the plan, whoever or whatever caused that.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
+
+from pydantic import TypeAdapter, ValidationError
+
+from throwcollect.config.schema import Config
+from throwcollect.config.values import is_physics, leaves, sweepable_keys
+from throwcollect.errors import DatasetError
+from throwcollect.sweep.digest import determines_samples
+
+_TASK = "task."
+_TASK_END = "task.end."
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """What one episode was simulated with.
+
+    Attributes:
+        build: Digest of sources, engine and model (`build.build_digest`).
+        settings: Digest of what the configuration of the whole collection says of the simulation.
+        values: What the trial replaces of it, by dotted key.
+        inputs: Digest of the goal that each moving controller was given, by the controller's name.
+        lease: Token of the lease that it was simulated for; empty if for none.
+    """
+
+    build: str
+    settings: str
+    values: Mapping[str, float]
+    inputs: Mapping[str, str]
+    lease: str
+
+    def to_json(self) -> str:
+        """The conditions in JSON; equal ones give equal text."""
+        return json.dumps(asdict(self), sort_keys=True)
+
+    def differences(self, expected: Conditions) -> Iterator[str]:
+        """In what these conditions differ from those that were expected, a phrase each."""
+        if self.lease != expected.lease:
+            yield "it was not simulated for this lease"
+        if self.build != expected.build:
+            yield "its sources, its physics engine or its robot model are not those of the coordinator"
+        if self.settings != expected.settings:
+            yield "its configuration is another one"
+        for key in sorted({*self.values, *expected.values}):
+            used, wanted = self.values.get(key), expected.values.get(key)
+            if used != wanted:
+                yield f"{key} was {_told(used)}, not {_told(wanted)}"
+        for controller in sorted({*self.inputs, *expected.inputs}):
+            used_goal, wanted_goal = self.inputs.get(controller), expected.inputs.get(controller)
+            if used_goal != wanted_goal:
+                yield f"{controller} was given {'another goal' if used_goal and wanted_goal else _goal(wanted_goal)}"
+
+
+def _told(value: float | None) -> str:
+    return "as configured" if value is None else repr(value)
+
+
+def _goal(wanted: str | None) -> str:
+    return "a goal that the trial does not have" if wanted is None else "no goal"
+
+
+_CONDITIONS = TypeAdapter(Conditions)
+
+
+def conditions_from_json(text: str) -> Conditions:
+    """Read what `Conditions.to_json` writes.
+
+    Raises:
+        DatasetError: If the text is anything else.
+    """
+    try:
+        return _CONDITIONS.validate_json(text, strict=True)
+    except ValidationError as error:
+        raise DatasetError(f"conditions of the episode: {error.errors()[0]['msg']}") from error
+
+
+class Settings:
+    """What of a configuration concerns simulations, apart from what is swept.
+
+    Attributes:
+        digest: SHA-256, in hexadecimal.
+
+    Args:
+        config: Configuration of the collection.
+    """
+
+    def __init__(self, config: Config) -> None:
+        self._values = dict(leaves(config))
+        self._physics = [key for key in sweepable_keys(config) if is_physics(key)]
+        lines = [f"{key}={json.dumps(value)}" for key, value in sorted(_concerning(self._values).items())]
+        self.digest = hashlib.sha256("\n".join(lines).encode()).hexdigest()
+
+    def replaced_by(self, trial: Config) -> dict[str, float]:
+        """What the configuration of a trial replaces, by dotted key.
+
+        Args:
+            trial: The configuration, with some of the physics replaced.
+        """
+        values = dict(leaves(trial))
+        return {key: float(values[key]) for key in self._physics if values[key] != self._values[key]}
+
+
+def _concerning(values: Mapping[str, object]) -> dict[str, object]:
+    """Keys that simulations heed, with their values; of the task, that is what moves and where it starts."""
+    return {
+        key: None if key.startswith(_TASK_END) else value
+        for key, value in values.items()
+        if (determines_samples(key) and key != "seed") or key == "record.zstd_level"
+        if not key.startswith(_TASK) or key.startswith(_TASK_END) or is_physics(key)
+    }
