@@ -14,13 +14,16 @@ from pathlib import Path
 import zstandard
 from isal.isal_zlib import crc32
 
+from throwcollect.coordinator.acceptance import Acceptance, Assignment
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.episode.message import pack, unpack
 from throwcollect.robots.model import joint_limits
+from throwcollect.run_key import Signer
 from throwcollect.sweep.plan import Plan
 from throwcollect.tasks.throw import judge
-from throwcollect.tasks.trajectory import throw_trajectory
+
+_SIGNER = Signer(b"key of a run")
 
 
 def measure(directory: Path) -> tuple[float, float]:
@@ -30,26 +33,32 @@ def measure(directory: Path) -> tuple[float, float]:
         directory: A finished dataset, whose episodes are collected once more.
     """
     dataset = Dataset.open(directory)
-    messages = [pack(episode) for episode in dataset]
+    acceptance = Acceptance(dataset.config)
+    assignments = [acceptance.assign(dataset.plan, trial) for trial in dataset.plan.trials]
+    messages = [pack(episode, assignments[episode.header.trial].conditions.to_json(), _SIGNER) for episode in dataset]
     random.Random(0).shuffle(messages)
     with tempfile.TemporaryDirectory(prefix="throwcollect-bench-") as scratch:
-        return _taken_in(messages, dataset.plan, Path(scratch) / "data"), _raw(messages, Path(scratch) / "raw")
+        taken_in = _taken_in(messages, dataset.plan, acceptance, assignments, Path(scratch) / "data")
+        return taken_in, _raw(messages, Path(scratch) / "raw")
 
 
-def _taken_in(messages: list[bytes], plan: Plan, directory: Path) -> float:
+def _taken_in(
+    messages: list[bytes], plan: Plan, acceptance: Acceptance, assignments: list[Assignment], directory: Path
+) -> float:
     limits = joint_limits()
-    configs = [plan.config_of(trial) for trial in plan.trials]
-    trajectories = [throw_trajectory(config) for config in configs]
     writer = DatasetWriter.create(directory, plan)
     began = time.perf_counter()
     for message in messages:
-        episode = unpack(message)
-        trial = episode.header.trial
+        delivery = unpack(message, _SIGNER)
+        episode = delivery.episode
+        assignment = assignments[episode.header.trial]
+        if acceptance.foreign(delivery, assignment, "") or acceptance.unsound(plan, episode):
+            raise ValueError(f"trial {episode.header.trial} is refused")
         result = judge(
             episode.samples(),
             episode.header,
-            config=configs[trial],
-            trajectory=trajectories[trial],
+            config=assignment.config,
+            trajectory=assignment.trajectory,
             limits=limits,
         )
         writer.append(episode, result)
@@ -59,7 +68,7 @@ def _taken_in(messages: list[bytes], plan: Plan, directory: Path) -> float:
 
 
 def _raw(messages: list[bytes], path: Path) -> float:
-    chunks = [unpack(message).chunk for message in messages]
+    chunks = [unpack(message, _SIGNER).episode.chunk for message in messages]
     decompressor = zstandard.ZstdDecompressor()
     began = time.perf_counter()
     with path.open("wb", buffering=0) as file:

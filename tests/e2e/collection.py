@@ -25,7 +25,7 @@ sweep:
     task.end.arm_right_4_joint: {{min: -0.7, max: -0.4}}
     task.duration_s: {{min: 1.0, max: 1.2}}
     ball.mass_kg: {{min: 0.03, max: 0.06}}
-run: {{runtime: local}}
+run: {{runtime: local, replay: 0}}
 """
 """Its sampler draws without a library that takes each command a second to import."""
 

@@ -183,15 +183,23 @@ class Robot:
         kind = "".join(word.capitalize() for word in service.split("_"))
         return self.result(self.ask(f"simulation_interfaces/srv/{kind}", service, **fields))
 
-    def parameters(self, service: str, **fields: Any) -> Any:
-        """Call one of the node's services for parameters."""
+    def parameters(self, service: str, *, node: str | None = None, **fields: Any) -> Any:
+        """Call one of the services for parameters, of the simulation's node or of another one in its namespace."""
         kind = "".join(word.capitalize() for word in service.split("_"))
-        return self.result(self.ask(f"rcl_interfaces/srv/{kind}", f"{self.name}/{service}", **fields))
+        return self.result(self.ask(f"rcl_interfaces/srv/{kind}", f"{node or self.name}/{service}", **fields))
 
-    def set(self, values: Mapping[str, Any]) -> Any:
+    def set(self, values: Mapping[str, Any], *, node: str | None = None) -> Any:
         """Set parameters all at once; returns rcl_interfaces/msg/SetParametersResult."""
         messages = [Parameter(name, value=value).to_parameter_msg() for name, value in values.items()]
-        return self.parameters("set_parameters_atomically", parameters=messages).result
+        return self.parameters("set_parameters_atomically", node=node, parameters=messages).result
+
+    def publish(self, topic: str, message: Any) -> None:
+        """Publish a message once the simulation listens, and let it have that."""
+        publisher = self.node.create_publisher(type(message), self.topic(topic), 10)
+        self.wait_until(lambda: publisher.get_subscription_count() > 0, topic)
+        publisher.publish(message)
+        self.state()
+        self.node.destroy_publisher(publisher)
 
     def reset(self) -> None:
         assert self.call("reset_simulation").result.result == Result.RESULT_OK

@@ -10,9 +10,11 @@ from throwcollect.config.values import is_physics, sweepable_keys
 from throwcollect.episode.message import unpack
 from throwcollect.interfaces import deserialize, message_class
 from throwcollect.ros import Parameter
+from throwcollect.run_key import Signer
 
-OWN = ["trial.number", "trial.controllers", "sim.real_time_factor"]
-INTEGER, DOUBLE, STRINGS = 2, 3, 9
+OWN = ["trial.number", "trial.controllers", "trial.lease", "sim.real_time_factor"]
+UNKEYED = Signer(b"")
+INTEGER, DOUBLE, STRING, STRINGS = 2, 3, 4, 9
 
 
 def test_trial_clock_and_swept_physics_are_parameters(robot: Robot) -> None:
@@ -26,7 +28,7 @@ def test_parameters_are_described_with_their_types_and_have_the_values_of_the_co
     names = [*OWN, "ball.mass_kg"]
     described = robot.parameters("describe_parameters", names=names).descriptors
     assert [(each.name, each.type) for each in described] == list(
-        zip(names, [INTEGER, STRINGS, DOUBLE, DOUBLE], strict=True)
+        zip(names, [INTEGER, STRINGS, STRING, DOUBLE, DOUBLE], strict=True)
     )
     values = robot.parameters("get_parameters", names=["trial.number", "ball.mass_kg"]).values
     assert values[0].integer_value == -1
@@ -85,8 +87,8 @@ def test_a_trial_waits_for_all_its_controllers_and_then_hands_in_its_episode(rob
     assert [robot.outcome(handle)[1] for handle in (first, second)] == [0, 0]
     (message,) = heard
     parts = [each.label for each in deserialize(message, message_class("std_msgs/msg/UInt8MultiArray")).layout.dim]
-    assert parts == ["header", "sha256", "chunk"]
-    episode = unpack(message)
+    assert parts == ["header", "sha256", "conditions", "chunk", "signature"]
+    episode = unpack(message, UNKEYED).episode
     episode.check_records()
     header = episode.header
     assert (header.trial, header.start_ns, header.end_reason) == (5, start_ns, "landed")

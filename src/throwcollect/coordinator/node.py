@@ -53,6 +53,7 @@ class Coordinator(Node):
         self._acceptance = Acceptance(plan.config)
         self._assignments: dict[int, Assignment] = {}
         self._backlog: deque[tuple[Episode, Assignment]] = deque()
+        self._set_aside: dict[str, str] = {}
         self._outcomes: Counter[str] = Counter()
         self._ends: deque[tuple[float, int]] = deque([(time.monotonic(), 0)])
         self._draining = False
@@ -135,6 +136,7 @@ class Coordinator(Node):
         )
         self._writer.append(episode, result)
         self._leases.complete(trial)
+        self._tell_set_aside()
         self._note(trial, result)
 
     def prepare_one(self) -> bool:
@@ -195,9 +197,7 @@ class Coordinator(Node):
             throws_per_s=(ended - before) / (now - since) if now > since else 0.0,
             hung=[name.strip("/") for name, simulation in self._simulations.items() if simulation.hung],
             wanted=self._config.until.landed if self._config.until else None,
-            set_aside={
-                name.strip("/"): reason for name in self._simulations if (reason := self._leases.set_aside(name))
-            },
+            set_aside={name.strip("/"): reason for name, reason in self._set_aside.items()},
         )
         self._progress.publish(progress.message())
         return progress
@@ -287,12 +287,17 @@ class Coordinator(Node):
             given_up = self._leases.fail(namespace, reason, refused=refused)
             self._give_back(namespace, trial, reason, given_up and given_up[1])
 
+    def _tell_set_aside(self) -> None:
+        aside = {name: reason for name in self._simulations if (reason := self._leases.set_aside(name)) is not None}
+        for name in aside.keys() - self._set_aside.keys():
+            reason = f"others could do what it refused: {aside[name]}"
+            self.get_logger().warning(f"{name}: gets no more trials, as {reason}")
+        self._set_aside = aside
+
     def _give_back(self, namespace: str, trial: int, reason: str, given_up: list[str] | None) -> None:
         """Tell of a trial that goes to another simulation, or write that it is lost, with the reasons."""
         self.get_logger().warning(f"{namespace}: trial {trial} is given to another simulation: {reason}")
         self._writer.note("fail", trial=trial, simulation=namespace.strip("/"), reason=reason)
-        if (aside := self._leases.set_aside(namespace)) is not None:
-            self.get_logger().warning(f"{namespace}: gets no more trials, as others could do what it refused: {aside}")
         if given_up is not None:
             del self._assignments[trial]
             self._writer.append_lost(trial, "; ".join(given_up))

@@ -7,7 +7,7 @@ from throwcollect.config.values import is_physics, with_values
 from throwcollect.coordinator.goals import trial_goals
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.chunk import ChunkEncoder
-from throwcollect.episode.message import Episode
+from throwcollect.episode.message import Delivery, Episode
 from throwcollect.errors import ThrowcollectError
 from throwcollect.robots.description import full_description, start_posture
 from throwcollect.sim.present_trial import TrialSetup
@@ -33,8 +33,16 @@ class Replayer:
         self._simulation.real_time_factor = None
         self._encoder = ChunkEncoder(Channels(config, full_description(config)), level=config.record.zstd_level)
 
+    def close(self) -> None:
+        """Free the world; no trial can be run afterwards."""
+        self._simulation.world.close()
+
     def run(self, plan: Plan, trial: int) -> Episode:
-        """The episode of a trial.
+        """The episode of a trial; see `delivery`."""
+        return self.delivery(plan, trial).episode
+
+    def delivery(self, plan: Plan, trial: int) -> Delivery:
+        """The episode of a trial, and what it was simulated with.
 
         Args:
             plan: The plan that has it.
@@ -57,4 +65,6 @@ class Replayer:
         while (ended := simulation.episode()) is None:
             simulation.advance(watched=False)
         header, samples, states = ended
-        return Episode(header, *self._encoder.encode(samples, states))
+        return Delivery(
+            Episode(header, *self._encoder.encode(samples, states)), simulation.trial.conditions().to_json()
+        )

@@ -7,7 +7,7 @@ import pytest
 
 from throwcollect import ros
 from throwcollect.config.schema import Config
-from throwcollect.coordinator.goals import FollowJointTrajectory, trial_goals
+from throwcollect.coordinator.goals import FollowJointTrajectory, goal_message, trial_goals
 from throwcollect.coordinator.simulation_client import SimulationClient
 from throwcollect.interfaces import get_service
 from throwcollect.robots.description import start_posture
@@ -15,11 +15,19 @@ from throwcollect.robots.talos import graph_name
 from throwcollect.ros import ActionServer, GoalResponse
 from throwcollect.ros.router import router
 from throwcollect.tasks.trajectory import throw_trajectory
+from throwcollect.trial.lease import Lease
 
-ResetSimulation = get_service("simulation_interfaces/srv/ResetSimulation")
+GetParameters = get_service("rcl_interfaces/srv/GetParameters")
 NAMING = "ros1"
 CONFIG = Config()
-GOALS = trial_goals(throw_trajectory(CONFIG), start_posture(CONFIG))
+GOALS = {
+    name: goal_message(goal) for name, goal in trial_goals(throw_trajectory(CONFIG), start_posture(CONFIG)).items()
+}
+
+
+def lease(trial: int, **values: float) -> Lease:
+    named = {key.replace("__", "."): value for key, value in values.items()}
+    return Lease("/sim_0", trial, tuple(GOALS), named)
 
 
 class Bench:
@@ -34,7 +42,7 @@ class Bench:
         self.simulation.declare_parameter("trial.number", -1)
         self.simulation.declare_parameter("trial.controllers", [""])
         self.simulation.declare_parameter("ball.mass_kg", 0.045)
-        self.simulation.create_service(ResetSimulation, "reset_simulation", self._reset)
+        self.simulation.declare_parameter("trial.lease", "")
         self.servers = [
             ActionServer(
                 self.simulation,
@@ -43,25 +51,21 @@ class Bench:
                 self._execute,
                 goal_callback=self._consider,
             )
-            for controller in GOALS.controllers
+            for controller in GOALS
         ]
         self.node = ros.Node("coordinator")
         self.client = SimulationClient(
             self.node,
             "/sim_0",
-            controllers={name: graph_name(name, NAMING) for name in GOALS.controllers},
+            controllers={name: graph_name(name, NAMING) for name in GOALS},
             action_type=FollowJointTrajectory,
             on_episode=lambda *_: None,
             on_refusal=lambda namespace, reason: self.refusals.append((namespace, reason)),
         )
+        self.asking = self.node.create_client(GetParameters, "/sim_0/sim_0/get_parameters")
         self.executor.add_node(self.node)
         self.executor.add_node(self.simulation)
         assert self.spin(self.client.ready)
-
-    def _reset(self, _request, response):
-        self.requests.append("reset")
-        response.result.result = 1
-        return response
 
     def _consider(self, _goal):
         self.requests.append("goal")
@@ -73,7 +77,7 @@ class Bench:
 
     def settle(self) -> None:
         """Let every answer that is under way arrive: those of a further call come after them."""
-        done = self.client._reset.call_async(ResetSimulation.Request())
+        done = self.asking.call_async(GetParameters.Request(names=["trial.number"]))
         assert self.spin(done.done)
 
     def spin(self, condition: Callable[[], bool]) -> bool:
@@ -94,34 +98,35 @@ def bench(monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
             ros.shutdown()
 
 
-def test_a_trial_is_parameters_then_reset_then_goals(bench: Bench) -> None:
-    bench.client.begin(5, {"ball.mass_kg": 0.05}, GOALS)
-    assert bench.spin(lambda: len(bench.requests) == 3)
-    assert bench.requests == ["reset", "goal", "goal"]
+def test_a_trial_is_a_lease_and_then_goals(bench: Bench) -> None:
+    bench.client.begin(lease(5, ball__mass_kg=0.05), "token", GOALS)
+    assert bench.spin(lambda: len(bench.requests) == 2)
+    assert bench.requests == ["goal", "goal"]
+    assert bench.simulation.get_parameter("trial.lease").value == bench.client.token == "token"
     assert bench.simulation.get_parameter("trial.number").value == 5
-    assert tuple(bench.simulation.get_parameter("trial.controllers").value) == GOALS.controllers
+    assert tuple(bench.simulation.get_parameter("trial.controllers").value) == tuple(GOALS)
     assert bench.simulation.get_parameter("ball.mass_kg").value == 0.05
     assert bench.refusals == []
 
 
 def test_refused_goals_are_reported(bench: Bench) -> None:
     bench.accepts = False
-    bench.client.begin(0, {}, GOALS)
+    bench.client.begin(lease(0), "token", GOALS)
     assert bench.spin(lambda: len(bench.refusals) == 2)
     assert bench.refusals[0] == ("/sim_0", "arm_right_controller refused the goal; its log says why")
 
 
 def test_refused_parameters_are_reported_with_the_reason(bench: Bench) -> None:
-    bench.client.begin(0, {"ball.colour": 1.0}, GOALS)
+    bench.client.begin(lease(0, ball__colour=1.0), "token", GOALS)
     assert bench.spin(lambda: bool(bench.refusals))
     assert bench.refusals[0][1].startswith("parameters: ")
 
 
 def test_a_late_refusal_does_not_touch_the_next_trial(bench: Bench) -> None:
     bench.accepts = False
-    bench.client.begin(0, {}, GOALS)
+    bench.client.begin(lease(0), "token", GOALS)
     assert bench.spin(lambda: bench.requests.count("goal") == 1)
-    bench.client.begin(1, {}, GOALS)
+    bench.client.begin(lease(1), "token", GOALS)
     assert bench.spin(lambda: bench.requests.count("goal") == 4)
     bench.settle()
     assert len(bench.refusals) == 2
@@ -129,7 +134,7 @@ def test_a_late_refusal_does_not_touch_the_next_trial(bench: Bench) -> None:
 
 def test_an_abandoned_trial_is_not_heard_of_again(bench: Bench) -> None:
     bench.accepts = False
-    bench.client.begin(0, {}, GOALS)
+    bench.client.begin(lease(0), "token", GOALS)
     assert bench.spin(lambda: bench.requests.count("goal") == 1)
     bench.client.abandon()
     bench.settle()
@@ -138,8 +143,7 @@ def test_an_abandoned_trial_is_not_heard_of_again(bench: Bench) -> None:
 
 
 def test_an_abandoned_trial_goes_no_further(bench: Bench) -> None:
-    bench.client.begin(0, {}, GOALS)
-    assert bench.spin(lambda: bench.requests == ["reset"])
+    bench.client.begin(lease(0), "token", GOALS)
     bench.client.abandon()
     bench.settle()
     bench.settle()

@@ -15,7 +15,7 @@ from throwcollect.config.schema import Config
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.chunk import ChunkEncoder
-from throwcollect.episode.message import Episode, pack, unpack
+from throwcollect.episode.message import Episode
 from throwcollect.episode.record import Contact, ControllerSamples, EpisodeHeader, GoalOutcome, Samples
 from throwcollect.robots.description import full_description, start_posture
 from throwcollect.robots.interpolation import sample_quintic
@@ -97,7 +97,7 @@ class Collection:
             )
             for name in ("arm_right_controller", "torso_controller")
         }
-        return unpack(pack(Episode(header, *self.encoder.encode(samples, targets))))
+        return Episode(header, *self.encoder.encode(samples, targets))
 
     def result(self, episode: Episode) -> ThrowResult:
         config = self.plan.config_of(self.plan.trials[episode.header.trial])

@@ -16,6 +16,10 @@ from throwcollect.episode.record import EpisodeHeader
 from throwcollect.errors import DatasetError
 from throwcollect.interfaces import deserialize, get_message
 from throwcollect.robots.description import full_description
+from throwcollect.run_key import Signer
+
+SIGNER = Signer(b"key of the run")
+CONDITIONS = '{"ball.mass_kg": 0.05}'
 
 
 @pytest.fixture(scope="module")
@@ -29,20 +33,24 @@ def sent(encoder: ChunkEncoder, header: EpisodeHeader, make_samples: Any) -> Epi
 
 
 def test_an_episode_arrives_as_it_was_sent(sent: Episode, make_samples: Any) -> None:
-    episode = unpack(pack(sent))
+    episode, conditions = unpack(pack(sent, CONDITIONS, SIGNER), SIGNER)
+    assert conditions == CONDITIONS
     assert vars(episode) == {"header": sent.header, "chunk": sent.chunk, "records_sha256": sent.records_sha256}
     assert episode.samples().ball_position.tolist() == make_samples(50).ball_position.tolist()
 
 
 def test_the_message_is_a_stock_one_that_names_its_parts(sent: Episode) -> None:
-    message = deserialize(pack(sent), get_message("std_msgs/msg/UInt8MultiArray"))
+    message = deserialize(pack(sent, CONDITIONS, SIGNER), get_message("std_msgs/msg/UInt8MultiArray"))
     sizes = {part.label: part.size for part in message.layout.dim}
-    assert list(sizes) == ["header", "sha256", "chunk"]
-    data = message.data.tobytes()
-    header, sha256 = data[: sizes["header"]], data[sizes["header"] : sizes["header"] + sizes["sha256"]]
-    assert header_from_json(header) == sent.header
-    assert sha256.decode() == hashlib.sha256(sent.contents).hexdigest()
-    assert data[len(header) + len(sha256) :] == sent.chunk.record()
+    assert list(sizes) == ["header", "sha256", "conditions", "chunk", "signature"]
+    data, parts = message.data.tobytes(), {}
+    for name, size in sizes.items():
+        parts[name], data = data[:size], data[size:]
+    assert header_from_json(parts["header"]) == sent.header
+    assert parts["sha256"].decode() == hashlib.sha256(sent.contents).hexdigest()
+    assert parts["conditions"].decode() == CONDITIONS
+    assert parts["chunk"] == sent.chunk.record()
+    assert SIGNER.has_signed(parts.pop("signature").decode(), *parts.values())
 
 
 def test_the_digest_covers_header_and_messages_but_not_their_packing(
@@ -90,6 +98,10 @@ def test_the_header_is_one_text(header: EpisodeHeader) -> None:
         ('"trial":7,', ""),
         ('"samples":50', '"samples":0'),
         ('"end_ns":null', '"end_ns":"never"'),
+        ('"end_reason":"landed"', '"end_reason":"vanished"'),
+        ('"body":"spoon"', f'"body":"{"s" * 300}"'),
+        ('"body":"spoon"', '"body":""'),
+        ('"status":4', '"status":7'),
         ("}", ""),
     ],
 )
@@ -103,35 +115,35 @@ def test_a_wrong_header_is_refused(header: EpisodeHeader, old: str, new: str) ->
 def test_more_samples_than_there_are_is_an_error(sent: Episode) -> None:
     claim = Episode(replace(sent.header, samples=51), sent.chunk, sent.records_sha256)
     with pytest.raises(DatasetError, match="are not the records of 51 samples"):
-        unpack(pack(claim)).samples()
+        unpack(pack(claim, "", SIGNER), SIGNER).episode.samples()
 
 
 @pytest.mark.parametrize("length", [0, 3, 60, 100, 300, -1])
 def test_a_message_that_is_cut_off_is_refused(sent: Episode, length: int) -> None:
     with pytest.raises(DatasetError, match="episode: "):
-        unpack(pack(sent)[:length])
+        unpack(pack(sent, "", SIGNER)[:length], SIGNER)
 
 
 def test_padding_is_left_alone(sent: Episode) -> None:
-    assert unpack(pack(sent) + bytes(3)).chunk == sent.chunk
+    assert unpack(pack(sent, "", SIGNER) + bytes(3), SIGNER).episode.chunk == sent.chunk
 
 
 def test_a_message_of_another_layout_is_refused(sent: Episode) -> None:
-    message = pack(sent)
+    message = pack(sent, "", SIGNER)
     for wrong in (message[:-1], message.replace(b"chunk", b"blobs", 1), b"\1" + message[1:]):
         with pytest.raises(DatasetError, match="episode: "):
-            unpack(wrong)
+            unpack(wrong, SIGNER)
 
 
 @pytest.fixture(scope="module")
 def whole(encoder: ChunkEncoder, header: EpisodeHeader, make_samples: Any) -> bytes:
-    return pack(Episode(replace(header, samples=3), *encoder.encode(make_samples(3))))
+    return pack(Episode(replace(header, samples=3), *encoder.encode(make_samples(3))), CONDITIONS, SIGNER)
 
 
 @settings(max_examples=300)
 @given(data=st.data())
 def test_garbage_is_refused_with_one_kind_of_error(whole: bytes, data: st.DataObject) -> None:
-    """A changed byte or a changed stretch: a DatasetError, or an episode with the same messages."""
+    """A changed byte or a changed stretch: a DatasetError, or nothing was changed but padding."""
     message = bytearray(whole)
     if data.draw(st.booleans()):
         message[data.draw(st.integers(0, len(message) - 1))] ^= data.draw(st.integers(1, 255))
@@ -139,8 +151,21 @@ def test_garbage_is_refused_with_one_kind_of_error(whole: bytes, data: st.DataOb
         start = data.draw(st.integers(0, len(message)))
         message[start : data.draw(st.integers(start, len(message)))] = data.draw(st.binary(max_size=200))
     try:
-        episode = unpack(bytes(message))
-        episode.samples()
+        delivery = unpack(bytes(message), SIGNER)
     except DatasetError:
         return
-    assert episode.contents == unpack(whole).contents
+    assert bytes(message).startswith(whole)
+    assert delivery.conditions == CONDITIONS
+
+
+def test_what_another_key_has_signed_is_refused(sent: Episode) -> None:
+    with pytest.raises(DatasetError, match="episode: is not signed with the key of this run"):
+        unpack(pack(sent, CONDITIONS, Signer(b"another")), SIGNER)
+
+
+@pytest.mark.parametrize("part", [b'"trial":7', CONDITIONS.encode()])
+def test_every_part_is_signed(sent: Episode, part: bytes) -> None:
+    message = pack(sent, CONDITIONS, SIGNER)
+    assert message.count(part) == 1
+    with pytest.raises(DatasetError, match="signed"):
+        unpack(message.replace(part, bytes(byte ^ 1 for byte in part)), SIGNER)

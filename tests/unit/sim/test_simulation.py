@@ -9,7 +9,8 @@ from throwcollect.control import GoalStatus, Trajectory, TrajectoryGoal, Traject
 from throwcollect.errors import RequestError
 from throwcollect.robots.description import start_posture
 from throwcollect.robots.talos import CONTROLLERS
-from throwcollect.sim.simulation import Scope, Simulation, State, TrialSetup
+from throwcollect.sim.present_trial import TrialSetup
+from throwcollect.sim.simulation import Scope, Simulation, State
 
 CONFIG = Config()
 POSTURE = start_posture(CONFIG)

@@ -1,0 +1,104 @@
+from dataclasses import replace
+
+import pytest
+
+from throwcollect.build import build_digest
+from throwcollect.config.schema import Config
+from throwcollect.config.values import is_physics, leaves, sweepable_keys, with_values
+from throwcollect.errors import DatasetError
+from throwcollect.trial.conditions import Conditions, Settings, conditions_from_json
+
+CONFIG = Config()
+WANTED = Conditions("build", "settings", {"ball.mass_kg": 0.05}, {"arm_right_controller": "goal"}, "token")
+WITHOUT_EFFECT = {
+    "sim.real_time_factor": 2.0,
+    "record.trials_per_shard": 7,
+    "controllers.names": "ros1",
+    "task.duration_s": 1.5,
+    "task.points_hz": 50.0,
+    "task.recatch_gap_s": 0.1,
+    "run.simulations": 5,
+}
+
+
+def test_conditions_travel_as_text() -> None:
+    assert conditions_from_json(WANTED.to_json()) == WANTED
+
+
+@pytest.mark.parametrize("text", ["", "{}", "[]", WANTED.to_json().replace("0.05", '"0.05"'), WANTED.to_json() + "x"])
+def test_what_is_no_text_of_conditions_is_refused(text: str) -> None:
+    with pytest.raises(DatasetError, match="conditions of the episode: "):
+        conditions_from_json(text)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({}, []),
+        ({"lease": ""}, ["it was not simulated for this lease"]),
+        ({"build": "x"}, ["its sources, its physics engine or its robot model are not those of the coordinator"]),
+        ({"settings": "x"}, ["its configuration is another one"]),
+        ({"values": {"ball.mass_kg": 0.06}}, ["ball.mass_kg was 0.06, not 0.05"]),
+        ({"values": {}}, ["ball.mass_kg was as configured, not 0.05"]),
+        (
+            {"values": {"ball.mass_kg": 0.05, "ball.friction": 0.1}},
+            ["ball.friction was 0.1, not as configured"],
+        ),
+        ({"inputs": {"arm_right_controller": "x"}}, ["arm_right_controller was given another goal"]),
+        ({"inputs": {}}, ["arm_right_controller was given no goal"]),
+        (
+            {"inputs": {**WANTED.inputs, "head_controller": "x"}},
+            ["head_controller was given a goal that the trial does not have"],
+        ),
+    ],
+)
+def test_differences_are_named(changes: dict[str, object], said: list[str]) -> None:
+    assert list(replace(WANTED, **changes).differences(WANTED)) == said
+
+
+def changed(key: str, value: object) -> Config:
+    section, _, name = key.rpartition(".")
+    holder = getattr(CONFIG, section)
+    return CONFIG.model_copy(update={section: holder.model_copy(update={name: value})})
+
+
+@pytest.mark.parametrize("key", WITHOUT_EFFECT)
+def test_settings_leave_out_what_simulations_do_not_heed(key: str) -> None:
+    assert Settings(changed(key, WITHOUT_EFFECT[key])).digest == Settings(CONFIG).digest
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("robot.base_height_m", 1.1),
+        ("robot.effort_scale", 0.5),
+        ("tool.cup_walls", 8),
+        ("ball.friction", 0.1),
+        ("scene.gravity_mps2", 1.6),
+        ("sim.physics_hz", 1000),
+        ("sim.max_trial_s", 5.0),
+        ("controllers.hold", "command"),
+        ("record.rate_hz", 125),
+        ("record.zstd_level", 3),
+        ("task.end", {"arm_right_4_joint": -0.5}),
+        ("task.start", {**CONFIG.task.start, "arm_right_4_joint": -1.8}),
+    ],
+)
+def test_settings_cover_what_simulations_heed(key: str, value: object) -> None:
+    before = dict(leaves(CONFIG))
+    assert before.get(key) != value
+    assert Settings(changed(key, value)).digest != Settings(CONFIG).digest
+
+
+def test_what_a_trial_replaces_is_named_key_by_key() -> None:
+    settings = Settings(CONFIG)
+    physics = [key for key in sweepable_keys(CONFIG) if is_physics(key)]
+    assert settings.replaced_by(CONFIG) == {}
+    trial = with_values(CONFIG, {"ball.mass_kg": 0.06, "task.start.arm_right_4_joint": -1.8, "task.duration_s": 1.3})
+    assert {"ball.mass_kg", "task.start.arm_right_4_joint"} <= set(physics)
+    assert settings.replaced_by(trial) == {"ball.mass_kg": 0.06, "task.start.arm_right_4_joint": -1.8}
+
+
+def test_a_build_has_one_digest() -> None:
+    assert build_digest() == build_digest()
+    assert len(build_digest()) == 64
