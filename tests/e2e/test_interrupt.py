@@ -243,7 +243,9 @@ def test_a_trial_without_retries_left_is_recorded_as_lost(
     in_the_middle(running, whole=reference)
     running.node("--name", "sim_0").kill()
     code, out, err = running.finish()
-    assert code == 0, err
+    assert code == 5, err
+    assert f"throwcollect: 1 of {TRIALS} trials is lost; throws.parquet says why" in err
+    assert f"throwcollect resume {tmp_path / 'data'}" in err
     summary = json.loads(out)
     assert summary["outcomes"]["lost"] == 1
     assert summary["episodes"] == TRIALS - 1

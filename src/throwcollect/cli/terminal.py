@@ -50,6 +50,7 @@ class _Lines:
     def __init__(self, *, quiet: bool) -> None:
         self._quiet = quiet
         self._next = 0.0
+        self._ended = -1
 
     def __enter__(self) -> _Lines:
         return self
@@ -61,9 +62,10 @@ class _Lines:
 
     def update(self, progress: Progress) -> None:
         now = time.monotonic()
-        if now < self._next and progress.ended < progress.total:
+        # The last trial is told at once, but only once: reports go on while the dataset is checked and finished.
+        if now < self._next and (progress.ended < progress.total or progress.ended == self._ended):
             return
-        self._next = now + _LINE_EVERY_S
+        self._next, self._ended = now + _LINE_EVERY_S, progress.ended
         self.say(progress.line)
 
     def say(self, line: str) -> None:

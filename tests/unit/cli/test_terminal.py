@@ -17,7 +17,7 @@ def test_counts_tell_failures_and_losses() -> None:
 
 def test_lines_come_now_and_then_and_at_the_end(capsys: pytest.CaptureFixture[str]) -> None:
     with display(quiet=False) as shown:
-        for ended in (1, 2, 3, 10):
+        for ended in (1, 2, 3, 10, 10, 10):
             shown.update(progress(ended, landed=ended))
     lines = capsys.readouterr().err.splitlines()
     assert [line.split()[0] for line in lines] == ["1/10", "10/10"]
