@@ -120,7 +120,7 @@ def test_nothing_else_moves_or_stops_a_leased_controller(leased: Robot) -> None:
 
 def test_controllers_are_as_configured_in_every_leased_trial(leased: Robot) -> None:
     untouched = finished(leased).episode
-    assert leased.set({f"constraints.{ELBOW}.trajectory": 1e-6}, node=ARM).successful
+    assert leased.set({f"constraints.{ELBOW}.trajectory": 1e-12}, node=ARM).successful
     leased.publish(f"{ARM}/speed_scaling_input", SpeedScalingFactor(factor=0.5))
     assert ask_for(leased, {"ball.mass_kg": 0.05}).successful
     assert finished(leased).episode.digest == untouched.digest
