@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
@@ -96,9 +97,9 @@ class Settings:
     """
 
     def __init__(self, config: Config) -> None:
-        self._values = dict(leaves(config))
-        self._physics = [key for key in sweepable_keys(config) if is_physics(key)]
-        lines = [f"{key}={json.dumps(value)}" for key, value in sorted(_concerning(self._values).items())]
+        values = dict(leaves(config))
+        self._physics = [(key, key.split("."), values[key]) for key in sweepable_keys(config) if is_physics(key)]
+        lines = [f"{key}={json.dumps(value)}" for key, value in sorted(_concerning(values).items())]
         self.digest = hashlib.sha256("\n".join(lines).encode()).hexdigest()
 
     def replaced_by(self, trial: Config) -> dict[str, float]:
@@ -107,8 +108,16 @@ class Settings:
         Args:
             trial: The configuration, with some of the physics replaced.
         """
-        values = dict(leaves(trial))
-        return {key: float(values[key]) for key in self._physics if values[key] != self._values[key]}
+        values = ((key, _value(trial, path), configured) for key, path, configured in self._physics)
+        return {key: float(value) for key, value, configured in values if value != configured}
+
+
+def _value(config: Config, path: Sequence[str]) -> Any:
+    """The value of a key; looking up all keys of a configuration takes ten times as long, in every trial."""
+    holder: Any = config
+    for part in path:
+        holder = holder[part] if isinstance(holder, dict) else getattr(holder, part)
+    return holder
 
 
 def _concerning(values: Mapping[str, object]) -> dict[str, object]:
