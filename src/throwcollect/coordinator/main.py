@@ -59,33 +59,19 @@ def run(directory: Path) -> None:
     executor.add_node(node)
     # What is here now stays until the end; the garbage collector need not go through it again and again.
     gc.freeze()
-    started = told = synced = time.monotonic()
+    started = time.monotonic()
     try:
-        while not node.finished:
-            # Simulations come first: what can wait is done when no message is there.
-            waiting = node.backlog or node.prepare_one()
-            executor.spin_once(timeout_sec=0.0 if waiting else _IDLE_S)
-            if node.backlog:
-                node.write_one()
-            if (reason := node.hopeless) is not None:
-                raise WorkerError("every simulation refuses its trials, and none was ever done", evidence=reason)
-            now = time.monotonic()
-            if now >= synced + _SYNC_EVERY_S:
-                synced = now
-                writer.sync()
-            if now >= told + _TELL_EVERY_S:
-                told = now
-                print(node.report().line, flush=True)
-        print(node.report().line, flush=True)
+        _collect(node, writer, executor)
         if not node.complete:
             raise Interrupted(
                 f"interrupted; what is finished is in {directory}", hint=f"throwcollect resume {directory}"
             )
+        config = writer.plan.config
         said = check_by_replay(
             directory,
             writer.digests(),
-            count=writer.plan.config.run.replay,
-            seed=writer.plan.config.seed,
+            count=config.run.replay,
+            seed=config.seed,
             meanwhile=lambda: executor.spin_once(timeout_sec=_IDLE_S),
         )
         if said is not None:
@@ -98,3 +84,29 @@ def run(directory: Path) -> None:
     lost = loss(info(directory).outcomes, hint=f"throwcollect resume {shlex.quote(str(directory))} runs them again")
     if lost is not None:
         raise lost
+
+
+def _collect(node: Coordinator, writer: DatasetWriter, executor: ros.Executor) -> None:
+    """Have all trials run, or drain.
+
+    Raises:
+        WorkerError: If every simulation refuses every trial.
+        DatasetError: If the dataset cannot be written.
+    """
+    told = synced = time.monotonic()
+    while not node.finished:
+        # Simulations come first: what can wait is done when no message is there.
+        waiting = node.backlog or node.prepare_one()
+        executor.spin_once(timeout_sec=0.0 if waiting else _IDLE_S)
+        if node.backlog:
+            node.write_one()
+        if (reason := node.hopeless) is not None:
+            raise WorkerError("every simulation refuses its trials, and none was ever done", evidence=reason)
+        now = time.monotonic()
+        if now >= synced + _SYNC_EVERY_S:
+            synced = now
+            writer.sync()
+        if now >= told + _TELL_EVERY_S:
+            told = now
+            print(node.report().line, flush=True)
+    print(node.report().line, flush=True)

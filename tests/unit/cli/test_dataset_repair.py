@@ -80,17 +80,17 @@ def test_repair_without_losses_ends_with_0(
     )
 
 
-def test_repair_lists_what_is_lost_and_ends_with_3(
+def test_repair_lists_what_is_lost_and_ends_with_5(
     run: Run, source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     spoiled(source / "quick_00000.mcap", 20_000)
     output = tmp_path / "output"
-    assert run("dataset", "repair", source, output) == 3
+    assert run("dataset", "repair", source, output) == 5
     told = capsys.readouterr()
     assert told.out == f"trial 0: lost: no whole episode of it was left\n{output}: 2 episodes of 3 trials\n"
     assert f"{output}: 1 trial is lost" in told.err
     assert f"try: throwcollect resume {output}" in told.err
-    assert run("dataset", "repair", source, tmp_path / "again", "--json") == 3
+    assert run("dataset", "repair", source, tmp_path / "again", "--json") == 5
     found = json.loads(capsys.readouterr().out)
     assert found["lost"] == [{"trial": 0, "reason": "no whole episode of it was left"}]
     assert (found["trials"], found["episodes"], found["remarks"]) == (3, 2, [])
