@@ -16,7 +16,7 @@ import pytest
 from docker.client import DockerClient
 from docker.models.containers import Container
 
-from tests.docker.collection import Collection, collecting, config_for, new_run
+from tests.docker.collection import Collection, collecting, config_for, key_in, new_run
 from tests.docker.cut_line import CutLine
 from throwcollect.coordinator.prepare import prepare
 from throwcollect.dataset.inspect import info
@@ -46,7 +46,7 @@ def digest(tmp_path_factory: pytest.TempPathFactory) -> str:
     directory = tmp_path_factory.mktemp("local")
     config = config_for(directory)
     prepare(config, directory / "dataset", sweep_directory=directory)
-    runtime = LocalRuntime(directory / "dataset", directory / "logs", config.run)
+    runtime = LocalRuntime(directory / "dataset", directory / "logs", config.run, key_in(directory))
     with Supervisor(runtime, config.run, simulations=2) as supervisor:
         supervisor.start()
         until(lambda: supervisor.poll()[0] is not None)
@@ -150,7 +150,7 @@ def test_a_router_that_comes_back_at_another_address_is_found_again(
         collection.until(lambda: collection.runtime.router_address() not in (address, None))
         assert collection.finish() == digest
         assert collection.news == [
-            "router was lost (ended by SIGKILL) and is started again; its log ends: router listening on tcp/router:7447"
+            "router was lost (ended by SIGKILL) and is started again; its log ends: router listening on tls/router:7447"
         ]
 
 
@@ -161,7 +161,8 @@ def test_runs_side_by_side_do_not_disturb_one_another(client: DockerClient, tmp_
     run = new_run()
     config = config_for(tmp_path / "other", f"containers.volume={volume}", "run.simulations=1")
     prepare(config, tmp_path / "other" / "dataset", sweep_directory=tmp_path)
-    runtime = DockerRuntime(run, config, directory=None, logs=tmp_path / "other" / "logs", client=client)
+    key = key_in(tmp_path / "other")
+    runtime = DockerRuntime(run, config, directory=None, logs=tmp_path / "other" / "logs", key=key, client=client)
     assert runtime.data == f"/data/{run}"
     try:
         with (
@@ -185,11 +186,13 @@ LAUNCHER = """
 import sys, time
 from pathlib import Path
 from throwcollect.config.loader import load
+from throwcollect.run_key import RunKey
 from throwcollect.runtime.docker import DockerRuntime
 from throwcollect.runtime.supervisor import Supervisor
 run, directory = sys.argv[1], Path(sys.argv[2])
 config = load(directory / "config.yaml")
-runtime = DockerRuntime(run, config, directory=directory, logs=directory / "logs")
+key = RunKey(directory.parent / "key")
+runtime = DockerRuntime(run, config, directory=directory, logs=directory / "logs", key=key)
 runtime.open()
 supervisor = Supervisor(runtime, config.run, simulations=2)
 supervisor.start()
@@ -203,6 +206,7 @@ def test_a_run_whose_launcher_vanished_is_taken_over(client: DockerClient, tmp_p
     run = new_run()
     dataset = tmp_path / "dataset"
     prepare(config_for(tmp_path), dataset, sweep_directory=tmp_path)
+    key_in(tmp_path)
     launcher = subprocess.Popen([sys.executable, "-c", LAUNCHER, run, str(dataset)])
     nodes = (ROUTER, "sim_0", "sim_1", COORDINATOR)
     try:
@@ -226,7 +230,12 @@ def bare(client: DockerClient, tmp_path: Path) -> Any:
     def make(*overrides: str, through: DockerClient = client) -> DockerRuntime:
         run = new_run()
         runtime = DockerRuntime(
-            run, config_for(tmp_path, *overrides), directory=tmp_path, logs=tmp_path / "logs", client=through
+            run,
+            config_for(tmp_path, *overrides),
+            directory=tmp_path,
+            logs=tmp_path / "logs",
+            key=key_in(tmp_path),
+            client=through,
         )
         made.append((runtime, run))
         runtime.open()
@@ -344,7 +353,7 @@ def test_a_broken_line_to_the_engine_is_mended(bare: Any, client: DockerClient, 
     line.interrupt()
     client.containers.get(handle).kill("SIGTERM")
     assert ended(runtime).reason == "exit code 0"
-    assert runtime.log_tail(ROUTER) == "router listening on tcp/router:7447"
+    assert runtime.log_tail(ROUTER) == "router listening on tls/router:7447"
 
 
 @pytest.mark.parametrize(("trouble", "evidence"), [("cut", "Connection refused"), ("clog", None)])

@@ -33,7 +33,8 @@ from throwcollect.ros.embedded import (
     SingleThreadedExecutor,
 )
 from throwcollect.ros.router import router
-from throwcollect.runtime.nodes import node_environment
+from throwcollect.run_key import RunKey
+from throwcollect.runtime.nodes import joining_environment
 from throwcollect.runtime.records import Record, Records
 from throwcollect.session_config import OVERRIDE_VARIABLE
 
@@ -299,7 +300,7 @@ def test_a_run_is_joined_by_its_name_or_directory(
     endpoint: str, say: Callable[..., Said], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setenv("THROWCOLLECT_STATE", str(tmp_path))
-    for variable in node_environment(endpoint, 0):
+    for variable in joining_environment(endpoint, 0, RunKey(tmp_path)):
         monkeypatch.setenv(variable, "nonsense")
     run = Records().new("throws")
     record = Record(
