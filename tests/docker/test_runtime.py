@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import socket
@@ -14,6 +15,7 @@ from typing import Any
 
 import pytest
 from docker.client import DockerClient
+from docker.errors import NotFound
 from docker.models.containers import Container
 
 from tests.docker.collection import Collection, collecting, config_for, key_in, new_run
@@ -24,6 +26,7 @@ from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.runtime import docker_watch
 from throwcollect.runtime.docker import DockerRuntime
 from throwcollect.runtime.docker_engine import connect
+from throwcollect.runtime.docker_options import KEY_LABEL
 from throwcollect.runtime.docker_runs import remove, runs
 from throwcollect.runtime.local import LocalRuntime
 from throwcollect.runtime.nodes import COORDINATOR, ROUTER, NodeExit
@@ -74,7 +77,9 @@ def container(client: DockerClient, collection: Collection, node: str) -> Contai
 
 def left_of(client: DockerClient, label: str) -> list[Any]:
     filters = {"label": label}
-    return [*client.containers.list(all=True, filters=filters), *client.networks.list(filters=filters)]
+    containers, networks = client.containers.list(all=True, filters=filters), client.networks.list(filters=filters)
+    # The volume of a dataset stays, if there is one.
+    return [*containers, *networks, *client.volumes.list(filters={"label": [label, KEY_LABEL]})]
 
 
 def test_a_collection_in_containers_yields_the_dataset_of_one_in_processes(
@@ -102,7 +107,9 @@ def test_a_collection_in_containers_yields_the_dataset_of_one_in_processes(
             assert not any(details["NetworkSettings"]["Ports"].values())
             binds = [(each["Source"], each["Destination"], each["RW"]) for each in details["Mounts"]]
             writes = node == COORDINATOR
-            assert binds == ([] if node == ROUTER else [(str(prepared), "/data", writes)])
+            assert [bind for bind in binds if bind[1] != "/key"] == (
+                [] if node == ROUTER else [(str(prepared), "/data", writes)]
+            )
         assert client.networks.get(f"throwcollect-{run}").attrs["Internal"]
         listening = container(client, collection, ROUTER).exec_run(["cat", "/proc/net/tcp"]).output.decode()
         assert ":1D17" in listening
@@ -293,6 +300,32 @@ def test_a_published_router_is_reached_on_the_loopback_interface_alone(bare: Any
     assert ports == {"7447/tcp": [{"HostIp": "127.0.0.1", "HostPort": str(port)}]}
     runtime.stop([ROUTER])
     assert runtime.router_address() is None
+
+
+def test_a_node_has_the_key_as_files_of_the_caller_which_the_engine_tells_nobody(
+    bare: Any, client: DockerClient, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(os, "getuid", lambda: 4242)
+    key = key_in(tmp_path).private_key.read_text()
+    runtime = bare()
+    runtime.start(ROUTER, ["router", "--listen", runtime.listen])
+    until(lambda: runtime.log_tail(ROUTER) != "")
+    assert runtime.log_tail(ROUTER) == "router listening on tls/router:7447"
+    router = client.containers.get(runtime.handle(ROUTER))
+    script = "stat -c '%a %u' /key/*; touch /key/new; cat /key/key.pem"
+    said = router.exec_run(["sh", "-c", script]).output.decode()
+    assert said.startswith("400 4242\n400 4242\n")
+    assert "/key/new': Read-only file system" in said
+    assert said.endswith(key)
+    (mount,) = (each for each in router.attrs["Mounts"] if each["Destination"] == "/key")
+    assert (mount["Type"], mount["RW"]) == ("volume", False)
+    volume = client.volumes.get(mount["Name"])
+    told = json.dumps([router.attrs, volume.attrs])
+    assert not any(line in told for line in key.splitlines())
+    assert router.exec_run(["python", "-m", "throwcollect.health"]).exit_code == 0
+    runtime.close()
+    with pytest.raises(NotFound):
+        volume.reload()
 
 
 def test_what_is_not_there_is_found_before_anything_is_started(bare: Any, tmp_path: Path) -> None:
