@@ -316,7 +316,7 @@ def test_a_node_has_the_key_as_files_of_the_caller_which_the_engine_tells_nobody
     said = router.exec_run(["sh", "-c", script]).output.decode()
     assert said.startswith("400 4242\n400 4242\n")
     assert "/key/new': Read-only file system" in said
-    assert said.endswith(key)
+    assert key in said
     (mount,) = (each for each in router.attrs["Mounts"] if each["Destination"] == "/key")
     assert (mount["Type"], mount["RW"]) == ("volume", False)
     volume = client.volumes.get(mount["Name"])
