@@ -13,6 +13,7 @@ import psutil
 
 from throwcollect.coordinator.progress import Progress
 from throwcollect.dataset.writer import create
+from throwcollect.run_key import RunKey
 from throwcollect.runtime.docker import DockerRuntime
 from throwcollect.runtime.listening import Listening
 from throwcollect.runtime.local import LocalRuntime
@@ -105,14 +106,24 @@ def _process(handle: str) -> psutil.Process:
     return node
 
 
+def _key(directory: Path) -> RunKey:
+    """Key of the run that collects into a directory."""
+    key = RunKey(directory.with_name(f"{directory.name}-key"))
+    if not key.exists:
+        key.create()
+    return key
+
+
 def local_runtime(plan: Plan, directory: Path) -> LocalRuntime:
     """Nodes as processes."""
-    return LocalRuntime(directory, directory / "logs", plan.config.run)
+    return LocalRuntime(directory, directory / "logs", plan.config.run, _key(directory))
 
 
 def docker_runtime(plan: Plan, directory: Path) -> DockerRuntime:
     """Nodes as containers of the default image."""
-    runtime = DockerRuntime(f"bench-{os.getpid()}", plan.config, directory=directory, logs=directory / "logs")
+    runtime = DockerRuntime(
+        f"bench-{os.getpid()}", plan.config, directory=directory, logs=directory / "logs", key=_key(directory)
+    )
     runtime.open()
     return runtime
 
@@ -136,7 +147,7 @@ def measure(
     runtime = make_runtime(plan, directory)
     with Supervisor(runtime, run, simulations=simulations) as supervisor:
         supervisor.start()
-        with Listening(reports.append, domain_id=run.domain_id) as listening:
+        with Listening(reports.append, domain_id=run.domain_id, key=_key(directory)) as listening:
             first = _until(supervisor, listening, reports, 1)
             watch = _Watch(supervisor, listening, reports)
             start, stop = watch.until(trials // 10), watch.until(trials * 9 // 10)

@@ -53,6 +53,21 @@ class RunKey:
         """Whether both files are there."""
         return self.private_key.is_file() and self.certificate.is_file()
 
+    @classmethod
+    def of_environment(cls) -> RunKey | None:
+        """The key of the run that this process belongs to; None if it belongs to none."""
+        named = os.environ.get(KEY_VARIABLE)
+        return cls(Path(named).absolute()) if named else None
+
+    def check(self) -> None:
+        """Find out whether this process may use the key.
+
+        Raises:
+            ConfigError: If one of its files is missing, or cannot be read.
+        """
+        for path in (self.private_key, self.certificate):
+            check_readable(path)
+
     def create(self) -> None:
         """Make a new key; the directory is made if it is missing.
 
@@ -91,14 +106,10 @@ class Signer:
         Raises:
             ConfigError: If the environment names a key that cannot be read.
         """
-        named = os.environ.get(KEY_VARIABLE)
-        if not named:
+        key = RunKey.of_environment()
+        if key is None:
             return cls(b"")
-        path = RunKey(Path(named)).private_key
-        try:
-            return cls(hashlib.sha256(_PURPOSE + path.read_bytes()).digest())
-        except OSError as error:
-            raise ConfigError(f"{KEY_VARIABLE}: {path}: cannot be read: {error.strerror}") from error
+        return cls(hashlib.sha256(_PURPOSE + _read(key.private_key)).digest())
 
     def sign(self, *parts: bytes | memoryview) -> str:
         """Signature (HMAC-SHA256, in hexadecimal) of the parts one after the other."""
@@ -110,6 +121,25 @@ class Signer:
     def has_signed(self, signature: str, *parts: bytes | memoryview) -> bool:
         """Whether a signature is that of the parts."""
         return hmac.compare_digest(signature.encode(), self.sign(*parts).encode())
+
+
+def check_readable(path: Path) -> None:
+    """Find out whether this process may read a file of a key.
+
+    Raises:
+        ConfigError: If it is missing, or cannot be read.
+    """
+    _read(path)
+
+
+def _read(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise ConfigError(
+            f"the key of the run cannot be read: {path}: {error.strerror}",
+            expected=f"a directory with the key of a run, which only its owner can read (--key, {KEY_VARIABLE})",
+        ) from error
 
 
 def _new_pair() -> tuple[bytes, bytes]:

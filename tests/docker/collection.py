@@ -16,6 +16,7 @@ from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.prepare import prepare
 from throwcollect.dataset.inspect import info
+from throwcollect.run_key import RunKey
 from throwcollect.runtime.docker import DockerRuntime
 from throwcollect.runtime.docker_runs import remove
 from throwcollect.runtime.nodes import NodeExit
@@ -80,6 +81,14 @@ def new_run() -> str:
     return f"test-{uuid4().hex[:8]}"
 
 
+def key_in(directory: Path) -> RunKey:
+    """A key of the test's own; the one that is there, if one is."""
+    key = RunKey(directory / "key")
+    if not key.exists:
+        key.create()
+    return key
+
+
 @contextmanager
 def collecting(
     client: DockerClient, directory: Path, *overrides: str, run: str | None = None, found: tuple[str, ...] = ()
@@ -90,7 +99,7 @@ def collecting(
     dataset = directory / "dataset"
     if not dataset.exists():
         prepare(config, dataset, sweep_directory=directory)
-    runtime = DockerRuntime(run, config, directory=dataset, logs=dataset / "logs", client=client)
+    runtime = DockerRuntime(run, config, directory=dataset, logs=dataset / "logs", key=key_in(directory), client=client)
     try:
         with Supervisor(runtime, config.run, simulations=config.run.simulations) as supervisor:
             runtime.open()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import socket
@@ -14,9 +15,10 @@ from typing import Any
 
 import pytest
 from docker.client import DockerClient
+from docker.errors import NotFound
 from docker.models.containers import Container
 
-from tests.docker.collection import Collection, collecting, config_for, new_run
+from tests.docker.collection import Collection, collecting, config_for, key_in, new_run
 from tests.docker.cut_line import CutLine
 from throwcollect.coordinator.prepare import prepare
 from throwcollect.dataset.inspect import info
@@ -24,6 +26,7 @@ from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.runtime import docker_watch
 from throwcollect.runtime.docker import DockerRuntime
 from throwcollect.runtime.docker_engine import connect
+from throwcollect.runtime.docker_options import KEY_LABEL
 from throwcollect.runtime.docker_runs import remove, runs
 from throwcollect.runtime.local import LocalRuntime
 from throwcollect.runtime.nodes import COORDINATOR, ROUTER, NodeExit
@@ -46,7 +49,7 @@ def digest(tmp_path_factory: pytest.TempPathFactory) -> str:
     directory = tmp_path_factory.mktemp("local")
     config = config_for(directory)
     prepare(config, directory / "dataset", sweep_directory=directory)
-    runtime = LocalRuntime(directory / "dataset", directory / "logs", config.run)
+    runtime = LocalRuntime(directory / "dataset", directory / "logs", config.run, key_in(directory))
     with Supervisor(runtime, config.run, simulations=2) as supervisor:
         supervisor.start()
         until(lambda: supervisor.poll()[0] is not None)
@@ -74,7 +77,9 @@ def container(client: DockerClient, collection: Collection, node: str) -> Contai
 
 def left_of(client: DockerClient, label: str) -> list[Any]:
     filters = {"label": label}
-    return [*client.containers.list(all=True, filters=filters), *client.networks.list(filters=filters)]
+    containers, networks = client.containers.list(all=True, filters=filters), client.networks.list(filters=filters)
+    # The volume of a dataset stays, if there is one.
+    return [*containers, *networks, *client.volumes.list(filters={"label": [label, KEY_LABEL]})]
 
 
 def test_a_collection_in_containers_yields_the_dataset_of_one_in_processes(
@@ -102,7 +107,9 @@ def test_a_collection_in_containers_yields_the_dataset_of_one_in_processes(
             assert not any(details["NetworkSettings"]["Ports"].values())
             binds = [(each["Source"], each["Destination"], each["RW"]) for each in details["Mounts"]]
             writes = node == COORDINATOR
-            assert binds == ([] if node == ROUTER else [(str(prepared), "/data", writes)])
+            assert [bind for bind in binds if bind[1] != "/key"] == (
+                [] if node == ROUTER else [(str(prepared), "/data", writes)]
+            )
         assert client.networks.get(f"throwcollect-{run}").attrs["Internal"]
         listening = container(client, collection, ROUTER).exec_run(["cat", "/proc/net/tcp"]).output.decode()
         assert ":1D17" in listening
@@ -150,7 +157,7 @@ def test_a_router_that_comes_back_at_another_address_is_found_again(
         collection.until(lambda: collection.runtime.router_address() not in (address, None))
         assert collection.finish() == digest
         assert collection.news == [
-            "router was lost (ended by SIGKILL) and is started again; its log ends: router listening on tcp/router:7447"
+            "router was lost (ended by SIGKILL) and is started again; its log ends: router listening on tls/router:7447"
         ]
 
 
@@ -161,7 +168,8 @@ def test_runs_side_by_side_do_not_disturb_one_another(client: DockerClient, tmp_
     run = new_run()
     config = config_for(tmp_path / "other", f"containers.volume={volume}", "run.simulations=1")
     prepare(config, tmp_path / "other" / "dataset", sweep_directory=tmp_path)
-    runtime = DockerRuntime(run, config, directory=None, logs=tmp_path / "other" / "logs", client=client)
+    key = key_in(tmp_path / "other")
+    runtime = DockerRuntime(run, config, directory=None, logs=tmp_path / "other" / "logs", key=key, client=client)
     assert runtime.data == f"/data/{run}"
     try:
         with (
@@ -185,11 +193,13 @@ LAUNCHER = """
 import sys, time
 from pathlib import Path
 from throwcollect.config.loader import load
+from throwcollect.run_key import RunKey
 from throwcollect.runtime.docker import DockerRuntime
 from throwcollect.runtime.supervisor import Supervisor
 run, directory = sys.argv[1], Path(sys.argv[2])
 config = load(directory / "config.yaml")
-runtime = DockerRuntime(run, config, directory=directory, logs=directory / "logs")
+key = RunKey(directory.parent / "key")
+runtime = DockerRuntime(run, config, directory=directory, logs=directory / "logs", key=key)
 runtime.open()
 supervisor = Supervisor(runtime, config.run, simulations=2)
 supervisor.start()
@@ -203,6 +213,7 @@ def test_a_run_whose_launcher_vanished_is_taken_over(client: DockerClient, tmp_p
     run = new_run()
     dataset = tmp_path / "dataset"
     prepare(config_for(tmp_path), dataset, sweep_directory=tmp_path)
+    key_in(tmp_path)
     launcher = subprocess.Popen([sys.executable, "-c", LAUNCHER, run, str(dataset)])
     nodes = (ROUTER, "sim_0", "sim_1", COORDINATOR)
     try:
@@ -226,7 +237,12 @@ def bare(client: DockerClient, tmp_path: Path) -> Any:
     def make(*overrides: str, through: DockerClient = client) -> DockerRuntime:
         run = new_run()
         runtime = DockerRuntime(
-            run, config_for(tmp_path, *overrides), directory=tmp_path, logs=tmp_path / "logs", client=through
+            run,
+            config_for(tmp_path, *overrides),
+            directory=tmp_path,
+            logs=tmp_path / "logs",
+            key=key_in(tmp_path),
+            client=through,
         )
         made.append((runtime, run))
         runtime.open()
@@ -284,6 +300,32 @@ def test_a_published_router_is_reached_on_the_loopback_interface_alone(bare: Any
     assert ports == {"7447/tcp": [{"HostIp": "127.0.0.1", "HostPort": str(port)}]}
     runtime.stop([ROUTER])
     assert runtime.router_address() is None
+
+
+def test_a_node_has_the_key_as_files_of_the_caller_which_the_engine_tells_nobody(
+    bare: Any, client: DockerClient, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(os, "getuid", lambda: 4242)
+    key = key_in(tmp_path).private_key.read_text()
+    runtime = bare()
+    runtime.start(ROUTER, ["router", "--listen", runtime.listen])
+    until(lambda: runtime.log_tail(ROUTER) != "")
+    assert runtime.log_tail(ROUTER) == "router listening on tls/router:7447"
+    router = client.containers.get(runtime.handle(ROUTER))
+    script = "stat -c '%a %u' /key/*; touch /key/new; cat /key/key.pem"
+    said = router.exec_run(["sh", "-c", script]).output.decode()
+    assert said.startswith("400 4242\n400 4242\n")
+    assert "/key/new': Read-only file system" in said
+    assert key in said
+    (mount,) = (each for each in router.attrs["Mounts"] if each["Destination"] == "/key")
+    assert (mount["Type"], mount["RW"]) == ("volume", False)
+    volume = client.volumes.get(mount["Name"])
+    told = json.dumps([router.attrs, volume.attrs])
+    assert not any(line in told for line in key.splitlines())
+    assert router.exec_run(["python", "-m", "throwcollect.health"]).exit_code == 0
+    runtime.close()
+    with pytest.raises(NotFound):
+        volume.reload()
 
 
 def test_what_is_not_there_is_found_before_anything_is_started(bare: Any, tmp_path: Path) -> None:
@@ -344,7 +386,7 @@ def test_a_broken_line_to_the_engine_is_mended(bare: Any, client: DockerClient, 
     line.interrupt()
     client.containers.get(handle).kill("SIGTERM")
     assert ended(runtime).reason == "exit code 0"
-    assert runtime.log_tail(ROUTER) == "router listening on tcp/router:7447"
+    assert runtime.log_tail(ROUTER) == "router listening on tls/router:7447"
 
 
 @pytest.mark.parametrize(("trouble", "evidence"), [("cut", "Connection refused"), ("clog", None)])

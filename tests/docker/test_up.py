@@ -13,6 +13,7 @@ import docker
 import pytest
 
 from tests.e2e.collection import Running, call, collect, fingerprints, start, write_config
+from throwcollect.runtime.docker_options import KEY_LABEL
 
 pytestmark = [pytest.mark.docker, pytest.mark.usefixtures("client")]
 LABEL = "throwcollect.run"
@@ -44,7 +45,8 @@ def engine() -> Iterator[docker.DockerClient]:
 def left_on(client: docker.DockerClient) -> set[str]:
     filters = {"label": LABEL}
     containers = client.containers.list(all=True, filters=filters)
-    return {each.name for each in (*containers, *client.networks.list(filters=filters))}
+    keys = client.volumes.list(filters={"label": KEY_LABEL})
+    return {each.name for each in (*containers, *client.networks.list(filters=filters), *keys)}
 
 
 def containers_of(client: docker.DockerClient, directory: Path) -> dict[str, docker.models.containers.Container]:

@@ -85,13 +85,17 @@ def listened(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, 
     directory = tmp_path_factory.mktemp("listened")
     port = free_port()
     config = write_config(directory, trials=TRIALS)
-    running = start(config, directory / "data", 2, "--set", f"run.router_port={port}")
+    # Open, so that anybody may listen.
+    running = start(config, directory / "data", 2, "--set", f"run.router_port={port}", "--set", "run.open=true")
     running.wait_until(lambda: is_open(port))
     with listener(port) as ears:
         while running.process.poll() is None:
             ears.listen()
-    code, _, err = running.finish()
+    code, out, err = running.finish()
     assert code == 0, err
+    assert "run.open: anybody who reaches the router may join, read and disturb this run\n" in err
+    assert "\nopen      anybody who reached the router could join, read and disturb the run\n" in out
+    assert "\n| open | anybody who reached the router could join" in (directory / "data" / "README.md").read_text()
     return directory / "data", {name: during_trials(messages) for name, messages in ears.heard.items()}
 
 

@@ -81,5 +81,5 @@ def test_signatures_are_of_one_key_and_one_text(tmp_path: Path, monkeypatch: pyt
 
 def test_a_key_that_is_not_there_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(KEY_VARIABLE, str(tmp_path / "gone"))
-    with pytest.raises(ConfigError, match=r"THROWCOLLECT_KEY: .*gone/key.pem: cannot be read: No such file"):
+    with pytest.raises(ConfigError, match=r"the key of the run cannot be read: .*gone/key.pem: No such file"):
         Signer.of_environment()

@@ -56,7 +56,7 @@ def describe(found: Mapping[str, Any]) -> str:
     """Summary of a dataset in words, one fact a line.
 
     Args:
-        found: `Info` as dictionary; `wall_s` [s] beside it is told, too.
+        found: `Info` as dictionary; beside it, `wall_s` [s] and whether the run was `open` are told, too.
     """
     outcomes = ", ".join(f"{count} {outcome}" for outcome, count in found["outcomes"].items())
     lines = {
@@ -70,6 +70,8 @@ def describe(found: Mapping[str, Any]) -> str:
     }
     if "wall_s" in found:
         lines["took"] = f"{found['wall_s']:.1f} s, {found['episodes'] / found['wall_s']:.1f} throws/s from start to end"
+    if found.get("open"):
+        lines["open"] = "anybody who reached the router could join, read and disturb the run"
     width = max(map(len, lines))
     return "".join(f"{key:{width}}  {text}\n" for key, text in lines.items())
 

@@ -283,11 +283,20 @@ def router(
     listen: Annotated[
         str, typer.Option("--listen", metavar="ENDPOINT", help="Zenoh endpoint to listen on.")
     ] = "tcp/127.0.0.1:7447",
+    key: Annotated[
+        Path | None,
+        typer.Option(
+            "--key",
+            metavar="DIR",
+            help="Key that tls/... lets nobody in without; made if DIR has none. By default, that of THROWCOLLECT_KEY.",
+            readable=False,
+        ),
+    ] = None,
 ) -> None:
     """Run the router that all nodes connect to."""
     from throwcollect.ros.router import serve
 
-    serve(listen)
+    serve(listen, key)
 
 
 @app.command(rich_help_panel="Nodes, as `up` starts them")

@@ -34,6 +34,23 @@ NodeArgument = Annotated[str, typer.Argument(metavar="NODE", help="Name of the n
 ParameterArgument = Annotated[str, typer.Argument(metavar="NAME", help="Name of the parameter.")]
 
 
+@ros_app.command("env")
+def env(
+    run: Annotated[
+        str | None,
+        typer.Option(
+            "--run",
+            metavar="RUN",
+            help="Id of a run, its beginning, or the dataset's directory; by default, the only one.",
+        ),
+    ] = None,
+) -> None:
+    """Print the line that lets a shell's ROS 2 nodes join a run: eval "$(throwcollect ros env)"."""
+    from throwcollect.cli.ros_env import show_environment
+
+    show_environment(run)
+
+
 @topic_app.command("list")
 def topic_list(types: TypesOption = False, hidden: HiddenOption = False, run: RunOption = None) -> None:
     """List the topics."""

@@ -5,13 +5,13 @@ from __future__ import annotations
 import difflib
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
 from throwcollect import ros
 from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError, WorkerError
-from throwcollect.runtime.nodes import node_environment
+from throwcollect.runtime.nodes import joining_environment
 from throwcollect.runtime.records import Records
 from throwcollect.runtime.runs import find, living
 
@@ -79,10 +79,7 @@ def joined(run: str | None) -> Iterator[Session]:
         Interrupted: If the user leaves; the message is empty, as that is how one leaves.
     """
     if run is not None:
-        record = living(find(Records(), run))
-        if record.endpoint is None:
-            raise WorkerError(f"run {record.run} has no router yet", hint="try once more")
-        os.environ.update(node_environment(record.endpoint, record.domain_id))
+        os.environ.update(way_into(run))
     try:
         _init()
         session = Session()
@@ -92,6 +89,23 @@ def joined(run: str | None) -> Iterator[Session]:
             session.close()
     except KeyboardInterrupt:
         raise Interrupted("") from None
+
+
+def way_into(named: str | None) -> Mapping[str, str]:
+    """Environment variables by which a process joins a run.
+
+    Args:
+        named: Id of a run, unique beginning of one, or directory of the dataset; None for the only one that lives.
+
+    Raises:
+        ConfigError: If there is no such run, or it has ended.
+        WorkerError: If the run has no router (any more).
+    """
+    run = find(Records(), named)
+    record = living(run)
+    if record.endpoint is None:
+        raise WorkerError(f"run {record.run} has no router yet", hint="try once more")
+    return joining_environment(record.endpoint, record.domain_id, run.key)
 
 
 def _init() -> None:

@@ -17,7 +17,7 @@ def print_summary(summary: Mapping[str, Any], directory: Path | None, *, as_json
     """Print the summary of a dataset.
 
     Args:
-        summary: What `dataset info` says, and ``wall_s`` [s].
+        summary: What `dataset info` says, ``wall_s`` [s], and whether the run was ``open``.
         directory: Directory of the dataset; None if it is in a volume.
         as_json: Whether to print one JSON document.
     """

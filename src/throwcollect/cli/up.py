@@ -185,11 +185,13 @@ def _prepared(records: Records, request: _Request, plan: Plan | None, shown: Dis
             earlier_s=collected_s(directory),
         )
         # Finds what cannot be had of what the configuration asks for.
-        place_of(record, config).close()
+        place_of(record, config, run.key).close()
         run.write(record)
         undo.pop_all()
     refused = sum(trial.refused is not None for trial in plan.trials)
     note = f", {refused} refused by calculation (see `throwcollect plan`)" if refused else ""
+    if config.run.open:
+        shown.warn("run.open: anybody who reaches the router may join, read and disturb this run")
     where = f"volume {volume}" if volume else directory
     shown.say(f"plan: {counted(len(plan.trials), 'trial')}{note}{more_trials(plan)}; dataset: {where}")
     return run

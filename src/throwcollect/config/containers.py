@@ -26,7 +26,8 @@ _LEAST_MEMORY = 6 * 1024**2
 """What Docker engines ask for."""
 
 _SIZE_UNITS = {"": 1, "b": 1, "k": 1024, "m": 1024**2, "g": 1024**3}
-_OWN_VARIABLES = ("THROWCOLLECT_NODE", "ZENOH_CONFIG_OVERRIDE", "ROS_DOMAIN_ID")
+_OWN_VARIABLES = ("THROWCOLLECT_NODE", "THROWCOLLECT_KEY", "ZENOH_CONFIG_OVERRIDE", "ROS_DOMAIN_ID")
+_OWN_DIRECTORIES = ("/data", "/key")
 _SOCKETS = ("docker.sock", "containerd.sock", "podman.sock")
 _ABOVE_SOCKETS = ("/", "/run", "/var", "/var/run")
 _LABELS = "throwcollect."
@@ -66,9 +67,9 @@ def _cpuset(text: str) -> str:
 
 
 def _own_path(text: str) -> bool:
-    """Whether a path in a container belongs to the runtime: the dataset's directory and what is in it."""
+    """Whether a path in a container belongs to the runtime: the directories of dataset and key, and what is in them."""
     path = PurePosixPath(text)
-    return PurePosixPath("/data") in (path, *path.parents)
+    return any(PurePosixPath(own) in (path, *path.parents) for own in _OWN_DIRECTORIES)
 
 
 def _mount(text: str) -> str:
@@ -80,7 +81,7 @@ def _mount(text: str) -> str:
     if plain.endswith(_SOCKETS) or plain in _ABOVE_SOCKETS:
         raise ValueError(f"{source} is refused, as it holds the engine's socket, and with it power over the host")
     if _own_path(target) or PurePosixPath(target) == PurePosixPath("/"):
-        raise ValueError(f"{target} is refused, as the dataset or the image is there in the container")
+        raise ValueError(f"{target} is refused, as the dataset, the key or the image is there in the container")
     return text
 
 
@@ -119,7 +120,7 @@ def _label(text: str) -> str:
 
 def _tmpfs(text: str) -> str:
     if not text.startswith("/") or _own_path(text):
-        raise ValueError("should be an absolute path in the container, outside of /data")
+        raise ValueError("should be an absolute path in the container, outside of /data and /key")
     return text
 
 
@@ -222,7 +223,7 @@ class NodeContainerConfig(Section):
     environment: dict[Variable, str | int | float] = {}
     """Further environment variables."""
     mounts: list[Mount] = []
-    """Directories and files of the host that are there in the container, too; not below /data."""
+    """Directories and files of the host that are there in the container, too; not below /data or /key."""
     networks: list[Network] = []
     """Networks of the engine that it joins besides the run's own."""
     ports: dict[ContainerPort, HostPort] = {}

@@ -20,6 +20,8 @@ class RunConfig(Section):
     """TCP port of the router on the loopback interface; 7447 is the one ROS nodes look for.
 
     0 takes a free one, and publishes none of a container."""
+    open: bool = False
+    """Anybody who reaches the router may join, read and disturb the run; episodes are still signed."""
     domain_id: Annotated[int, Field(ge=0, le=232)] = 0
     """ROS domain."""
     trial_timeout_s: PositiveFloat = 60.0

@@ -46,6 +46,8 @@ def run(directory: Path) -> None:
     if found := writer.recover(lambda trial, result: there.append((trial, result))):
         print(f"keeps {counted(found, 'episode')} of an earlier collection", flush=True)
     ros.init()
+    if not ros.joins_protected():
+        writer.note("exposed")
     node = Coordinator(writer.plan, writer)
     for trial, result in there:
         node.recall(trial, result)

@@ -39,6 +39,7 @@ class Provenance:
         libraries: Versions of the libraries that the data pass through.
         simulations: Number of simulations; None if not known.
         wall_s: Real time that it took [s]; None if not known.
+        was_open: Whether anybody who reached its router could join it.
     """
 
     finished: datetime
@@ -48,9 +49,10 @@ class Provenance:
     libraries: Mapping[str, str]
     simulations: int | None
     wall_s: float | None
+    was_open: bool
 
     @classmethod
-    def of_this_machine(cls, *, simulations: int | None, wall_s: float | None) -> Provenance:
+    def of_this_machine(cls, *, simulations: int | None, wall_s: float | None, was_open: bool) -> Provenance:
         """Provenance of a collection that ends now, here."""
         return cls(
             finished=datetime.now(timezone.utc),
@@ -60,6 +62,7 @@ class Provenance:
             libraries={"throwcollect": throwcollect.__version__, **_versions()},
             simulations=simulations,
             wall_s=wall_s,
+            was_open=was_open,
         )
 
 
@@ -180,4 +183,6 @@ def _provenance(provenance: Provenance) -> dict[str, str]:
         facts["simulations"] = str(provenance.simulations)
     if provenance.wall_s is not None:
         facts["wall time"] = f"{provenance.wall_s:.1f} s"
+    if provenance.was_open:
+        facts["open"] = "anybody who reached the router could join, read and disturb the collection"
     return facts

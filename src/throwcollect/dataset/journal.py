@@ -1,7 +1,7 @@
 """What happened while a dataset was collected, in the order in which it did: ``logs/journal.jsonl``.
 
 One JSON object a line, only ever appended to, through all interruptions: `event`, `time` (Unix [s]) and what belongs to
-the event. Nothing is read back from it to make the dataset; it is there for people, and for how long it all took.
+the event. Nothing is read back from it to make the dataset; it is there for people, and for the data card.
 """
 
 from __future__ import annotations
@@ -22,9 +22,10 @@ from throwcollect.errors import DatasetError
 _LOCK_S = 5.0
 """Whoever was killed a moment ago may still hold it."""
 
-Event = Literal["opened", "recovered", "planned", "lease", "commit", "fail", "lost", "shard", "finished"]
+Event = Literal["opened", "exposed", "recovered", "planned", "lease", "commit", "fail", "lost", "shard", "finished"]
 """
 - ``opened``: a process began to collect into the directory: `pid`.
+- ``exposed``: whoever reaches its router may join it, as it was wanted so (`run.open`) or nothing protects it.
 - ``recovered``: what earlier ones had left was taken in: `episodes`.
 - ``planned``: trials were added to the plan: `trials` in all.
 - ``lease``: a trial was given to a simulation: `trial`, `simulation`.
@@ -129,6 +130,11 @@ def read_journal(path: Path) -> Iterator[dict[str, Any]]:
                 and isinstance(entry.get("time"), int | float)
             ):
                 yield entry
+
+
+def was_open(directory: Path) -> bool:
+    """Whether anybody who reached the router could join one of the collections into a dataset."""
+    return any(entry["event"] == "exposed" for entry in read_journal(directory / JOURNAL))
 
 
 def collected_s(directory: Path) -> float:

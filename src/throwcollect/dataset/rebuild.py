@@ -14,6 +14,7 @@ from throwcollect.dataset.card import Provenance, data_card
 from throwcollect.dataset.digest import combined_digest
 from throwcollect.dataset.directory import CARD, CONFIG, METADATA, PLAN, THROWS
 from throwcollect.dataset.files import write_file
+from throwcollect.dataset.journal import was_open
 from throwcollect.dataset.mcap_reader import StoredEpisode
 from throwcollect.dataset.throws import Row, ThrowsTable, encode_table, read_throws_table
 from throwcollect.dataset.verify_episode import EpisodeCheck, RowJudge
@@ -89,7 +90,7 @@ def rebuild(directory: Path) -> Rebuilt:
     written = [THROWS, METADATA]
     write_file(directory / THROWS, encode_table(throws))
     if not (directory / CARD).exists():
-        provenance = Provenance.of_this_machine(simulations=None, wall_s=None)
+        provenance = Provenance.of_this_machine(simulations=None, wall_s=None, was_open=was_open(directory))
         write_file(directory / CARD, data_card(config.without_run(), throws, provenance).encode())
         written.append(CARD)
     write_file(directory / METADATA, dataset_metadata(recordings.summaries, channels.all, digest).encode())

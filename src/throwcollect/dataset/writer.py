@@ -22,7 +22,7 @@ from throwcollect.dataset.card import Provenance, data_card
 from throwcollect.dataset.digest import combined_digest
 from throwcollect.dataset.directory import CARD, CONFIG, METADATA, PLAN, THROWS, TRIALS, shard_name
 from throwcollect.dataset.files import remove, write_file
-from throwcollect.dataset.journal import Event, Journal
+from throwcollect.dataset.journal import Event, Journal, was_open
 from throwcollect.dataset.recovery import recover_shard
 from throwcollect.dataset.shard import FinishedShard, OpenShard
 from throwcollect.dataset.throws import Place, Row, ThrowsTable, encode_table
@@ -284,7 +284,9 @@ class DatasetWriter:
         files = [each.summary for each in finished if each.summary]
         earlier_s = self._journal.earlier_s if self._journal else 0.0
         whole_s = None if wall_s is None else earlier_s + wall_s
-        provenance = Provenance.of_this_machine(simulations=simulations, wall_s=whole_s)
+        provenance = Provenance.of_this_machine(
+            simulations=simulations, wall_s=whole_s, was_open=was_open(self._directory)
+        )
         # How it was run may not change the dataset, so what is kept of that is in the data card alone.
         config = self._config.without_run()
         write_file(self._directory / THROWS, encode_table(throws))

@@ -41,6 +41,7 @@ from rclpy.utilities import get_default_context
 from rosidl_runtime_py.utilities import get_action, get_message, get_service
 
 from throwcollect.errors import ThrowcollectError
+from throwcollect.session_config import is_protected
 
 _looks = itertools.count()
 
@@ -71,6 +72,15 @@ def graph_changes(_node: Node) -> int:
     rclpy does not tell of changes, so there may always have been one.
     """
     return next(_looks)
+
+
+def joins_protected() -> bool:
+    """Whether nodes of this process join a graph that lets nobody in without a key: other RMWs know of no key.
+
+    Raises:
+        ConfigError: If an environment variable does not hold what it should.
+    """
+    return rclpy.get_rmw_implementation_identifier() == "rmw_zenoh_cpp" and is_protected()
 
 
 def provide_time(node: Node) -> None:
@@ -116,6 +126,7 @@ __all__ = [
     "get_service",
     "graph_changes",
     "init",
+    "joins_protected",
     "ok",
     "provide_time",
     "shutdown",

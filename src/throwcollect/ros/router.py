@@ -11,11 +11,13 @@ import socket
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
+from pathlib import Path
 from queue import Empty, SimpleQueue
 
 import zenoh
 
 from throwcollect.errors import ConfigError, ThrowcollectError
+from throwcollect.run_key import RunKey
 from throwcollect.session_config import in_words, router_config
 
 DEFAULT_LISTEN = "tcp/127.0.0.1:7447"
@@ -27,32 +29,33 @@ _PORT_ATTEMPTS = 5
 
 
 @contextmanager
-def router(listen: str = DEFAULT_LISTEN) -> Iterator[str]:
+def router(listen: str = DEFAULT_LISTEN, key: RunKey | None = None) -> Iterator[str]:
     """Run a router in this process.
 
     Args:
         listen: Endpoint to listen on; port 0 takes a free one.
+        key: Key that an endpoint ``tls/...`` lets nobody in without.
 
     Yields:
         The endpoint that nodes connect to.
 
     Raises:
-        ConfigError: If the endpoint is malformed, or the router cannot listen on it.
+        ConfigError: If the endpoint is malformed, the router cannot listen on it, or its key cannot be read.
     """
-    session, endpoint = _open(listen)
+    session, endpoint = _open(listen, key)
     try:
         yield endpoint
     finally:
         session.close()  # type: ignore[no-untyped-call]
 
 
-def _open(listen: str) -> tuple[zenoh.Session, str]:
+def _open(listen: str, key: RunKey | None) -> tuple[zenoh.Session, str]:
     address, _, port = listen.rpartition(":")
     wants_any = port == "0"
     for attempt in range(_PORT_ATTEMPTS):
         endpoint = f"{address}:{_free_port(address)}" if wants_any else listen
         try:
-            return zenoh.open(router_config(endpoint)), endpoint
+            return zenoh.open(router_config(endpoint, key)), endpoint
         except zenoh.ZError as error:
             # Somebody may have taken the free port in between.
             if not wants_any or attempt == _PORT_ATTEMPTS - 1:
@@ -75,20 +78,28 @@ def _free_port(address: str) -> int:
         raise ConfigError(f"cannot listen on {address!r}: {error}", expected="such as tcp/127.0.0.1:0") from error
 
 
-def serve(listen: str = DEFAULT_LISTEN) -> None:
+def serve(listen: str = DEFAULT_LISTEN, key_directory: Path | None = None) -> None:
     """Run a router until SIGTERM or SIGINT, after printing one line that says where it listens.
 
     Args:
         listen: Endpoint to listen on; port 0 takes a free one.
+        key_directory: Directory of the key that an endpoint ``tls/...`` lets nobody in without; a key is made there if
+            there is none. None for the key that the environment names.
 
     Raises:
-        ConfigError: If the endpoint is malformed, or the router cannot listen on it.
+        ConfigError: If the endpoint is malformed, the router cannot listen on it, or its key cannot be read.
     """
+    if key_directory is None:
+        key = RunKey.of_environment()
+    else:
+        key = RunKey(key_directory.absolute())
+        if not key.exists:
+            key.create()
     # Not `sigwait`: libraries start threads when they are imported, and one of those would take the signal and die.
     stop: SimpleQueue[int] = SimpleQueue()
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda received, _frame: stop.put(received))
-    with router(listen) as endpoint:
+    with router(listen, key) as endpoint:
         print(f"router listening on {endpoint}", flush=True)
         # In slices: a signal just before the wait would have its handler run only when the wait ends.
         while True:
@@ -108,8 +119,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     parser = argparse.ArgumentParser(prog="python -m throwcollect.ros.router", description="Zenoh router")
     parser.add_argument("--listen", default=DEFAULT_LISTEN, help="endpoint; port 0 takes a free one [%(default)s]")
+    parser.add_argument("--key", type=Path, help="directory of the key for tls/...; made if there is none")
     try:
-        serve(parser.parse_args(arguments).listen)
+        parsed = parser.parse_args(arguments)
+        serve(parsed.listen, parsed.key)
     except ThrowcollectError as error:
         print(error, file=sys.stderr)
         return error.exit_code

@@ -16,21 +16,22 @@ from docker.errors import NotFound
 
 from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError, Interrupted, Problem, WorkerError
+from throwcollect.run_key import RunKey
 from throwcollect.runtime.docker_checks import check
 from throwcollect.runtime.docker_engine import ENGINE_ERRORS, connect, engine_errors
 from throwcollect.runtime.docker_node import NodeContainer
 from throwcollect.runtime.docker_options import (
     NODE_LABEL,
-    ROUTER_ENDPOINT,
     ROUTER_PORT,
     RUN_LABEL,
     RunPlace,
     node_options,
     published,
+    router_endpoint,
     section_of,
 )
 from throwcollect.runtime.docker_runs import remove
-from throwcollect.runtime.docker_volume import dataset_info, place_directory
+from throwcollect.runtime.docker_volume import dataset_info, place_directory, place_key
 from throwcollect.runtime.docker_watch import ContainerState, EngineWatch
 from throwcollect.runtime.node_logs import NodeLogs
 from throwcollect.runtime.nodes import ROUTER, NodeExit
@@ -62,6 +63,7 @@ class DockerRuntime:
         config: Configuration of the run.
         directory: Directory of the dataset; None if it lies in the volume ``containers.volume``.
         logs: Directory for the log files.
+        key: Key of the run.
         client: Client of the engine; None for that which ``DOCKER_HOST`` names.
 
     Raises:
@@ -76,15 +78,17 @@ class DockerRuntime:
         *,
         directory: Path | None,
         logs: Path,
+        key: RunKey,
         client: DockerClient | None = None,
     ) -> None:
         source = config.containers.volume if directory is None else str(directory.resolve())
         if source is None:
             raise ConfigError([Problem("missing, as the dataset has no directory either", "containers.volume")])
-        self.listen = ROUTER_ENDPOINT
+        self.listen = router_endpoint(config)
         self._place = RunPlace(run_id, source)
         self.data = self._place.data
         self._config = config
+        self._key = key
         self._logs = NodeLogs(logs)
         self._client = client or connect()
         self._watch: EngineWatch | None = None
@@ -93,7 +97,7 @@ class DockerRuntime:
         check(self._client, self._place, config)
 
     def open(self) -> None:
-        """Make the run's network and volume unless they exist, and begin to watch its containers.
+        """Make the run's network and volumes unless they exist, and begin to watch its containers.
 
         Raises:
             WorkerError: If the engine refuses.
@@ -106,10 +110,14 @@ class DockerRuntime:
                     self._client.volumes.get(place.source)
                 except NotFound:
                     self._client.volumes.create(place.source, labels=place.labels())
+            # A run that has its network has its key, too, which its nodes go on using.
             if not self._client.networks.list(filters={"label": f"{RUN_LABEL}={place.run_id}"}):
-                self._client.networks.create(
-                    place.network, driver="bridge", internal=not published(self._config), labels=place.labels()
-                )
+                with ThreadPoolExecutor(1) as beside:
+                    placed = beside.submit(place_key, self._client, place, self._config, self._key)
+                    self._client.networks.create(
+                        place.network, driver="bridge", internal=not published(self._config), labels=place.labels()
+                    )
+                    placed.result()
         self._watch = EngineWatch(self._client, place)
 
     def found(self) -> tuple[str, ...]:

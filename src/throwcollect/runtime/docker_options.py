@@ -13,22 +13,25 @@ from docker.types import EndpointConfig, LogConfig, Mount, Ulimit
 import throwcollect
 from throwcollect.config.containers import NodeContainerConfig
 from throwcollect.config.schema import Config
+from throwcollect.run_key import RunKey
 from throwcollect.runtime.image import default_tag
-from throwcollect.runtime.nodes import COORDINATOR, ROUTER, node_environment
+from throwcollect.runtime.nodes import COORDINATOR, ROUTER, node_environment, protocol_of
 from throwcollect.runtime.ports import LOOPBACK
 
 RUN_LABEL = "throwcollect.run"
 NODE_LABEL = "throwcollect.node"
 DIRECTORY_LABEL = "throwcollect.directory"
 VERSION_LABEL = "throwcollect.version"
+KEY_LABEL = "throwcollect.key"
+"""Marks the volume that holds the key of a run."""
 LOG_LABEL = "throwcollect.log-offset"
 """Size of a node's log file when this container began to write to it [bytes]."""
 
 ROUTER_PORT = 7447
-ROUTER_ENDPOINT = f"tcp/{ROUTER}:{ROUTER_PORT}"
-"""In the router itself, its name means its address in the run's network; it listens nowhere else."""
 
 DATA = "/data"
+KEY = RunKey(Path("/key"))
+"""The key of the run, as nodes see it."""
 
 _API_VERSION = "1.41"
 _PIDS = 512
@@ -63,6 +66,11 @@ class RunPlace:
         """Name of the run's network."""
         return f"throwcollect-{self.run_id}"
 
+    @property
+    def key_volume(self) -> str:
+        """Name of the volume that holds the run's key."""
+        return f"throwcollect-{self.run_id}-key"
+
     def container(self, node: str) -> str:
         """Name of a node's container."""
         return f"throwcollect-{self.run_id}-{node}"
@@ -80,6 +88,15 @@ class RunPlace:
         """The dataset, or the volume that it lies in, for a container."""
         kind = "volume" if self.in_volume else "bind"
         return Mount(target=DATA, source=self.source, type=kind, read_only=read_only)
+
+    def key_mount(self, *, read_only: bool) -> Mount:
+        """The volume with the run's key, for a container."""
+        return Mount(target=str(KEY.directory), source=self.key_volume, type="volume", read_only=read_only)
+
+
+def router_endpoint(config: Config) -> str:
+    """Zenoh endpoint of the router: in the router itself, its name means its address in the run's network alone."""
+    return f"{protocol_of(config.run)}/{ROUTER}:{ROUTER_PORT}"
 
 
 def image(config: Config) -> str:
@@ -131,12 +148,14 @@ def node_options(
     node = section_of(config, name)
     options: dict[str, Any] = dict(node.options)
     general = confined(place, config)
-    own: Mapping[str, str] = node_environment(ROUTER_ENDPOINT, config.run.domain_id)
+    own: Mapping[str, str] = node_environment(router_endpoint(config), config.run.domain_id, KEY)
     wanted = {key: str(value) for key, value in node.environment.items()}
     ports = {port: (LOOPBACK, host_port) for port, host_port in node.ports.items()}
     if name == ROUTER and config.run.router_port:
         ports[f"{ROUTER_PORT}/tcp"] = (LOOPBACK, config.run.router_port)
-    mounts = [] if name == ROUTER else [place.mount(read_only=name != COORDINATOR)]
+    mounts = [place.key_mount(read_only=True)]
+    if name != ROUTER:
+        mounts.append(place.mount(read_only=name != COORDINATOR))
     return {
         **general,
         **options,

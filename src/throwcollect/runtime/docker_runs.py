@@ -13,7 +13,7 @@ from docker.errors import NotFound
 
 from throwcollect.errors import WorkerError
 from throwcollect.runtime.docker_engine import ENGINE_ERRORS, engine_errors, in_words
-from throwcollect.runtime.docker_options import DIRECTORY_LABEL, NODE_LABEL, RUN_LABEL, VERSION_LABEL
+from throwcollect.runtime.docker_options import DIRECTORY_LABEL, KEY_LABEL, NODE_LABEL, RUN_LABEL, VERSION_LABEL
 
 _GRACE_S = 3
 _AT_ONCE = 8
@@ -79,12 +79,12 @@ def runs(client: DockerClient) -> list[FoundRun]:
 
 
 def remove(client: DockerClient, run_id: str, *, volumes: bool) -> list[str]:
-    """Remove what an engine holds of a run; its containers are asked to end first.
+    """Remove what an engine holds of a run, its key included; its containers are asked to end first.
 
     Args:
         client: Client of the engine.
         run_id: Name of the run.
-        volumes: Whether to remove the volume that was made for the run, too, and the dataset with it.
+        volumes: Whether to remove the volume that was made for the dataset, too, and the dataset with it.
 
     Returns:
         Names of what was removed.
@@ -113,13 +113,13 @@ def remove(client: DockerClient, run_id: str, *, volumes: bool) -> list[str]:
     with engine_errors(f"run {run_id} cannot be removed"):
         containers = client.api.containers(all=True, filters=filters)
         networks = client.api.networks(filters=filters)
-        found_volumes = client.api.volumes(filters=filters)["Volumes"] or [] if volumes else []
+        found_volumes = client.api.volumes(filters=filters)["Volumes"] or []
     with ThreadPoolExecutor(_AT_ONCE) as pool:
         for each in containers:
             pool.submit(attempt, each["Names"][0].lstrip("/"), partial(end, each))
     for each in networks:
         attempt(f"network {each['Name']}", partial(client.api.remove_network, each["Id"]))
-    for each in found_volumes:
+    for each in (each for each in found_volumes if volumes or KEY_LABEL in each["Labels"]):
         attempt(f"volume {each['Name']}", partial(client.api.remove_volume, each["Name"]))
     if failures:
         raise WorkerError(f"run {run_id}: not everything could be removed", evidence="\n".join(sorted(failures)))

@@ -1,7 +1,8 @@
-"""A dataset in a volume of the engine: how it gets in, and what can be asked about it."""
+"""Volumes of the engine: how a dataset or the key of a run gets into one, and what can be asked about a dataset."""
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import tarfile
@@ -13,11 +14,13 @@ from typing import Any
 
 from docker.client import DockerClient
 from docker.models.containers import Container
+from docker.types import Mount
 
 from throwcollect.config.schema import Config
 from throwcollect.errors import DatasetError
+from throwcollect.run_key import RunKey
 from throwcollect.runtime.docker_engine import ENGINE_ERRORS, engine_errors
-from throwcollect.runtime.docker_options import DATA, RunPlace, confined
+from throwcollect.runtime.docker_options import DATA, KEY, KEY_LABEL, RunPlace, confined
 
 _IN_MEMORY = 16 * 1024**2
 _INFO_S = 120
@@ -39,12 +42,39 @@ def place_directory(client: DockerClient, place: RunPlace, config: Config, direc
         engine_errors(f"{directory} cannot be copied into the volume {place.source}"),
         tempfile.SpooledTemporaryFile(_IN_MEMORY) as packed,
         # It need not run: the engine writes into its mounts.
-        _single(client, place, config, ["--version"], read_only=False) as container,
+        _single(client, place, config, ["--version"], place.mount(read_only=False)) as container,
     ):
         with tarfile.open(fileobj=packed, mode="w") as archive:
             archive.add(directory, arcname=place.run_id, filter=_owned_by_caller)
         packed.seek(0)
         container.put_archive(DATA, packed)
+
+
+def place_key(client: DockerClient, place: RunPlace, config: Config, key: RunKey) -> None:
+    """Make the volume with the run's key, whose files the caller's uid alone can read there.
+
+    It goes the engine's way for files, so that the key is on no command line and in nothing that the engine tells of
+    containers.
+
+    Args:
+        client: Client of the engine.
+        place: The run.
+        config: Its configuration.
+        key: The key.
+
+    Raises:
+        WorkerError: If the engine refuses.
+        ConfigError: If the key cannot be read.
+    """
+    key.check()
+    with engine_errors(f"the key of run {place.run_id} cannot be copied into the volume {place.key_volume}"):
+        client.volumes.create(place.key_volume, labels={**place.labels(), KEY_LABEL: ""})
+        packed = io.BytesIO()
+        with tarfile.open(fileobj=packed, mode="w") as archive:
+            for path in (key.certificate, key.private_key):
+                archive.add(path, arcname=path.name, filter=_readable_by_caller)
+        with _single(client, place, config, ["--version"], place.key_mount(read_only=False)) as container:
+            container.put_archive(str(KEY.directory), packed.getvalue())
 
 
 def dataset_info(client: DockerClient, place: RunPlace, config: Config) -> dict[str, Any]:
@@ -62,7 +92,7 @@ def dataset_info(client: DockerClient, place: RunPlace, config: Config) -> dict[
     command = ["dataset", "info", place.data, "--json"]
     with (
         engine_errors(f"the dataset in the volume {place.source} cannot be looked at"),
-        _single(client, place, config, command, read_only=True) as container,
+        _single(client, place, config, command, place.mount(read_only=True)) as container,
     ):
         container.start()
         code = container.wait(timeout=_INFO_S)["StatusCode"]
@@ -80,13 +110,18 @@ def _owned_by_caller(member: tarfile.TarInfo) -> tarfile.TarInfo:
     return member
 
 
+def _readable_by_caller(member: tarfile.TarInfo) -> tarfile.TarInfo:
+    member.mode = 0o400
+    return _owned_by_caller(member)
+
+
 @contextmanager
 def _single(
-    client: DockerClient, place: RunPlace, config: Config, command: list[str], *, read_only: bool
+    client: DockerClient, place: RunPlace, config: Config, command: list[str], mount: Mount
 ) -> Iterator[Container]:
     """A container of the run that is no node of it, without a network; removed at the end."""
     container = client.containers.create(
-        **confined(place, config), command=command, mounts=[place.mount(read_only=read_only)], network_mode="none"
+        **confined(place, config), command=command, mounts=[mount], network_mode="none"
     )
     try:
         yield container

@@ -17,6 +17,7 @@ from throwcollect.config.schema import Config
 from throwcollect.coordinator.progress import Progress
 from throwcollect.dataset.inspect import info, loss
 from throwcollect.errors import ConfigError, DatasetError, Interrupted, LossError, ThrowcollectError, WorkerError
+from throwcollect.run_key import RunKey
 from throwcollect.runtime.events import EventLog, RunEvent
 from throwcollect.runtime.listening import Listening
 from throwcollect.runtime.local import LocalRuntime
@@ -49,19 +50,24 @@ class Onlooker(Protocol):
         """Something that went wrong."""
 
 
-def place_of(record: Record, config: Config) -> Place:
+def place_of(record: Record, config: Config, key: RunKey) -> Place:
     """The place where the nodes of a run are to live, or live already.
+
+    Args:
+        record: What is known of the run.
+        config: Its configuration.
+        key: Its key.
 
     Raises:
         ConfigError: If the router's port is taken, or something that the configuration asks for is not there.
         WorkerError: If there is no such place on this machine.
     """
     if record.runtime == "local":
-        return LocalRuntime(Path(record.directory), Path(record.logs), config.run)
+        return LocalRuntime(Path(record.directory), Path(record.logs), config.run, key)
     from throwcollect.runtime.docker import DockerRuntime
 
     directory = None if record.volume else Path(record.directory)
-    return DockerRuntime(record.run, config, directory=directory, logs=Path(record.logs))
+    return DockerRuntime(record.run, config, directory=directory, logs=Path(record.logs), key=key)
 
 
 def launch(
@@ -80,8 +86,8 @@ def launch(
         interruptions: How often the user has asked to stop: at first running trials are finished, then no more.
 
     Returns:
-        What the dataset holds, and ``wall_s``: the time since the run was started, and of earlier runs into it [s]; and
-        the error that says that trials of it are lost, if some are.
+        What the dataset holds, ``wall_s``: the time since the run was started, and of earlier runs into it [s], and
+        ``open``: whether anybody could join the run; and the error that says that trials are lost, if some are.
 
     Raises:
         ConfigError: If the configuration cannot be used after all.
@@ -172,12 +178,17 @@ class _Launcher:
         self._notes = notes
         self._onlooker = onlooker
         self._interruptions = interruptions
+        self._is_open = config.run.open
         self._simulations = self._wanted = run.record.simulations
         self._set_aside: set[str] = set()
-        self._place = place_of(run.record, config)
+        self._place = place_of(run.record, config, run.key)
         self._supervisor = Supervisor(self._place, config.run, simulations=self._simulations)
         self._listening = Listening(
-            self._report, domain_id=run.record.domain_id, name=LAUNCHER, on_connect=self._offer_scaling
+            self._report,
+            domain_id=run.record.domain_id,
+            key=run.key,
+            name=LAUNCHER,
+            on_connect=self._offer_scaling,
         )
 
     def run_to_the_end(self) -> dict[str, Any]:
@@ -191,7 +202,8 @@ class _Launcher:
             whole = self._summary()
         wall_s = (datetime.now(timezone.utc) - self._run.record.started).total_seconds()
         # Somebody may have set the clock back.
-        return {**whole, "wall_s": max(wall_s, _POLL_S) + self._run.record.earlier_s}
+        wall_s = max(wall_s, _POLL_S) + self._run.record.earlier_s
+        return {**whole, "wall_s": wall_s, "open": self._is_open}
 
     def _open(self) -> tuple[str, ...]:
         """Make what the nodes need; names of those that a launcher before this one has left."""

@@ -11,6 +11,7 @@ from types import TracebackType
 from throwcollect import ros
 from throwcollect.coordinator.progress import Progress, ProgressListener
 from throwcollect.errors import ConfigError, ThrowcollectError
+from throwcollect.run_key import RunKey
 from throwcollect.runtime.nodes import node_environment
 from throwcollect.runtime.records import Records, Run
 
@@ -24,6 +25,7 @@ class Listening:
     Args:
         on_progress: Called with every report, within `spin`.
         domain_id: ROS domain of the run.
+        key: Key of the run.
         name: Name of the node; one of this process alone, and hidden, by default.
         on_connect: Called with the node whenever it is made anew.
     """
@@ -33,11 +35,13 @@ class Listening:
         on_progress: Callable[[Progress], None],
         *,
         domain_id: int,
+        key: RunKey,
         name: str | None = None,
         on_connect: Callable[[ros.Node], None] = lambda _: None,
     ) -> None:
         self._on_progress = on_progress
         self._domain_id = domain_id
+        self._key = key
         self._name = name
         self._on_connect = on_connect
         self._listener: ProgressListener | None = None
@@ -72,7 +76,7 @@ class Listening:
             time.sleep(seconds)
 
     def _connect(self, endpoint: str) -> None:
-        os.environ.update(node_environment(endpoint, self._domain_id))
+        os.environ.update(node_environment(endpoint, self._domain_id, self._key))
         try:
             listener = ProgressListener(self._on_progress, name=self._name)
         except ConfigError:
@@ -85,7 +89,7 @@ class Listening:
 
 
 def answers(endpoint: str) -> bool:
-    """Whether something listens at a Zenoh endpoint of TCP, such as ``tcp/127.0.0.1:7447``."""
+    """Whether something listens at a Zenoh endpoint of TCP or TLS, such as ``tls/127.0.0.1:7447``."""
     host, _, port = endpoint.partition("/")[2].rpartition(":")
     try:
         socket.create_connection((host, int(port)), _CONNECT_S).close()
@@ -112,7 +116,7 @@ def follow(
         ConfigError: If its record vanishes or cannot be read.
     """
     found = records.get(run)
-    with Listening(on_progress, domain_id=found.record.domain_id) as listening:
+    with Listening(on_progress, domain_id=found.record.domain_id, key=found.key) as listening:
         yield found
         while found.status == "running" and keep_on():
             listening.spin(found.record.endpoint, _POLL_S)

@@ -14,8 +14,9 @@ from pathlib import Path
 
 from throwcollect.config.run import RunConfig
 from throwcollect.errors import WorkerError
+from throwcollect.run_key import RunKey
 from throwcollect.runtime.node_logs import NodeLogs
-from throwcollect.runtime.nodes import ROUTER, NodeExit, node_environment
+from throwcollect.runtime.nodes import ROUTER, NodeExit, node_environment, protocol_of
 from throwcollect.runtime.ports import reserved_port
 
 _PR_SET_PDEATHSIG = 1
@@ -46,18 +47,19 @@ class LocalRuntime:
         data: Directory of the dataset.
         logs: Directory for the log files.
         run: How to run.
+        key: Key of the run.
 
     Raises:
         ConfigError: If the router's port is taken.
     """
 
-    def __init__(self, data: Path, logs: Path, run: RunConfig) -> None:
+    def __init__(self, data: Path, logs: Path, run: RunConfig, key: RunKey) -> None:
         self.data = str(data)
         self._logs = NodeLogs(logs)
         self._reserved = reserved_port(run.router_port)
         self._address: tuple[str, int] = self._reserved.getsockname()
-        self.listen = "tcp/{}:{}".format(*self._address)
-        self._environment = {**os.environ, **node_environment(self.listen, run.domain_id)}
+        self.listen = "{}/{}:{}".format(protocol_of(run), *self._address)
+        self._environment = {**os.environ, **node_environment(self.listen, run.domain_id, key)}
         self._processes: dict[str, subprocess.Popen[bytes]] = {}
 
     def router_address(self) -> tuple[str, int]:

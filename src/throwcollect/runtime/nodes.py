@@ -8,6 +8,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
+from throwcollect.config.run import RunConfig
+from throwcollect.run_key import KEY_VARIABLE, RunKey
+from throwcollect.session_config import OVERRIDE_VARIABLE, client_override
+
 ROUTER = "router"
 COORDINATOR = "coordinator"
 LAUNCHER = "launcher"
@@ -102,19 +106,42 @@ class Runtime(Protocol):
 def endpoint_of(runtime: Runtime) -> str | None:
     """Zenoh endpoint at which this process reaches the router of a runtime; None while there is no way to it."""
     address = runtime.router_address()
-    return None if address is None else "tcp/{}:{}".format(*address)
+    if address is None:
+        return None
+    protocol = runtime.listen.partition("/")[0]
+    return "{}/{}:{}".format(protocol, *address)
 
 
-def node_environment(endpoint: str, domain_id: int) -> Mapping[str, str]:
-    """Environment variables of a process that joins a run.
+def protocol_of(run: RunConfig) -> str:
+    """What the router of a run speaks: TLS, which nobody else has the key to, unless the run is open."""
+    return "tcp" if run.open else "tls"
+
+
+def joining_environment(endpoint: str, domain_id: int, key: RunKey) -> Mapping[str, str]:
+    """Environment variables by which any process joins a run; they name the key's files and hold no secret.
 
     Args:
         endpoint: Zenoh endpoint of the router.
         domain_id: ROS domain.
+        key: Key of the run.
     """
     return {
-        "ZENOH_CONFIG_OVERRIDE": f'mode="client";connect/endpoints=["{endpoint}"]',
+        OVERRIDE_VARIABLE: client_override(endpoint, key),
         "ROS_DOMAIN_ID": str(domain_id),
+        KEY_VARIABLE: str(key.directory),
+    }
+
+
+def node_environment(endpoint: str, domain_id: int, key: RunKey) -> Mapping[str, str]:
+    """Environment variables of a node of a run.
+
+    Args:
+        endpoint: Zenoh endpoint of the router.
+        domain_id: ROS domain.
+        key: Key of the run.
+    """
+    return {
+        **joining_environment(endpoint, domain_id, key),
         # One process per core is the parallelism here; threads of numerical libraries would only fight it.
         "OMP_NUM_THREADS": "1",
         "OPENBLAS_NUM_THREADS": "1",

@@ -4,7 +4,10 @@ The files lie in a directory of the user, not in datasets, so that a dataset doe
 
     runs/<run>.json     the record, written whole at each change
     runs/<run>.lock     locked by the launcher: neither a pid that is used again nor a crash can feign a living one
-    runs/<run>/         files of a run whose dataset has no directory on this machine
+    runs/<run>/key/     the key of the run: whoever can read it may join
+    runs/<run>/         besides, files of a run whose dataset has no directory on this machine
+
+All of it is for its owner alone.
 """
 
 from __future__ import annotations
@@ -17,7 +20,7 @@ import secrets
 import shutil
 import tempfile
 import time
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from datetime import datetime, timezone
 from pathlib import Path
@@ -26,6 +29,7 @@ from typing import Any, Literal
 from pydantic import TypeAdapter, ValidationError
 
 from throwcollect.errors import ConfigError
+from throwcollect.run_key import RunKey
 from throwcollect.runtime.supervisor import NodeState
 
 STATE_VARIABLE = "THROWCOLLECT_STATE"
@@ -99,10 +103,12 @@ class Run:
     Attributes:
         record: What is known of it.
         lives: Whether its launcher lives.
+        key: What its router lets nobody in without.
     """
 
     record: Record
     lives: bool
+    key: RunKey
 
     @property
     def status(self) -> Literal["running", "ended", "died"]:
@@ -120,7 +126,8 @@ class OpenRun:
 
     Attributes:
         run: Id of the run.
-        directory: Directory for files of a run whose dataset has no directory on this machine; made by who needs it.
+        directory: Directory of the key, and for files of a run whose dataset has no directory on this machine.
+        key: What its router lets nobody in without.
 
     Args:
         runs: Directory of the records.
@@ -131,6 +138,7 @@ class OpenRun:
     def __init__(self, runs: Path, run: str, lock: int) -> None:
         self.run = run
         self.directory = runs / run
+        self.key = _key(runs, run)
         self._runs = runs
         self._lock = lock
         self._record: Record | None = None
@@ -151,6 +159,18 @@ class OpenRun:
             self._record = _read(self._runs / f"{self.run}.json")
         return self._record
 
+    def make(self) -> None:
+        """Make the directory, and the key in it.
+
+        Raises:
+            ConfigError: If they cannot be written.
+        """
+        try:
+            self.directory.mkdir(mode=0o700, exist_ok=True)
+        except OSError as error:
+            raise _unusable(self.directory, error) from error
+        self.key.create()
+
     def write(self, record: Record) -> None:
         """Write the record.
 
@@ -161,7 +181,8 @@ class OpenRun:
         path = self._runs / f"{self.run}.json"
         beside = path.with_suffix(".new")
         try:
-            beside.write_bytes(_ADAPTER.dump_json(record, indent=1))
+            with open(os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600), "wb") as file:
+                file.write(_ADAPTER.dump_json(record, indent=1))
             beside.replace(path)
         except OSError as error:
             raise _unusable(path, error) from error
@@ -202,12 +223,14 @@ class Records:
         state = _state_directory()
         self._runs = state / "runs"
         try:
-            self._runs.mkdir(exist_ok=True)
+            self._runs.mkdir(mode=0o700, exist_ok=True)
+            # Whoever may read in the directory above, which the user has named, shall see nothing of what is in here.
+            self._runs.chmod(0o700)
         except OSError as error:
             raise _unusable(self._runs, error) from error
 
     def new(self, name: str) -> OpenRun:
-        """A new run, without a record yet; forgets what ended a week ago.
+        """A new run, with a key but without a record yet; forgets what ended a week ago.
 
         Args:
             name: Name of the collection; part of the id.
@@ -225,7 +248,12 @@ class Records:
             except OSError as error:
                 raise _unusable(self._runs / f"{run}.lock", error) from error
             fcntl.flock(lock, fcntl.LOCK_EX)
-            return OpenRun(self._runs, run, lock)
+            made = OpenRun(self._runs, run, lock)
+            with ExitStack() as undo:
+                undo.callback(made.forget)
+                made.make()
+                undo.pop_all()
+            return made
 
     def inherited(self, run: str, lock: int) -> OpenRun:
         """The run that the starter of this process has handed over, with its locked descriptor."""
@@ -265,7 +293,7 @@ class Records:
         """
         # The lock first: a launcher that ends in between has written its end before it lets go.
         lives = self.lives(run)
-        return Run(_read(self._runs / f"{run}.json"), lives)
+        return Run(_read(self._runs / f"{run}.json"), lives, _key(self._runs, run))
 
     def all(self) -> list[Run]:
         """All runs whose records can be read, the latest last."""
@@ -307,16 +335,21 @@ def _state_directory() -> Path:
     path = Path(named).absolute() if named else Path(tempfile.gettempdir()) / f"throwcollect-{os.getuid()}"
     try:
         path.mkdir(mode=0o700, parents=bool(named), exist_ok=True)
-        owner = path.stat(follow_symlinks=False)
+        # A link that the user has named is the user's own choice.
+        owner = path.stat(follow_symlinks=bool(named))
     except OSError as error:
         raise _unusable(path, error) from error
     # In a directory that all may write to, somebody else may have been faster.
-    if owner.st_uid != os.getuid() or (not named and owner.st_mode & 0o077):
+    if owner.st_uid != os.getuid() or owner.st_mode & (0o022 if named else 0o077):
         raise ConfigError(
             f"{path}: runs cannot be remembered there: it belongs to somebody else, or others may write there",
             hint=f"name another directory in {STATE_VARIABLE}, or remove it",
         )
     return path
+
+
+def _key(runs: Path, run: str) -> RunKey:
+    return RunKey(runs / run / "key")
 
 
 def _read(path: Path) -> Record:

@@ -10,6 +10,7 @@ from typing import Any
 from throwcollect import ros
 from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.ros import IntegerRange, get_service
+from throwcollect.run_key import RunKey
 from throwcollect.runtime.listening import answers
 from throwcollect.runtime.nodes import LAUNCHER, node_environment
 from throwcollect.runtime.records import Record, Run
@@ -53,7 +54,7 @@ def scale(run: Run, simulations: int) -> None:
         WorkerError: If the launcher died, or does not answer.
     """
     record = living(run)
-    with _graph_of(record):
+    with _graph_of(record, run.key):
         node = ros.Node(f"_throwcollect_{os.getpid()}")
         client = node.create_client(SetParameters, f"/{LAUNCHER}/set_parameters")
         if not client.wait_for_service(_ANSWER_S):
@@ -70,10 +71,10 @@ def scale(run: Run, simulations: int) -> None:
 
 
 @contextmanager
-def _graph_of(record: Record) -> Iterator[None]:
+def _graph_of(record: Record, key: RunKey) -> Iterator[None]:
     if record.endpoint is None or not answers(record.endpoint):
         raise _silent(record)
-    os.environ.update(node_environment(record.endpoint, record.domain_id))
+    os.environ.update(node_environment(record.endpoint, record.domain_id, key))
     ros.init()
     try:
         yield

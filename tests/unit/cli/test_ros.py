@@ -33,7 +33,8 @@ from throwcollect.ros.embedded import (
     SingleThreadedExecutor,
 )
 from throwcollect.ros.router import router
-from throwcollect.runtime.nodes import node_environment
+from throwcollect.run_key import RunKey
+from throwcollect.runtime.nodes import joining_environment
 from throwcollect.runtime.records import Record, Records
 from throwcollect.session_config import OVERRIDE_VARIABLE
 
@@ -299,7 +300,7 @@ def test_a_run_is_joined_by_its_name_or_directory(
     endpoint: str, say: Callable[..., Said], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setenv("THROWCOLLECT_STATE", str(tmp_path))
-    for variable in node_environment(endpoint, 0):
+    for variable in joining_environment(endpoint, 0, RunKey(tmp_path)):
         monkeypatch.setenv(variable, "nonsense")
     run = Records().new("throws")
     record = Record(
@@ -316,10 +317,18 @@ def test_a_run_is_joined_by_its_name_or_directory(
         endpoint=endpoint,
     )
     run.write(record)
+    override = f'mode="client";connect/endpoints=["{endpoint}"]'
+    line = (
+        f"export RMW_IMPLEMENTATION=rmw_zenoh_cpp ZENOH_CONFIG_OVERRIDE='{override}' ROS_DOMAIN_ID=0 "
+        f"THROWCOLLECT_KEY={run.key.directory}\n"
+    )
+    assert say("env") == (0, line, "")
     for named in (run.run, "thr", str(tmp_path / "data")):
         assert say("node", "list", "--run", named) == (0, "/robot/driver\n", "")
+        assert say("env", "--run", named) == (0, line, "")
     run.update(endpoint=None)
-    assert say("node", "list", "--run", run.run).code == 3
+    for command in (("node", "list"), ("env",)):
+        assert say(*command, "--run", run.run).code == 3
     run.close()
     assert "its launcher died" in say("node", "list", "--run", run.run).err
 

@@ -15,7 +15,7 @@ INSTEAD = "should be left out; use {} beside options"
 NETWORK = "is refused; a network of the engine is joined besides the run's own"
 PORT = "should be a port of the container from 1 to 65535, with /udp if it is not TCP"
 LABEL = "is refused, as labels that begin with throwcollect. are the launcher's"
-OUTSIDE = "should be an absolute path in the container, outside of /data"
+OUTSIDE = "should be an absolute path in the container, outside of /data and /key"
 VARIABLE = "should be the name of a variable: letters, digits and _"
 PATHS = "should be HOST:CONTAINER or HOST:CONTAINER:ro with absolute paths"
 
@@ -80,7 +80,7 @@ def test_everything_that_may_be_said_of_containers_is_read_and_written_again(tmp
         ("sim: {mounts: [/var/run/:/b]}", f"sim.mounts.0: /var/run/ {SOCKET}"),
         (
             "sim: {mounts: [/a:/data/b]}",
-            "sim.mounts.0: /data/b is refused, as the dataset or the image is there in the container",
+            "sim.mounts.0: /data/b is refused, as the dataset, the key or the image is there in the container",
         ),
         ("sim: {networks: [host]}", f"sim.networks.0: host {NETWORK}"),
         ("sim: {ports: {http: 80}}", f"sim.ports.http: {PORT}"),

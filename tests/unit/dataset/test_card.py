@@ -36,5 +36,5 @@ def test_trials_without_an_episode_are_no_throws(dataset: Path) -> None:
     throws = pq.read_table(dataset / "throws.parquet")
     column = throws.schema.get_field_index("digest")
     fewer = throws.set_column(column, "digest", pa.array([None, None, *throws["digest"].to_pylist()[2:]]))
-    provenance = Provenance.of_this_machine(simulations=1, wall_s=1.0)
+    provenance = Provenance.of_this_machine(simulations=1, wall_s=1.0, was_open=False)
     assert "\n5 simulated throws of a ball" in data_card(load(dataset / "config.yaml"), fewer, provenance)

@@ -4,8 +4,12 @@ import sys
 
 import pytest
 
-from throwcollect.errors import ConfigError
-from throwcollect.ros.router import router
+from throwcollect.errors import ConfigError, ThrowcollectError
+from throwcollect.health import check
+from throwcollect.ros.embedded import session
+from throwcollect.ros.router import router, serve
+from throwcollect.run_key import KEY_VARIABLE, RunKey
+from throwcollect.session_config import OVERRIDE_VARIABLE, client_override, is_protected
 
 COMMAND = [sys.executable, "-m", "throwcollect.ros.router", "--listen"]
 
@@ -46,3 +50,68 @@ def test_the_command_reports_a_busy_port(endpoint):
     ended = subprocess.run([*COMMAND, endpoint], capture_output=True, text=True, timeout=20, check=False)
     assert ended.returncode == 2
     assert ended.stderr.startswith(f"the router cannot listen on {endpoint}")
+
+
+@pytest.fixture
+def key(tmp_path):
+    made = RunKey(tmp_path / "a key with ä")
+    made.create()
+    return made
+
+
+def test_a_protected_router_lets_in_who_has_its_key_and_nobody_else(environment, rig, monkeypatch, key, tmp_path):
+    stranger = RunKey(tmp_path / "stranger")
+    stranger.create()
+    monkeypatch.setattr(session, "_PATIENCE_S", 0.1)
+    with router("tls/127.0.0.1:0", key) as endpoint:
+        monkeypatch.setenv(OVERRIDE_VARIABLE, client_override(endpoint, key))
+        assert is_protected()
+        rig.context().shutdown()
+        check("router")
+        for override in (client_override(endpoint, stranger), client_override(endpoint.replace("tls", "tcp"), key)):
+            monkeypatch.setenv(OVERRIDE_VARIABLE, override)
+            with pytest.raises(ThrowcollectError, match="no Zenoh session"):
+                rig.context()
+            with pytest.raises(ThrowcollectError, match="no session with the router"):
+                check("router")
+
+
+def test_a_protected_router_needs_a_key_that_can_be_read(key):
+    with pytest.raises(ConfigError, match=r"tls/127.0.0.1:\d+: no key is named") as caught, router("tls/127.0.0.1:0"):
+        pass
+    assert "--key DIR" in caught.value.expected
+    key.private_key.unlink()
+    with pytest.raises(ConfigError, match=r"cannot be read: .*/key.pem: No such file"), router("tls/127.0.0.1:0", key):
+        pass
+
+
+def test_a_key_where_zenoh_does_not_find_it_is_refused(tmp_path):
+    key = RunKey(tmp_path / "what;now?")
+    key.create()
+    with pytest.raises(ConfigError, match="what;now\\?: Zenoh finds no key in a directory with ; or \\? in its name"):
+        client_override("tls/127.0.0.1:1", key)
+
+
+def test_a_client_is_told_of_a_key_that_cannot_be_read(environment, monkeypatch, key, rig):
+    key.certificate.unlink()
+    monkeypatch.setenv(OVERRIDE_VARIABLE, client_override("tls/127.0.0.1:1", key))
+    with pytest.raises(ConfigError, match=r"cannot be read: .*/certificate.pem: No such file"):
+        rig.context()
+
+
+def test_the_command_makes_a_key_where_there_is_none_and_keeps_the_one_that_is_there(tmp_path):
+    command = [*COMMAND, "tls/127.0.0.1:0", "--key", str(tmp_path / "new")]
+    keys = []
+    for _ in range(2):
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+            assert process.stdout.readline().startswith("router listening on tls/127.0.0.1:")
+            process.terminate()
+        keys.append(RunKey(tmp_path / "new").private_key.read_bytes())
+    assert keys[0] == keys[1]
+
+
+def test_the_key_of_the_environment_is_used_and_never_made(monkeypatch, tmp_path):
+    monkeypatch.setenv(KEY_VARIABLE, str(tmp_path / "gone"))
+    with pytest.raises(ConfigError, match=r"cannot be read: .*gone/key.pem"):
+        serve("tls/127.0.0.1:0")
+    assert not (tmp_path / "gone").exists()

@@ -40,7 +40,7 @@ def test_a_node_is_told_who_it_is_and_where_the_router_is() -> None:
     assert made["networking_config"]["throwcollect-throws-1a2b"]["Aliases"] == ["sim_3"]
     environment = made["environment"]
     assert (environment["THROWCOLLECT_NODE"], environment["ROS_DOMAIN_ID"]) == ("sim_3", "9")
-    assert "tcp/router:7447" in environment["ZENOH_CONFIG_OVERRIDE"]
+    assert "tls/router:7447" in environment["ZENOH_CONFIG_OVERRIDE"]
     assert made["labels"] == {
         "throwcollect.run": "throws-1a2b",
         "throwcollect.node": "sim_3",
@@ -51,13 +51,29 @@ def test_a_node_is_told_who_it_is_and_where_the_router_is() -> None:
 
 def test_the_dataset_is_written_by_the_coordinator_read_by_simulations_and_not_there_for_the_router() -> None:
     def mounts(name: str, place: RunPlace) -> list[tuple[str, str, str, bool]]:
-        found = options(name, place)["mounts"]
+        found = options(name, place)["mounts"][1:]
         return [(each["Type"], each["Source"], each["Target"], each["ReadOnly"]) for each in found]
 
     assert mounts("coordinator", DIRECTORY) == [("bind", "/home/me/data set", "/data", False)]
     assert mounts("sim_0", DIRECTORY) == [("bind", "/home/me/data set", "/data", True)]
     assert mounts("sim_0", VOLUME) == [("volume", "datasets", "/data", True)]
     assert mounts("router", VOLUME) == []
+
+
+def test_every_node_gets_the_key_as_files_that_it_can_only_read_and_the_paths_of_these() -> None:
+    for name in ("router", "sim_0", "coordinator"):
+        made = options(name)
+        mount = made["mounts"][0]
+        assert (mount["Type"], mount["Source"]) == ("volume", "throwcollect-throws-1a2b-key")
+        assert (mount["Target"], mount["ReadOnly"]) == ("/key", True)
+        assert made["environment"]["THROWCOLLECT_KEY"] == "/key"
+        assert 'connect_private_key="/key/key.pem"' in made["environment"]["ZENOH_CONFIG_OVERRIDE"]
+
+
+def test_an_open_run_has_a_router_that_asks_for_no_key_and_nodes_that_have_one() -> None:
+    environment = options("sim_0", run={"open": True})["environment"]
+    assert environment["ZENOH_CONFIG_OVERRIDE"] == 'mode="client";connect/endpoints=["tcp/router:7447"]'
+    assert environment["THROWCOLLECT_KEY"] == "/key"
 
 
 def test_a_volume_may_hold_the_datasets_of_several_runs() -> None:
@@ -82,7 +98,7 @@ def test_a_section_is_for_its_kind_of_node_alone() -> None:
 
 def test_mounts_of_the_configuration_join_the_dataset() -> None:
     found = options("sim_0", sim={"mounts": ["/a b:/c:ro", "/d:/e"]})["mounts"]
-    assert [(each["Source"], each["Target"], each["ReadOnly"]) for each in found[1:]] == [
+    assert [(each["Source"], each["Target"], each["ReadOnly"]) for each in found[2:]] == [
         ("/a b", "/c", True),
         ("/d", "/e", False),
     ]

@@ -1,5 +1,6 @@
 import json
 import os
+import stat
 import subprocess
 import sys
 from collections.abc import Callable
@@ -10,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from throwcollect.errors import ConfigError
+from throwcollect.run_key import RunKey
 from throwcollect.runtime.records import STATE_VARIABLE, OpenRun, Record, Records
 from throwcollect.runtime.supervisor import NodeState
 
@@ -21,6 +23,10 @@ NODE = NodeState("sim_0", "restarting", 2, None, "ended by SIGKILL")
 def state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "state"))
     return tmp_path / "state"
+
+
+def mode(path: Path) -> int:
+    return stat.S_IMODE(path.stat(follow_symlinks=False).st_mode)
 
 
 def record(run: OpenRun, **fields: object) -> Record:
@@ -233,6 +239,62 @@ def test_by_default_the_state_is_the_users_alone(tmp_path: Path, monkeypatch: py
         Records()
 
 
+def test_all_that_is_remembered_is_for_its_owner_alone(state: Path) -> None:
+    state.mkdir(mode=0o755)
+    (state / "runs").mkdir(mode=0o755)
+    before = os.umask(0)
+    try:
+        run = Records().new("small")
+        run.write(record(run))
+    finally:
+        os.umask(before)
+    runs = state / "runs"
+    assert (mode(runs), mode(run.directory), mode(run.key.directory)) == (0o700, 0o700, 0o700)
+    files = [path for path in runs.rglob("*") if path.is_file()]
+    assert sorted(path.name for path in files) == ["certificate.pem", "key.pem", f"{run.run}.json", f"{run.run}.lock"]
+    assert {mode(path) for path in files} == {0o600}
+
+
+def test_every_run_has_a_key_of_its_own_which_those_who_find_it_and_take_it_over_get(state: Path) -> None:
+    records = Records()
+    names = [remember(records), remember(records)]
+    keys = [records.get(name).key for name in names]
+    assert len({key.private_key.read_bytes() for key in keys}) == 2
+    taken = records.take(names[0])
+    assert taken is not None
+    assert (taken.key, taken.key.exists) == (keys[0], True)
+    taken.forget()
+    assert (keys[0].exists, keys[1].exists) == (False, True)
+
+
+def test_a_run_that_can_have_no_key_is_none(state: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(_: RunKey) -> None:
+        raise ConfigError("the key of the run cannot be written: No space left on device")
+
+    monkeypatch.setattr(RunKey, "create", fail)
+    with pytest.raises(ConfigError, match="cannot be written"):
+        Records().new("small")
+    assert list((state / "runs").iterdir()) == []
+
+
+@pytest.mark.parametrize(("permissions", "taken"), [(0o755, True), (0o775, False), (0o757, False), (0o1777, False)])
+def test_a_named_directory_may_be_read_by_others_but_not_written(state: Path, permissions: int, taken: bool) -> None:
+    state.mkdir()
+    state.chmod(permissions)
+    if taken:
+        Records()
+    else:
+        with pytest.raises(ConfigError, match="belongs to somebody else, or others may write there"):
+            Records()
+
+
+def test_a_link_that_the_user_has_named_is_followed(state: Path, tmp_path: Path) -> None:
+    (tmp_path / "elsewhere").mkdir(mode=0o700)
+    state.symlink_to(tmp_path / "elsewhere")
+    Records()
+    assert (tmp_path / "elsewhere" / "runs").is_dir()
+
+
 def test_a_link_that_somebody_else_has_laid_is_not_followed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv(STATE_VARIABLE, raising=False)
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
@@ -252,10 +314,10 @@ def test_a_state_directory_that_is_none_is_named_with_a_way_out(state: Path) -> 
 def test_a_full_disk_is_named(state: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     run = Records().new("small")
 
-    def full(*_: object) -> int:
+    def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(Path, "write_bytes", full)
+    monkeypatch.setattr(Path, "replace", full)
     with pytest.raises(ConfigError, match="runs cannot be remembered there: No space left on device") as caught:
         run.write(record(run))
     assert "free space there" in str(caught.value)

@@ -1,12 +1,14 @@
 import threading
 from collections.abc import Iterator
 from datetime import datetime, timezone
+from pathlib import Path
 
 import pytest
 
 from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.ros import Context, Node, SingleThreadedExecutor
 from throwcollect.ros.router import router
+from throwcollect.run_key import KEY_VARIABLE, RunKey
 from throwcollect.runtime import scaling
 from throwcollect.runtime.nodes import LAUNCHER
 from throwcollect.runtime.records import Record, Run
@@ -16,13 +18,14 @@ from throwcollect.session_config import CONFIG_FILE_VARIABLE, OVERRIDE_VARIABLE
 
 def living(endpoint: str | None) -> Run:
     started = datetime.now(timezone.utc)
-    return Run(Record("a-0123", "a", "local", "/a", None, "/a/logs", 0, started, 1, 2, endpoint=endpoint), lives=True)
+    record = Record("a-0123", "a", "local", "/a", None, "/a/logs", 0, started, 1, 2, endpoint=endpoint)
+    return Run(record, lives=True, key=RunKey(Path("/a/key")))
 
 
 @pytest.fixture
 def endpoint(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
     # What a client sets in its environment is undone, too.
-    for variable in (OVERRIDE_VARIABLE, CONFIG_FILE_VARIABLE, "ROS_DOMAIN_ID"):
+    for variable in (OVERRIDE_VARIABLE, CONFIG_FILE_VARIABLE, KEY_VARIABLE, "ROS_DOMAIN_ID"):
         monkeypatch.setenv(variable, "")
     with router("tcp/127.0.0.1:0") as endpoint:
         yield endpoint

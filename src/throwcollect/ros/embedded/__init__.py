@@ -10,7 +10,7 @@ from throwcollect.ros.embedded.action import (
     get_action_names_and_types,
     get_action_server_names_and_types_by_node,
 )
-from throwcollect.ros.embedded.beyond import graph_changes, provide_time
+from throwcollect.ros.embedded.beyond import graph_changes, joins_protected, provide_time
 from throwcollect.ros.embedded.clock import Clock, ROSClock
 from throwcollect.ros.embedded.context import Context, get_default_context, init, ok, shutdown, try_shutdown
 from throwcollect.ros.embedded.duration import Duration
@@ -61,6 +61,7 @@ __all__ = [
     "get_service",
     "graph_changes",
     "init",
+    "joins_protected",
     "ok",
     "provide_time",
     "shutdown",

@@ -1,0 +1,267 @@
+"""Another user of the machine finds a run and its router, and can neither hear nor change anything.
+
+All tests look at one collection, which goes on while they do.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import ssl
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from tests.e2e.collection import Running, call, start, write_config
+from throwcollect.dataset.directory import CARD
+from throwcollect.dataset.journal import read_journal
+from throwcollect.run_key import RunKey
+from throwcollect.runtime.records import STATE_VARIABLE, Record, Records
+from throwcollect.session_config import OVERRIDE_VARIABLE, client_override
+
+pytestmark = [
+    pytest.mark.e2e,
+    pytest.mark.skipif(os.getuid() != 0, reason="only root can become another user"),
+]
+NOBODY = 65534
+TRIALS = 12
+UNTIL_STOPPED = ("--trials", "200", "--set", "sim.real_time_factor=1")
+"""Longer than these tests, whatever else the machine does; its first trials are those of any number."""
+
+BECOME_NOBODY = f"""
+os.setgroups([])
+os.setresgid({NOBODY}, {NOBODY}, {NOBODY})
+os.setresuid({NOBODY}, {NOBODY}, {NOBODY})
+"""
+"""Comes after all imports, as another user may not even be able to read the interpreter of this one."""
+
+ATTEMPT = f"""
+import json, os, sys, time, zenoh
+from throwcollect.errors import ConfigError
+from throwcollect.health import REQUEST, attachment
+from throwcollect.session_config import client_config
+{BECOME_NOBODY}
+heard = []
+for name, override in json.loads(sys.argv[1]).items():
+    os.environ["ZENOH_CONFIG_OVERRIDE"] = override
+    try:
+        session = zenoh.open(client_config())
+    except (zenoh.ZError, ConfigError) as error:
+        print(f"{{name}}: {{error}}")
+        continue
+    subscriber = session.declare_subscriber("**", lambda sample: heard.append(str(sample.key_expr)))
+    session.put("0/sim_0/episode/std_msgs::msg::dds_::UInt8MultiArray_/RIHS01_0", b"an episode")
+    asked = session.get("0/sim_0/sim_0/get_parameters/**", payload=REQUEST, attachment=attachment(), timeout=3.0)
+    answers = len(list(asked))
+    time.sleep(0.5)
+    session.close()
+    print(f"{{name}}: HAS A SESSION, heard {{len(heard)}} messages, was answered {{answers}} times")
+"""
+"""Somebody who subscribes, publishes and asks wherever there is a session."""
+
+POSE = f"""
+import os, sys
+import throwcollect.cli.nodes, throwcollect.sim.main
+from throwcollect.cli.main import main
+from throwcollect.ros.embedded import session
+session._PATIENCE_S = 0.5
+{BECOME_NOBODY}
+main()
+"""
+"""Somebody who starts a node."""
+
+LOOK = f"""
+import os, pathlib, sys
+{BECOME_NOBODY}
+for path in map(pathlib.Path, sys.argv[1:]):
+    try:
+        print([*path.iterdir()] if path.suffix == "" else path.read_bytes())
+    except PermissionError:
+        print("refused")
+"""
+"""Somebody who looks around."""
+
+LIKELIEST = "with a key of its own and the router's certificate"
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A collection that goes on, and somebody else on the machine.
+
+    Attributes:
+        running: The collection.
+        undisturbed: The beginning of the same collection, out of reach.
+        record: What its owner's commands know of it; the router has an address.
+        key: Its key.
+        home: A directory of the other user.
+        ways: Ways to the router that the other user can find out about, as values of `OVERRIDE_VARIABLE`.
+    """
+
+    running: Running
+    undisturbed: Running
+    record: Record
+    key: RunKey
+    home: Path
+    ways: dict[str, str]
+
+    def as_nobody(self, code: str, *arguments: str) -> subprocess.CompletedProcess[str]:
+        """Python code that another user runs."""
+        own = {name: os.environ[name] for name in ("PATH", "PYTHONPATH") if name in os.environ}
+        return subprocess.run(
+            [sys.executable, "-c", code, *arguments],
+            env={**own, "HOME": str(self.home), OVERRIDE_VARIABLE: self.ways[LIKELIEST]},
+            cwd=self.home,
+            capture_output=True,
+            text=True,
+            timeout=60,
+            check=False,
+        )
+
+
+@pytest.fixture(scope="module")
+def scene() -> Iterator[Scene]:
+    # Not among pytest's directories, which others cannot even enter.
+    with tempfile.TemporaryDirectory() as directory:
+        Path(directory).chmod(0o755)
+        yield from _scene_in(Path(directory))
+
+
+def _scene_in(directory: Path) -> Iterator[Scene]:
+    state = directory / "state"
+    # Others may read in it, as in most directories.
+    state.mkdir(mode=0o755)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv(STATE_VARIABLE, str(state))
+        # Runs of others on an engine of this machine are none of these tests' business.
+        patch.setenv("DOCKER_HOST", f"unix://{directory}/none.sock")
+        config = write_config(directory, trials=TRIALS)
+        running = start(config, directory / "data", 2, *UNTIL_STOPPED)
+        elsewhere = {STATE_VARIABLE: str(directory / "elsewhere")}
+        undisturbed = start(config, directory / "undisturbed", 1, **elsewhere)
+        try:
+            running.wait_until(lambda: running.written() > 0)
+            (run,) = Records().all()
+            assert run.record.endpoint is not None
+            home = directory / "home"
+            home.mkdir()
+            yield Scene(running, undisturbed, run.record, run.key, home, _ways(run.record.endpoint, home))
+        finally:
+            running.process.kill()
+            undisturbed.process.kill()
+
+
+def _ways(endpoint: str, home: Path) -> dict[str, str]:
+    """Ways to the router for somebody who knows where it is, and can make keys."""
+    forged = RunKey(home / "forged")
+    forged.create()
+    # Any server shows its certificate to everybody; that makes the router trusted, but not the one who comes.
+    shown = RunKey(home / "shown")
+    shutil.copytree(forged.directory, shown.directory)
+    host, _, port = endpoint.partition("/")[2].rpartition(":")
+    shown.certificate.write_text(ssl.get_server_certificate((host, int(port))))
+    for path in (home, *home.rglob("*")):
+        os.chown(path, NOBODY, NOBODY)
+    trusting = client_override(endpoint, forged).replace(
+        f'root_ca_certificate="{forged.certificate}"', f'root_ca_certificate="{shown.certificate}"'
+    )
+    return {
+        "without TLS": client_override(endpoint.replace("tls/", "tcp/"), forged),
+        "with a key of its own": client_override(endpoint, forged),
+        LIKELIEST: trusting,
+        "with the router's certificate": client_override(endpoint, shown),
+        "without a certificate": f'mode="client";connect/endpoints=["{endpoint}"];'
+        f'transport/link/tls/root_ca_certificate="{shown.certificate}";transport/link/tls/verify_name_on_connect=false',
+    }
+
+
+def test_nobody_else_hears_says_or_asks_anything(scene: Scene) -> None:
+    """Not even a session is had, in which they could."""
+    said = scene.as_nobody(ATTEMPT, json.dumps(scene.ways))
+    assert len(said.stdout.splitlines()) == len(scene.ways) == 5, said
+    for line in said.stdout.splitlines():
+        assert ": Unable to connect to any of " in line, said
+
+
+def test_whoever_is_let_in_hears_says_and_asks(scene: Scene) -> None:
+    """So that the test above does not pass because there is nothing to be heard."""
+    with_key = client_override(scene.record.endpoint or "", scene.key)
+    said = subprocess.run(
+        [sys.executable, "-c", ATTEMPT.replace(BECOME_NOBODY, ""), json.dumps({"owner": with_key})],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert re.match("owner: HAS A SESSION, heard [1-9].* messages, was answered 1 times\n", said.stdout), said
+
+
+def test_nobody_else_poses_as_a_node(scene: Scene) -> None:
+    """A simulation that would be given trials, a coordinator that would give some: neither finds the router."""
+    (scene.home / "other.yaml").write_text((scene.running.directory.parent / "small.yaml").read_text())
+    for node in (["sim", "other.yaml", "--name", "evil"], ["coordinator", "data", "--config", "other.yaml"]):
+        said = scene.as_nobody(POSE, *node)
+        assert said.returncode == 1, said
+        assert "no Zenoh session within 0.5 s" in said.stderr, said
+
+
+def test_nobody_else_reads_the_key_or_lists_the_runs(scene: Scene) -> None:
+    assert scene.key.exists
+    places = (scene.key.private_key, scene.key.certificate, scene.key.directory, scene.key.directory.parents[1])
+    said = scene.as_nobody(LOOK, *map(str, places))
+    assert said.stdout.splitlines() == ["refused"] * len(places), said
+    with_its_path = client_override(scene.record.endpoint or "", scene.key)
+    said = scene.as_nobody(ATTEMPT, json.dumps({"thief": with_its_path}))
+    assert re.match("thief: the key of the run cannot be read: .*/key.pem: Permission denied\n", said.stdout), said
+
+
+def test_nobody_else_sees_the_key_in_what_the_system_tells_of_processes(scene: Scene) -> None:
+    secret = scene.key.private_key.read_text().splitlines()[1]
+    for node in (scene.running.process.pid, *(int(node.handle or 0) for node in scene.record.nodes)):
+        for told in ("cmdline", "environ"):
+            assert secret not in Path(f"/proc/{node}/{told}").read_text(errors="replace")
+
+
+def test_whoever_evaluates_one_line_has_joined(scene: Scene) -> None:
+    """The owner, in a shell; the next process there is any node, of which this is the smallest."""
+    throwcollect = f"{sys.executable} -m throwcollect"
+    script = f'eval "$({throwcollect} ros env)"; {throwcollect} ros node list; printenv RMW_IMPLEMENTATION'
+    said = subprocess.run(["bash", "-c", script], capture_output=True, text=True, timeout=60, check=False)
+    assert (said.returncode, said.stderr) == (0, "")
+    assert {"/coordinator", "/launcher", "/sim_0/sim_0", "/sim_1/sim_1"} <= set(said.stdout.splitlines())
+    assert said.stdout.endswith("rmw_zenoh_cpp\n")
+
+
+def test_the_owner_changes_the_run_as_ever(scene: Scene) -> None:
+    assert call("scale", "3").returncode == 0
+    (listed,) = json.loads(call("ps", "--json").stdout)
+    assert (listed["run"], listed["simulations"]) == (scene.record.run, 3)
+
+
+def test_what_is_collected_is_what_would_have_been(scene: Scene) -> None:
+    """Comes last: it ends the collection."""
+    assert call("stop").returncode == 0
+    code, out, _ = scene.running.finish()
+    assert (code, "run.open" in out) == (130, False)
+    collected = commits(scene.running)
+    assert 0 in collected
+    code, out, err = scene.undisturbed.finish()
+    assert (code, "\nopen " in out) == (0, False), err
+    assert "| open |" not in (scene.undisturbed.directory / CARD).read_text()
+    expected = commits(scene.undisturbed)
+    assert collected.items() & expected.items() == {
+        (trial, digest) for trial, digest in collected.items() if trial in expected
+    }
+    assert "evil" not in (scene.running.directory / "logs" / "journal.jsonl").read_text()
+
+
+def commits(running: Running) -> dict[int, str]:
+    """Digest of every episode that was written, by trial."""
+    journal = read_journal(running.directory / "logs" / "journal.jsonl")
+    return {entry["trial"]: entry["digest"] for entry in journal if entry["event"] == "commit"}
