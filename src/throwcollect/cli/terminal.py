@@ -63,7 +63,8 @@ class _Lines:
     def update(self, progress: Progress) -> None:
         now = time.monotonic()
         # The last trial is told at once, but only once: reports go on while the dataset is checked and finished.
-        if now < self._next and (progress.ended < progress.total or progress.ended == self._ended):
+        over = progress.ended >= progress.total
+        if (over and progress.ended == self._ended) or (not over and now < self._next):
             return
         self._next, self._ended = now + _LINE_EVERY_S, progress.ended
         self.say(progress.line)
