@@ -105,7 +105,8 @@ def _collect(request: _Request, *, detach: bool, json: bool) -> None:
         left = left_in(records, directory)
         if left is not None:
             run, config = _taken_over(records, left, config)
-            shown.say(f"run {run.run}: its launcher had died; it goes on where its containers are")
+            fate = "died" if left.status == "died" else "given up"
+            shown.say(f"run {run.run}: its launcher had {fate}; it goes on where its containers are")
         else:
             plan = None
             if request.resumed:
@@ -183,7 +184,7 @@ def _prepared(records: Records, request: _Request, plan: Plan | None, shown: Dis
             earlier_s=collected_s(directory),
         )
         # Finds what cannot be had of what the configuration asks for.
-        place_of(record, config).close()
+        place_of(record, config, warn=shown.warn).close()
         run.write(record)
         undo.pop_all()
     refused = sum(trial.refused is not None for trial in plan.trials)
@@ -202,7 +203,7 @@ def _remove_plan(directory: Path, *, made: bool) -> None:
 
 
 def _taken_over(records: Records, left: Run, config: Config) -> tuple[OpenRun, Config]:
-    """A run whose launcher died, with its own configuration."""
+    """A run that has no launcher any more, with its own configuration."""
     record = left.record
     own = load(Path(record.directory) / CONFIG)
     if own.without_run() != self_contained(config).without_run():
@@ -213,6 +214,8 @@ def _taken_over(records: Records, left: Run, config: Config) -> tuple[OpenRun, C
     run = records.take(record.run)
     if run is None:
         raise busy(record)
+    # Its containers are there until this launcher has removed them, whatever happens to it.
+    run.update(ended=None, exit_code=None, message="", left=True)
     return run, own
 
 

@@ -49,8 +49,13 @@ class Onlooker(Protocol):
         """Something that went wrong."""
 
 
-def place_of(record: Record, config: Config) -> Place:
+def place_of(record: Record, config: Config, *, warn: Callable[[str], None]) -> Place:
     """The place where the nodes of a run are to live, or live already.
+
+    Args:
+        record: The run.
+        config: Its configuration.
+        warn: Is told in one line when the place keeps everybody waiting.
 
     Raises:
         ConfigError: If the router's port is taken, or something that the configuration asks for is not there.
@@ -61,7 +66,7 @@ def place_of(record: Record, config: Config) -> Place:
     from throwcollect.runtime.docker import DockerRuntime
 
     directory = None if record.volume else Path(record.directory)
-    return DockerRuntime(record.run, config, directory=directory, logs=Path(record.logs))
+    return DockerRuntime(record.run, config, directory=directory, logs=Path(record.logs), warn=warn)
 
 
 def launch(
@@ -90,15 +95,19 @@ def launch(
     """
     notes = _Notes(run, onlooker)
     code, message, summary = 1, "internal error", None
+    place: Place | None = None
     try:
-        summary = _Launcher(run, config, notes, onlooker, interruptions).run_to_the_end()
+        place = place_of(run.record, config, warn=onlooker.warn)
+        summary = _Launcher(run, config, place, notes, onlooker, interruptions).run_to_the_end()
         code, message = 0, ""
         return summary
     except ThrowcollectError as error:
         code, message = error.exit_code, str(error)
         raise
     finally:
-        notes.end(code, message, summary)
+        # What was there before may be there still, if it could not even be looked for.
+        left = run.record.left if place is None else not place.cleared
+        notes.end(code, message, summary, left=left)
         run.close()
 
 
@@ -137,13 +146,19 @@ class _Notes:
             trials = self._trials()
         self._write(lambda: self._run.update(nodes=tuple(states), endpoint=endpoint, simulations=simulations, **trials))
 
-    def end(self, code: int, message: str, summary: dict[str, Any] | None) -> None:
-        """How the run ended, last of all."""
+    def end(self, code: int, message: str, summary: dict[str, Any] | None, *, left: bool) -> None:
+        """How the run ended, last of all, and whether containers of it may be left."""
         event: RunEvent = "failed"
         if code in (0, Interrupted.exit_code):
             event = "stopped" if code else "finished"
         self.event(event, reason=message or None, exit_code=code)
-        end = {"ended": datetime.now(timezone.utc), "exit_code": code, "message": message, "summary": summary}
+        end = {
+            "ended": datetime.now(timezone.utc),
+            "exit_code": code,
+            "message": message,
+            "summary": summary,
+            "left": left,
+        }
         self._write(lambda: self._run.update(nodes=(), endpoint=None, **end, **self._trials()))
 
     def _trials(self) -> dict[str, int]:
@@ -164,14 +179,20 @@ class _Launcher:
     """What `launch` does until the nodes have ended."""
 
     def __init__(
-        self, run: OpenRun, config: Config, notes: _Notes, onlooker: Onlooker, interruptions: Callable[[], int]
+        self,
+        run: OpenRun,
+        config: Config,
+        place: Place,
+        notes: _Notes,
+        onlooker: Onlooker,
+        interruptions: Callable[[], int],
     ) -> None:
         self._run = run
         self._notes = notes
         self._onlooker = onlooker
         self._interruptions = interruptions
         self._simulations = self._wanted = run.record.simulations
-        self._place = place_of(run.record, config)
+        self._place = place
         self._supervisor = Supervisor(self._place, config.run, simulations=self._simulations)
         self._listening = Listening(
             self._report, domain_id=run.record.domain_id, name=LAUNCHER, on_connect=self._offer_scaling

@@ -41,6 +41,7 @@ class LocalRuntime:
     Attributes:
         data: Directory of the dataset.
         listen: Zenoh endpoint at which the router is to listen.
+        cleared: Always true, as processes end with their launcher.
 
     Args:
         data: Directory of the dataset.
@@ -53,6 +54,7 @@ class LocalRuntime:
 
     def __init__(self, data: Path, logs: Path, run: RunConfig) -> None:
         self.data = str(data)
+        self.cleared = True
         self._logs = NodeLogs(logs)
         self._reserved = reserved_port(run.router_port)
         self._address: tuple[str, int] = self._reserved.getsockname()

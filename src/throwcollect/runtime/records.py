@@ -60,6 +60,7 @@ class Record:
         trials_ended: Number of trials that have ended.
         ended: When it ended; None before.
         exit_code: Exit code of its launcher; None before it ended.
+        left: Whether containers of it may be left, as its launcher could not remove them or did not come to it.
         message: The error that it ended with, as it was printed; empty if there was none.
         summary: What its dataset holds, as `dataset info` says it, and ``wall_s`` [s]; None if it is not finished.
         version: Version of this layout.
@@ -82,6 +83,7 @@ class Record:
     trials_ended: int = 0
     ended: datetime | None = None
     exit_code: int | None = None
+    left: bool = False
     message: str = ""
     summary: dict[str, Any] | None = None
     version: Literal[1] = _VERSION
@@ -105,10 +107,10 @@ class Run:
     lives: bool
 
     @property
-    def status(self) -> Literal["running", "ended", "died"]:
-        """Whether it runs, has ended, or lost its launcher before it could."""
+    def status(self) -> Literal["running", "ended", "abandoned", "died"]:
+        """Whether it runs, has ended, ended with containers left behind, or lost its launcher before it could."""
         if self.record.ended is not None:
-            return "ended"
+            return "abandoned" if self.record.left else "ended"
         return "running" if self.lives else "died"
 
 
@@ -294,7 +296,7 @@ class Records:
         for each in self.all():
             record = each.record
             # Containers outlive their launcher; as long as they do, this record tells what they are.
-            over = not each.lives and (record.ended is not None or record.runtime == "local")
+            over = each.status == "ended" or (each.status == "died" and record.runtime == "local")
             if over and (now - (record.ended or record.started)).total_seconds() >= _REMEMBERED_S:
                 run = self.take(record.run)
                 if run is not None:
