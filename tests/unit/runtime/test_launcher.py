@@ -82,7 +82,7 @@ def test_a_launcher_that_gives_up_says_that_containers_are_left(
         if len(engine.running()) == 3:
             engine.withheld = "."
 
-    with pytest.raises(WorkerError, match="the Docker engine has not answered for [12] s"):
+    with pytest.raises(WorkerError, match=r"the Docker engine has not answered for [12] s"):
         launched(run, silence)
     engine.answer_all()
     assert status(run) == "abandoned"
