@@ -296,7 +296,8 @@ def test_what_is_not_there_is_found_before_anything_is_started(bare: Any, tmp_pa
     assert [str(problem) for problem in caught.value.problems] == [
         "containers.router.networks.0: the Docker engine has no network nowhere; create it first",
         "containers.sim.mounts.0: /no/where does not exist on this machine",
-        f"containers.sim.mounts.1: {sock}, which is /run, is refused, as /run belongs to the system; mounts are for data",
+        f"containers.sim.mounts.1: {sock}, which is /run, is refused, as /run belongs to the system; "
+        "mounts are for data",
     ]
 
 

@@ -21,7 +21,6 @@ from throwcollect.coordinator.prepare import more_trials, prepare, self_containe
 from throwcollect.coordinator.resume import begun, finished, resume
 from throwcollect.dataset.directory import CONFIG, PLAN, TRIALS
 from throwcollect.dataset.inspect import info
-from throwcollect.dataset.journal import collected_s
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.runtime.choice import choose
 from throwcollect.runtime.detached import start_launcher, wait_for_nodes
@@ -30,7 +29,7 @@ from throwcollect.runtime.ports import reserved_port
 from throwcollect.runtime.records import OpenRun, Record, Records, Run
 from throwcollect.runtime.runs import busy, left_in
 from throwcollect.sweep.plan import Plan
-from throwcollect.wording import counted
+from throwcollect.wording import command, counted
 
 _MANY_TRIALS = 1000
 """From here on the plan takes long enough to be announced."""
@@ -92,7 +91,7 @@ def go_on(directory: Path, *, path: Path | None, overrides: Sequence[str], detac
         try:
             config = places.enter_context(loaded(path or directory / CONFIG, overrides))
         except ConfigError as error:
-            hint = f"throwcollect up CONFIG --resume {directory}, if the dataset's own file is damaged"
+            hint = f"{command('up', 'CONFIG', '--resume', directory)}, if the dataset's own file is damaged"
             raise ConfigError(error.problems, hint=error.hint if path else hint) from error
         sweep_directory = directory if path is None else path.parent
         _collect(_Request(config, sweep_directory, directory, started, resumed=True), detach=detach, json=json)
@@ -181,7 +180,6 @@ def _prepared(records: Records, request: _Request, plan: Plan | None, shown: Dis
             started=request.started,
             launcher=os.getpid(),
             simulations=config.run.simulations,
-            earlier_s=collected_s(directory),
         )
         # Finds what cannot be had of what the configuration asks for.
         place_of(record, config, warn=shown.warn).close()
@@ -209,7 +207,7 @@ def _taken_over(records: Records, left: Run, config: Config) -> tuple[OpenRun, C
     if own.without_run() != self_contained(config).without_run():
         raise ConfigError(
             f"{record.directory}: run {record.run} collects into it, with another configuration",
-            hint=f"throwcollect down --run {record.run} ends that run",
+            hint=f"{command('down', '--run', record.run)} ends that run",
         )
     run = records.take(record.run)
     if run is None:
@@ -230,4 +228,4 @@ def _detach(records: Records, run: OpenRun, *, json: bool) -> None:
         typer.echo(jsonlib.dumps({"run": record.run, **where}, indent=2))
         return
     typer.echo(record.run)
-    typer.echo(f"follow it: throwcollect wait --run {record.run}   (or ps, logs -f, stop)", err=True)
+    typer.echo(f"follow it: {command('wait', '--run', record.run)}   (or ps, logs -f, stop)", err=True)

@@ -25,7 +25,10 @@ _LEAST_MEMORY = 6 * 1024**2
 """What Docker engines ask for."""
 
 _SIZE_UNITS = {"": 1, "b": 1, "k": 1024, "m": 1024**2, "g": 1024**3}
-_OWN_VARIABLES = ("THROWCOLLECT_NODE", "ZENOH_CONFIG_OVERRIDE", "ROS_DOMAIN_ID")
+_OWN_VARIABLES = (
+    *("THROWCOLLECT_NODE", "THROWCOLLECT_HOST", "THROWCOLLECT_DIRECTORY"),
+    *("ZENOH_CONFIG_OVERRIDE", "ROS_DOMAIN_ID"),
+)
 _SOCKETS = ("docker.sock", "containerd.sock", "podman.sock")
 _LABELS = "throwcollect."
 

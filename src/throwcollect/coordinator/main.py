@@ -10,10 +10,11 @@ from types import FrameType
 
 from throwcollect import ros
 from throwcollect.coordinator.node import Coordinator
+from throwcollect.dataset.directory import known_directory
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.errors import Interrupted
 from throwcollect.tasks.throw import ThrowResult
-from throwcollect.wording import counted
+from throwcollect.wording import command, counted
 
 _IDLE_S = 0.05
 _SYNC_EVERY_S = 1.0
@@ -53,7 +54,7 @@ def run(directory: Path) -> None:
     executor.add_node(node)
     # What is here now stays until the end; the garbage collector need not go through it again and again.
     gc.freeze()
-    started = told = synced = time.monotonic()
+    told = synced = time.monotonic()
     try:
         while not node.finished:
             # Simulations come first: what can wait is done when no message is there.
@@ -70,10 +71,12 @@ def run(directory: Path) -> None:
                 print(node.report().line, flush=True)
         print(node.report().line, flush=True)
         if not node.complete:
+            known = known_directory(directory)
             raise Interrupted(
-                f"interrupted; what is finished is in {directory}", hint=f"throwcollect resume {directory}"
+                f"interrupted; what is finished is in {known or 'the volume'}",
+                hint=command("resume", known) if known else None,
             )
-        writer.finish(wall_s=time.monotonic() - started)
+        writer.finish()
     finally:
         writer.close()
         node.destroy_node()

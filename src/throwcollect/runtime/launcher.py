@@ -85,7 +85,7 @@ def launch(
         interruptions: How often the user has asked to stop: at first running trials are finished, then no more.
 
     Returns:
-        What the dataset holds, and ``wall_s``: the time since the run was started, and of earlier runs into it [s].
+        What the dataset holds, as `dataset info` says it.
 
     Raises:
         ConfigError: If the configuration cannot be used after all.
@@ -206,10 +206,7 @@ class _Launcher:
             self._supervisor.start(found=found)
             self._notes.known([state for state in self._supervisor.states() if state.name in found])
             self._check(self._follow())
-            whole = self._summary()
-        wall_s = (datetime.now(timezone.utc) - self._run.record.started).total_seconds()
-        # Somebody may have set the clock back.
-        return {**whole, "wall_s": max(wall_s, _POLL_S) + self._run.record.earlier_s}
+            return self._summary()
 
     def _open(self) -> tuple[str, ...]:
         """Make what the nodes need; names of those that a launcher before this one has left."""

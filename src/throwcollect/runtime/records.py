@@ -27,6 +27,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from throwcollect.errors import ConfigError
 from throwcollect.runtime.supervisor import NodeState
+from throwcollect.wording import command
 
 STATE_VARIABLE = "THROWCOLLECT_STATE"
 """Names the directory of the records."""
@@ -53,7 +54,6 @@ class Record:
         started: When it was started.
         launcher: Process id of its launcher.
         simulations: Number of simulations that are wanted.
-        earlier_s: Real time that earlier runs collected into the same dataset for [s].
         endpoint: Zenoh endpoint of the router, as this machine reaches it; None while there is none.
         nodes: Its nodes; none once it has ended.
         trials: Number of trials to run; None before the first report of the coordinator.
@@ -62,7 +62,7 @@ class Record:
         exit_code: Exit code of its launcher; None before it ended.
         left: Whether containers of it may be left, as its launcher could not remove them or did not come to it.
         message: The error that it ended with, as it was printed; empty if there was none.
-        summary: What its dataset holds, as `dataset info` says it, and ``wall_s`` [s]; None if it is not finished.
+        summary: What its dataset holds, as `dataset info` says it; None if it is not finished.
         version: Version of this layout.
     """
 
@@ -76,7 +76,6 @@ class Record:
     started: datetime
     launcher: int
     simulations: int
-    earlier_s: float = 0.0
     endpoint: str | None = None
     nodes: tuple[NodeState, ...] = ()
     trials: int | None = None
@@ -322,7 +321,7 @@ def _state_directory() -> Path:
 
 
 def _read(path: Path) -> Record:
-    hint = f"throwcollect down --run {path.stem} ends what is left of it, and forgets it"
+    hint = f"{command('down', '--run', path.stem)} ends what is left of it, and forgets it"
     try:
         content = json.loads(path.read_bytes())
         version = content.get("version") if isinstance(content, dict) else None

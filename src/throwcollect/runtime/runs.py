@@ -125,7 +125,7 @@ def busy(record: Record) -> ConfigError:
     """The error that says that a run collects into a directory."""
     return ConfigError(
         f"{record.directory}: run {record.run} collects into it",
-        hint=f"throwcollect wait --run {record.run} follows it",
+        hint=f"{command('wait', '--run', record.run)} follows it",
     )
 
 
@@ -145,7 +145,7 @@ def goes_on(record: Record) -> str | None:
 
 def died(record: Record) -> WorkerError:
     """The error that says that the launcher of a run died before the run ended."""
-    hint = f"throwcollect down --run {record.run} cleans up"
+    hint = f"{command('down', '--run', record.run)} cleans up"
     if again := goes_on(record):
         hint = f"{again} goes on where it ended, or with its containers if they live; {hint}"
     return WorkerError(
