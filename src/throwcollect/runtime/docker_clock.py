@@ -62,7 +62,12 @@ class EngineClock:
             self._silent_s += _TICK_S
             if self._silent_s >= _TELL_S and not self._told:
                 self._told = True
-                self._warn(f"the Docker engine has not answered for {self._silent_s:.0f} s; waiting")
+                self._tell(f"the Docker engine has not answered for {self._silent_s:.0f} s; waiting")
             elif self._silent_s < _TELL_S and self._told:
                 self._told = False
-                self._warn("the Docker engine answers again")
+                self._tell("the Docker engine answers again")
+
+    def _tell(self, line: str) -> None:
+        # Whoever listened may have gone; the time must be counted all the same.
+        with suppress(OSError, ValueError):
+            self._warn(line)

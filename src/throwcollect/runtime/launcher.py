@@ -25,6 +25,7 @@ from throwcollect.runtime.records import OpenRun, Record
 from throwcollect.runtime.runs import goes_on
 from throwcollect.runtime.scaling import offer_scaling
 from throwcollect.runtime.supervisor import NodeState, Supervisor
+from throwcollect.wording import command
 
 if TYPE_CHECKING:
     from throwcollect.runtime.docker import DockerRuntime
@@ -107,6 +108,8 @@ def launch(
     finally:
         # What was there before may be there still, if it could not even be looked for.
         left = run.record.left if place is None else not place.cleared
+        if left:
+            onlooker.warn(f"containers of this run may be left: {command('down', '--run', run.run)} ends them")
         notes.end(code, message, summary, left=left)
         run.close()
 

@@ -98,6 +98,19 @@ def test_a_slow_answer_is_waited_for_with_a_word(
     assert runtime.cleared
 
 
+def test_an_engine_is_listened_to_even_if_nobody_hears_of_it(
+    engine: Engine, make: Callable[[], DockerRuntime], warnings: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def gone(_: str) -> None:
+        raise BrokenPipeError
+
+    runtime = make()
+    monkeypatch.setattr(runtime._clock, "_warn", gone)
+    engine.withheld = "."
+    with pytest.raises(WorkerError, match="has not answered for 1 s"):
+        until(lambda: False, runtime=runtime)
+
+
 def test_a_silent_engine_is_given_up_with_what_is_left_on_it_and_how_to_go_on(
     engine: Engine, make: Callable[[], DockerRuntime], tmp_path: Path
 ) -> None:

@@ -13,6 +13,7 @@ from tests.unit.runtime.engine import Engine, engine_at
 
 from throwcollect.cli.ps import show_runs
 from throwcollect.config.schema import Config
+from throwcollect.coordinator.progress import Progress
 from throwcollect.errors import DatasetError, WorkerError
 from throwcollect.runtime import docker as docker_runtime
 from throwcollect.runtime import docker_watch
@@ -25,12 +26,19 @@ CONFIG = Config.model_validate({"containers": {"image": "image"}, "run": {"simul
 
 
 class Onlooker:
-    """Is told everything, and does what the test says when the nodes are looked after."""
+    """Remembers what it is warned of."""
 
-    def update(self, _: object) -> None:
+    def __init__(self) -> None:
+        self.warnings: list[str] = []
+
+    def update(self, progress: Progress) -> None:
         pass
 
-    say = warn = update
+    def say(self, line: str) -> None:
+        pass
+
+    def warn(self, line: str) -> None:
+        self.warnings.append(line)
 
 
 @pytest.fixture
@@ -63,12 +71,12 @@ def run(engine: Engine, tmp_path: Path) -> OpenRun:
     return run
 
 
-def launched(run: OpenRun, each_look: Callable[[], None] = lambda: None) -> None:
+def launched(run: OpenRun, each_look: Callable[[], None] = lambda: None, *, onlooker: Onlooker | None = None) -> None:
     def interruptions() -> int:
         each_look()
         return 0
 
-    launch(run, CONFIG, onlooker=Onlooker(), interruptions=interruptions)
+    launch(run, CONFIG, onlooker=onlooker or Onlooker(), interruptions=interruptions)
 
 
 def status(run: OpenRun) -> str:
@@ -78,12 +86,17 @@ def status(run: OpenRun) -> str:
 def test_a_launcher_that_gives_up_says_that_containers_are_left(
     engine: Engine, run: OpenRun, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    onlooker = Onlooker()
+
     def silence() -> None:
         if len(engine.running()) == 3:
             engine.withheld = "."
 
     with pytest.raises(WorkerError, match=r"the Docker engine has not answered for [12] s"):
-        launched(run, silence)
+        launched(run, silence, onlooker=onlooker)
+    assert onlooker.warnings == [
+        f"containers of this run may be left: throwcollect down --run {run.run} ends them",
+    ]
     engine.answer_all()
     assert status(run) == "abandoned"
     show_runs(everything=False, json=False)
