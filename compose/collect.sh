@@ -17,7 +17,8 @@ CONFIGS=$(cd "$(dirname "$config")" && pwd)
 CONFIG=$(basename "$config")
 RUN_USER=$(id -u):$(id -g)
 THROWCOLLECT_IMAGE=${THROWCOLLECT_IMAGE:-throwcollect:0.1.0}
-export CONFIGS CONFIG RUN_USER THROWCOLLECT_IMAGE
+THROWCOLLECT_HOST=${THROWCOLLECT_HOST:-$(uname -n)}
+export CONFIGS CONFIG RUN_USER THROWCOLLECT_IMAGE THROWCOLLECT_HOST
 
 project=throwcollect-$$
 file=$(dirname "$0")/compose.yaml
@@ -40,4 +41,6 @@ mkdir -p "$output"
 docker run --rm --network none --user "$RUN_USER" --entrypoint sh \
     -v "${project}_data:/data:ro" -v "$(cd "$output" && pwd):/out" "$THROWCOLLECT_IMAGE" \
     -c 'test ! -d /data/dataset || cp -r /data/dataset/. /out'
+# Where nothing was begun there is nothing to keep, and the next try wants a new directory.
+rmdir "$output" 2>/dev/null || true
 exit "$code"

@@ -255,12 +255,12 @@ def bare(client: DockerClient, tmp_path: Path) -> Any:
 
 
 def test_what_the_engine_refuses_is_the_reason_of_an_end(bare: Any) -> None:
-    runtime = bare("containers.sim.options.devices=[/dev/nowhere]", "containers.coordinator.memory=16m")
+    runtime = bare("containers.sim.options.runtime=nowhere", "containers.coordinator.memory=16m")
     runtime.start("sim_0", ["--version"])
     end = ended(runtime)
     assert (end.name, end.code) == ("sim_0", None)
     assert "cannot be started" in end.reason
-    assert "/dev/nowhere" in end.reason
+    assert "nowhere" in end.reason
     assert (runtime.running(), runtime.handle("sim_0")) == ((), None)
     runtime.start(COORDINATOR, ["config", "/data/small.yaml"])
     assert ended(runtime).reason == "ran out of memory (limit 16m)"
@@ -338,7 +338,8 @@ def test_what_is_not_there_is_found_before_anything_is_started(bare: Any, tmp_pa
     assert [str(problem) for problem in caught.value.problems] == [
         "containers.router.networks.0: the Docker engine has no network nowhere; create it first",
         "containers.sim.mounts.0: /no/where does not exist on this machine",
-        f"containers.sim.mounts.1: {sock} is refused, as it holds the engine's socket",
+        f"containers.sim.mounts.1: {sock}, which is /run, is refused, as /run belongs to the system; "
+        "mounts are for data",
     ]
 
 
@@ -389,7 +390,7 @@ def test_a_broken_line_to_the_engine_is_mended(bare: Any, client: DockerClient, 
     assert runtime.log_tail(ROUTER) == "router listening on tls/router:7447"
 
 
-@pytest.mark.parametrize(("trouble", "evidence"), [("cut", "Connection refused"), ("clog", None)])
+@pytest.mark.parametrize(("trouble", "evidence"), [("cut", "Connection refused\n"), ("clog", "")])
 def test_an_engine_that_does_not_answer_any_more_is_said_so_with_what_is_safe(
     monkeypatch: pytest.MonkeyPatch,
     line: CutLine,
@@ -397,7 +398,7 @@ def test_an_engine_that_does_not_answer_any_more_is_said_so_with_what_is_safe(
     client: DockerClient,
     tmp_path: Path,
     trouble: str,
-    evidence: str | None,
+    evidence: str,
 ) -> None:
     monkeypatch.setattr("throwcollect.runtime.docker._SILENCE_S", 3.0)
     runtime = bare(through=connect())
@@ -408,6 +409,8 @@ def test_an_engine_that_does_not_answer_any_more_is_said_so_with_what_is_safe(
     with pytest.raises(WorkerError, match=r"engine has not answered for \d+ s; .* safe in \S+") as caught:
         until(lambda: bool(runtime.exits()))
     assert caught.value.message.endswith(str(tmp_path))
-    assert (caught.value.evidence, caught.value.exit_code) == (evidence, 3)
+    left = client.containers.get(handle).name
+    assert (caught.value.evidence, caught.value.exit_code) == (f"{evidence}containers that may run on: {left}", 3)
     runtime.close()
+    assert not runtime.cleared
     assert client.containers.get(handle).status == "running"

@@ -43,7 +43,7 @@ def stop_run(named: str | None) -> None:
     record = run.record
     if run.status == "running":
         raise Interrupted(f"not waited for; run {record.run} is stopping all the same")
-    error = failure(record) if run.status == "ended" else died(record)
+    error = died(record) if run.status == "died" else failure(record)
     if error is not None and not isinstance(error, Interrupted):
         raise error
     complete = "is complete" if error is None else "is not complete"

@@ -56,7 +56,7 @@ def describe(found: Mapping[str, Any]) -> str:
     """Summary of a dataset in words, one fact a line.
 
     Args:
-        found: `Info` as dictionary; beside it, `wall_s` [s] and whether the run was `open` are told, too.
+        found: `Info` as dictionary; beside it, whether the run was `open` is told, too.
     """
     outcomes = ", ".join(f"{count} {outcome}" for outcome, count in found["outcomes"].items())
     lines = {
@@ -68,8 +68,8 @@ def describe(found: Mapping[str, Any]) -> str:
         "topics": ", ".join(f"{topic} ({count})" for topic, count in found["topics"].items()),
         "digest": found["digest"],
     }
-    if "wall_s" in found:
-        lines["took"] = f"{found['wall_s']:.1f} s, {found['episodes'] / found['wall_s']:.1f} throws/s from start to end"
+    if wall_s := found.get("wall_s"):
+        lines["took"] = f"{wall_s:.1f} s, {found['episodes'] / wall_s:.1f} throws/s, start-up included"
     if found.get("open"):
         lines["open"] = "anybody who reached the router could join, read and disturb the run"
     width = max(map(len, lines))

@@ -12,7 +12,7 @@ from throwcollect.coordinator.prepare import checked_plan
 from throwcollect.dataset.rebuild import rebuild
 from throwcollect.dataset.repair import repair
 from throwcollect.errors import LossError
-from throwcollect.wording import counted
+from throwcollect.wording import command, counted
 
 _MOST_NAMED = 10
 
@@ -55,5 +55,5 @@ def show_repaired(directory: Path, output: Path, *, json: bool) -> None:
     if repaired.lost:
         count = len(repaired.lost)
         raise LossError(
-            f"{output}: {count} trial{'s are' if count > 1 else ' is'} lost", hint=f"throwcollect resume {output}"
+            f"{output}: {count} trial{'s are' if count > 1 else ' is'} lost", hint=command("resume", output)
         )

@@ -24,7 +24,7 @@ _HEADINGS = ("RUN", "RUNTIME", "SIMULATIONS", "THROWS", "STATUS", "DATASET")
 
 
 def show_runs(*, everything: bool, json: bool) -> None:
-    """Print the runs that live, whose launcher died or, with `everything`, that have ended.
+    """Print the runs that live, that have lost their launcher or, with `everything`, that have ended.
 
     Raises:
         ConfigError: If the records cannot be used.
@@ -39,15 +39,21 @@ def show_runs(*, everything: bool, json: bool) -> None:
     shown = [run for run in known if everything or run.status != "ended"]
     shown.sort(key=lambda run: run.record.started)
     ids = records.ids()
-    strangers = [found for found in on_engine() if found.run_id not in ids]
+    held = {found.run_id: found for found in on_engine()}
+    strangers = [found for found in held.values() if found.run_id not in ids]
     if json:
         documents = [_document(run) for run in shown] + [_strange_document(found) for found in strangers]
-        typer.echo(jsonlib.dumps(documents, indent=2, default=str))
+        typer.echo(jsonlib.dumps(documents, indent=2, default=_in_json))
         return
-    rows = [(_row(run), _node_lines(run)) for run in shown]
-    rows += [(_strange_row(found), _strange_node_lines(found)) for found in strangers]
+    rows = [(_row(run), _node_lines(run, held.get(run.record.run))) for run in shown]
+    rows += [(_strange_row(found), _found_node_lines(found)) for found in strangers]
     for line in _table(rows):
         typer.echo(line)
+
+
+def _in_json(value: datetime) -> str:
+    """A time by RFC 3339, as events have it."""
+    return value.isoformat(timespec="milliseconds")
 
 
 def _document(run: Run) -> dict[str, Any]:
@@ -63,7 +69,7 @@ def _row(run: Run) -> tuple[str, ...]:
     throws = f"{record.trials_ended}/{record.trials}" if record.trials is not None else "-"
     status: str = run.status
     if record.ended is not None:
-        status = f"ended {_age(record.ended)} ago, exit code {record.exit_code}"
+        status = f"{run.status} {_age(record.ended)} ago, exit code {record.exit_code}"
     elif run.lives:
         status = f"running for {_age(record.started)}"
     return record.run, record.runtime, str(record.simulations), throws, status, record.dataset
@@ -74,9 +80,11 @@ def _strange_row(found: FoundRun) -> tuple[str, ...]:
     return found.run_id, "docker", str(simulations), "-", "unrecorded", found.source
 
 
-def _node_lines(run: Run) -> list[tuple[str, ...]]:
-    # What a dead launcher wrote of its nodes may be true no more.
-    return [_node_line(node, run.record.runtime) for node in run.record.nodes] if run.status == "running" else []
+def _node_lines(run: Run, found: FoundRun | None) -> list[tuple[str, ...]]:
+    if run.status == "running":
+        return [_node_line(node, run.record.runtime) for node in run.record.nodes]
+    # What a launcher that is gone wrote of its nodes may be true no more.
+    return _found_node_lines(found) if found is not None else []
 
 
 def _node_line(node: NodeState, runtime: str) -> tuple[str, ...]:
@@ -90,7 +98,7 @@ def _node_line(node: NodeState, runtime: str) -> tuple[str, ...]:
     )
 
 
-def _strange_node_lines(found: FoundRun) -> list[tuple[str, ...]]:
+def _found_node_lines(found: FoundRun) -> list[tuple[str, ...]]:
     return [(node.name, node.status, f"container {node.handle[:12]}", "") for node in found.nodes]
 
 

@@ -11,13 +11,14 @@ from typing import Any
 import typer
 
 from throwcollect.cli.dataset import describe
+from throwcollect.wording import command
 
 
 def print_summary(summary: Mapping[str, Any], directory: Path | None, *, as_json: bool) -> None:
     """Print the summary of a dataset.
 
     Args:
-        summary: What `dataset info` says, ``wall_s`` [s], and whether the run was ``open``.
+        summary: What `dataset info` says, and whether the run was ``open``.
         directory: Directory of the dataset; None if it is in a volume.
         as_json: Whether to print one JSON document.
     """
@@ -26,4 +27,4 @@ def print_summary(summary: Mapping[str, Any], directory: Path | None, *, as_json
         return
     sys.stdout.write(describe(summary))
     if directory is not None:
-        typer.echo(f"look into it: throwcollect dataset info {directory}   (or open the .mcap files in Foxglove)")
+        typer.echo(f"look into it: {command('dataset', 'info', directory)}   (or open the .mcap files in Foxglove)")

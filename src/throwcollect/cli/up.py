@@ -21,7 +21,6 @@ from throwcollect.coordinator.prepare import more_trials, prepare, self_containe
 from throwcollect.coordinator.resume import begun, finished, resume
 from throwcollect.dataset.directory import CONFIG, PLAN, TRIALS
 from throwcollect.dataset.inspect import info
-from throwcollect.dataset.journal import collected_s
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.runtime.choice import choose
 from throwcollect.runtime.detached import start_launcher, wait_for_nodes
@@ -30,7 +29,7 @@ from throwcollect.runtime.ports import reserved_port
 from throwcollect.runtime.records import OpenRun, Record, Records, Run
 from throwcollect.runtime.runs import busy, left_in
 from throwcollect.sweep.plan import Plan
-from throwcollect.wording import counted
+from throwcollect.wording import command, counted
 
 _MANY_TRIALS = 1000
 """From here on the plan takes long enough to be announced."""
@@ -92,7 +91,7 @@ def go_on(directory: Path, *, path: Path | None, overrides: Sequence[str], detac
         try:
             config = places.enter_context(loaded(path or directory / CONFIG, overrides))
         except ConfigError as error:
-            hint = f"throwcollect up CONFIG --resume {directory}, if the dataset's own file is damaged"
+            hint = f"{command('up', 'CONFIG', '--resume', directory)}, if the dataset's own file is damaged"
             raise ConfigError(error.problems, hint=error.hint if path else hint) from error
         sweep_directory = directory if path is None else path.parent
         _collect(_Request(config, sweep_directory, directory, started, resumed=True), detach=detach, json=json)
@@ -105,7 +104,8 @@ def _collect(request: _Request, *, detach: bool, json: bool) -> None:
         left = left_in(records, directory)
         if left is not None:
             run, config = _taken_over(records, left, config)
-            shown.say(f"run {run.run}: its launcher had died; it goes on where its containers are")
+            fate = "died" if left.status == "died" else "given up"
+            shown.say(f"run {run.run}: its launcher had {fate}; it goes on where its containers are")
         else:
             plan = None
             if request.resumed:
@@ -182,10 +182,9 @@ def _prepared(records: Records, request: _Request, plan: Plan | None, shown: Dis
             started=request.started,
             launcher=os.getpid(),
             simulations=config.run.simulations,
-            earlier_s=collected_s(directory),
         )
         # Finds what cannot be had of what the configuration asks for.
-        place_of(record, config, run.key).close()
+        place_of(record, config, run.key, warn=shown.warn).close()
         run.write(record)
         undo.pop_all()
     refused = sum(trial.refused is not None for trial in plan.trials)
@@ -206,17 +205,19 @@ def _remove_plan(directory: Path, *, made: bool) -> None:
 
 
 def _taken_over(records: Records, left: Run, config: Config) -> tuple[OpenRun, Config]:
-    """A run whose launcher died, with its own configuration."""
+    """A run that has no launcher any more, with its own configuration."""
     record = left.record
     own = load(Path(record.directory) / CONFIG)
     if own.without_run() != self_contained(config).without_run():
         raise ConfigError(
             f"{record.directory}: run {record.run} collects into it, with another configuration",
-            hint=f"throwcollect down --run {record.run} ends that run",
+            hint=f"{command('down', '--run', record.run)} ends that run",
         )
     run = records.take(record.run)
     if run is None:
         raise busy(record)
+    # Its containers are there until this launcher has removed them, whatever happens to it.
+    run.update(ended=None, exit_code=None, message="", left=True)
     return run, own
 
 
@@ -231,4 +232,4 @@ def _detach(records: Records, run: OpenRun, *, json: bool) -> None:
         typer.echo(jsonlib.dumps({"run": record.run, **where}, indent=2))
         return
     typer.echo(record.run)
-    typer.echo(f"follow it: throwcollect wait --run {record.run}   (or ps, logs -f, stop)", err=True)
+    typer.echo(f"follow it: {command('wait', '--run', record.run)}   (or ps, logs -f, stop)", err=True)

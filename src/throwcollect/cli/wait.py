@@ -13,6 +13,7 @@ from throwcollect.runtime.listening import follow
 from throwcollect.runtime.logs import Tail
 from throwcollect.runtime.records import Records
 from throwcollect.runtime.runs import died, failure, find
+from throwcollect.wording import command
 
 
 def wait_for(named: str | None, *, json: bool) -> None:
@@ -37,7 +38,7 @@ def wait_for(named: str | None, *, json: bool) -> None:
                     shown.warn(str(event))
     record = run.record
     if run.status == "running":
-        raise Interrupted(f"left; run {record.run} goes on", hint=f"throwcollect wait --run {record.run}")
+        raise Interrupted(f"left; run {record.run} goes on", hint=command("wait", "--run", record.run))
     if run.status == "died":
         raise died(record)
     error = failure(record)

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
 from pathlib import PurePosixPath
-from typing import Annotated, Any
+from typing import Annotated
 
 from pydantic import (
     AfterValidator,
-    BeforeValidator,
     ConfigDict,
     Field,
     PositiveFloat,
@@ -19,6 +17,7 @@ from pydantic import (
 )
 from typing_extensions import TypedDict
 
+from throwcollect.config.host_paths import DEVICES, is_allowed_device, normal_path, refusal
 from throwcollect.config.kinds import ContradictionError
 from throwcollect.config.section import Section
 
@@ -26,10 +25,12 @@ _LEAST_MEMORY = 6 * 1024**2
 """What Docker engines ask for."""
 
 _SIZE_UNITS = {"": 1, "b": 1, "k": 1024, "m": 1024**2, "g": 1024**3}
-_OWN_VARIABLES = ("THROWCOLLECT_NODE", "THROWCOLLECT_KEY", "ZENOH_CONFIG_OVERRIDE", "ROS_DOMAIN_ID")
+_OWN_VARIABLES = (
+    *("THROWCOLLECT_NODE", "THROWCOLLECT_KEY", "THROWCOLLECT_HOST", "THROWCOLLECT_DIRECTORY"),
+    *("ZENOH_CONFIG_OVERRIDE", "ROS_DOMAIN_ID"),
+)
 _OWN_DIRECTORIES = ("/data", "/key")
 _SOCKETS = ("docker.sock", "containerd.sock", "podman.sock")
-_ABOVE_SOCKETS = ("/", "/run", "/var", "/var/run")
 _LABELS = "throwcollect."
 
 _POWER = "is refused, as it would give a container power over its host"
@@ -77,9 +78,10 @@ def _mount(text: str) -> str:
     target, _, mode = rest.partition(":")
     if not (source.startswith("/") and target.startswith("/")) or ".." in text.split("/") or mode not in ("", "ro"):
         raise ValueError(f"should be HOST:CONTAINER or HOST:CONTAINER:ro with absolute paths, got '{text}'")
-    plain = str(PurePosixPath(source.replace("//", "/")))
-    if plain.endswith(_SOCKETS) or plain in _ABOVE_SOCKETS:
-        raise ValueError(f"{source} is refused, as it holds the engine's socket, and with it power over the host")
+    if normal_path(source).endswith(_SOCKETS):
+        raise ValueError(f"{source} is refused, as it is an engine's socket, and gives power over the host")
+    if reason := refusal(source):
+        raise ValueError(f"{source} {reason}")
     if _own_path(target) or PurePosixPath(target) == PurePosixPath("/"):
         raise ValueError(f"{target} is refused, as the dataset, the key or the image is there in the container")
     return text
@@ -124,11 +126,14 @@ def _tmpfs(text: str) -> str:
     return text
 
 
-def _refuse(options: Any) -> Any:
-    """Options that are known and yet not taken get a reason, where others are only unknown."""
-    if isinstance(options, Mapping) and (refused := {key: _REFUSED[key] for key in options if key in _REFUSED}):
-        raise ContradictionError(refused)
-    return options
+def _device(text: str) -> str:
+    host, _, rest = text.partition(":")
+    inside, _, permissions = rest.partition(":")
+    if not inside.startswith("/dev/") or ".." in inside.split("/") or permissions not in ("r", "w", "rw"):
+        raise ValueError(f"should be HOST:CONTAINER:PERMISSIONS, such as /dev/dri:/dev/dri:rw, got '{text}'")
+    if not is_allowed_device(host):
+        raise ValueError(f"{host} is refused; containers get {DEVICES}")
+    return text
 
 
 def _in_words(words: str) -> WithJsonSchema:
@@ -143,6 +148,8 @@ Volume = Annotated[str, AfterValidator(_volume), _in_words("a volume's name")]
 Variable = Annotated[str, AfterValidator(_variable)]
 ContainerPort = Annotated[str, AfterValidator(_port)]
 HostPort = Annotated[int, Field(ge=1, le=65535)]
+
+Device = Annotated[str, AfterValidator(_device), _in_words("HOST:CONTAINER:PERMISSIONS")]
 
 _OPTIONAL_KEYS = ConfigDict(extra="forbid", use_attribute_docstrings=True)
 
@@ -166,7 +173,8 @@ class DeviceRequest(TypedDict, total=False):
 class ContainerOptions(TypedDict, total=False):
     """Further keywords of `docker.containers.create` of the Docker SDK for Python; absent ones are the engine's."""
 
-    __pydantic_config__ = _OPTIONAL_KEYS  # type: ignore[misc]
+    # Others are unknown; of those that are known and yet not taken, the message tells why.
+    __pydantic_config__ = ConfigDict(**_OPTIONAL_KEYS, json_schema_extra={"refused": _REFUSED})  # type: ignore[misc]
     hostname: str
     """Name of the host inside."""
     domainname: str
@@ -203,8 +211,8 @@ class ContainerOptions(TypedDict, total=False):
     """NUMA nodes whose memory it uses."""
     blkio_weight: Annotated[int, Field(ge=10, le=1000)]
     """Weight of its disk access."""
-    devices: list[str]
-    """Devices of the host as HOST:CONTAINER:PERMISSIONS, such as `/dev/dri:/dev/dri:rw`."""
+    devices: list[Device]
+    """Graphics processors of the host as HOST:CONTAINER:PERMISSIONS, such as `/dev/dri:/dev/dri:rw`."""
     device_requests: list[DeviceRequest]
     """Devices that a driver provides, such as GPUs."""
     runtime: str
@@ -223,12 +231,12 @@ class NodeContainerConfig(Section):
     environment: dict[Variable, str | int | float] = {}
     """Further environment variables."""
     mounts: list[Mount] = []
-    """Directories and files of the host that are there in the container, too; not below /data or /key."""
+    """Directories and files with data of the host that are there in the container, too; not below /data or /key."""
     networks: list[Network] = []
     """Networks of the engine that it joins besides the run's own."""
     ports: dict[ContainerPort, HostPort] = {}
     """Ports of the container (`80`, `53/udp`) and those of 127.0.0.1 at which they are published."""
-    options: Annotated[ContainerOptions, BeforeValidator(_refuse)] = {}
+    options: ContainerOptions = {}
     """Further options."""
 
 

@@ -102,8 +102,8 @@ def _findings(details: ErrorDetails, values: Any, above: Location) -> Iterator[F
     kind, value = details["type"], details["input"]
     cause = details.get("ctx", {}).get("error")
     if kind == "extra_forbidden":
-        known = list(_section(details, values, above).keys)
-        yield Finding(location, unknown_key(str(location[-1]), known), unknown=True)
+        section, name = _section(details, values, above), str(location[-1])
+        yield Finding(location, section.refused.get(name) or unknown_key(name, list(section.keys)), unknown=True)
     elif isinstance(cause, ContradictionError):
         for key, sentence in cause.sentences.items():
             yield Finding((*location, *_split(key)), sentence)

@@ -27,7 +27,7 @@ class RunConfig(Section):
     trial_timeout_s: PositiveFloat = 60.0
     """Real time that a simulation may take for one trial before it counts as lost, besides what slow motion takes."""
     start_timeout_s: PositiveFloat = 60.0
-    """Real time within which the first simulation must be ready."""
+    """Real time within which the first simulation must be ready once it runs."""
     grace_s: Annotated[float, Field(ge=0, le=3600)] = 8.0
     """Real time that running trials get to end in after Ctrl-C or SIGTERM; what is dropped then is run when resumed."""
     retries: Annotated[int, Field(ge=0, le=100)] = 3

@@ -52,6 +52,11 @@ class Shape:
         return {name: self.child(name) for shape in self.alternatives for name in shape.node.get("properties", {})}
 
     @property
+    def refused(self) -> dict[str, str]:
+        """Why keys that somebody may expect in a section are not taken; empty when it has no such keys."""
+        return {name: why for shape in self.alternatives for name, why in shape.node.get("refused", {}).items()}
+
+    @property
     def choices(self) -> list[str]:
         """The words it allows, if there are only some."""
         return [word for shape in self.alternatives for word in _words_allowed(shape.node)]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import shlex
 import signal
 import time
 from pathlib import Path
@@ -12,11 +11,12 @@ from types import FrameType
 from throwcollect import ros
 from throwcollect.coordinator.node import Coordinator
 from throwcollect.coordinator.replay_check import check_by_replay
+from throwcollect.dataset.directory import known_directory
 from throwcollect.dataset.inspect import info, loss
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.errors import Interrupted, WorkerError
 from throwcollect.tasks.throw import ThrowResult
-from throwcollect.wording import counted
+from throwcollect.wording import command, counted
 
 _IDLE_S = 0.05
 _SYNC_EVERY_S = 1.0
@@ -61,12 +61,13 @@ def run(directory: Path) -> None:
     executor.add_node(node)
     # What is here now stays until the end; the garbage collector need not go through it again and again.
     gc.freeze()
-    started = time.monotonic()
     try:
         _collect(node, writer, executor)
         if not node.complete:
+            known = known_directory(directory)
             raise Interrupted(
-                f"interrupted; what is finished is in {directory}", hint=f"throwcollect resume {directory}"
+                f"interrupted; what is finished is in {known or 'the volume'}",
+                hint=command("resume", known) if known else None,
             )
         config = writer.plan.config
         said = check_by_replay(
@@ -78,12 +79,13 @@ def run(directory: Path) -> None:
         )
         if said is not None:
             print(said, flush=True)
-        writer.finish(wall_s=time.monotonic() - started)
+        writer.finish()
     finally:
         writer.close()
         node.destroy_node()
         ros.shutdown()
-    lost = loss(info(directory).outcomes, hint=f"throwcollect resume {shlex.quote(str(directory))} runs them again")
+    known = known_directory(directory)
+    lost = loss(info(directory).outcomes, hint=f"{command('resume', known)} runs them again" if known else None)
     if lost is not None:
         raise lost
 

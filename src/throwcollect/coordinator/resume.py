@@ -18,6 +18,7 @@ from throwcollect.errors import ConfigError, DatasetError, Problem
 from throwcollect.sweep.plan import Plan, Trial
 from throwcollect.sweep.table import encode_points
 from throwcollect.tasks.throw import Outcome
+from throwcollect.wording import command
 
 _MAY_GROW = ("trials", "until.landed")
 
@@ -90,7 +91,7 @@ def _stored_plan(directory: Path, stored: Config | None, config: Config) -> Plan
     except DatasetError as error:
         if stored is None:
             # A power cut may have cost the configuration; then only the plan can tell that it was this one.
-            hint = f"throwcollect up CONFIG --resume {directory}, as at first"
+            hint = f"{command('up', 'CONFIG', '--resume', directory)}, as at first"
             raise DatasetError(error.message, hint=hint) from error
         return None
 

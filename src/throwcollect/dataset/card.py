@@ -5,6 +5,7 @@ It is the only file that may differ between two collections of the same configur
 
 from __future__ import annotations
 
+import os
 import platform
 import socket
 from collections.abc import Mapping
@@ -22,6 +23,9 @@ from throwcollect.dataset.bag import to_yaml
 from throwcollect.dataset.directory import TRIALS
 from throwcollect.sweep.plan import FIRST_TRIALS
 
+HOST_VARIABLE = "THROWCOLLECT_HOST"
+"""Name of the machine for processes that cannot know it; empty if nobody does."""
+
 _LIBRARIES = ("pybullet", "numpy", "rosbags", "mcap", "zstandard", "pyarrow", "pin", "example-robot-data")
 _SIZES = ((1_000, "n<1K"), (10_000, "1K<n<10K"), (100_000, "10K<n<100K"), (1_000_000, "100K<n<1M"))
 _MORE = "1M<n<10M"
@@ -33,7 +37,7 @@ class Provenance:
 
     Attributes:
         finished: When it ended.
-        host: Name of the machine that wrote the dataset.
+        host: Name of the machine that wrote the dataset; None if it is not known, as in a container.
         platform: Its system and processor.
         python: Version of Python.
         libraries: Versions of the libraries that the data pass through.
@@ -43,7 +47,7 @@ class Provenance:
     """
 
     finished: datetime
-    host: str
+    host: str | None
     platform: str
     python: str
     libraries: Mapping[str, str]
@@ -56,7 +60,8 @@ class Provenance:
         """Provenance of a collection that ends now, here."""
         return cls(
             finished=datetime.now(timezone.utc),
-            host=socket.gethostname(),
+            # Of itself, a container knows nothing but a random id.
+            host=os.environ.get(HOST_VARIABLE, socket.gethostname()) or None,
             platform=platform.platform(),
             python=platform.python_version(),
             libraries={"throwcollect": throwcollect.__version__, **_versions()},
@@ -174,7 +179,7 @@ def _drawn(config: Config) -> list[str]:
 def _provenance(provenance: Provenance) -> dict[str, str]:
     facts = {
         "finished": provenance.finished.isoformat(timespec="seconds"),
-        "host": provenance.host,
+        **({"host": provenance.host} if provenance.host else {}),
         "platform": provenance.platform,
         "Python": provenance.python,
         **provenance.libraries,

@@ -2,6 +2,12 @@
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
+
+DIRECTORY_VARIABLE = "THROWCOLLECT_DIRECTORY"
+"""Directory of the dataset as its user knows it, for processes that see it elsewhere; empty if there is none."""
+
 CONFIG = "config.yaml"
 PLAN = "plan.parquet"
 THROWS = "throws.parquet"
@@ -26,3 +32,13 @@ def shard_name(collection: str, number: int) -> str:
         number: Number of the shard, counted from 0.
     """
     return f"{collection}_{number:05d}{SHARD_SUFFIX}"
+
+
+def known_directory(directory: Path) -> Path | None:
+    """The directory of a dataset as its user knows it; None if it has none, such as in a volume.
+
+    Args:
+        directory: The same as this process sees it.
+    """
+    known = os.environ.get(DIRECTORY_VARIABLE, str(directory))
+    return Path(known) if known else None

@@ -11,6 +11,7 @@ import pyarrow.compute as pc
 
 from throwcollect.dataset.card import count_outcomes
 from throwcollect.dataset.digest import combined_digest
+from throwcollect.dataset.journal import collected_s
 from throwcollect.dataset.reader import Dataset
 from throwcollect.errors import DatasetError, LossError
 from throwcollect.tasks.throw import Outcome
@@ -35,6 +36,7 @@ class Info:
         recordings_bytes: Size of the MCAP files.
         topics: Number of messages of each topic.
         digest: Hash over all episodes in order of trials, as it was written.
+        wall_s: Real time for which it was collected, without pauses [s]; None if no journal tells.
     """
 
     name: str
@@ -50,6 +52,7 @@ class Info:
     recordings_bytes: int
     topics: Mapping[str, int]
     digest: str
+    wall_s: float | None = None
 
     def as_dict(self) -> dict[str, object]:
         """The same for JSON."""
@@ -103,6 +106,7 @@ def summary(dataset: Dataset) -> Info:
         recordings_bytes=sum(size for name, size in sizes.items() if name.endswith(".mcap")),
         topics=topics,
         digest=digest,
+        wall_s=collected_s(directory),
     )
 
 

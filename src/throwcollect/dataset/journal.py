@@ -33,15 +33,12 @@ Event = Literal["opened", "exposed", "recovered", "planned", "lease", "commit", 
 - ``fail``: a simulation did not bring it back: `trial`, `simulation`, `reason`.
 - ``lost``: no simulation did: `trial`, `reason`.
 - ``shard``: a file was finished: `name`.
-- ``finished``: the dataset was.
+- ``finished``: the dataset was: `wall_s`, the real time that it took in all [s], as the data card has it.
 """
 
 
 class Journal:
     """The journal of a dataset that is being collected, which one process at a time may hold.
-
-    Attributes:
-        earlier_s: Real time that earlier processes collected for [s].
 
     Args:
         directory: Directory of the dataset.
@@ -62,7 +59,8 @@ class Journal:
             raise DatasetError(
                 f"{directory}: another process collects into it", hint="throwcollect ps lists the runs of this machine"
             )
-        self.earlier_s = collected_s(directory)
+        self._earlier_s = collected_s(directory) or 0.0
+        self._opened = time.time()
         size = os.fstat(self._descriptor).st_size
         if size and os.pread(self._descriptor, 1, size - 1) != b"\n":
             # Whoever wrote last was killed within a line.
@@ -76,6 +74,11 @@ class Journal:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+    def collected_s(self) -> float:
+        """Real time that this process and earlier ones have collected for [s], to the millisecond."""
+        # Clocks are set back now and then.
+        return round(self._earlier_s + max(time.time() - self._opened, 0.0), 3)
 
     def note(self, event: Event, **details: Any) -> None:
         """Write down an event.
@@ -137,12 +140,18 @@ def was_open(directory: Path) -> bool:
     return any(entry["event"] == "exposed" for entry in read_journal(directory / JOURNAL))
 
 
-def collected_s(directory: Path) -> float:
-    """Real time for which processes have collected into a dataset: from first to last event of each, in all [s]."""
-    total = began = last = 0.0
+def collected_s(directory: Path) -> float | None:
+    """Real time for which processes have collected into a dataset [s]; None if no journal says so.
+
+    What the last one has written when it finished the dataset; before that, from first to last event of each.
+    """
+    total: float | None = None
+    began = last = 0.0
     for entry in read_journal(directory / JOURNAL):
         if entry["event"] == "opened":
-            total += max(last - began, 0.0)
+            total = (total or 0.0) + max(last - began, 0.0)
             began = entry["time"]
+        elif entry["event"] == "finished" and isinstance(entry.get("wall_s"), int | float):
+            total, began = entry["wall_s"], entry["time"]
         last = entry["time"]
-    return total + max(last - began, 0.0)
+    return None if total is None else total + max(last - began, 0.0)

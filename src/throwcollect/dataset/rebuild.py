@@ -25,6 +25,7 @@ from throwcollect.errors import DatasetError
 from throwcollect.robots.description import full_description
 from throwcollect.sweep.plan import Plan, Trial
 from throwcollect.tasks.throw import Outcome, ThrowResult
+from throwcollect.wording import command
 
 NO_EPISODE = "no file holds an episode of it"
 """Reason of a lost trial of which nothing else is known."""
@@ -63,11 +64,11 @@ def rebuild(directory: Path) -> Rebuilt:
     """
     config = load(directory / CONFIG)
     plan = Plan.read(directory / PLAN, config)
-    repair = f"throwcollect dataset repair {directory} OUTPUT"
+    repair = command("dataset", "repair", directory, "OUTPUT")
     if unfinished := sorted(path.name for path in directory.glob("*.part")):
         raise DatasetError(
             f"{directory}: holds {unfinished[0]}: it is not collected to its end",
-            hint=f"throwcollect resume {directory}, or {repair}",
+            hint=f"{command('resume', directory)}, or {repair}",
         )
     if wrong := wrong_trials(plan):
         raise DatasetError(f"{directory / PLAN}: trial {min(wrong)}: was changed since the plan was made", hint=repair)

@@ -34,7 +34,7 @@ from throwcollect.sweep.plan import Plan, Trial
 from throwcollect.sweep.points import Points
 from throwcollect.sweep.table import encode_points
 from throwcollect.tasks.throw import Outcome, ThrowResult
-from throwcollect.wording import counted
+from throwcollect.wording import command, counted
 
 Tell = Callable[[int, ThrowResult], None]
 """Told a trial and what came of it."""
@@ -63,7 +63,7 @@ def create(directory: Path, plan: Plan, *, listed: Points | None = None) -> None
         raise ConfigError(
             f"{directory}: holds {', '.join(taken[:3])}{' and more' if taken[3:] else ''}",
             expected="a directory that is new or empty",
-            hint=f"choose another one with --output{f', or go on: throwcollect resume {directory}' if begun else ''}",
+            hint="choose another one with --output" + (f", or go on: {command('resume', directory)}" if begun else ""),
         )
     with ExitStack() as undo:
         undo.callback(_clear, directory, remove=made)
@@ -263,12 +263,12 @@ class DatasetWriter:
             digests |= {trial: digest for trial, digest in pairs if digest is not None}
         return digests
 
-    def finish(self, *, wall_s: float | None, simulations: int | None = None) -> None:
+    def finish(self, *, wall_s: float | None = None, simulations: int | None = None) -> None:
         """Write everything that describes the dataset as a whole; ``metadata.yaml`` comes last.
 
         Args:
-            wall_s: Real time that this writer collected for [s], for the data card; that of earlier ones is added;
-                None if it is not known.
+            wall_s: Real time that it took to make the dataset [s], for the data card; None if it is not known, or a
+                journal tells.
             simulations: Number of simulations that took part, for the data card; None if that is not known.
 
         Raises:
@@ -282,10 +282,10 @@ class DatasetWriter:
         throws = pa.concat_tables([each.rows for each in finished])
         digest = combined_digest(throws["digest"].drop_null().to_pylist())
         files = [each.summary for each in finished if each.summary]
-        earlier_s = self._journal.earlier_s if self._journal else 0.0
-        whole_s = None if wall_s is None else earlier_s + wall_s
+        if self._journal is not None:
+            wall_s = self._journal.collected_s()
         provenance = Provenance.of_this_machine(
-            simulations=simulations, wall_s=whole_s, was_open=was_open(self._directory)
+            simulations=simulations, wall_s=wall_s, was_open=was_open(self._directory)
         )
         # How it was run may not change the dataset, so what is kept of that is in the data card alone.
         config = self._config.without_run()
@@ -293,7 +293,7 @@ class DatasetWriter:
         write_file(self._directory / CARD, data_card(config, throws, provenance).encode())
         write_file(self._directory / CONFIG, resolved_yaml(config).encode())
         write_file(self._directory / METADATA, dataset_metadata(files, self._channels.all, digest).encode())
-        self.note("finished")
+        self.note("finished", wall_s=wall_s)
 
     def close(self) -> None:
         """Close all files; what is written stays."""

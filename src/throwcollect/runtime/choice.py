@@ -15,6 +15,7 @@ from throwcollect.runtime.docker_options import image
 from throwcollect.runtime.image import build, ensure, is_outdated
 
 _PROBE_S = 3.0
+"""Where processes will do as well, an engine that takes longer to answer is as good as none."""
 
 
 def choose(config: Config, *, say: Callable[[str], None], warn: Callable[[str], None]) -> Literal["local", "docker"]:
@@ -33,7 +34,7 @@ def choose(config: Config, *, say: Callable[[str], None], warn: Callable[[str], 
         say("runtime: local processes")
         return "local"
     try:
-        with closing(connect(timeout_s=_PROBE_S)) as client:
+        with closing(connect(timeout_s=None if wanted == "docker" else _PROBE_S)) as client:
             ensure(client, image(config), say=say)
             if is_outdated(client, image(config)):
                 _settle(client, config, warn)

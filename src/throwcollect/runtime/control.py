@@ -11,6 +11,7 @@ from contextlib import suppress
 from throwcollect.errors import ConfigError, ThrowcollectError, WorkerError
 from throwcollect.runtime.records import Record, Records, Run
 from throwcollect.runtime.runs import id_of, living, on_engine
+from throwcollect.wording import command
 
 _POLL_S = 0.05
 _STOP_S = 60.0
@@ -41,7 +42,7 @@ def stop(records: Records, run: Run, *, keep_on: Callable[[], bool]) -> Run:
         if time.monotonic() > deadline:
             raise WorkerError(
                 f"run {record.run} has not ended within {_STOP_S:g} s",
-                hint=f"throwcollect down --run {record.run} ends it by force",
+                hint=f"{command('down', '--run', record.run)} ends it by force",
             )
         time.sleep(_POLL_S)
     return records.get(record.run)

@@ -75,7 +75,7 @@ def wait_for_nodes(
         if nodes and all(node.handle for node in nodes) and not told:
             return
         time.sleep(_POLL_S)
-    if run.status == "ended":
+    if run.record.ended is not None:
         if (error := failure(run.record)) is not None:
             raise error
     elif told:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 import signal
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError, Interrupted, Problem, WorkerError
 from throwcollect.run_key import RunKey
 from throwcollect.runtime.docker_checks import check
+from throwcollect.runtime.docker_clock import EngineClock
 from throwcollect.runtime.docker_engine import ENGINE_ERRORS, connect, engine_errors
 from throwcollect.runtime.docker_node import NodeContainer
 from throwcollect.runtime.docker_options import (
@@ -36,14 +37,17 @@ from throwcollect.runtime.docker_watch import ContainerState, EngineWatch
 from throwcollect.runtime.node_logs import NodeLogs
 from throwcollect.runtime.nodes import ROUTER, NodeExit
 from throwcollect.runtime.ports import LOOPBACK
+from throwcollect.wording import command
 
-_SILENCE_S = 10.0
-"""An engine that has not answered for so long will hardly come back before the nodes are missed."""
+_SILENCE_S = 120.0
+"""A busy engine may leave a request waiting for half a minute; one that answers nothing for so long is given up."""
 
 _LOG_S = 2.0
 """What a node printed last is in its file within this time after its end."""
 
 _BEGIN_S = 30.0
+"""Nobody but the end of the run waits longer for a container that is being started."""
+_POLL_S = 0.2
 _AT_ONCE = 8
 _SIGNALLED = 128
 """Exit codes above this are those of a signal."""
@@ -57,6 +61,7 @@ class DockerRuntime:
     Attributes:
         data: Directory of the dataset, as nodes see it.
         listen: Zenoh endpoint at which the router is to listen.
+        cleared: Whether `close` has removed everything of the run from the engine.
 
     Args:
         run_id: Name of the run; unique on the engine.
@@ -64,6 +69,7 @@ class DockerRuntime:
         directory: Directory of the dataset; None if it lies in the volume ``containers.volume``.
         logs: Directory for the log files.
         key: Key of the run.
+        warn: Is told in one line when the engine keeps everybody waiting.
         client: Client of the engine; None for that which ``DOCKER_HOST`` names.
 
     Raises:
@@ -79,22 +85,31 @@ class DockerRuntime:
         directory: Path | None,
         logs: Path,
         key: RunKey,
+        warn: Callable[[str], None] = lambda _line: None,
         client: DockerClient | None = None,
     ) -> None:
         source = config.containers.volume if directory is None else str(directory.resolve())
         if source is None:
             raise ConfigError([Problem("missing, as the dataset has no directory either", "containers.volume")])
         self.listen = router_endpoint(config)
+        self.cleared = False
         self._place = RunPlace(run_id, source)
         self.data = self._place.data
         self._config = config
         self._key = key
         self._logs = NodeLogs(logs)
-        self._client = client or connect()
         self._watch: EngineWatch | None = None
         self._nodes: dict[str, NodeContainer] = {}
+        self._beginning: list[NodeContainer] = []
         self._ended_at: dict[str, float] = {}
-        check(self._client, self._place, config)
+        with ExitStack() as undo:
+            self._clock = EngineClock(warn)
+            undo.callback(self._clock.close)
+            self._client = client or connect(timeout_s=_SILENCE_S)
+            self._clock.attend(self._client)
+            undo.callback(self._clock.ignore, self._client)
+            check(self._client, self._place, config)
+            undo.pop_all()
 
     def open(self) -> None:
         """Make the run's network and volumes unless they exist, and begin to watch its containers.
@@ -118,7 +133,7 @@ class DockerRuntime:
                         place.network, driver="bridge", internal=not published(self._config), labels=place.labels()
                     )
                     placed.result()
-        self._watch = EngineWatch(self._client, place)
+        self._watch = EngineWatch(self._client, place, self._clock)
 
     def found(self) -> tuple[str, ...]:
         """Names of the nodes whose containers exist already, of a launcher that died; they become nodes of this one.
@@ -135,7 +150,7 @@ class DockerRuntime:
                 # What was created and never started is replaced when the node is.
                 if name not in self._nodes and container.status != "created":
                     self._opened.look(container.id)
-                    self._nodes[name] = NodeContainer(self._client, name, self._logs.path(name))
+                    self._nodes[name] = self._node(name)
                     self._nodes[name].adopt(container)
         return self.running()
 
@@ -174,8 +189,7 @@ class DockerRuntime:
             core: Processor core that it is bound to unless the configuration binds it; None for any.
         """
         options = node_options(name, arguments, place=self._place, config=self._config, core=core)
-        node = NodeContainer(self._client, name, self._logs.path(name))
-        self._nodes[name] = node
+        node = self._nodes[name] = self._node(name)
         node.start(options, networks=section_of(self._config, name).networks)
 
     def handle(self, name: str) -> str | None:
@@ -194,12 +208,7 @@ class DockerRuntime:
             WorkerError: If the engine does not answer any more.
         """
         if self._silent:
-            raise WorkerError(
-                f"the Docker engine has not answered for {self._opened.silent_s:.0f} s; "
-                f"finished throws are safe in {self._place.source}",
-                evidence=self._opened.last_error or None,
-                hint=f"once it answers: throwcollect down --run {self._place.run_id} ends what may still run",
-            )
+            raise self._silence()
         ends = [end for node in self._nodes.values() if (end := self._end_of(node)) is not None]
         for end in ends:
             del self._nodes[end.name]
@@ -230,22 +239,54 @@ class DockerRuntime:
     def stop(self, names: Sequence[str], *, grace_s: float = 3.0) -> None:
         """End nodes and remove their containers: politely, then after `grace_s` [s], in whole seconds, by force."""
         nodes = [self._nodes.pop(name) for name in names if name in self._nodes]
+        self._beginning += [node for node in nodes if not node.begun]
         with ThreadPoolExecutor(_AT_ONCE) as pool:
             for node in nodes:
                 pool.submit(self._end, node, math.ceil(grace_s))
 
     def close(self) -> None:
-        """End all nodes, the router last, and remove all that was made for the run but its volume."""
+        """End all nodes, the router last, and remove all that was made for the run but its volume.
+
+        What an engine that is silent, or refuses, keeps is left there; `cleared` tells.
+        """
         if not self._silent:
             self.stop([name for name in self._nodes if name != ROUTER])
             self.stop([ROUTER])
-            # Somebody may have joined the network with a container of his own, and keeps it alive.
-            with suppress(WorkerError):
-                remove(self._client, self._place.run_id, volumes=False)
+        while not self._silent and any(not node.wait_begun(_POLL_S) for node in self._beginning):
+            pass
+        if not self._silent:
+            self._remove()
         if self._watch is not None:
             self._watch.close()
+        self._clock.close()
+        self._clock.ignore(self._client)
         for node in self._nodes.values():
             node.close()
+
+    def _remove(self) -> None:
+        # Somebody may have joined the network with a container of his own, and keeps it alive.
+        with suppress(WorkerError):
+            remove(self._client, self._place.run_id, volumes=False)
+        filters = {"label": [f"{RUN_LABEL}={self._place.run_id}", NODE_LABEL]}
+        with suppress(*ENGINE_ERRORS):
+            self.cleared = not self._client.api.containers(all=True, filters=filters)
+
+    def _silence(self) -> WorkerError:
+        """The error that says that the engine is given up, what may be left on it, and how to go on."""
+        place = self._place
+        left = ", ".join(map(place.container, self._nodes)) or "none"
+        hint = f"once it answers, {command('down', '--run', place.run_id)} ends them"
+        if not place.in_volume:
+            hint += f", and {command('resume', place.source)} goes on with them"
+        return WorkerError(
+            f"the Docker engine has not answered for {self._clock.silent_s:.0f} s; "
+            f"finished throws are safe in {place.source}",
+            evidence="\n".join(filter(None, (self._opened.last_error, f"containers that may run on: {left}"))),
+            hint=hint,
+        )
+
+    def _node(self, name: str) -> NodeContainer:
+        return NodeContainer(self._client, name, self._logs.path(name), self._clock)
 
     @property
     def _opened(self) -> EngineWatch:
@@ -255,7 +296,7 @@ class DockerRuntime:
 
     @property
     def _silent(self) -> bool:
-        return self._watch is not None and self._watch.silent_s > _SILENCE_S
+        return self._clock.silent_s >= _SILENCE_S
 
     def _state(self, name: str) -> ContainerState | None:
         node = self._nodes.get(name)
@@ -277,7 +318,8 @@ class DockerRuntime:
         return NodeExit(node.name, state.code, end_in_words(state, memory), self.log_tail(node.name))
 
     def _end(self, node: NodeContainer, grace_s: int) -> None:
-        node.wait_begun(_BEGIN_S)
+        if not node.wait_begun(_BEGIN_S):
+            node.renounce()
         if node.handle is None:
             return
         with suppress(*ENGINE_ERRORS):

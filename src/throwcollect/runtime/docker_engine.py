@@ -10,7 +10,9 @@ from contextlib import contextmanager
 
 from docker.client import DockerClient
 from docker.errors import APIError, DockerException
+from requests.exceptions import Timeout
 from urllib3.exceptions import HTTPError
+from urllib3.exceptions import TimeoutError as PoolTimeoutError
 
 from throwcollect.errors import WorkerError
 
@@ -18,6 +20,10 @@ from throwcollect.errors import WorkerError
 ENGINE_ERRORS = (DockerException, HTTPError, OSError, struct.error, json.JSONDecodeError)
 """Whatever the client raises when the engine refuses, fails or is gone."""
 
+PATIENCE_S = 30.0
+"""How long a command waits for an answer of the engine, unless it knows better."""
+
+_TIMEOUTS = (Timeout, PoolTimeoutError, TimeoutError)
 _DEFAULT_HOST = "unix:///var/run/docker.sock"
 
 
@@ -26,17 +32,17 @@ def engine_address() -> str:
     return os.environ.get("DOCKER_HOST") or _DEFAULT_HOST
 
 
-def connect(*, timeout_s: float = 30.0) -> DockerClient:
+def connect(*, timeout_s: float | None = None) -> DockerClient:
     """A client of the engine that ``DOCKER_HOST`` names.
 
     Args:
-        timeout_s: How long to wait for each answer [s].
+        timeout_s: How long to wait for each answer [s]; None for `PATIENCE_S`.
 
     Raises:
         WorkerError: If no engine answers.
     """
     try:
-        return DockerClient.from_env(timeout=timeout_s)
+        return DockerClient.from_env(timeout=timeout_s or PATIENCE_S)
     except ENGINE_ERRORS as error:
         raise WorkerError(
             f"no Docker engine answers at {engine_address()}: {in_words(error)}",
@@ -48,13 +54,26 @@ def in_words(error: BaseException) -> str:
     """What the engine, or else the system, said."""
     if isinstance(error, APIError):
         return str(error.explanation or error).strip()
+    if timed_out(error):
+        return "no answer in time"
+    for each in _causes(error):
+        if isinstance(each, OSError) and isinstance(each.strerror, str):
+            return each.strerror
+    return str(error) or type(error).__name__
+
+
+def timed_out(error: BaseException) -> bool:
+    """Whether something failed because the engine did not answer in time, as opposed to refusing or being gone."""
+    return any(isinstance(each, _TIMEOUTS) for each in _causes(error))
+
+
+def _causes(error: BaseException) -> Iterator[object]:
+    """An exception and all that led to it, each after what it wraps."""
     cause: BaseException | None = error
     while cause is not None:
-        for each in (*_inside(cause), cause):
-            if isinstance(each, OSError) and isinstance(each.strerror, str):
-                return each.strerror
+        yield from _inside(cause)
+        yield cause
         cause = cause.__cause__ or cause.__context__
-    return str(error) or type(error).__name__
 
 
 def _inside(error: BaseException) -> Iterator[object]:

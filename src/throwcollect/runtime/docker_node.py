@@ -12,6 +12,7 @@ from docker.client import DockerClient
 from docker.errors import NotFound
 from docker.models.containers import Container
 
+from throwcollect.runtime.docker_clock import EngineClock
 from throwcollect.runtime.docker_engine import ENGINE_ERRORS, in_words
 from throwcollect.runtime.docker_options import LOG_LABEL
 
@@ -34,17 +35,25 @@ class NodeContainer:
         client: Client of the engine.
         name: Name of the node.
         log: File to which its output is appended.
+        clock: Is told of all that it prints; it counts the client's answers by itself.
     """
 
-    def __init__(self, client: DockerClient, name: str, log: Path) -> None:
+    def __init__(self, client: DockerClient, name: str, log: Path, clock: EngineClock) -> None:
         self.name = name
         self.handle: str | None = None
         self.failure: str | None = None
         self._client = client
         self._log = log
+        self._clock = clock
         self._begun = threading.Event()
+        self._unwanted = threading.Event()
         self._closed = threading.Event()
         self._thread: threading.Thread | None = None
+
+    @property
+    def begun(self) -> bool:
+        """Whether it has been started, or could not be."""
+        return self._begun.is_set()
 
     @property
     def log_complete(self) -> bool:
@@ -67,9 +76,13 @@ class NodeContainer:
         offset = int(container.labels.get(LOG_LABEL, 0))
         self._run_in_thread(lambda: self._copy_log(container, offset))
 
-    def wait_begun(self, timeout_s: float) -> None:
-        """Wait until it runs or could not be started, at most so long [s]."""
-        self._begun.wait(timeout_s)
+    def wait_begun(self, timeout_s: float) -> bool:
+        """Wait until it runs or could not be started, at most so long [s]; whether either is so."""
+        return self._begun.wait(timeout_s)
+
+    def renounce(self) -> None:
+        """Let it end as soon as it runs, if it is still being started: nobody waits for it any more."""
+        self._unwanted.set()
 
     def wait_log(self, timeout_s: float) -> None:
         """Wait until its output is in its file, at most so long [s]."""
@@ -88,6 +101,8 @@ class NodeContainer:
         container = None
         try:
             with _AT_ONCE:
+                if self._unwanted.is_set():
+                    return
                 with suppress(NotFound):
                     self._client.api.remove_container(options["name"], v=True, force=True)
                 self._log.parent.mkdir(parents=True, exist_ok=True)
@@ -106,6 +121,10 @@ class NodeContainer:
             return
         finally:
             self._begun.set()
+        if self._unwanted.is_set():
+            with suppress(*ENGINE_ERRORS):
+                container.remove(v=True, force=True)
+            return
         self._copy_log(container, offset)
 
     def _copy_log(self, container: Container, offset: int) -> None:
@@ -120,6 +139,7 @@ class NodeContainer:
                 try:
                     known = self._log.stat().st_size - offset
                     for chunk in container.logs(stream=True, follow=True):
+                        self._clock.heard()
                         log.write(chunk[known:])
                         known = max(0, known - len(chunk))
                     container.reload()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import socket
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +14,8 @@ from docker.types import EndpointConfig, LogConfig, Mount, Ulimit
 import throwcollect
 from throwcollect.config.containers import NodeContainerConfig
 from throwcollect.config.schema import Config
+from throwcollect.dataset.card import HOST_VARIABLE
+from throwcollect.dataset.directory import DIRECTORY_VARIABLE
 from throwcollect.run_key import RunKey
 from throwcollect.runtime.image import default_tag
 from throwcollect.runtime.nodes import COORDINATOR, ROUTER, node_environment, protocol_of
@@ -148,7 +151,12 @@ def node_options(
     node = section_of(config, name)
     options: dict[str, Any] = dict(node.options)
     general = confined(place, config)
-    own: Mapping[str, str] = node_environment(router_endpoint(config), config.run.domain_id, KEY)
+    own = {
+        **node_environment(router_endpoint(config), config.run.domain_id, KEY),
+        # What nodes would say otherwise, a random id and /data, means nothing outside of the container.
+        HOST_VARIABLE: socket.gethostname(),
+        DIRECTORY_VARIABLE: "" if place.in_volume else place.source,
+    }
     wanted = {key: str(value) for key, value in node.environment.items()}
     ports = {port: (LOOPBACK, host_port) for port, host_port in node.ports.items()}
     if name == ROUTER and config.run.router_port:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-import time
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
@@ -12,7 +11,8 @@ from typing import Any
 from docker.client import DockerClient
 from docker.errors import NotFound
 
-from throwcollect.runtime.docker_engine import ENGINE_ERRORS, in_words
+from throwcollect.runtime.docker_clock import EngineClock
+from throwcollect.runtime.docker_engine import ENGINE_ERRORS, in_words, timed_out
 from throwcollect.runtime.docker_options import RUN_LABEL, RunPlace
 
 _EVENTS = ["start", "die", "oom", "destroy", "pause", "unpause", "health_status"]
@@ -49,29 +49,28 @@ class EngineWatch:
 
     Events only say where to look: what is known is always what the engine says of a container when it is asked.
 
+    Attributes:
+        last_error: What the engine, or the system, said when it last refused to answer; empty if it never did.
+
     Args:
         client: Client of the engine.
         place: The run.
+        clock: Is told of every event; it counts the client's answers by itself.
     """
 
-    def __init__(self, client: DockerClient, place: RunPlace) -> None:
+    def __init__(self, client: DockerClient, place: RunPlace, clock: EngineClock) -> None:
         self.last_error = ""
         self._client = client
+        self._clock = clock
         self._network = place.network
         self._label = f"{RUN_LABEL}={place.run_id}"
         self._states: dict[str, ContainerState] = {}
         # One look at a time, so that an old finding never replaces a newer one.
         self._looking = threading.Lock()
         self._closed = threading.Event()
-        self._answered = time.monotonic()
         self._stream: Any = None
         for target in (self._follow_events, self._look_around):
             threading.Thread(target=target, daemon=True).start()
-
-    @property
-    def silent_s(self) -> float:
-        """Time since the engine last answered [s]."""
-        return time.monotonic() - self._answered
 
     def state(self, container: str | None) -> ContainerState | None:
         """What is known of a container; None when nothing is."""
@@ -88,7 +87,6 @@ class EngineWatch:
                 self._states[container] = _state(self._client.api.inspect_container(container), self._network)
             except NotFound:
                 self._states[container] = ContainerState("removed")
-        self._answered = time.monotonic()
 
     def close(self) -> None:
         """Stop watching."""
@@ -104,23 +102,29 @@ class EngineWatch:
             try:
                 self._stream = self._client.events(decode=True, filters=filters)
                 for event in self._stream:
+                    self._clock.heard()
                     self.look(event["id"])
             except ENGINE_ERRORS as error:
-                self.last_error = in_words(error)
+                self._note(error)
             self._closed.wait(_LOOK_EVERY_S)
 
     def _look_around(self) -> None:
         while not self._closed.wait(_LOOK_EVERY_S):
             try:
                 listed = self._client.api.containers(all=True, filters={"label": self._label})
-                self._answered = time.monotonic()
                 now = {each["Id"]: each["State"] for each in listed}
                 before = {key: state.status for key, state in self._states.copy().items() if state.status != "removed"}
                 for container in now.keys() | before.keys():
                     if now.get(container) != before.get(container):
                         self.look(container)
             except ENGINE_ERRORS as error:
-                self.last_error = in_words(error)
+                self._note(error)
+
+    def _note(self, error: BaseException) -> None:
+        # That nothing comes in for a while says nothing beyond the silence, which the clock measures; and a stream
+        # without an event is none.
+        if not timed_out(error):
+            self.last_error = in_words(error)
 
 
 def _state(details: Mapping[str, Any], network: str) -> ContainerState:

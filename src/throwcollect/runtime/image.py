@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import re
+import shlex
 import subprocess
 import tarfile
 import tempfile
@@ -29,6 +30,11 @@ _SOURCES = ("pyproject.toml", "README.md", "configs/quickstart.yaml", "src")
 _LEFT_OUT = re.compile(r"__pycache__|.*\.egg-info")
 SOURCES_LABEL = "throwcollect.sources"
 """Label that tells which sources are installed in an image."""
+SOURCE_LABEL = "org.opencontainers.image.source"
+"""Label that tells where the sources come from; an image of a clone from nowhere else than this machine has none."""
+_SCHEMES = ("https", "http", "ssh", "git")
+_SSH_ADDRESS = re.compile(r"(?:[^@:/]+@)?([^@:/]{2,}):(?!//)/?(.+)")
+"""The short form of ssh: ``git@host:path``."""
 _EVIDENCE_LINES = 15
 _STEP = re.compile(r"Step (\d+/\d+) : (.*)")
 _STEP_COLUMNS = 100
@@ -69,17 +75,27 @@ def build(
     """
     root = source_root()
     if wheelhouse is not None and not any(wheelhouse.glob("*.whl")):
-        raise ConfigError(f"{wheelhouse}: holds no wheels", hint=f"python {root}/docker/wheelhouse.py {wheelhouse}")
+        raise ConfigError(
+            f"{wheelhouse}: holds no wheels",
+            hint=shlex.join(["python", f"{root}/docker/wheelhouse.py", str(wheelhouse)]),
+        )
     if not _is_there(client, base):
         hint = "throwcollect image build --base IMAGE takes another one; docker/base.sh makes one from Debian packages"
         say(f"pulling {base}")
         with engine_errors(f"the base image {base} is not here and cannot be pulled", hint=hint):
             client.images.pull(base)
-    arguments = {"BASE_IMAGE": base, **_provenance(root)}
+    revision, address = _revision(root), _address(root)
+    arguments = {
+        "BASE_IMAGE": base,
+        "VERSION": throwcollect.__version__,
+        "REVISION": revision or _UNKNOWN,
+        "SOURCES": _digest_of(root),
+    }
+    labels = {SOURCE_LABEL: address} if address else {}
     with engine_errors(f"{tag}: cannot be built"), tempfile.TemporaryFile() as context:
         _write_context(context, root, wheelhouse)
         context.seek(0)
-        _run_steps(client, context, tag, arguments, wheelhouse, say)
+        _run_steps(client, context, tag, arguments, labels, wheelhouse, say)
         return int(client.images.get(tag).attrs["Size"])
 
 
@@ -190,6 +206,7 @@ def _run_steps(
     context: IO[bytes],
     tag: str,
     arguments: Mapping[str, str],
+    labels: Mapping[str, str],
     wheelhouse: Path | None,
     say: Callable[[str], None],
 ) -> None:
@@ -202,6 +219,7 @@ def _run_steps(
         target=_TARGET,
         tag=tag,
         buildargs=arguments,
+        labels=labels,
         rm=True,
         forcerm=True,
         decode=True,
@@ -224,24 +242,26 @@ def _failure(tag: str, error: str, missing: str | None, wheelhouse: Path | None,
     if wheelhouse is None:
         hint = "throwcollect image build --wheelhouse DIR takes wheels from there; docker/wheelhouse.py fills one"
         return WorkerError(f"{tag}: cannot be built: the package index gives no {missing}", evidence=log, hint=hint)
-    hint = f"python docker/wheelhouse.py {wheelhouse}"
+    hint = shlex.join(["python", "docker/wheelhouse.py", str(wheelhouse)])
     return WorkerError(f"{tag}: cannot be built: {wheelhouse} lacks {missing}", evidence=log, hint=hint)
 
 
-def _provenance(root: Path) -> dict[str, str]:
-    """Where the sources come from, for the labels."""
-    revision = source = None
-    if (root / ".git").exists() and (revision := _git(root, "rev-parse", "HEAD")):
-        revision += "-dirty" if _git(root, "status", "--porcelain", "--", "docker", *_SOURCES) else ""
-        address = urlsplit(_git(root, "remote", "get-url", "origin") or "")
-        # Without the name and the password that the address of a clone may hold.
-        source = address._replace(netloc=address.netloc.rpartition("@")[2]).geturl()
-    return {
-        "VERSION": throwcollect.__version__,
-        "REVISION": revision or _UNKNOWN,
-        "SOURCE": source or _UNKNOWN,
-        "SOURCES": _digest_of(root),
-    }
+def _revision(root: Path) -> str | None:
+    """Commit of a clone; None if it is not one."""
+    if not (root / ".git").exists() or not (revision := _git(root, "rev-parse", "HEAD")):
+        return None
+    return revision + ("-dirty" if _git(root, "status", "--porcelain", "--", "docker", *_SOURCES) else "")
+
+
+def _address(root: Path) -> str | None:
+    """Where others find the sources, without the name and the password that the address of a clone may hold."""
+    origin = (_git(root, "remote", "get-url", "origin") if (root / ".git").exists() else None) or ""
+    if short := _SSH_ADDRESS.fullmatch(origin):
+        return f"ssh://{short[1]}/{short[2]}"
+    parts = urlsplit(origin)
+    if parts.scheme not in _SCHEMES or not parts.hostname:
+        return None
+    return parts._replace(netloc=parts.netloc.rpartition("@")[2], query="", fragment="").geturl()
 
 
 def _git(root: Path, *arguments: str) -> str | None:

@@ -26,6 +26,7 @@ from throwcollect.runtime.records import OpenRun, Record
 from throwcollect.runtime.runs import goes_on
 from throwcollect.runtime.scaling import offer_scaling
 from throwcollect.runtime.supervisor import NodeState, Supervisor
+from throwcollect.wording import command
 
 if TYPE_CHECKING:
     from throwcollect.runtime.docker import DockerRuntime
@@ -50,13 +51,14 @@ class Onlooker(Protocol):
         """Something that went wrong."""
 
 
-def place_of(record: Record, config: Config, key: RunKey) -> Place:
+def place_of(record: Record, config: Config, key: RunKey, *, warn: Callable[[str], None]) -> Place:
     """The place where the nodes of a run are to live, or live already.
 
     Args:
         record: What is known of the run.
         config: Its configuration.
         key: Its key.
+        warn: Is told in one line when the place keeps everybody waiting.
 
     Raises:
         ConfigError: If the router's port is taken, or something that the configuration asks for is not there.
@@ -67,7 +69,7 @@ def place_of(record: Record, config: Config, key: RunKey) -> Place:
     from throwcollect.runtime.docker import DockerRuntime
 
     directory = None if record.volume else Path(record.directory)
-    return DockerRuntime(record.run, config, directory=directory, logs=Path(record.logs), key=key)
+    return DockerRuntime(record.run, config, directory=directory, logs=Path(record.logs), key=key, warn=warn)
 
 
 def launch(
@@ -86,8 +88,8 @@ def launch(
         interruptions: How often the user has asked to stop: at first running trials are finished, then no more.
 
     Returns:
-        What the dataset holds, ``wall_s``: the time since the run was started, and of earlier runs into it [s], and
-        ``open``: whether anybody could join the run; and the error that says that trials are lost, if some are.
+        What the dataset holds, as `dataset info` says it, and ``open``: whether anybody could join the run; and the
+        error that says that trials are lost, if some are.
 
     Raises:
         ConfigError: If the configuration cannot be used after all.
@@ -97,8 +99,10 @@ def launch(
     """
     notes = _Notes(run, onlooker)
     code, message, summary = 1, "internal error", None
+    place: Place | None = None
     try:
-        summary = _Launcher(run, config, notes, onlooker, interruptions).run_to_the_end()
+        place = place_of(run.record, config, run.key, warn=onlooker.warn)
+        summary = _Launcher(run, config, place, notes, onlooker, interruptions).run_to_the_end()
         lost = loss(summary["outcomes"], hint=goes_on(run.record))
         code, message = (0, "") if lost is None else (lost.exit_code, str(lost))
         return summary, lost
@@ -106,7 +110,11 @@ def launch(
         code, message = error.exit_code, str(error)
         raise
     finally:
-        notes.end(code, message, summary)
+        # What was there before may be there still, if it could not even be looked for.
+        left = run.record.left if place is None else not place.cleared
+        if left:
+            onlooker.warn(f"containers of this run may be left: {command('down', '--run', run.run)} ends them")
+        notes.end(code, message, summary, left=left)
         run.close()
 
 
@@ -145,13 +153,21 @@ class _Notes:
             trials = self._trials()
         self._write(lambda: self._run.update(nodes=tuple(states), endpoint=endpoint, simulations=simulations, **trials))
 
-    def end(self, code: int, message: str, summary: dict[str, Any] | None) -> None:
-        """How the run ended, last of all."""
+    def end(self, code: int, message: str, summary: dict[str, Any] | None, *, left: bool) -> None:
+        """How the run ended, last of all, and whether containers of it may be left."""
         event: RunEvent = "failed"
-        if code in (0, Interrupted.exit_code):
-            event = "stopped" if code else "finished"
+        if code in (0, LossError.exit_code):
+            event = "finished"
+        elif code == Interrupted.exit_code:
+            event = "stopped"
         self.event(event, reason=message or None, exit_code=code)
-        end = {"ended": datetime.now(timezone.utc), "exit_code": code, "message": message, "summary": summary}
+        end = {
+            "ended": datetime.now(timezone.utc),
+            "exit_code": code,
+            "message": message,
+            "summary": summary,
+            "left": left,
+        }
         self._write(lambda: self._run.update(nodes=(), endpoint=None, **end, **self._trials()))
 
     def _trials(self) -> dict[str, int]:
@@ -172,7 +188,13 @@ class _Launcher:
     """What `launch` does until the nodes have ended."""
 
     def __init__(
-        self, run: OpenRun, config: Config, notes: _Notes, onlooker: Onlooker, interruptions: Callable[[], int]
+        self,
+        run: OpenRun,
+        config: Config,
+        place: Place,
+        notes: _Notes,
+        onlooker: Onlooker,
+        interruptions: Callable[[], int],
     ) -> None:
         self._run = run
         self._notes = notes
@@ -181,7 +203,7 @@ class _Launcher:
         self._is_open = config.run.open
         self._simulations = self._wanted = run.record.simulations
         self._set_aside: set[str] = set()
-        self._place = place_of(run.record, config, run.key)
+        self._place = place
         self._supervisor = Supervisor(self._place, config.run, simulations=self._simulations)
         self._listening = Listening(
             self._report,
@@ -199,11 +221,7 @@ class _Launcher:
             self._supervisor.start(found=found)
             self._notes.known([state for state in self._supervisor.states() if state.name in found])
             self._check(self._follow())
-            whole = self._summary()
-        wall_s = (datetime.now(timezone.utc) - self._run.record.started).total_seconds()
-        # Somebody may have set the clock back.
-        wall_s = max(wall_s, _POLL_S) + self._run.record.earlier_s
-        return {**whole, "wall_s": wall_s, "open": self._is_open}
+            return {**self._summary(), "open": self._is_open}
 
     def _open(self) -> tuple[str, ...]:
         """Make what the nodes need; names of those that a launcher before this one has left."""

@@ -42,6 +42,7 @@ class LocalRuntime:
     Attributes:
         data: Directory of the dataset.
         listen: Zenoh endpoint at which the router is to listen.
+        cleared: Always true, as processes end with their launcher.
 
     Args:
         data: Directory of the dataset.
@@ -55,6 +56,7 @@ class LocalRuntime:
 
     def __init__(self, data: Path, logs: Path, run: RunConfig, key: RunKey) -> None:
         self.data = str(data)
+        self.cleared = True
         self._logs = NodeLogs(logs)
         self._reserved = reserved_port(run.router_port)
         self._address: tuple[str, int] = self._reserved.getsockname()

@@ -51,10 +51,12 @@ class Runtime(Protocol):
     Attributes:
         data: Directory of the dataset, as nodes see it.
         listen: Zenoh endpoint at which the router is to listen.
+        cleared: Whether nothing of the run is left but the dataset, once it is closed.
     """
 
     data: str
     listen: str
+    cleared: bool
 
     def router_address(self) -> tuple[str, int] | None:
         """Host and port at which this process reaches the router; None while there is no way to it."""

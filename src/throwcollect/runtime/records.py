@@ -31,6 +31,7 @@ from pydantic import TypeAdapter, ValidationError
 from throwcollect.errors import ConfigError
 from throwcollect.run_key import RunKey
 from throwcollect.runtime.supervisor import NodeState
+from throwcollect.wording import command
 
 STATE_VARIABLE = "THROWCOLLECT_STATE"
 """Names the directory of the records."""
@@ -57,15 +58,15 @@ class Record:
         started: When it was started.
         launcher: Process id of its launcher.
         simulations: Number of simulations that are wanted.
-        earlier_s: Real time that earlier runs collected into the same dataset for [s].
         endpoint: Zenoh endpoint of the router, as this machine reaches it; None while there is none.
         nodes: Its nodes; none once it has ended.
         trials: Number of trials to run; None before the first report of the coordinator.
         trials_ended: Number of trials that have ended.
         ended: When it ended; None before.
         exit_code: Exit code of its launcher; None before it ended.
+        left: Whether containers of it may be left, as its launcher could not remove them or did not come to it.
         message: The error that it ended with, as it was printed; empty if there was none.
-        summary: What its dataset holds, as `dataset info` says it, and ``wall_s`` [s]; None if it is not finished.
+        summary: What its dataset holds, as `dataset info` says it; None if it is not finished.
         version: Version of this layout.
     """
 
@@ -79,13 +80,13 @@ class Record:
     started: datetime
     launcher: int
     simulations: int
-    earlier_s: float = 0.0
     endpoint: str | None = None
     nodes: tuple[NodeState, ...] = ()
     trials: int | None = None
     trials_ended: int = 0
     ended: datetime | None = None
     exit_code: int | None = None
+    left: bool = False
     message: str = ""
     summary: dict[str, Any] | None = None
     version: Literal[1] = _VERSION
@@ -111,10 +112,10 @@ class Run:
     key: RunKey
 
     @property
-    def status(self) -> Literal["running", "ended", "died"]:
-        """Whether it runs, has ended, or lost its launcher before it could."""
+    def status(self) -> Literal["running", "ended", "abandoned", "died"]:
+        """Whether it runs, has ended, ended with containers left behind, or lost its launcher before it could."""
         if self.record.ended is not None:
-            return "ended"
+            return "abandoned" if self.record.left else "ended"
         return "running" if self.lives else "died"
 
 
@@ -322,7 +323,7 @@ class Records:
         for each in self.all():
             record = each.record
             # Containers outlive their launcher; as long as they do, this record tells what they are.
-            over = not each.lives and (record.ended is not None or record.runtime == "local")
+            over = each.status == "ended" or (each.status == "died" and record.runtime == "local")
             if over and (now - (record.ended or record.started)).total_seconds() >= _REMEMBERED_S:
                 run = self.take(record.run)
                 if run is not None:
@@ -353,7 +354,7 @@ def _key(runs: Path, run: str) -> RunKey:
 
 
 def _read(path: Path) -> Record:
-    hint = f"throwcollect down --run {path.stem} ends what is left of it, and forgets it"
+    hint = f"{command('down', '--run', path.stem)} ends what is left of it, and forgets it"
     try:
         content = json.loads(path.read_bytes())
         version = content.get("version") if isinstance(content, dict) else None

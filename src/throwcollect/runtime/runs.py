@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from throwcollect.errors import ConfigError, DatasetError, Interrupted, LossError, ThrowcollectError, WorkerError
 from throwcollect.runtime.records import Record, Records, Run
+from throwcollect.wording import command
 
 if TYPE_CHECKING:
     from throwcollect.runtime.docker_runs import FoundRun
@@ -76,7 +77,7 @@ def _listed(runs: Sequence[str]) -> str:
 
 
 def left_in(records: Records, directory: Path) -> Run | None:
-    """The run whose launcher died while its nodes live on, and collect into a directory.
+    """The run that has no launcher any more while its nodes are left, and collect or have collected into a directory.
 
     Args:
         records: All runs.
@@ -84,14 +85,34 @@ def left_in(records: Records, directory: Path) -> Run | None:
 
     Raises:
         ConfigError: If a run whose launcher lives collects into it.
+        WorkerError: If such a run may be left on an engine that is there, but does not answer in time.
     """
     for run in _into(records, directory):
         if run.status == "running":
             raise busy(run.record)
-        mine = on_engine() if run.status == "died" and run.record.runtime == "docker" else []
-        if any(found.nodes for found in mine if found.run_id == run.record.run):
+        if run.status in ("died", "abandoned") and run.record.runtime == "docker" and _left_on_engine(run.record):
             return run
     return None
+
+
+def _left_on_engine(record: Record) -> bool:
+    """Whether an engine holds containers of a run; one that is gone holds none that run.
+
+    Raises:
+        WorkerError: If the engine does not answer in time.
+    """
+    from throwcollect.runtime.docker_engine import connect, timed_out
+    from throwcollect.runtime.docker_runs import runs
+
+    try:
+        return any(found.nodes for found in runs(connect()) if found.run_id == record.run)
+    except WorkerError as error:
+        if error.__cause__ is None or not timed_out(error.__cause__):
+            return False
+        raise WorkerError(
+            f"{record.directory}: containers of run {record.run} may still collect into it: {error.message}",
+            hint="try again once the Docker engine answers",
+        ) from error
 
 
 def _into(records: Records, directory: Path) -> list[Run]:
@@ -104,7 +125,7 @@ def busy(record: Record) -> ConfigError:
     """The error that says that a run collects into a directory."""
     return ConfigError(
         f"{record.directory}: run {record.run} collects into it",
-        hint=f"throwcollect wait --run {record.run} follows it",
+        hint=f"{command('wait', '--run', record.run)} follows it",
     )
 
 
@@ -119,12 +140,12 @@ def failure(record: Record) -> ThrowcollectError | None:
 
 def goes_on(record: Record) -> str | None:
     """The command that goes on with the dataset of a run that is over; None if there is none, as it is in a volume."""
-    return None if record.volume else f"throwcollect resume {record.directory}"
+    return None if record.volume else command("resume", record.directory)
 
 
 def died(record: Record) -> WorkerError:
     """The error that says that the launcher of a run died before the run ended."""
-    hint = f"throwcollect down --run {record.run} cleans up"
+    hint = f"{command('down', '--run', record.run)} cleans up"
     if again := goes_on(record):
         hint = f"{again} goes on where it ended, or with its containers if they live; {hint}"
     return WorkerError(
@@ -143,7 +164,7 @@ def living(run: Run) -> Record:
     """
     if run.status == "died":
         raise died(run.record)
-    if run.status == "ended":
+    if run.status != "running":
         raise ConfigError(f"run {run.record.run} has ended", hint="throwcollect ps lists those that live")
     return run.record
 

@@ -242,6 +242,9 @@ class Supervisor:
                 evidence=last.log or None,
                 hint=hint,
             )
+        if not self._ready and not any(map(self.runtime.handle, self._simulations)):
+            # None of them runs yet: it is the engine that takes its time, and it has a patience of its own.
+            self._start_deadline = time.monotonic() + self._run.start_timeout_s
         if self._simulations and not self._ready and time.monotonic() > self._start_deadline:
             raise WorkerError(
                 f"no simulation was ready within {self._run.start_timeout_s:g} s (run.start_timeout_s)",

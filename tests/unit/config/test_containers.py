@@ -10,7 +10,10 @@ from throwcollect.errors import ConfigError
 
 POWER = "is refused, as it would give a container power over its host"
 LAUNCHER = "is refused, as the launcher decides it"
-SOCKET = "is refused, as it holds the engine's socket, and with it power over the host"
+SOCKET = "is refused, as it is an engine's socket, and gives power over the host"
+SYSTEM = "is refused, as {} belongs to the system; mounts are for data"
+DEVICES = "is refused; containers get graphics processors alone: /dev/dri, /dev/nvidia*, /dev/kfd, /dev/dxg"
+DEVICE = "should be HOST:CONTAINER:PERMISSIONS, such as /dev/dri:/dev/dri:rw"
 INSTEAD = "should be left out; use {} beside options"
 NETWORK = "is refused; a network of the engine is joined besides the run's own"
 PORT = "should be a port of the container from 1 to 65535, with /udp if it is not TCP"
@@ -76,8 +79,30 @@ def test_everything_that_may_be_said_of_containers_is_read_and_written_again(tmp
         ("sim: {mounts: [/a:/b:rw]}", f"sim.mounts.0: {PATHS}, got '/a:/b:rw'"),
         ("sim: {mounts: [/a/../run:/b]}", f"sim.mounts.0: {PATHS}, got '/a/../run:/b'"),
         ("sim: {mounts: [/run/docker.sock:/b]}", f"sim.mounts.0: /run/docker.sock {SOCKET}"),
-        ("sim: {mounts: [//:/b]}", f"sim.mounts.0: // {SOCKET}"),
-        ("sim: {mounts: [/var/run/:/b]}", f"sim.mounts.0: /var/run/ {SOCKET}"),
+        ("sim: {mounts: [/srv/x/podman.sock:/b]}", f"sim.mounts.0: /srv/x/podman.sock {SOCKET}"),
+        ("sim: {mounts: [//:/b]}", f"sim.mounts.0: // {SYSTEM.format('/bin')}"),
+        ("sim: {mounts: [///run/:/b]}", f"sim.mounts.0: ///run/ {SYSTEM.format('/run')}"),
+        ("sim: {mounts: [/etc:/b:ro]}", f"sim.mounts.0: /etc {SYSTEM.format('/etc')}"),
+        ("sim: {mounts: [/proc/1:/b]}", f"sim.mounts.0: /proc/1 {SYSTEM.format('/proc')}"),
+        ("sim: {mounts: [/var/lib/docker/x:/b]}", f"sim.mounts.0: /var/lib/docker/x {SYSTEM.format('/var/lib')}"),
+        ("sim: {mounts: [/var:/b]}", f"sim.mounts.0: /var {SYSTEM.format('/var/backups')}"),
+        ("sim: {mounts: [/root:/b:ro]}", f"sim.mounts.0: /root {SYSTEM.format('/root/.ssh')}"),
+        (
+            "sim: {mounts: [/home/me/.ssh/id:/b:ro]}",
+            "sim.mounts.0: /home/me/.ssh/id is refused, as .ssh holds secrets; mounts are for data",
+        ),
+        (
+            "sim: {mounts: [/tmp/:/b]}",
+            "sim.mounts.0: /tmp/ is refused, as all users of the machine share /tmp; mounts are for data",
+        ),
+        ("sim: {options: {devices: [/dev/vda:/dev/x:rw]}}", f"sim.options.devices.0: /dev/vda {DEVICES}"),
+        ("sim: {options: {devices: [/dev/dri/../vda:/dev/x:rw]}}", f"sim.options.devices.0: /dev/dri/../vda {DEVICES}"),
+        ("sim: {options: {devices: [/dev/mem:/dev/mem:r]}}", f"sim.options.devices.0: /dev/mem {DEVICES}"),
+        (
+            "sim: {options: {devices: [/dev/dri:/dev/dri:rwm]}}",
+            f"sim.options.devices.0: {DEVICE}, got '/dev/dri:/dev/dri:rwm'",
+        ),
+        ("sim: {options: {devices: [/dev/dri]}}", f"sim.options.devices.0: {DEVICE}, got '/dev/dri'"),
         (
             "sim: {mounts: [/a:/data/b]}",
             "sim.mounts.0: /data/b is refused, as the dataset, the key or the image is there in the container",
@@ -103,6 +128,30 @@ def test_everything_that_may_be_said_of_containers_is_read_and_written_again(tmp
 )
 def test_mistakes_are_named_with_file_line_and_key(tmp_path: Path, section: str, message: str) -> None:
     assert problems(tmp_path, f"containers:\n  {section}") == [f"run.yaml:2: containers.{message}"]
+
+
+def test_what_is_unknown_is_reported_beside_what_is_refused(tmp_path: Path) -> None:
+    text = "containers:\n  sim: {options: {privileged: true, shm_siez: 1m, user: root, pids_limit: 0}}"
+    assert problems(tmp_path, text) == [
+        f"run.yaml:2: containers.sim.options.privileged: {POWER}",
+        "run.yaml:2: containers.sim.options.shm_siez: unknown key; did you mean 'shm_size'?",
+        f"run.yaml:2: containers.sim.options.user: {LAUNCHER}",
+        "run.yaml:2: containers.sim.options.pids_limit: should be a whole number above 0, got 0",
+    ]
+
+
+@pytest.mark.parametrize(
+    "option",
+    ["mounts: [/srv/models:/m:ro]", "mounts: [/home/me/data:/d]", "mounts: [/var/tmp/x:/x]", "mounts: [/tmpdata:/t]"]
+    + [
+        f"options: {{devices: [{device}:rw]}}"
+        for device in ("/dev/dri:/dev/dri", "/dev/dri/renderD128:/dev/dri/renderD128", "/dev/nvidia0:/dev/nvidia0")
+    ],
+)
+def test_data_and_graphics_processors_are_handed_over(tmp_path: Path, option: str) -> None:
+    path = tmp_path / "run.yaml"
+    path.write_text(f"containers:\n  sim: {{{option}}}")
+    load(path)
 
 
 def test_a_port_of_this_machine_is_given_away_once(tmp_path: Path) -> None:

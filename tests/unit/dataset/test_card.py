@@ -1,14 +1,16 @@
 from __future__ import annotations
 
+import socket
 from pathlib import Path
 
 import pyarrow as pa
 import pyarrow.parquet as pq
+import pytest
 from ruamel.yaml import YAML
 
 import throwcollect
 from throwcollect.config.loader import load
-from throwcollect.dataset.card import Provenance, data_card
+from throwcollect.dataset.card import HOST_VARIABLE, Provenance, data_card
 
 
 def test_the_card_has_the_header_that_hubs_read(dataset: Path) -> None:
@@ -38,3 +40,18 @@ def test_trials_without_an_episode_are_no_throws(dataset: Path) -> None:
     fewer = throws.set_column(column, "digest", pa.array([None, None, *throws["digest"].to_pylist()[2:]]))
     provenance = Provenance.of_this_machine(simulations=1, wall_s=1.0, was_open=False)
     assert "\n5 simulated throws of a ball" in data_card(load(dataset / "config.yaml"), fewer, provenance)
+
+
+@pytest.mark.parametrize(("told", "host"), [(None, socket.gethostname()), ("lab-7", "lab-7"), ("", None)])
+def test_a_container_knows_its_host_only_if_it_is_told(
+    monkeypatch: pytest.MonkeyPatch, dataset: Path, told: str | None, host: str | None
+) -> None:
+    if told is None:
+        monkeypatch.delenv(HOST_VARIABLE, raising=False)
+    else:
+        monkeypatch.setenv(HOST_VARIABLE, told)
+    provenance = Provenance.of_this_machine(simulations=1, wall_s=1.0)
+    assert provenance.host == host
+    card = data_card(load(dataset / "config.yaml"), pq.read_table(dataset / "throws.parquet"), provenance)
+    assert (f"| host | {host} |" in card) == (host is not None)
+    assert ("| host |" in card) == (host is not None)

@@ -3,6 +3,7 @@ from pathlib import Path
 import pytest
 import requests
 from docker.errors import APIError, DockerException
+from urllib3.exceptions import ReadTimeoutError
 
 from throwcollect.errors import WorkerError
 from throwcollect.runtime.docker_engine import connect, engine_errors, in_words
@@ -21,7 +22,9 @@ def api_error(explanation: str) -> APIError:
             "Connection refused",
         ),
         (DockerException("something else"), "something else"),
-        (TimeoutError(), "TimeoutError"),
+        (TimeoutError(), "no answer in time"),
+        (requests.ReadTimeout(ReadTimeoutError(None, "/", "Read timed out. (read timeout=30)")), "no answer in time"),
+        (requests.ConnectionError(ReadTimeoutError(None, "/", "Read timed out.")), "no answer in time"),
     ],
 )
 def test_the_engines_own_words_come_through(error: Exception, words: str) -> None:

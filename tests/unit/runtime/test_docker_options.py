@@ -1,4 +1,5 @@
 import os
+import socket
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +42,9 @@ def test_a_node_is_told_who_it_is_and_where_the_router_is() -> None:
     environment = made["environment"]
     assert (environment["THROWCOLLECT_NODE"], environment["ROS_DOMAIN_ID"]) == ("sim_3", "9")
     assert "tls/router:7447" in environment["ZENOH_CONFIG_OVERRIDE"]
+    assert environment["THROWCOLLECT_HOST"] == socket.gethostname()
+    assert environment["THROWCOLLECT_DIRECTORY"] == "/home/me/data set"
+    assert options("sim_3", VOLUME)["environment"]["THROWCOLLECT_DIRECTORY"] == ""
     assert made["labels"] == {
         "throwcollect.run": "throws-1a2b",
         "throwcollect.node": "sim_3",

@@ -19,7 +19,8 @@ from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.runtime import image
 from throwcollect.runtime.image import DEFAULT_BASE, build, default_tag, ensure, is_outdated, source_root
 
-DOCKERFILE = (Path(__file__).parents[3] / "docker" / "Dockerfile").read_text(encoding="utf-8")
+ROOT = Path(__file__).parents[3]
+DOCKERFILE = (ROOT / "docker" / "Dockerfile").read_text(encoding="utf-8")
 
 
 class Engine:
@@ -202,28 +203,59 @@ def git(root: Path, *arguments: str) -> str:
 
 
 def test_the_revision_is_the_commit_and_says_when_files_differ_from_it(tmp_path: Path) -> None:
-    assert image._provenance(tmp_path)["REVISION"] == "unknown"
+    assert image._revision(tmp_path) is None
     git(tmp_path, "init", "-q")
     (tmp_path / "pyproject.toml").write_text("")
     git(tmp_path, "add", ".")
     git(tmp_path, "commit", "-qm", "first")
     commit = git(tmp_path, "rev-parse", "HEAD").strip()
-    assert image._provenance(tmp_path)["REVISION"] == commit
+    assert image._revision(tmp_path) == commit
     (tmp_path / "notes").write_text("not part of the image")
-    assert image._provenance(tmp_path)["REVISION"] == commit
+    assert image._revision(tmp_path) == commit
     (tmp_path / "src").mkdir()
     (tmp_path / "src" / "new.py").write_text("")
-    assert image._provenance(tmp_path)["REVISION"] == f"{commit}-dirty"
+    assert image._revision(tmp_path) == f"{commit}-dirty"
 
 
-def test_the_source_is_the_address_of_the_clone_without_what_is_secret_in_it(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("origin", "address"),
+    [
+        ("https://me:token@example.org/lab/throws.git", "https://example.org/lab/throws.git"),
+        ("https://example.org/lab/throws.git?token=1#x", "https://example.org/lab/throws.git"),
+        ("ssh://git@example.org:2222/lab/throws.git", "ssh://example.org:2222/lab/throws.git"),
+        ("git@example.org:lab/throws.git", "ssh://example.org/lab/throws.git"),
+        # Nobody else can do anything with a place on this machine.
+        ("/work/throws.git", None),
+        ("../throws", None),
+        ("file:///work/throws.git", None),
+        (None, None),
+    ],
+)
+def test_the_source_is_an_address_for_others_without_what_is_secret_in_it(
+    tmp_path: Path, origin: str | None, address: str | None
+) -> None:
+    assert image._address(tmp_path) is None
     git(tmp_path, "init", "-q")
-    (tmp_path / "pyproject.toml").write_text("")
-    git(tmp_path, "add", ".")
-    git(tmp_path, "commit", "-qm", "first")
-    assert image._provenance(tmp_path)["SOURCE"] == "unknown"
-    git(tmp_path, "remote", "add", "origin", "https://me:token@example.org/lab/throws.git")
-    assert image._provenance(tmp_path)["SOURCE"] == "https://example.org/lab/throws.git"
+    if origin is not None:
+        git(tmp_path, "remote", "add", "origin", origin)
+    assert image._address(tmp_path) == address
+
+
+def test_an_image_without_an_address_has_no_such_label(said: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    for address, labels in (("https://example.org/x", {image.SOURCE_LABEL: "https://example.org/x"}), (None, {})):
+        monkeypatch.setattr(image, "_address", lambda _, address=address: address)
+        engine = Engine("base")
+        build(engine, "mine", base="base", say=said.append)
+        assert engine.options["labels"] == labels
+
+
+def test_every_build_in_the_documents_names_the_target() -> None:
+    pages = [ROOT / "README.md", *(ROOT / "docs").glob("*.md")]
+    text = "\n".join(page.read_text(encoding="utf-8") for page in pages)
+    builds = re.findall(r"docker build [^`\n]*(?:\n[^`\n]*)?", text)
+    assert builds
+    # The last stage of the file is the one with ROS.
+    assert not [build for build in builds if "--target" not in build]
 
 
 def test_an_image_is_outdated_if_its_label_names_other_sources_than_those_of_the_clone(

@@ -2,12 +2,14 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
+from tests.unit.runtime.engine import Engine, engine_at
 
 from throwcollect.errors import ConfigError, DatasetError, Interrupted, ThrowcollectError, WorkerError
+from throwcollect.runtime import docker_engine
 from throwcollect.runtime import runs as module
+from throwcollect.runtime.docker_options import NODE_LABEL, RUN_LABEL
 from throwcollect.runtime.records import STATE_VARIABLE, Record, Records
 from throwcollect.runtime.runs import died, failure, find, left_in, living
 
@@ -150,6 +152,13 @@ def test_a_directory_into_which_a_living_run_collects_is_refused(records: Record
     assert left_in(records, tmp_path / "b") is None
 
 
+@pytest.fixture
+def engine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Engine]:
+    monkeypatch.setenv("DOCKER_HOST", f"unix://{tmp_path}/engine.sock")
+    with engine_at(tmp_path / "engine.sock") as engine:
+        yield engine
+
+
 @pytest.mark.parametrize(
     ("fields", "nodes", "left"),
     [
@@ -158,6 +167,9 @@ def test_a_directory_into_which_a_living_run_collects_is_refused(records: Record
         ({"runtime": "docker"}, [], False),
         ({"runtime": "local"}, ["coordinator"], False),
         ({"runtime": "docker", "ended": NOW}, ["coordinator"], False),
+        # Its launcher gave up, and could not remove them.
+        ({"runtime": "docker", "ended": NOW, "left": True}, ["sim_0"], True),
+        ({"runtime": "docker", "ended": NOW, "left": True}, [], False),
     ],
 )
 def test_containers_outlive_their_launcher(
@@ -167,14 +179,41 @@ def test_containers_outlive_their_launcher(
     records: Records,
     make: Make,
     tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
+    engine: Engine,
 ) -> None:
     record = make("a", "died", **fields)
-    found = SimpleNamespace(run_id="a-0123", nodes=[SimpleNamespace(name=name) for name in nodes])
-    monkeypatch.setattr(module, "on_engine", lambda: [found])
+    for name in nodes:
+        engine.create(f"throwcollect-a-0123-{name}", {RUN_LABEL: "a-0123", NODE_LABEL: name})
     run = left_in(records, tmp_path / "a")
     assert (run is not None) == left
     assert run is None or run.record == record
+
+
+def test_a_directory_into_which_containers_may_still_collect_is_refused_while_the_engine_is_silent(
+    records: Records, make: Make, tmp_path: Path, engine: Engine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    make("a", "died", runtime="docker")
+    engine.withheld = "."
+    monkeypatch.setattr(docker_engine, "PATIENCE_S", 0.1)
+    with pytest.raises(
+        WorkerError, match=r"/a: containers of run a-0123 may still collect into it: .*no answer in time"
+    ):
+        left_in(records, tmp_path / "a")
+
+
+def test_an_engine_that_is_gone_holds_no_containers_that_run(
+    records: Records, make: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    make("a", "died", runtime="docker")
+    monkeypatch.setenv("DOCKER_HOST", f"unix://{tmp_path}/none.sock")
+    assert left_in(records, tmp_path / "a") is None
+
+
+def test_the_record_of_containers_that_are_left_is_kept(records: Records, make: Make) -> None:
+    left = make("a", "ended", age_h=999, ended=NOW - timedelta(hours=999), left=True)
+    make("b", "ended", age_h=999, ended=NOW - timedelta(hours=999))
+    records.new("c").close()
+    assert [(run.record.run, run.status) for run in records.all()] == [(left.run, "abandoned")]
 
 
 def test_the_way_on_after_the_death_of_a_launcher_depends_on_where_the_dataset_is(make: Make) -> None:

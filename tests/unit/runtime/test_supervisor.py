@@ -233,6 +233,22 @@ def test_a_simulation_must_be_ready_in_time(runtime: FakeRuntime, clock: Clock) 
     assert caught.value.evidence == "log of sim_0"
 
 
+def test_an_engine_that_is_slow_to_start_containers_does_not_take_the_time_of_simulations(
+    runtime: FakeRuntime, clock: Clock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    supervisor = Supervisor(runtime, RunConfig(start_timeout_s=7), simulations=2)
+    supervisor.start()
+    with monkeypatch.context() as slow:
+        slow.setattr(runtime, "handle", lambda _: None)
+        clock.now += 100
+        supervisor.poll()
+    clock.now += 6.9
+    supervisor.poll()
+    clock.now += 0.2
+    with pytest.raises(WorkerError, match="no simulation was ready within 7 s"):
+        supervisor.poll()
+
+
 def test_one_ready_simulation_is_enough(runtime: FakeRuntime, clock: Clock) -> None:
     supervisor = Supervisor(runtime, RunConfig(start_timeout_s=7), simulations=2)
     supervisor.start()

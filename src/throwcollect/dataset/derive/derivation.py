@@ -29,6 +29,7 @@ from throwcollect.episode.restamp import Restamper
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.robots.description import full_description
 from throwcollect.sweep.plan import Plan, make_trials
+from throwcollect.wording import command
 
 _ROWS_AT_ONCE = 256
 _MOST_WORKERS = 4
@@ -146,5 +147,5 @@ def _restamped(restamper: Restamper, dataset: Dataset, row: Row, number: int) ->
         return restamper.restamped(episode, number)
     except DatasetError as error:
         raise DatasetError(
-            f"{dataset.directory}: trial {trial}: {error}", hint=f"throwcollect dataset verify {dataset.directory}"
+            f"{dataset.directory}: trial {trial}: {error}", hint=command("dataset", "verify", dataset.directory)
         ) from error

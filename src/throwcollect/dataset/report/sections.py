@@ -224,8 +224,9 @@ def _throughput(facts: Facts) -> Section:
     if found is None:
         text = "This dataset has no journal of its collection (<code>logs/journal.jsonl</code>) with throws in it."
         return Section("throughput", "Throughput", title, text)
-    mean = found.commits / found.edges_s[-1]
-    text = f"{found.commits:,} throws in {found.edges_s[-1]:,.1f} s, {mean:.1f} a second on average, start-up included."
+    wall_s = facts.info.wall_s or found.edges_s[-1]
+    mean = found.commits / wall_s
+    text = f"{found.commits:,} throws in {wall_s:,.1f} s, {mean:.1f} a second on average, start-up included."
     if found.resumed_s:
         times = f"{len(found.resumed_s)} times" if len(found.resumed_s) > 1 else "once"
         text += f" It was resumed {times} (dotted); the pauses are left out."

@@ -1,0 +1,35 @@
+"""`compose/collect.sh` without an engine."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+
+SCRIPT = Path(__file__).parents[3] / "compose" / "collect.sh"
+DOCKER = """\
+#!/bin/sh
+# Compose fails as it does when the coordinator does; the copy brings a file if there is one.
+case "$1 $*" in
+    "compose "*" up "*) echo "$THROWCOLLECT_HOST" >"$TOLD"; exit 4 ;;
+    "run "*) [ -z "$BEGUN" ] || touch "$OUTPUT/config.yaml" ;;
+esac
+"""
+
+
+@pytest.mark.parametrize("begun", ["", "yes"])
+def test_a_collection_that_never_began_leaves_no_directory(tmp_path: Path, begun: str) -> None:
+    (tmp_path / "docker").write_text(DOCKER)
+    (tmp_path / "docker").chmod(0o755)
+    (tmp_path / "bad.yaml").write_text("nonsense: 1\n")
+    output = tmp_path / "my data"
+    variables = {"OUTPUT": str(output), "TOLD": str(tmp_path / "told"), "BEGUN": begun}
+    environment = {**os.environ, **variables, "PATH": f"{tmp_path}:{os.environ['PATH']}"}
+    done = subprocess.run(
+        [SCRIPT, tmp_path / "bad.yaml", "2", output], env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 4, done.stderr
+    assert output.exists() == bool(begun)
+    assert (tmp_path / "told").read_text().strip() == os.uname().nodename
