@@ -6,6 +6,7 @@ It follows from the files alone and its text is canonical: equal files give equa
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
 import os
@@ -66,7 +67,8 @@ def entry_of_file(path: Path) -> FileEntry:
                 digest.update(block)
                 size += len(block)
     except OSError as error:
-        raise DatasetError(f"{path}: cannot be read: {error.strerror}") from error
+        reason = "it is a symbolic link" if error.errno == errno.ELOOP else error.strerror
+        raise DatasetError(f"{path}: cannot be read: {reason}") from error
     return FileEntry(path.name, size, digest.hexdigest())
 
 
@@ -90,19 +92,6 @@ def manifest_text(name: str, entries: Iterable[FileEntry]) -> str:
         for entry in sorted(entries, key=lambda entry: entry.path)
     ]
     return json.dumps({"profile": _PROFILE, "name": name, "resources": resources}, indent=2) + "\n"
-
-
-def expected_manifest(directory: Path, name: str) -> str:
-    """Text of the manifest that the files in a directory call for; all of them are read.
-
-    Args:
-        directory: Directory of a dataset.
-        name: Name of the collection.
-
-    Raises:
-        DatasetError: If a file cannot be read.
-    """
-    return manifest_text(name, (entry_of_file(directory / path) for path in promised_names(directory)))
 
 
 def read_manifest(directory: Path) -> tuple[FileEntry, ...]:

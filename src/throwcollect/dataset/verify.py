@@ -16,6 +16,7 @@ from throwcollect.dataset.directory import CARD, FORMAT, METADATA, SHARD_SUFFIX,
 from throwcollect.dataset.findings import Finding
 from throwcollect.dataset.reader import read_bag_metadata
 from throwcollect.dataset.verify_episode import EpisodeCheck
+from throwcollect.dataset.verify_manifest import manifest_findings
 from throwcollect.dataset.verify_shard import ShardCheck
 from throwcollect.dataset.verify_tables import Tables, check_tables, shard_of
 from throwcollect.errors import DatasetError
@@ -52,6 +53,7 @@ def verify(directory: Path) -> list[Finding]:
             raise
         findings.append(Finding(METADATA, "", str(error).removeprefix(f"{directory / METADATA}: ")))
     tables = check_tables(directory)
+    findings += manifest_findings(directory, tables.config.name if tables.config else None)
     findings += tables.findings
     checks = _check_shards(directory, tables)
     findings += [finding for check in checks.values() for finding in check.findings]
