@@ -13,16 +13,17 @@ from throwcollect.dataset.judging import judged
 from throwcollect.dataset.mcap_file import EpisodeRun, episode_run
 from throwcollect.dataset.mcap_reader import StoredEpisode
 from throwcollect.dataset.throws import Place, ThrowsTable
+from throwcollect.dataset.verify_header import header_problems
+from throwcollect.dataset.verify_motion import ball_problems, infinite_columns, joint_problems
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.message import Episode
 from throwcollect.episode.record import Samples
 from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.robots.description import touchable_bodies
 from throwcollect.sweep.plan import Plan
-from throwcollect.tasks.flight import flight_residual
+from throwcollect.tasks.trajectory import throw_trajectory
 from throwcollect.wording import counted
 
-BALLISTIC_TOLERANCE_M = 1e-9
-"""A recorded flight and the computed one differ by rounding, below 1e-12 m; the smallest kick moves a ball by more."""
 _RELATIVE_TOLERANCE = 1e-9
 """Numbers that are judged again on another machine may differ in their last bits."""
 _MOST_TOLD = 3
@@ -73,6 +74,7 @@ class EpisodeCheck:
         self._rows = rows
         self._doubtful = doubtful
         self._judge = RowJudge(plan) if plan else None
+        self._bodies = touchable_bodies() if plan else frozenset()
 
     def problems(self, stored: StoredEpisode, shard: str, channels: Channels | None) -> Iterator[str]:
         """Everything that is wrong with an episode.
@@ -130,9 +132,13 @@ class EpisodeCheck:
         if stamp_problems := list(_stamp_problems(episode, samples, config)):
             yield from stamp_problems
             return  # nothing can be measured by such stamps
-        residual = flight_residual(samples, episode.header, config=config)
-        if residual is not None and not residual <= BALLISTIC_TOLERANCE_M:
-            yield f"the flight departs from ballistic motion by {residual:.3g} m"
+        if infinite := list(infinite_columns(samples)):
+            yield from infinite
+            return
+        trajectory = throw_trajectory(config)
+        yield from header_problems(samples, episode.header, config=config, trajectory=trajectory, bodies=self._bodies)
+        yield from joint_problems(samples, episode.header, config=config, trajectory=trajectory)
+        yield from ball_problems(samples, episode.header, config=config)
 
 
 def _row_problems(expected: Mapping[str, Any], row: Mapping[str, Any]) -> Iterator[str]:

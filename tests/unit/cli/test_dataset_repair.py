@@ -40,7 +40,9 @@ def run(monkeypatch: pytest.MonkeyPatch) -> Run:
 
 def test_verify_lists_the_findings_and_ends_with_4(run: Run, source: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run("dataset", "verify", source) == 0
-    assert capsys.readouterr().out == f"{source}: nothing wrong\n"
+    first, second = capsys.readouterr().out.splitlines()
+    assert first == f"{source}: nothing wrong"
+    assert f"throwcollect dataset verify {source} --replay 100" in second
     (source / "README.md").unlink()
     (source / "plan.parquet").write_bytes(b"")
     assert run("dataset", "verify", source) == 4
