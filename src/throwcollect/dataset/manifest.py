@@ -13,6 +13,7 @@ import os
 import re
 import stat
 from collections.abc import Iterable
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -70,6 +71,47 @@ def entry_of_file(path: Path) -> FileEntry:
         reason = "it is a symbolic link" if error.errno == errno.ELOOP else error.strerror
         raise DatasetError(f"{path}: cannot be read: {reason}") from error
     return FileEntry(path.name, size, digest.hexdigest())
+
+
+class RunningHash:
+    """SHA-256 of a file while it is written, computed in a thread of its own, so that writing need not wait for it."""
+
+    def __init__(self) -> None:
+        self._hash = hashlib.sha256()
+        self._held: list[bytes] = []
+        self._held_bytes = 0
+        self._pool: ThreadPoolExecutor | None = None
+        self._running: Future[None] | None = None
+
+    def update(self, data: bytes) -> None:
+        """Take in the next bytes of the file."""
+        self._held.append(data)
+        self._held_bytes += len(data)
+        # Handing over to a thread takes some 20 µs, so it is done for many episodes at once.
+        if self._held_bytes >= _BLOCK:
+            self._hand_over()
+
+    def hexdigest(self) -> str:
+        """The hash of everything, in hexadecimal."""
+        if self._running is not None:
+            self._running.result()
+        self._add(self._held)
+        self._held = []
+        if self._pool is not None:
+            self._pool.shutdown()
+        return self._hash.hexdigest()
+
+    def _hand_over(self) -> None:
+        if self._pool is None:
+            self._pool = ThreadPoolExecutor(1)
+        if self._running is not None:
+            self._running.result()
+        self._running = self._pool.submit(self._add, self._held)
+        self._held, self._held_bytes = [], 0
+
+    def _add(self, parts: Iterable[bytes]) -> None:
+        for part in parts:
+            self._hash.update(part)
 
 
 def promised_names(directory: Path) -> list[str]:

@@ -6,7 +6,6 @@ run of records: its chunk, the chunk's message indexes, and a Metadata record na
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -15,7 +14,7 @@ from isal.isal_zlib import crc32
 from mcap import records
 
 from throwcollect.dataset.bag import FileSummary, bag_information, to_yaml
-from throwcollect.dataset.manifest import FileEntry
+from throwcollect.dataset.manifest import FileEntry, RunningHash
 from throwcollect.dataset.mcap_contents import FileContents, declarations
 from throwcollect.episode.channels import Channel, Channels
 from throwcollect.episode.chunk import Chunk, encode_records
@@ -117,7 +116,7 @@ class McapFile:
         self._write = write
         self.size = 0
         self._crc = 0
-        self._hash = hashlib.sha256()
+        self._hash = RunningHash()
         self._channels = channels
         self._contents = FileContents(*declarations(channels.all))
         opening = encode_records(records.Header(PROFILE, LIBRARY), *self._contents.schemas, *self._contents.channels)

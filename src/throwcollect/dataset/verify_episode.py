@@ -93,10 +93,15 @@ class EpisodeCheck:
         except DatasetError as error:
             yield str(error)
             return
-        problems = list(self.content_problems(episode, channels))
-        yield from problems
+        unreadable = list(self._layout_problems(episode, channels))
+        yield from unreadable or self._physics_problems(episode)
         row = self._rows.get(episode.header.trial)
-        if self._judge is not None and row is not None and not problems and episode.header.trial not in self._doubtful:
+        if (
+            self._judge is not None
+            and row is not None
+            and not unreadable
+            and episode.header.trial not in self._doubtful
+        ):
             # Swept values were compared with the plan, and that is where they come from here.
             judged_row = self._judge.row(stored, shard)
             yield from _row_problems({name: judged_row[name] for name in judged_row if "." not in name}, row)
@@ -111,6 +116,11 @@ class EpisodeCheck:
         Yields:
             What is wrong, a sentence each.
         """
+        problems = list(self._layout_problems(episode, channels))
+        yield from problems or self._physics_problems(episode)
+
+    def _layout_problems(self, episode: Episode, channels: Channels | None) -> Iterator[str]:
+        """What keeps an episode from being measured: by its records, its layout, its trial or its stamps."""
         try:
             samples = episode.samples()
             episode.check_records()
@@ -129,16 +139,26 @@ class EpisodeCheck:
         except ConfigError as error:
             yield f"the plan has values that cannot be: {error}"
             return
-        if stamp_problems := list(_stamp_problems(episode, samples, config)):
-            yield from stamp_problems
-            return  # nothing can be measured by such stamps
+        yield from _stamp_problems(episode, samples, config)
+
+    def _physics_problems(self, episode: Episode) -> Iterator[str]:
+        """What the simulation cannot have recorded."""
+        if self._plan is None or episode.header.trial in self._doubtful:
+            return
+        config = self._plan.config_of(self._plan.trials[episode.header.trial])
+        samples = episode.samples()
         if infinite := list(infinite_columns(samples)):
             yield from infinite
             return
-        trajectory = throw_trajectory(config)
-        yield from header_problems(samples, episode.header, config=config, trajectory=trajectory, bodies=self._bodies)
-        yield from joint_problems(samples, episode.header, config=config, trajectory=trajectory)
-        yield from ball_problems(samples, episode.header, config=config)
+        trajectory, header = throw_trajectory(config), episode.header
+        # Numbers of a forger may be as large as they like.
+        with np.errstate(all="ignore"):
+            problems = [
+                *header_problems(samples, header, config=config, trajectory=trajectory, bodies=self._bodies),
+                *joint_problems(samples, header, config=config, trajectory=trajectory),
+                *ball_problems(samples, header, config=config),
+            ]
+        yield from problems
 
 
 def _row_problems(expected: Mapping[str, Any], row: Mapping[str, Any]) -> Iterator[str]:

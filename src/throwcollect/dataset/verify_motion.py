@@ -115,7 +115,7 @@ def ball_problems(samples: Samples, header: EpisodeHeader, *, config: Config) ->
         What is wrong, a sentence each.
     """
     off_unit = np.abs(np.linalg.norm(samples.ball_orientation_xyzw, axis=1) - 1).max()
-    if off_unit > _UNIT:
+    if not off_unit <= _UNIT:
         yield f"the ball's orientation is no unit quaternion: its length is off by {off_unit:.3g}"
         return
     if len(samples) < 2:
@@ -125,7 +125,8 @@ def ball_problems(samples: Samples, header: EpisodeHeader, *, config: Config) ->
     departures = _departures(samples, steps.stride, config)
     free = _free_intervals(header, steps, config)
     for what, (values, tolerance, unit) in departures.items():
-        wrong = free & (values > tolerance)
+        # What is too large to be computed departs, too.
+        wrong = free & ~(values <= tolerance)
         if wrong.any():
             place = f"first at {times[int(wrong.argmax()) + 1]:.3f} s, where no contact is"
             yield f"the ball's {what} departs from ballistic motion by {values[wrong].max():.3g} {unit}, {place}"

@@ -21,6 +21,7 @@ from throwcollect.sweep.plan import Check, Plan, make_trials, refusal
 from throwcollect.sweep.points import Points
 from throwcollect.sweep.rounds import Rounds
 from throwcollect.sweep.samplers import draw_points
+from throwcollect.wording import counted
 
 CHECKED_AGAIN = 100
 """Trials that the plan does not refuse and that are checked again all the same, at 5 ms each."""
@@ -107,7 +108,9 @@ def _drawn(directory: Path, plan: Plan) -> _Drawing:
         return _Drawing(np.array([list(trial.values.values()) for trial in plan.trials]), None)
     points = _of_keys(draw_points(plan.config, directory=directory), plan)
     count, there = len(points.values), len(plan.trials)
-    return _Drawing(points.values, None if count == there else f"has {there} trials, the configuration draws {count}")
+    return _Drawing(
+        points.values, None if count == there else f"has {counted(there, 'trial')}, the configuration draws {count}"
+    )
 
 
 def _grown(plan: Plan, rows: Mapping[int, Row] | None) -> _Drawing:
@@ -131,7 +134,7 @@ def _grown(plan: Plan, rows: Mapping[int, Row] | None) -> _Drawing:
                 rounds.tell(trial.number, row_result(row, joints))
     problem, count = None, sum(map(len, values))
     if count > there or (rounds.over and count < there):
-        problem = f"has {there} trials, the configuration draws {count}"
+        problem = f"has {counted(there, 'trial')}, the configuration draws {count}"
     elif rounds.due and not rounds.over:
         problem = f"ends with trial {there - 1}, and by the results more would follow"
     return _Drawing(np.vstack(values), problem)

@@ -64,7 +64,8 @@ def test_rebuild_says_what_it_wrote(run: Run, source: Path, capsys: pytest.Captu
     assert (source / "throws.parquet").read_bytes() == before
     assert run("dataset", "rebuild", source, "--json") == 0
     found = json.loads(capsys.readouterr().out)
-    assert found == {"trials": 3, "episodes": 3, "lost": [], "written": ["throws.parquet", "metadata.yaml"]}
+    written = ["throws.parquet", "datapackage.json", "metadata.yaml"]
+    assert found == {"trials": 3, "episodes": 3, "lost": [], "written": written}
 
 
 def test_rebuild_of_a_damaged_dataset_hints_at_repair(

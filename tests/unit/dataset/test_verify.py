@@ -517,7 +517,7 @@ DEFECTS: dict[Callable[[Path], None], tuple[str, str, str]] = {
     chunk_length: (SHARD, "byte", r"the next episode is at byte \d+$"),
     index_length: (SHARD, "byte", r"the next episode is at byte \d+$"),
     metadata_name: (SHARD, "byte", "where the metadata of an episode should be"),
-    metadata_length: (SHARD, "byte", "metadata record is not readable"),
+    metadata_length: (SHARD, "", "metadata record is not readable|metadata at byte .* do not fit"),
     header_json: (SHARD, "byte", "episode header: .* Invalid JSON"),
     zeroed_sector: (SHARD, "byte", "a record 0x00 where"),
     bytes_inserted: (SHARD, "byte", "beyond the end"),
@@ -561,7 +561,7 @@ CONSEQUENCES: dict[Callable[[Path], None], tuple[str, ...]] = {
     row_invented: (SHARD,),
     refused_row: ("quick_00002.mcap",),
     a_row_too_many: ("quick_00002.mcap",),
-    plan_trial_removed: ("quick_00002.mcap",),
+    plan_trial_removed: ("quick_00002.mcap", "plan.parquet"),
 }
 """Other files that a defect contradicts."""
 
