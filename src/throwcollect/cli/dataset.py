@@ -1,4 +1,4 @@
-"""`throwcollect dataset ...`: what is in a dataset, and whether it is whole."""
+"""`throwcollect dataset info|digest`: what is in a dataset."""
 
 from __future__ import annotations
 
@@ -10,9 +10,6 @@ from typing import Any
 import typer
 
 from throwcollect.dataset.inspect import digest, info
-from throwcollect.dataset.verify import verify
-from throwcollect.errors import DatasetError
-from throwcollect.wording import counted
 
 
 def show_info(directory: Path, *, json: bool) -> None:
@@ -23,24 +20,6 @@ def show_info(directory: Path, *, json: bool) -> None:
     """
     found = info(directory).as_dict()
     typer.echo(jsonlib.dumps(found, indent=2) if json else describe(found), nl=json)
-
-
-def show_verification(directory: Path, *, json: bool) -> None:
-    """Print what is wrong with a dataset.
-
-    Raises:
-        DatasetError: If anything is, or the directory holds no finished dataset.
-    """
-    findings = verify(directory)
-    if json:
-        typer.echo(jsonlib.dumps([finding.as_dict() for finding in findings], indent=2))
-    else:
-        for finding in findings:
-            typer.echo(str(finding))
-    if findings:
-        raise DatasetError(f"{directory}: {counted(len(findings), 'finding')}")
-    if not json:
-        typer.echo(f"{directory}: nothing wrong")
 
 
 def show_digest(directory: Path) -> None:

@@ -22,16 +22,23 @@ def dataset_info(directory: DatasetArgument, json: JsonOption = False) -> None:
 
 
 @dataset_app.command("verify")
-def dataset_verify(directory: DatasetArgument, json: JsonOption = False) -> None:
-    """Check a dataset against itself and against physics."""
-    from throwcollect.cli.dataset import show_verification
+def dataset_verify(
+    directory: DatasetArgument,
+    replay: Annotated[
+        int | None,
+        typer.Option("--replay", metavar="N", min=1, help="Also simulate N throws again, chosen by the seed."),
+    ] = None,
+    json: JsonOption = False,
+) -> None:
+    """Check a dataset against itself and against physics; exit code 4 if anything is wrong."""
+    from throwcollect.cli.dataset_verify import show_verification
 
-    show_verification(directory, json=json)
+    show_verification(directory, replay=replay, json=json)
 
 
 @dataset_app.command("rebuild")
 def dataset_rebuild(directory: DatasetArgument, json: JsonOption = False) -> None:
-    """Write throws.parquet and metadata.yaml anew, from the recordings."""
+    """Write throws.parquet, datapackage.json and metadata.yaml anew, from the recordings."""
     from throwcollect.cli.dataset_repair import show_rebuilt
 
     show_rebuilt(directory, json=json)

@@ -1,8 +1,8 @@
-"""Writes the files of a dataset anew that follow from others: table of throws, bag's metadata, data card."""
+"""Writes the files of a dataset anew that follow from others: table of throws, manifest, bag's metadata, data card."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,9 +12,10 @@ from throwcollect.config.loader import load
 from throwcollect.dataset.bag import FileSummary, dataset_metadata
 from throwcollect.dataset.card import Provenance, data_card
 from throwcollect.dataset.digest import combined_digest
-from throwcollect.dataset.directory import CARD, CONFIG, METADATA, PLAN, THROWS
+from throwcollect.dataset.directory import CARD, CONFIG, MANIFEST, METADATA, PLAN, SHARD_SUFFIX, THROWS
 from throwcollect.dataset.files import write_file
 from throwcollect.dataset.journal import was_open
+from throwcollect.dataset.manifest import entry_of, entry_of_file, manifest_text, promised_names
 from throwcollect.dataset.mcap_reader import StoredEpisode
 from throwcollect.dataset.throws import Row, ThrowsTable, encode_table, read_throws_table
 from throwcollect.dataset.verify_episode import EpisodeCheck, RowJudge
@@ -49,7 +50,7 @@ class Rebuilt:
 
 
 def rebuild(directory: Path) -> Rebuilt:
-    """Write ``throws.parquet`` and ``metadata.yaml`` anew, and the data card if it is missing.
+    """Write ``throws.parquet``, the manifest and ``metadata.yaml`` anew, and the data card if it is missing.
 
     They follow from the configuration, the plan and the recordings, which are checked as `verify` does. The table that
     is there, if it can be read, says why trials are lost and which recordings there should be.
@@ -88,15 +89,25 @@ def rebuild(directory: Path) -> Rebuilt:
     throws = table.table(rows)
     digest = combined_digest(row["digest"] for row in recordings.rows.values())
     channels = recordings.channels or Channels(config, full_description(config))
-    written = [THROWS, METADATA]
+    written = [THROWS, MANIFEST, METADATA]
     write_file(directory / THROWS, encode_table(throws))
     if not (directory / CARD).exists():
         provenance = Provenance.of_this_machine(simulations=None, wall_s=None, was_open=was_open(directory))
         write_file(directory / CARD, data_card(config.without_run(), throws, provenance).encode())
         written.append(CARD)
-    write_file(directory / METADATA, dataset_metadata(recordings.summaries, channels.all, digest).encode())
+    metadata = dataset_metadata(recordings.summaries, channels.all, digest).encode()
+    write_file(directory / MANIFEST, _manifest(directory, config.name, recordings.summaries, metadata).encode())
+    write_file(directory / METADATA, metadata)
     lost = tuple(row["trial"] for row in rows if row["outcome"] == Outcome.LOST.value)
     return Rebuilt(len(rows), len(recordings.rows), lost, tuple(written))
+
+
+def _manifest(directory: Path, name: str, recordings: Sequence[FileSummary], metadata: bytes) -> str:
+    """Text of the manifest: of these recordings, of these bag's metadata, and of the tables as they lie there."""
+    held = {each.path for each in recordings}
+    others = [path for path in promised_names(directory) if path != METADATA and not path.endswith(SHARD_SUFFIX)]
+    files = [entry_of_file(directory / path) for path in (*others, *held)]
+    return manifest_text(name, [*files, entry_of(METADATA, metadata)])
 
 
 def earlier_rows(directory: Path, plan: Plan) -> Mapping[int, Row]:

@@ -140,7 +140,7 @@ def _finished(path: Path, channels: Channels, found: Mapping[int, _Found]) -> Fi
             offsets[trial] = file.size
             file.append(replace(run, data=contents.slice(offset, offset + run.length)))
         summary = file.finish(path.name)
-        return FinishedShard(summary, offsets) if same and written == len(contents) else None
+        return FinishedShard(summary, offsets, file.entry(path.name)) if same and written == len(contents) else None
 
 
 def _moved(shard: OpenShard, found: Mapping[int, _Found]) -> dict[int, _Found]:

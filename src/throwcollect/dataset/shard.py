@@ -15,6 +15,7 @@ from pathlib import Path
 
 from throwcollect.dataset.bag import FileSummary
 from throwcollect.dataset.files import replacing, unwritable, write_all
+from throwcollect.dataset.manifest import FileEntry
 from throwcollect.dataset.mcap_file import EpisodeRun, McapFile, episode_run
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.message import Episode
@@ -28,10 +29,12 @@ class FinishedShard:
     Attributes:
         summary: What the bag's metadata say of it; None when no trial of it has an episode, and so no file.
         offsets: Where the chunk of each trial's episode begins [bytes].
+        entry: What the manifest says of it; None when there is no file.
     """
 
     summary: FileSummary | None
     offsets: dict[int, int]
+    entry: FileEntry | None
 
 
 class OpenShard:
@@ -110,7 +113,7 @@ class OpenShard:
             DatasetError: If the shard cannot be written.
         """
         if self._descriptor is None or not self._runs:
-            return FinishedShard(None, {})
+            return FinishedShard(None, {}, None)
         offsets = {}
         first = min(self._runs)
         with replacing(self.path) as descriptor:
@@ -132,7 +135,7 @@ class OpenShard:
             self.part.unlink()
         except OSError as error:
             raise unwritable(self.part, error) from error
-        return FinishedShard(summary, offsets)
+        return FinishedShard(summary, offsets, file.entry(self.path.name))
 
     def sync(self) -> None:
         """Have what was appended survive a power cut.

@@ -16,6 +16,8 @@ from throwcollect.dataset.directory import CARD, FORMAT, METADATA, SHARD_SUFFIX,
 from throwcollect.dataset.findings import Finding
 from throwcollect.dataset.reader import read_bag_metadata
 from throwcollect.dataset.verify_episode import EpisodeCheck
+from throwcollect.dataset.verify_manifest import manifest_findings
+from throwcollect.dataset.verify_plan import CheckOf, drawing_findings, refusal_findings
 from throwcollect.dataset.verify_shard import ShardCheck
 from throwcollect.dataset.verify_tables import Tables, check_tables, shard_of
 from throwcollect.errors import DatasetError
@@ -27,16 +29,18 @@ _short.maxstring = _short.maxother = 120
 _short.maxlevel = _short.maxdict = _short.maxlist = 3
 
 
-def verify(directory: Path) -> list[Finding]:
+def verify(directory: Path, *, check_of: CheckOf | None = None) -> list[Finding]:
     """Check a dataset.
 
-    Checked are: the configuration and the plan against each other; the bag's metadata against the files; of each file
-    every record, index, count and CRC, the latched topics and the order of trials; of each episode its digest, layout,
-    stamps, and flight, which must be ballistic; the table of throws against the episodes, which are judged again, and
-    against the plan; and the dataset's digest.
+    Checked are: every promised file against the manifest; the configuration and the plan against each other, and the
+    plan is drawn again; the bag's metadata against the files; of each file every record, index, count and CRC, the
+    latched topics and the order of trials; of each episode its digest, layout and stamps, and that the simulation can
+    have recorded it; the table of throws against the episodes, which are judged again, and against the plan; and the
+    dataset's digest.
 
     Args:
         directory: Its directory.
+        check_of: Makes the check that says which trials the plan refuses; None leaves refusals as they are.
 
     Returns:
         What is wrong, file by file; empty when nothing is.
@@ -52,7 +56,9 @@ def verify(directory: Path) -> list[Finding]:
             raise
         findings.append(Finding(METADATA, "", str(error).removeprefix(f"{directory / METADATA}: ")))
     tables = check_tables(directory)
+    findings += manifest_findings(directory, tables.config.name if tables.config else None)
     findings += tables.findings
+    findings += _plan_findings(directory, tables, check_of)
     checks = _check_shards(directory, tables)
     findings += [finding for check in checks.values() for finding in check.findings]
     if bag is not None:
@@ -60,6 +66,14 @@ def verify(directory: Path) -> list[Finding]:
         findings += _digest_findings(bag, tables, checks)
     findings += _stray_findings(directory, checks)
     return findings
+
+
+def _plan_findings(directory: Path, tables: Tables, check_of: CheckOf | None) -> Iterator[Finding]:
+    if tables.plan is None:
+        return
+    yield from drawing_findings(directory, tables.plan, tables.rows)
+    if check_of is not None:
+        yield from refusal_findings(tables.plan, tables.doubtful, check_of)
 
 
 def _check_shards(directory: Path, tables: Tables) -> dict[str, ShardCheck]:

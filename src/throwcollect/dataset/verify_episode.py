@@ -13,16 +13,17 @@ from throwcollect.dataset.judging import judged
 from throwcollect.dataset.mcap_file import EpisodeRun, episode_run
 from throwcollect.dataset.mcap_reader import StoredEpisode
 from throwcollect.dataset.throws import Place, ThrowsTable
+from throwcollect.dataset.verify_header import header_problems
+from throwcollect.dataset.verify_motion import ball_problems, infinite_columns, joint_problems
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.message import Episode
 from throwcollect.episode.record import Samples
 from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.robots.description import touchable_bodies
 from throwcollect.sweep.plan import Plan
-from throwcollect.tasks.flight import flight_residual
+from throwcollect.tasks.trajectory import throw_trajectory
 from throwcollect.wording import counted
 
-BALLISTIC_TOLERANCE_M = 1e-9
-"""A recorded flight and the computed one differ by rounding, below 1e-12 m; the smallest kick moves a ball by more."""
 _RELATIVE_TOLERANCE = 1e-9
 """Numbers that are judged again on another machine may differ in their last bits."""
 _MOST_TOLD = 3
@@ -73,6 +74,7 @@ class EpisodeCheck:
         self._rows = rows
         self._doubtful = doubtful
         self._judge = RowJudge(plan) if plan else None
+        self._bodies = touchable_bodies() if plan else frozenset()
 
     def problems(self, stored: StoredEpisode, shard: str, channels: Channels | None) -> Iterator[str]:
         """Everything that is wrong with an episode.
@@ -91,10 +93,15 @@ class EpisodeCheck:
         except DatasetError as error:
             yield str(error)
             return
-        problems = list(self.content_problems(episode, channels))
-        yield from problems
+        unreadable = list(self._layout_problems(episode, channels))
+        yield from unreadable or self._physics_problems(episode)
         row = self._rows.get(episode.header.trial)
-        if self._judge is not None and row is not None and not problems and episode.header.trial not in self._doubtful:
+        if (
+            self._judge is not None
+            and row is not None
+            and not unreadable
+            and episode.header.trial not in self._doubtful
+        ):
             # Swept values were compared with the plan, and that is where they come from here.
             judged_row = self._judge.row(stored, shard)
             yield from _row_problems({name: judged_row[name] for name in judged_row if "." not in name}, row)
@@ -109,6 +116,11 @@ class EpisodeCheck:
         Yields:
             What is wrong, a sentence each.
         """
+        problems = list(self._layout_problems(episode, channels))
+        yield from problems or self._physics_problems(episode)
+
+    def _layout_problems(self, episode: Episode, channels: Channels | None) -> Iterator[str]:
+        """What keeps an episode from being measured: by its records, its layout, its trial or its stamps."""
         try:
             samples = episode.samples()
             episode.check_records()
@@ -127,12 +139,26 @@ class EpisodeCheck:
         except ConfigError as error:
             yield f"the plan has values that cannot be: {error}"
             return
-        if stamp_problems := list(_stamp_problems(episode, samples, config)):
-            yield from stamp_problems
-            return  # nothing can be measured by such stamps
-        residual = flight_residual(samples, episode.header, config=config)
-        if residual is not None and not residual <= BALLISTIC_TOLERANCE_M:
-            yield f"the flight departs from ballistic motion by {residual:.3g} m"
+        yield from _stamp_problems(episode, samples, config)
+
+    def _physics_problems(self, episode: Episode) -> Iterator[str]:
+        """What the simulation cannot have recorded."""
+        if self._plan is None or episode.header.trial in self._doubtful:
+            return
+        config = self._plan.config_of(self._plan.trials[episode.header.trial])
+        samples = episode.samples()
+        if infinite := list(infinite_columns(samples)):
+            yield from infinite
+            return
+        trajectory, header = throw_trajectory(config), episode.header
+        # Numbers of a forger may be as large as they like.
+        with np.errstate(all="ignore"):
+            problems = [
+                *header_problems(samples, header, config=config, trajectory=trajectory, bodies=self._bodies),
+                *joint_problems(samples, header, config=config, trajectory=trajectory),
+                *ball_problems(samples, header, config=config),
+            ]
+        yield from problems
 
 
 def _row_problems(expected: Mapping[str, Any], row: Mapping[str, Any]) -> Iterator[str]:

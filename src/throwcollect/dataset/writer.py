@@ -20,9 +20,20 @@ from throwcollect.config.schema import Config
 from throwcollect.dataset.bag import FileSummary, dataset_metadata
 from throwcollect.dataset.card import Provenance, data_card
 from throwcollect.dataset.digest import combined_digest
-from throwcollect.dataset.directory import CARD, CONFIG, METADATA, PLAN, THROWS, TRIALS, shard_name
+from throwcollect.dataset.directory import (
+    CARD,
+    CONFIG,
+    MANIFEST,
+    METADATA,
+    PLAN,
+    SOURCES,
+    THROWS,
+    TRIALS,
+    shard_name,
+)
 from throwcollect.dataset.files import remove, write_file
 from throwcollect.dataset.journal import Event, Journal, was_open
+from throwcollect.dataset.manifest import FileEntry, entry_of, entry_of_file, manifest_text
 from throwcollect.dataset.recovery import recover_shard
 from throwcollect.dataset.shard import FinishedShard, OpenShard
 from throwcollect.dataset.throws import Place, Row, ThrowsTable, encode_table
@@ -86,6 +97,7 @@ class _Finished(NamedTuple):
     """What is kept of a finished shard."""
 
     summary: FileSummary | None
+    entry: FileEntry | None
     rows: pa.Table
 
 
@@ -158,7 +170,7 @@ class DatasetWriter:
         Raises:
             DatasetError: If files cannot be read or written.
         """
-        for name in (METADATA, THROWS):
+        for name in (METADATA, MANIFEST, THROWS):
             remove(self._directory / name)
         found = 0
         for number, shard in list(self._shards.items()):
@@ -264,7 +276,9 @@ class DatasetWriter:
         return digests
 
     def finish(self, *, wall_s: float | None = None, simulations: int | None = None) -> None:
-        """Write everything that describes the dataset as a whole; ``metadata.yaml`` comes last.
+        """Write everything that describes the dataset as a whole.
+
+        The manifest comes last but one, and ``metadata.yaml`` last, as it is the mark of a finished dataset.
 
         Args:
             wall_s: Real time that it took to make the dataset [s], for the data card; None if it is not known, or a
@@ -289,10 +303,20 @@ class DatasetWriter:
         )
         # How it was run may not change the dataset, so what is kept of that is in the data card alone.
         config = self._config.without_run()
-        write_file(self._directory / THROWS, encode_table(throws))
         write_file(self._directory / CARD, data_card(config, throws, provenance).encode())
-        write_file(self._directory / CONFIG, resolved_yaml(config).encode())
-        write_file(self._directory / METADATA, dataset_metadata(files, self._channels.all, digest).encode())
+        described = {
+            THROWS: encode_table(throws),
+            CONFIG: resolved_yaml(config).encode(),
+            METADATA: dataset_metadata(files, self._channels.all, digest).encode(),
+        }
+        entries = [
+            *(entry_of(name, data) for name, data in described.items()),
+            *(entry_of_file(self._directory / name) for name in (PLAN, TRIALS, SOURCES) if self._has(name)),
+            *(each.entry for each in finished if each.entry),
+        ]
+        described[MANIFEST] = manifest_text(config.name, entries).encode()
+        for name in (THROWS, CONFIG, MANIFEST, METADATA):
+            write_file(self._directory / name, described[name])
         self.note("finished", wall_s=wall_s)
 
     def close(self) -> None:
@@ -302,6 +326,9 @@ class DatasetWriter:
         if self._journal is not None:
             self._journal.close()
             self._journal = None
+
+    def _has(self, name: str) -> bool:
+        return (self._directory / name).exists()
 
     def _expect(self, trials: Sequence[Trial]) -> None:
         members: dict[int, list[Trial]] = {}
@@ -341,7 +368,7 @@ class DatasetWriter:
         rows = [row for _, row in sorted(self._rows.pop(number).items())]
         for row in rows:
             row["chunk_offset"] = finished.offsets.get(row["trial"])
-        self._finished[number] = _Finished(finished.summary, self._table.table(rows))
+        self._finished[number] = _Finished(finished.summary, finished.entry, self._table.table(rows))
         shard = self._shards.pop(number)
         if finished.summary is not None:
             self.note("shard", name=shard.path.name)

@@ -98,6 +98,15 @@ def full_description(config: Config) -> str:
     return _text(robot)
 
 
+def touchable_bodies() -> frozenset[str]:
+    """Names under which contacts of the ball are recorded: ``spoon``, ``ground``, and the links of Talos.
+
+    Raises:
+        ConfigError: If Talos' files cannot be read.
+    """
+    return frozenset({"spoon", "ground", *(link.get("name", "") for link in _talos().iter("link"))})
+
+
 def joint_model() -> pinocchio.Model:
     """Talos without the spoon as a model of its 32 joints.
 

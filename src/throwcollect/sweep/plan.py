@@ -174,7 +174,7 @@ def make_trials(config: Config, points: Points, *, check: Check | None = None, f
     rows = zip(points.values.tolist(), seeds, trial_digests(config, points, seeds), strict=True)
     for number, (row, seed, digest) in enumerate(rows, first):
         values = dict(zip(points.keys, row, strict=True))
-        refused = _refusal(with_values(config, values), check) if check else None
+        refused = refusal(with_values(config, values), check) if check else None
         yield Trial(number, values, seed, digest, refused)
 
 
@@ -182,7 +182,13 @@ def _seed(root: int, number: int) -> int:
     return int(np.random.SeedSequence(root, spawn_key=(number,)).generate_state(1, np.uint64)[0])
 
 
-def _refusal(config: Config, check: Check) -> str | None:
+def refusal(config: Config, check: Check) -> str | None:
+    """Why the plan refuses a trial; None if it does not.
+
+    Args:
+        config: Configuration of the trial.
+        check: Says why it cannot be run; a ConfigError that it raises is a reason, too.
+    """
     try:
         return check(config)
     except ConfigError as error:

@@ -40,25 +40,32 @@ def run(monkeypatch: pytest.MonkeyPatch) -> Run:
 
 def test_verify_lists_the_findings_and_ends_with_4(run: Run, source: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run("dataset", "verify", source) == 0
-    assert capsys.readouterr().out == f"{source}: nothing wrong\n"
+    first, second = capsys.readouterr().out.splitlines()
+    assert first == f"{source}: nothing wrong"
+    assert f"throwcollect dataset verify {source} --replay 100" in second
     (source / "README.md").unlink()
     (source / "plan.parquet").write_bytes(b"")
     assert run("dataset", "verify", source) == 4
     told = capsys.readouterr()
-    assert told.out.startswith("plan.parquet: is damaged: ")
+    assert told.out.startswith("plan.parquet: has 0 bytes, in datapackage.json ")
+    assert "\nplan.parquet: is damaged: " in told.out
     assert told.out.endswith("README.md: is missing\n")
-    assert f"{source}: 2 findings" in told.err
+    assert f"{source}: 3 findings" in told.err
 
 
 def test_rebuild_says_what_it_wrote(run: Run, source: Path, capsys: pytest.CaptureFixture[str]) -> None:
     before = (source / "throws.parquet").read_bytes()
     (source / "throws.parquet").unlink()
     assert run("dataset", "rebuild", source) == 0
-    assert capsys.readouterr().out == f"{source}: 3 trials, 3 episodes; wrote throws.parquet, metadata.yaml\n"
+    assert (
+        capsys.readouterr().out
+        == f"{source}: 3 trials, 3 episodes; wrote throws.parquet, datapackage.json, metadata.yaml\n"
+    )
     assert (source / "throws.parquet").read_bytes() == before
     assert run("dataset", "rebuild", source, "--json") == 0
     found = json.loads(capsys.readouterr().out)
-    assert found == {"trials": 3, "episodes": 3, "lost": [], "written": ["throws.parquet", "metadata.yaml"]}
+    written = ["throws.parquet", "datapackage.json", "metadata.yaml"]
+    assert found == {"trials": 3, "episodes": 3, "lost": [], "written": written}
 
 
 def test_rebuild_of_a_damaged_dataset_hints_at_repair(

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
 from throwcollect.dataset.writer import DatasetWriter
@@ -33,6 +34,7 @@ SETTINGS: dict[str, Any] = {
     "sweep": {"sampler": "uniform", "parameters": {"task.duration_s": {"min": 0.8, "max": 1.2}}},
 }
 RELEASE_S = 0.4
+SPIN_RADPS = 1.0
 HOLDING = (0.5, -0.2, 1.3)
 
 Change = Callable[[Samples, EpisodeHeader], tuple[Samples, EpisodeHeader]]
@@ -58,6 +60,9 @@ def throw(config: Config, trial: int) -> tuple[Samples, EpisodeHeader]:
     effort[:, moving] = 5 * np.sin(3 * times)[:, np.newaxis]
     ball_velocity = np.zeros((count, 3))
     ball_velocity[held:] = speed - np.outer(np.arange(flown) / rate, [0, 0, config.scene.gravity_mps2])
+    angle = SPIN_RADPS * times / 2
+    zero = np.zeros(count)
+    turns = np.stack([zero, np.sin(angle), zero, np.cos(angle)])
     quaternion = np.array([0.1, -0.3, 0.2, 0.9])
     samples = Samples(
         stamps_ns=start_ns + np.arange(count, dtype=np.int64) * (1_000_000_000 // rate),
@@ -65,15 +70,29 @@ def throw(config: Config, trial: int) -> tuple[Samples, EpisodeHeader]:
         velocity=velocity,
         effort=effort,
         ball_position=np.concatenate([np.tile(HOLDING, (held, 1)), path[:flown]]),
-        ball_orientation_xyzw=np.tile(quaternion / np.linalg.norm(quaternion), (count, 1)),
+        ball_orientation_xyzw=_product(turns, quaternion / np.linalg.norm(quaternion)),
         ball_linear_velocity=ball_velocity,
-        ball_angular_velocity=np.tile([0.0, 1.0, 0.0], (count, 1)),
+        ball_angular_velocity=np.tile([0.0, SPIN_RADPS, 0.0], (count, 1)),
     )
     release = start_ns + round(RELEASE_S * 1e9)
-    end = int(samples.stamps_ns[-1])
-    contacts = (Contact("spoon", start_ns, release), Contact("ground", end, None))
-    goals = tuple(GoalOutcome(name, 4, 0, "") for name in ("arm_right_controller", "torso_controller"))
-    return samples, EpisodeHeader(trial, start_ns, "landed", contacts, goals, count)
+    status = 4 if times[-1] >= trajectory.times[-1] else 2
+    goals = tuple(GoalOutcome(name, status, 0, "") for name in ("arm_right_controller", "torso_controller"))
+    return samples, EpisodeHeader(trial, start_ns, "landed", (Contact("spoon", start_ns, release),), goals, count)
+
+
+def _product(turns: NDArray[np.float64], quaternion: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Quaternions (xyzw), shape ``(4, n)``, times one; shape ``(n, 4)``."""
+    x, y, z, w = turns
+    a, b, c, d = quaternion
+    return np.stack(
+        [
+            w * a + x * d + y * c - z * b,
+            w * b - x * c + y * d + z * a,
+            w * c + x * b - y * a + z * d,
+            w * d - x * a - y * b - z * c,
+        ],
+        axis=1,
+    )
 
 
 class Collection:

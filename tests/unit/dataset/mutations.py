@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from throwcollect.dataset.inspect import digest, info
+from throwcollect.dataset.manifest import entry_of_file, manifest_text, named_manifest, promised_names
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.rebuild import rebuild
 from throwcollect.dataset.repair import repair
@@ -68,6 +69,13 @@ def mutate(data: bytes, mutations: Sequence[Mutation]) -> bytes:
         elif kind == "zero":
             damaged[at : at + span] = bytes(len(damaged[at : at + span]))
     return bytes(damaged)
+
+
+def fit_manifest(directory: Path) -> None:
+    """Write the manifest that the files call for, as somebody would who wants a change to go unnoticed."""
+    files = [directory / name for name in promised_names(directory) if (directory / name).is_file()]
+    name, _ = named_manifest(directory)
+    (directory / "datapackage.json").write_text(manifest_text(name, map(entry_of_file, files)))
 
 
 def no_plan(config: object) -> Plan:

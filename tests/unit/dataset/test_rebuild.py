@@ -14,7 +14,7 @@ from throwcollect.dataset.rebuild import NO_EPISODE, rebuild
 from throwcollect.dataset.verify import verify
 from throwcollect.errors import DatasetError
 
-DERIVED = ("throws.parquet", "metadata.yaml")
+DERIVED = ("throws.parquet", "datapackage.json", "metadata.yaml")
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +43,7 @@ def test_derived_files_come_back_byte_for_byte(mixed: Path, spoiled: Path) -> No
     (spoiled / "README.md").unlink()
     rebuilt = rebuild(spoiled)
     assert (rebuilt.trials, rebuilt.episodes, rebuilt.lost) == (7, 4, (4, 6))
-    assert rebuilt.written == ("throws.parquet", "metadata.yaml", "README.md")
+    assert rebuilt.written == (*DERIVED, "README.md")
     for name in DERIVED:
         assert (spoiled / name).read_bytes() == (mixed / name).read_bytes()
     assert "wall time" not in (spoiled / "README.md").read_text()

@@ -19,6 +19,7 @@ import pytest
 import zstandard
 from mcap.opcode import Opcode
 from tests.unit.dataset.conftest import Collection
+from tests.unit.dataset.mutations import fit_manifest
 
 from throwcollect.config.loader import load
 from throwcollect.dataset.inspect import digest
@@ -516,7 +517,7 @@ DEFECTS: dict[Callable[[Path], None], tuple[str, str, str]] = {
     chunk_length: (SHARD, "byte", r"the next episode is at byte \d+$"),
     index_length: (SHARD, "byte", r"the next episode is at byte \d+$"),
     metadata_name: (SHARD, "byte", "where the metadata of an episode should be"),
-    metadata_length: (SHARD, "byte", "metadata record is not readable"),
+    metadata_length: (SHARD, "", "metadata record is not readable|metadata at byte .* do not fit"),
     header_json: (SHARD, "byte", "episode header: .* Invalid JSON"),
     zeroed_sector: (SHARD, "byte", "a record 0x00 where"),
     bytes_inserted: (SHARD, "byte", "beyond the end"),
@@ -560,7 +561,7 @@ CONSEQUENCES: dict[Callable[[Path], None], tuple[str, ...]] = {
     row_invented: (SHARD,),
     refused_row: ("quick_00002.mcap",),
     a_row_too_many: ("quick_00002.mcap",),
-    plan_trial_removed: ("quick_00002.mcap",),
+    plan_trial_removed: ("quick_00002.mcap", "plan.parquet"),
 }
 """Other files that a defect contradicts."""
 
@@ -572,6 +573,7 @@ def test_a_sound_dataset_has_no_findings(dataset: Path) -> None:
 @pytest.mark.parametrize("plant", DEFECTS, ids=lambda plant: plant.__name__)
 def test_a_planted_defect_is_found_and_named(dataset: Path, plant: Callable[[Path], None]) -> None:
     plant(dataset)
+    fit_manifest(dataset)
     file, place, problem = DEFECTS[plant]
     findings = verify(dataset)
     assert [
@@ -585,6 +587,7 @@ def test_a_planted_defect_is_found_and_named(dataset: Path, plant: Callable[[Pat
 
 def test_what_is_sound_beside_a_defect_is_not_accused(dataset: Path) -> None:
     measured_landing(dataset)
+    fit_manifest(dataset)
     (finding,) = verify(dataset)
     assert str(finding).startswith("quick_00000.mcap: trial 2: throws.parquet has landing_x_m = 1.25")
 
@@ -618,6 +621,7 @@ def test_a_damaged_stretch_is_told_with_its_end_and_hides_nothing_behind_it(data
     zeroed_sector(dataset)
     second, third = (pq.read_table(dataset / "throws.parquet")["chunk_offset"].to_pylist()[trial] for trial in (4, 5))
     flip(dataset / SHARD, third + 2000)
+    fit_manifest(dataset)
     findings = verify(dataset)
     assert [finding.place for finding in findings] == [f"byte {second}", "trial 5", "trial 4"]
     assert findings[0].problem.endswith(f"the next episode is at byte {third}")

@@ -20,7 +20,7 @@ from throwcollect.dataset.report.limits import JointPeaks
 from throwcollect.dataset.report.outcomes import LANDED, Outcomes, in_words, style_of
 from throwcollect.dataset.report.parameters import Parameter
 from throwcollect.dataset.report.thinning import thinned
-from throwcollect.dataset.verify_episode import BALLISTIC_TOLERANCE_M
+from throwcollect.tasks.flight import BALLISTIC_TOLERANCE_M
 
 MOST_KEYS = 8
 _NEUTRAL = "#6b7280"

@@ -17,7 +17,7 @@ from throwcollect.dataset.report.outcomes import LANDED, Outcomes, in_words, sty
 from throwcollect.dataset.report.parameters import Parameter
 from throwcollect.dataset.report.thinning import thinned
 from throwcollect.dataset.report.throughput import Throughput
-from throwcollect.dataset.verify_episode import BALLISTIC_TOLERANCE_M
+from throwcollect.tasks.flight import BALLISTIC_TOLERANCE_M
 
 SCALE = "Viridis"
 NEUTRAL = "#8a8f98"

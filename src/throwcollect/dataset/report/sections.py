@@ -15,7 +15,7 @@ from throwcollect.dataset.report.matrix import MOST_KEYS, parameter_matrix, poin
 from throwcollect.dataset.report.outcomes import LANDED, in_words
 from throwcollect.dataset.report.panels import Panel, Section
 from throwcollect.dataset.report.thinning import MOST_POINTS as MOST_MAP_POINTS
-from throwcollect.dataset.verify_episode import BALLISTIC_TOLERANCE_M
+from throwcollect.tasks.flight import BALLISTIC_TOLERANCE_M
 
 _MOST_FAILURES = 40
 

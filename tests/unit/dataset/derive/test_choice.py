@@ -6,6 +6,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from tests.unit.dataset.conftest import Collection
+from tests.unit.dataset.mutations import fit_manifest
 
 from throwcollect.config.loader import load
 from throwcollect.dataset.derive.choice import filtered, merge, sample
@@ -45,7 +46,7 @@ def test_all_trials_of_a_dataset_give_its_recordings_byte_for_byte(collected: Pa
     filtered(collected, tmp_path / "all", where="True")
     names = {path.name for path in (tmp_path / "all").iterdir()} - {"sources.parquet", "trials.parquet"}
     assert names == {path.name for path in collected.iterdir()}
-    for name in names - {"README.md", "config.yaml", "plan.parquet"}:
+    for name in names - {"README.md", "config.yaml", "plan.parquet", "datapackage.json"}:
         assert (tmp_path / "all" / name).read_bytes() == (collected / name).read_bytes(), name
 
 
@@ -160,8 +161,10 @@ def test_a_list_that_is_not_the_one_of_the_plan_is_found(collected: Path, tmp_pa
     path = tmp_path / "some" / "trials.parquet"
     table = pq.read_table(path)
     pq.write_table(table.take([1, 0, *range(2, len(table))]), path)
+    fit_manifest(tmp_path / "some")
     assert list(map(str, verify(tmp_path / "some"))) == [
         "trials.parquet: begins with other points than those of plan.parquet"
     ]
     path.unlink()
+    fit_manifest(tmp_path / "some")
     assert list(map(str, verify(tmp_path / "some"))) == ["trials.parquet: is missing"]

@@ -1,0 +1,155 @@
+"""Checks the plan against its configuration: the trials are drawn again, and the refused ones checked again."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Collection, Iterator, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from throwcollect.config.schema import Config
+from throwcollect.dataset.derive.row_result import row_result
+from throwcollect.dataset.directory import PLAN
+from throwcollect.dataset.findings import Finding
+from throwcollect.dataset.throws import REFUSED
+from throwcollect.errors import ConfigError
+from throwcollect.sweep.plan import Check, Plan, make_trials, refusal
+from throwcollect.sweep.points import Points
+from throwcollect.sweep.rounds import Rounds
+from throwcollect.sweep.samplers import draw_points
+from throwcollect.wording import counted
+
+CHECKED_AGAIN = 100
+"""Trials that the plan does not refuse and that are checked again all the same, at 5 ms each."""
+
+_RELATIVE_TOLERANCE = 1e-9
+"""Values that are drawn again on another machine may differ in their last bits."""
+_NUMBER = re.compile(r"-?\d[\d.]*(?:e[-+]?\d+)?")
+
+Row = Mapping[str, Any]
+
+CheckOf = Callable[[Config], Check]
+"""Makes the check of the trials of a configuration."""
+
+
+def drawing_findings(directory: Path, plan: Plan, rows: Mapping[int, Row] | None) -> Iterator[Finding]:
+    """Trials that are not those that the configuration draws.
+
+    The rounds of a plan that grows are drawn from the results in the table of throws, which is compared with the
+    episodes elsewhere.
+
+    Args:
+        directory: Directory of the dataset.
+        plan: Its plan.
+        rows: Rows of the table of throws, by trial; None if they are not known, and then only what depends on no
+            result is drawn again.
+    """
+    try:
+        drawing = _grown(plan, rows) if plan.config.grows else _drawn(directory, plan)
+    except ConfigError as error:
+        yield Finding(PLAN, "", f"cannot be drawn again from the configuration: {error.problems[0]}")
+        return
+    if drawing.problem is not None:
+        yield Finding(PLAN, "", drawing.problem)
+    drawn = make_trials(plan.config, Points(plan.keys, drawing.values[: len(plan.trials)]))
+    for trial, again in zip(plan.trials, drawn, strict=False):
+        for key, value in again.values.items():
+            if not math.isclose(trial.values[key], value, rel_tol=_RELATIVE_TOLERANCE, abs_tol=_RELATIVE_TOLERANCE):
+                yield _of_trial(again.number, f"has {key} = {trial.values[key]!r}, the configuration draws {value!r}")
+        if trial.seed != again.seed:
+            yield _of_trial(again.number, f"has seed {trial.seed}, the configuration gives {again.seed}")
+
+
+def refusal_findings(plan: Plan, doubtful: Collection[int], check_of: CheckOf) -> Iterator[Finding]:
+    """Refusals that the plan should not have, and ones that it lacks.
+
+    All refused trials are checked again, and `CHECKED_AGAIN` others that the seed of the configuration chooses.
+
+    Args:
+        plan: The plan.
+        doubtful: Trials whose values are not known.
+        check_of: Makes the check that the plan was made with.
+    """
+    refused = [trial.number for trial in plan.trials if trial.refused is not None]
+    others = [trial.number for trial in plan.trials if trial.refused is None]
+    chosen = np.random.default_rng(plan.config.seed).permutation(len(others))[:CHECKED_AGAIN]
+    check = check_of(plan.config)
+    for number in sorted({*refused, *(others[index] for index in chosen)} - set(doubtful)):
+        trial = plan.trials[number]
+        again = refusal(plan.config_of(trial), check)
+        if _kind(again) != _kind(trial.refused):
+            yield _of_trial(number, f"is refused as {trial.refused!r}, the check says {again!r}")
+
+
+class _Drawing(NamedTuple):
+    """The trials that a configuration draws, as far as they are known.
+
+    Attributes:
+        values: Their values, shape ``(n_trials, n_keys)``.
+        problem: Why they are not as many as the plan has; None if they are, or if that is not known.
+    """
+
+    values: NDArray[np.float64]
+    problem: str | None
+
+
+def _drawn(directory: Path, plan: Plan) -> _Drawing:
+    """The drawing of a plan that is fixed before anything runs.
+
+    Raises:
+        ConfigError: If it cannot be drawn.
+    """
+    if plan.config.sweep.file is not None:
+        # The list lies beside the plan and is compared with it there.
+        return _Drawing(np.array([list(trial.values.values()) for trial in plan.trials]), None)
+    points = _of_keys(draw_points(plan.config, directory=directory), plan)
+    count, there = len(points.values), len(plan.trials)
+    return _Drawing(
+        points.values, None if count == there else f"has {counted(there, 'trial')}, the configuration draws {count}"
+    )
+
+
+def _grown(plan: Plan, rows: Mapping[int, Row] | None) -> _Drawing:
+    """The drawing of a plan that grew, round by round from the results of its trials.
+
+    Raises:
+        ConfigError: If it cannot be drawn.
+    """
+    rounds, joints, there = Rounds(plan.config), tuple(plan.config.task.end), len(plan.trials)
+    values: list[NDArray[np.float64]] = []
+    while rounds.due and not rounds.over and rounds.planned < there:
+        points = rounds.draw()
+        if points is None:
+            continue
+        values.append(_of_keys(points, plan).values)
+        added = plan.trials[rounds.planned : rounds.planned + len(points.values)]
+        rounds.add(added)
+        for trial in added:
+            row = None if rows is None else rows.get(trial.number)
+            if row is not None and row["outcome"] != REFUSED:
+                rounds.tell(trial.number, row_result(row, joints))
+    problem, count = None, sum(map(len, values))
+    if count > there or (rounds.over and count < there):
+        problem = f"has {counted(there, 'trial')}, the configuration draws {count}"
+    elif rounds.due and not rounds.over:
+        problem = f"ends with trial {there - 1}, and by the results more would follow"
+    return _Drawing(np.vstack(values), problem)
+
+
+def _of_keys(points: Points, plan: Plan) -> Points:
+    if points.keys != plan.keys:
+        raise ConfigError(f"it sweeps {', '.join(points.keys)}, the plan {', '.join(plan.keys)}")
+    return points
+
+
+def _kind(reason: str | None) -> str | None:
+    """A reason without its numbers, which may differ in their last digits on another machine."""
+    return None if reason is None else _NUMBER.sub("#", reason)
+
+
+def _of_trial(number: int, problem: str) -> Finding:
+    return Finding(PLAN, f"trial {number}", problem)

@@ -1,0 +1,253 @@
+"""Forgeries in which every hash, CRC, digest and row fits: physics, plan and configuration tell them all the same."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.unit.dataset.conftest import SETTINGS, Change, Collection, throw
+
+from throwcollect.config.schema import Config
+from throwcollect.coordinator.prepare import checked_plan, feasibility_check
+from throwcollect.dataset.throws import ThrowsTable
+from throwcollect.dataset.verify import verify
+from throwcollect.dataset.verify_episode import EpisodeCheck
+from throwcollect.dataset.verify_plan import drawing_findings, refusal_findings
+from throwcollect.episode.channels import Channels
+from throwcollect.episode.record import Contact, EpisodeHeader, Samples
+from throwcollect.robots.description import full_description
+from throwcollect.robots.talos import JOINTS
+from throwcollect.sweep.digest import trial_digests
+from throwcollect.sweep.plan import Plan, make_trials
+from throwcollect.sweep.points import Points
+from throwcollect.sweep.samplers import draw_points
+from throwcollect.tasks.throw import Outcome, ThrowResult
+
+FORGED = 2
+"""The trial that is forged."""
+FLIGHT = 150
+"""A sample of its flight."""
+ELBOW, LOCKED = JOINTS.index("arm_right_4_joint"), JOINTS.index("head_1_joint")
+
+Forgery = Callable[[Samples, EpisodeHeader], tuple[Samples, EpisodeHeader]]
+
+
+def in_samples(column: str, row: int | slice, what: int | slice, change: Callable[[Any], Any]) -> Forgery:
+    """Changes some numbers of a column."""
+
+    def forge(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
+        changed = getattr(samples, column).copy()
+        changed[row, what] = change(changed[row, what])
+        return replace(samples, **{column: changed}), header
+
+    return forge
+
+
+def in_header(**changes: Callable[[EpisodeHeader], Any]) -> Forgery:
+    """Changes some fields of the header."""
+    return lambda samples, header: (samples, replace(header, **{key: make(header) for key, make in changes.items()}))
+
+
+def cut(end_reason: str, rows: slice = slice(-5)) -> Forgery:
+    """Some samples are missing, and the trial is said to have ended there."""
+
+    def forge(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
+        goals = tuple(replace(goal, status=2) for goal in header.goals)
+        left = samples[rows]
+        last = int(left.stamps_ns[-1])
+        contacts = tuple(replace(each, end_ns=None if each.end_ns > last else each.end_ns) for each in header.contacts)
+        return left, replace(header, samples=len(left), goals=goals, end_reason=end_reason, contacts=contacts)
+
+    return forge
+
+
+def with_contact(body: str, begin_s: float, end_s: float | None, *, off_ns: int = 0) -> Forgery:
+    """One contact is invented."""
+
+    def add(header: EpisodeHeader) -> tuple[Contact, ...]:
+        begin, end = (None if s is None else header.start_ns + round(s * 1e9) + off_ns for s in (begin_s, end_s))
+        return (*header.contacts, Contact(body, begin, end))
+
+    return in_header(contacts=add)
+
+
+def with_goal(**changes: Any) -> Forgery:
+    return in_header(goals=lambda header: (replace(header.goals[0], **changes), *header.goals[1:]))
+
+
+def released(by_s: float) -> Forgery:
+    """The contact with the spoon ends later."""
+    return in_header(
+        contacts=lambda header: tuple(
+            replace(each, end_ns=each.end_ns + round(by_s * 1e9)) for each in header.contacts if each.end_ns
+        )
+    )
+
+
+def swapped(_: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
+    """The recording of another trial, moved into this one's slot of time."""
+    plan = Collection().plan
+    return throw(plan.config_of(plan.trials[4]), header.trial)
+
+
+def turned(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
+    orientation = samples.ball_orientation_xyzw.copy()
+    orientation[FLIGHT:] = orientation[FLIGHT:][:, [1, 0, 3, 2]]
+    return replace(samples, ball_orientation_xyzw=orientation), header
+
+
+def succeeded_at_once(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
+    goals = tuple(replace(goal, status=4) for goal in header.goals)
+    return samples[:40], replace(header, samples=40, goals=goals)
+
+
+FORGERIES: dict[str, tuple[Forgery, str]] = {
+    "effort that is no number": (in_samples("effort", 7, 3, lambda _: np.nan), "effort holds .* sample 7"),
+    "infinite position": (in_samples("position", 9, 3, lambda _: np.inf), "position holds .* not finite"),
+    "infinite ball": (in_samples("ball_position", 9, 1, lambda _: -np.inf), "ball_position holds"),
+    "unknown end": (in_header(end_reason=lambda _: "crashed"), "ended as 'crashed', not as landed"),
+    "cut end": (cut("landed"), "do not enclose a crossing"),
+    "cut as timeout": (cut("timeout"), "ended as timeout after"),
+    "cut as rest in flight": (cut("rest"), "ended as rest, but the ball moved at"),
+    "cut as rest at the start": (cut("rest", slice(90)), "ended as rest, but the arm moved until"),
+    "another end": (in_header(end_reason=lambda _: "timeout"), "although the ball crossed the landing plane"),
+    "swapped trials": (swapped, "departs from the trajectory of the trial by"),
+    "other start": (in_samples("position", slice(0, 3), ELBOW, lambda was: was + 0.1), "rad away from the start"),
+    "other motion": (in_samples("position", slice(50, 60), ELBOW, lambda was: was + 0.1), "although its torque is"),
+    "locked joint moves": (in_samples("position", 50, LOCKED, lambda was: was + 1e-9), "head_1_joint is locked at"),
+    "locked joint has torque": (in_samples("effort", 50, LOCKED, lambda _: 1e-9), "head_1_joint is locked, and"),
+    "too much torque": (in_samples("effort", 50, ELBOW, lambda _: 1e3), "of the most that its motor has"),
+    "dropped contact": (in_header(contacts=lambda _: ()), "departs from ballistic motion .* where no contact is"),
+    "contact that ends too early": (released(-0.1), "velocity departs from ballistic motion"),
+    "contact that ends too late": (released(0.1), "contact with 'spoon' at 0.000 s: the ball moves as if nothing"),
+    "invented contact": (with_contact("arm_right_4_link", 0.6, 0.602), "the ball moves as if nothing touched it"),
+    "invented lasting contact": (with_contact("torso_2_link", 0.6, None), "the ball moves as if nothing"),
+    "unknown body": (with_contact("wall", 0.6, 0.602), "'wall' at 0.600 s: no such body"),
+    "endless name": (with_contact("x" * 100_000, 0.6, 0.602), "no such body can touch the ball"),
+    "contact off the steps": (with_contact("spoon", 0.6, 0.602, off_ns=1), "on physics steps of the trial"),
+    "contact that ends before it begins": (with_contact("spoon", 0.6, 0.5), "does not begin and end, in this order"),
+    "contact after the end": (with_contact("spoon", 50.0, None), "does not begin and end"),
+    "contact within another": (with_contact("spoon", 0.2, 0.3), "begins before the one before it has ended"),
+    "contacts in another order": (
+        in_header(contacts=lambda header: (Contact("head_1_link", header.start_ns, None), *header.contacts)[::-1]),
+        "not in order of their starts",
+    ),
+    "contact with ground that stops nothing": (with_contact("ground", 0.6, 0.602), "the ground stops nothing"),
+    "velocity in flight": (
+        in_samples("ball_linear_velocity", FLIGHT, 0, lambda was: was + 1e-6),
+        "velocity departs from ballistic motion by 1e-06 m/s",
+    ),
+    "all velocities": (in_samples("ball_linear_velocity", slice(None), 0, lambda was: was + 1e-6), "position departs"),
+    "orientation in flight": (turned, "orientation departs from ballistic motion"),
+    "spin in flight": (in_samples("ball_angular_velocity", FLIGHT, 2, lambda _: 1e-6), "spin departs"),
+    "no unit quaternion": (in_samples("ball_orientation_xyzw", FLIGHT, 3, lambda was: was + 1e-6), "no unit"),
+    "goal of another controller": (with_goal(controller="head_controller"), "the trajectory is sent to"),
+    "goal with an unknown status": (with_goal(status=3), "has the unknown status 3"),
+    "goal with an unknown error": (with_goal(error_code=-17, status=6), "has the unknown error code -17"),
+    "goal that succeeded with an error": (with_goal(error_code=-4, status=4), "an error code all the same"),
+    "goal that succeeded too early": (succeeded_at_once, "before its trajectory"),
+}
+
+
+@pytest.mark.parametrize("name", FORGERIES)
+def test_a_forged_episode_is_found(collection: Collection, name: str) -> None:
+    forge, problem = FORGERIES[name]
+    assert list(problems(collection, None)) == []
+    found = list(problems(collection, forge))
+    assert any(re.search(problem, each) for each in found), [each[:200] for each in found]
+    assert all(len(each) < 500 for each in found)
+
+
+def problems(collection: Collection, forge: Change | None) -> Iterator[str]:
+    channels = Channels(collection.config, full_description(collection.config))
+    return EpisodeCheck(collection.plan, {}).content_problems(collection.episode(FORGED, forge), channels)
+
+
+def test_verify_names_the_trial(collection: Collection, tmp_path: Path) -> None:
+    def change(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
+        return swapped(samples, header) if header.trial == FORGED else (samples, header)
+
+    (finding,) = verify(collection.collect(tmp_path / "dataset", change=change))
+    assert str(finding).startswith("quick_00000.mcap: trial 2: arm_right_4_joint departs from the trajectory")
+
+
+def replanned(plan: Plan, points: Points, *, seed: int | None = None) -> Plan:
+    """A plan of other points, or of the seeds of another configuration, in which digests and hashes fit."""
+    seeds = plan.config if seed is None else plan.config.model_copy(update={"seed": seed})
+    drawn = [each.seed for each in make_trials(seeds, points)]
+    digests = trial_digests(plan.config, points, drawn)
+    trials = zip(make_trials(plan.config, points), drawn, digests, strict=True)
+    return replace(plan, trials=tuple(replace(trial, seed=own, digest=digest) for trial, own, digest in trials))
+
+
+def test_a_plan_that_the_configuration_does_not_draw_is_found(collection: Collection, tmp_path: Path) -> None:
+    points = draw_points(collection.config, directory=tmp_path)
+    points.values[5] = 0.9
+    collection.plan = replanned(collection.plan, points)
+    (finding,) = verify(collection.collect(tmp_path / "dataset"))
+    assert str(finding).startswith("plan.parquet: trial 5: has task.duration_s = 0.9, the configuration draws")
+
+
+def test_seeds_that_the_configuration_does_not_give_are_found(collection: Collection, tmp_path: Path) -> None:
+    points = draw_points(collection.config, directory=tmp_path)
+    plan = replanned(collection.plan, points, seed=8)
+    found = list(drawing_findings(tmp_path, plan, None))
+    assert len(found) == len(plan.trials)
+    assert "has seed" in found[0].problem
+
+
+def test_a_plan_with_fewer_trials_is_found(collection: Collection, tmp_path: Path) -> None:
+    plan = replace(collection.plan, trials=collection.plan.trials[:6])
+    (finding,) = drawing_findings(tmp_path, plan, None)
+    assert finding.problem == "has 6 trials, the configuration draws 7"
+
+
+def test_refusals_that_are_invented_or_dropped_are_found(tmp_path: Path) -> None:
+    collection = Collection(
+        {"trials": 2, "sweep": {"sampler": "grid", "parameters": {"task.duration_s": {"values": [0.3, 1.0]}}}}
+    )
+    honest = checked_plan(collection.config, directory=tmp_path)
+    assert [trial.refused is None for trial in honest.trials] == [False, True]
+    assert list(refusal_findings(honest, (), feasibility_check)) == []
+    forged = replace(
+        honest, trials=tuple(replace(trial, refused="too fast" if trial.number else None) for trial in honest.trials)
+    )
+    dropped, invented = refusal_findings(forged, (), feasibility_check)
+    assert dropped.problem.startswith("is refused as None, the check says 'arm_right_7_joint moves at")
+    assert invented.problem == "is refused as 'too fast', the check says None"
+
+
+def test_what_depends_on_results_is_not_judged_without_them(tmp_path: Path) -> None:
+    config = Config.model_validate({**SETTINGS, "trials": None, "until": {"landed": 60}})
+    points = draw_points(config, directory=tmp_path)
+    plan = Plan(config, tuple(make_trials(config, points.first(192))))
+    assert list(drawing_findings(tmp_path, plan, None)) == []
+    plan = Plan(config, tuple(make_trials(config, Points(points.keys, points.values[::-1].copy()).first(192))))
+    found = list(drawing_findings(tmp_path, plan, None))
+    assert len(found) == 128
+
+
+@pytest.mark.parametrize(
+    ("trials", "landed", "problem"),
+    [
+        (128, 128, None),
+        (100, 100, "has 100 trials, the configuration draws 128"),
+        (192, 192, "has 192 trials, the configuration draws 128"),
+        (128, 10, "ends with trial 127, and by the results more would follow"),
+    ],
+)
+def test_the_rounds_of_a_plan_that_grew_follow_from_the_results(
+    tmp_path: Path, trials: int, landed: int, problem: str | None
+) -> None:
+    config = Config.model_validate({**SETTINGS, "trials": None, "until": {"landed": 60}})
+    plan = Plan(config, tuple(make_trials(config, draw_points(config, directory=tmp_path).first(trials))))
+    table = ThrowsTable(plan.keys, tuple(config.task.end))
+    outcomes = [Outcome.LANDED if number < landed else Outcome.TIMEOUT for number in range(trials)]
+    made = [table.row(trial.number, trial.values, ThrowResult(outcomes[trial.number]), None) for trial in plan.trials]
+    rows = {row["trial"]: row for row in table.table(made).to_pylist()}
+    assert [finding.problem for finding in drawing_findings(tmp_path, plan, rows)] == ([problem] if problem else [])

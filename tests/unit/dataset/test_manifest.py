@@ -1,0 +1,176 @@
+"""The manifest covers every promised byte, and whoever writes a dataset writes it."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from mcap.opcode import Opcode
+from tests.unit.dataset.conftest import Collection
+from tests.unit.dataset.mutations import SETTINGS, no_plan
+
+from throwcollect.dataset.derive.choice import filtered
+from throwcollect.dataset.manifest import changed_sizes, entry_of_file, promised_names, read_manifest
+from throwcollect.dataset.mcap_reader import opened
+from throwcollect.dataset.rebuild import rebuild
+from throwcollect.dataset.repair import repair
+from throwcollect.dataset.verify import verify
+from throwcollect.dataset.verify_manifest import manifest_findings
+from throwcollect.errors import DatasetError
+
+MANIFEST = "datapackage.json"
+TABLES = ["config.yaml", "metadata.yaml", "plan.parquet", "throws.parquet"]
+SHARDS = [f"quick_{number:05d}.mcap" for number in range(3)]
+FLIPS_PER_CLASS = 100
+
+
+@pytest.fixture(scope="module")
+def derived(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A small dataset with every kind of file that there is."""
+    scratch = tmp_path_factory.mktemp("derived")
+    filtered(Collection(SETTINGS).collect(scratch / "source"), scratch / "dataset", where="trial >= 0")
+    return scratch / "dataset"
+
+
+def classes(directory: Path) -> Iterator[tuple[str, str, list[range]]]:
+    """Name, file and byte ranges of each class of bytes that a flip may hit."""
+    for name in (*promised_names(directory), MANIFEST):
+        if not name.endswith(".mcap"):
+            yield name, name, [range((directory / name).stat().st_size)]
+    shard = next(name for name in promised_names(directory) if name.endswith(".mcap"))
+    size = (directory / shard).stat().st_size
+    kinds: dict[str, list[range]] = {"magic": [range(8), range(size - 8, size)]}
+    with opened(directory / shard) as contents:
+        for record in contents.records():
+            kinds.setdefault(Opcode(record.opcode).name, []).append(range(record.offset, record.end))
+    yield from ((f"MCAP {kind}", shard, places) for kind, places in kinds.items())
+
+
+def flipped(data: bytes, byte: int, bit: int) -> bytes:
+    changed = bytearray(data)
+    changed[byte] ^= 1 << bit
+    return bytes(changed)
+
+
+def test_every_flipped_bit_is_seen(derived: Path, tmp_path: Path) -> None:
+    directory = Path(shutil.copytree(derived, tmp_path / "dataset"))
+    assert verify(directory) == []
+    source, flips, kinds = random.Random(0), 0, list(classes(directory))
+    for kind, name, places in kinds:
+        whole = (directory / name).read_bytes()
+        for number in range(FLIPS_PER_CLASS):
+            byte = source.choice(source.choice(places))
+            (directory / name).write_bytes(flipped(whole, byte, source.randrange(8)))
+            flips += 1
+            assert any(manifest_findings(directory, "quick")), (kind, byte)
+            if not number:
+                assert verify(directory), (kind, byte)
+        (directory / name).write_bytes(whole)
+    assert {"MCAP CHUNK", "MCAP MESSAGE_INDEX", "MCAP METADATA", "MCAP FOOTER"} <= {kind for kind, _, _ in kinds}
+    assert flips >= 2000
+    assert verify(directory) == []
+
+
+def test_a_flip_in_the_footer_of_a_table_is_named_with_its_file(dataset: Path) -> None:
+    """What Parquet keeps beside the columns: no reader of them misses it."""
+    for name in ("plan.parquet", "throws.parquet"):
+        path = dataset / name
+        whole = path.read_bytes()
+        path.write_bytes(flipped(whole, whole.index(b"parquet-cpp-arrow") + 3, 0))
+        assert any(finding.file == name and "SHA-256" in finding.problem for finding in verify(dataset))
+        path.write_bytes(whole)
+
+
+def test_it_has_every_promised_file_and_nothing_else(dataset: Path) -> None:
+    entries = read_manifest(dataset)
+    assert [entry.path for entry in entries] == sorted([*TABLES, *SHARDS])
+    assert list(entries) == [entry_of_file(dataset / entry.path) for entry in entries]
+    document = json.loads((dataset / MANIFEST).read_text())
+    assert document["profile"] == "data-package"
+    assert document["resources"][0]["hash"].startswith("sha256:")
+
+
+def test_whoever_makes_a_dataset_of_another_writes_it(dataset: Path, derived: Path, tmp_path: Path) -> None:
+    assert [entry.path for entry in read_manifest(derived)] == promised_names(derived)
+    assert {"sources.parquet", "trials.parquet"} < set(promised_names(derived))
+    repair(dataset, tmp_path / "repaired", remake=no_plan)
+    assert (tmp_path / "repaired" / MANIFEST).read_bytes() == (dataset / MANIFEST).read_bytes()
+
+
+def test_one_of_before_is_told_and_written_by_rebuild(dataset: Path) -> None:
+    written = (dataset / MANIFEST).read_bytes()
+    (dataset / MANIFEST).unlink()
+    (finding,) = verify(dataset)
+    assert finding.file == MANIFEST
+    assert f"throwcollect dataset rebuild {dataset}" in finding.problem
+    with pytest.raises(DatasetError, match=f"{MANIFEST}: is missing"):
+        read_manifest(dataset)
+    assert MANIFEST in rebuild(dataset).written
+    assert (dataset / MANIFEST).read_bytes() == written
+
+
+def test_rebuild_does_not_cover_a_file_that_is_none_of_the_dataset(dataset: Path) -> None:
+    written = (dataset / MANIFEST).read_bytes()
+    (dataset / "other.mcap").write_bytes(b"")
+    rebuild(dataset)
+    assert (dataset / MANIFEST).read_bytes() == written
+    assert {finding.file for finding in verify(dataset)} == {"other.mcap"}
+
+
+def test_sizes_alone_tell_what_is_cut_missing_or_added(dataset: Path) -> None:
+    assert changed_sizes(dataset) == []
+    os.truncate(dataset / SHARDS[0], 100)
+    (dataset / SHARDS[1]).unlink()
+    (dataset / "sources.parquet").write_bytes(b"")
+    assert changed_sizes(dataset) == [SHARDS[0], SHARDS[1], "sources.parquet"]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "[1]",
+        '{"name": "quick", "resources": [{}]}',
+        '{"name": "quick", "resources": {}}',
+        '{"name": "quick", "resources": [1]}',
+        "[" * 100_000,
+    ],
+)
+def test_text_that_is_no_manifest_is_refused(dataset: Path, text: str) -> None:
+    (dataset / MANIFEST).write_text(text)
+    with pytest.raises(DatasetError, match=MANIFEST):
+        read_manifest(dataset)
+    assert [finding.file for finding in verify(dataset)] == [MANIFEST]
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("path", "../metadata.yaml"),
+        ("path", "/etc/passwd"),
+        ("path", "\ud800"),
+        ("bytes", True),
+        ("bytes", 1.0),
+        ("hash", "sha256:0"),
+        ("hash", "0" * 64),
+    ],
+)
+def test_an_entry_that_no_dataset_has_is_refused(dataset: Path, key: str, value: Any) -> None:
+    document = json.loads((dataset / MANIFEST).read_text())
+    document["resources"][0][key] = value
+    (dataset / MANIFEST).write_text(json.dumps(document, indent=2) + "\n")
+    with pytest.raises(DatasetError, match=MANIFEST):
+        read_manifest(dataset)
+
+
+def test_links_are_not_followed(dataset: Path, tmp_path: Path) -> None:
+    (dataset / SHARDS[0]).rename(tmp_path / SHARDS[0])
+    (dataset / SHARDS[0]).symlink_to(tmp_path / SHARDS[0])
+    assert changed_sizes(dataset) == [SHARDS[0]]
+    assert any("symbolic link" in finding.problem for finding in verify(dataset))
