@@ -11,6 +11,8 @@ TRIALS = "trials.parquet"
 """The points that the sampler `list` of the dataset's own configuration reads."""
 SOURCES = "sources.parquet"
 """Where the trials of a derived dataset come from."""
+MANIFEST = "datapackage.json"
+"""Sizes and hashes of all files that the dataset promises (see `manifest`)."""
 SHARD_SUFFIX = ".mcap"
 JOURNAL = "logs/journal.jsonl"
 

@@ -1,0 +1,166 @@
+"""The manifest ``datapackage.json``: size and hash of every file that a dataset promises.
+
+It is a Frictionless Data Package (https://specs.frictionlessdata.io/data-package/), so other tools can check it, too.
+It follows from the files alone and its text is canonical: equal files give equal bytes.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+import stat
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from throwcollect.dataset.digest import is_digest
+from throwcollect.dataset.directory import CONFIG, MANIFEST, METADATA, PLAN, SHARD_SUFFIX, SOURCES, THROWS, TRIALS
+from throwcollect.dataset.files import read_text
+from throwcollect.errors import DatasetError
+
+_PROFILE = "data-package"
+_HASH = "sha256:"
+_PROMISED = frozenset({CONFIG, METADATA, PLAN, SOURCES, THROWS, TRIALS})
+_NAME = re.compile(r"[a-z0-9][a-z0-9_.-]*")
+"""A name alone: nothing outside the directory is ever meant."""
+_MOST_BYTES = 100_000_000
+_BLOCK = 1 << 20
+
+
+@dataclass(frozen=True)
+class FileEntry:
+    """One file of a dataset.
+
+    Attributes:
+        path: Its name in the dataset's directory.
+        bytes: Its size [bytes].
+        sha256: SHA-256 of its contents, in hexadecimal.
+    """
+
+    path: str
+    bytes: int
+    sha256: str
+
+
+def entry_of(path: str, data: bytes) -> FileEntry:
+    """Entry of a file with these contents."""
+    return FileEntry(path, len(data), hashlib.sha256(data).hexdigest())
+
+
+def entry_of_file(path: Path) -> FileEntry:
+    """Entry of a file as it lies on disk.
+
+    Raises:
+        DatasetError: If it cannot be read, or is no plain file.
+    """
+    digest, size = hashlib.sha256(), 0
+    try:
+        # A link is not followed, and opening a pipe would wait for somebody to write into it.
+        with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOFOLLOW), "rb") as file:
+            if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+                raise DatasetError(f"{path}: is not a file")
+            while block := file.read(_BLOCK):
+                digest.update(block)
+                size += len(block)
+    except OSError as error:
+        raise DatasetError(f"{path}: cannot be read: {error.strerror}") from error
+    return FileEntry(path.name, size, digest.hexdigest())
+
+
+def promised_names(directory: Path) -> list[str]:
+    """Names of the files in a directory that a manifest has to cover, in order; nothing is opened.
+
+    The data card and the logs are not among them, as they say how, where and when a dataset was collected.
+    """
+    return sorted(name for name in os.listdir(directory) if name in _PROMISED or name.endswith(SHARD_SUFFIX))
+
+
+def manifest_text(name: str, entries: Iterable[FileEntry]) -> str:
+    """Text of a manifest.
+
+    Args:
+        name: Name of the collection.
+        entries: The files, in any order.
+    """
+    resources = [
+        {"name": entry.path, "path": entry.path, "bytes": entry.bytes, "hash": _HASH + entry.sha256}
+        for entry in sorted(entries, key=lambda entry: entry.path)
+    ]
+    return json.dumps({"profile": _PROFILE, "name": name, "resources": resources}, indent=2) + "\n"
+
+
+def expected_manifest(directory: Path, name: str) -> str:
+    """Text of the manifest that the files in a directory call for; all of them are read.
+
+    Args:
+        directory: Directory of a dataset.
+        name: Name of the collection.
+
+    Raises:
+        DatasetError: If a file cannot be read.
+    """
+    return manifest_text(name, (entry_of_file(directory / path) for path in promised_names(directory)))
+
+
+def read_manifest(directory: Path) -> tuple[FileEntry, ...]:
+    """Entries of the manifest of a dataset, in order of their paths.
+
+    Args:
+        directory: Directory of the dataset.
+
+    Raises:
+        DatasetError: If the manifest is missing, or its text is not one that `manifest_text` makes.
+    """
+    return named_manifest(directory)[1]
+
+
+def named_manifest(directory: Path) -> tuple[str, tuple[FileEntry, ...]]:
+    """Name of the collection that a manifest has, and its entries; see `read_manifest`."""
+    path = directory / MANIFEST
+    if not os.path.lexists(path):
+        raise DatasetError(f"{path}: is missing", hint=f"throwcollect dataset rebuild {directory}")
+    text = read_text(path, most_bytes=_MOST_BYTES)
+    try:
+        document = json.loads(text)
+        name, entries = str(document["name"]), tuple(map(_entry, document["resources"]))
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
+        raise DatasetError(f"{path}: is not the manifest of a dataset") from error
+    if text != manifest_text(name, entries) or len({entry.path for entry in entries}) < len(entries):
+        raise DatasetError(f"{path}: is not written as the manifest of a dataset is")
+    return name, entries
+
+
+def changed_sizes(directory: Path) -> list[str]:
+    """Names of the files that are missing, have another size than the manifest says, or are not in it; cheap.
+
+    Args:
+        directory: Directory of a dataset.
+
+    Raises:
+        DatasetError: If the manifest is missing or damaged.
+    """
+    said = {entry.path: entry.bytes for entry in read_manifest(directory)}
+    return [
+        name for name in sorted({*said, *promised_names(directory)}) if _size(directory / name) != said.get(name, -1)
+    ]
+
+
+def _size(path: Path) -> int | None:
+    """Size of a plain file [bytes]; None if there is none."""
+    try:
+        found = path.lstat()
+    except OSError:
+        return None
+    return found.st_size if stat.S_ISREG(found.st_mode) else None
+
+
+def _entry(resource: Any) -> FileEntry:
+    path, size, digest = resource["path"], resource["bytes"], str(resource["hash"]).removeprefix(_HASH)
+    if not isinstance(path, str) or not _NAME.fullmatch(path):
+        raise ValueError(path)
+    if type(size) is not int or not is_digest(digest):
+        raise ValueError(size, digest)
+    return FileEntry(path, size, digest)
