@@ -19,7 +19,7 @@ from throwcollect.config.loader import load, loaded
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.prepare import more_trials, prepare, self_contained
 from throwcollect.coordinator.resume import begun, finished, resume
-from throwcollect.dataset.directory import CONFIG, PLAN, TRIALS
+from throwcollect.dataset.directory import CONFIG, PLAN, TRIALS, config_path
 from throwcollect.dataset.inspect import info
 from throwcollect.dataset.journal import collected_s
 from throwcollect.errors import ConfigError, Problem
@@ -90,7 +90,7 @@ def go_on(directory: Path, *, path: Path | None, overrides: Sequence[str], detac
         raise ConfigError(f"{directory}: holds no dataset", expected="a directory that throwcollect up has made")
     with ExitStack() as places:
         try:
-            config = places.enter_context(loaded(path or directory / CONFIG, overrides))
+            config = places.enter_context(loaded(path or config_path(directory), overrides))
         except ConfigError as error:
             hint = f"throwcollect up CONFIG --resume {directory}, if the dataset's own file is damaged"
             raise ConfigError(error.problems, hint=error.hint if path else hint) from error
@@ -139,7 +139,7 @@ def serve(run: str, lock: int) -> None:
     """
     with display(quiet=True) as shown, Interruptions() as interruptions:
         inherited = Records().inherited(run, lock)
-        config = load(Path(inherited.record.directory) / CONFIG)
+        config = load(config_path(Path(inherited.record.directory)))
         launch(inherited, config, onlooker=shown, interruptions=lambda: interruptions.count)
 
 
@@ -204,7 +204,7 @@ def _remove_plan(directory: Path, *, made: bool) -> None:
 def _taken_over(records: Records, left: Run, config: Config) -> tuple[OpenRun, Config]:
     """A run whose launcher died, with its own configuration."""
     record = left.record
-    own = load(Path(record.directory) / CONFIG)
+    own = load(config_path(Path(record.directory)))
     if own.without_run() != self_contained(config).without_run():
         raise ConfigError(
             f"{record.directory}: run {record.run} collects into it, with another configuration",

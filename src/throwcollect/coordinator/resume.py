@@ -11,10 +11,11 @@ from throwcollect.config.problems import quoted
 from throwcollect.config.schema import Config
 from throwcollect.config.values import differences
 from throwcollect.coordinator.prepare import checked_plan, listed_points, self_contained
-from throwcollect.dataset.directory import CONFIG, METADATA, PLAN, TRIALS
-from throwcollect.dataset.files import remove, write_file
+from throwcollect.dataset.directory import CONFIG, METADATA, PLAN, TRIALS, config_path
 from throwcollect.dataset.reader import read_throws
+from throwcollect.dataset.recovery import remove_unfinished
 from throwcollect.errors import ConfigError, DatasetError, Problem
+from throwcollect.files import remove, write_file
 from throwcollect.sweep.plan import Plan, Trial
 from throwcollect.sweep.table import encode_points
 from throwcollect.tasks.throw import Outcome
@@ -44,6 +45,7 @@ def resume(config: Config, directory: Path, *, sweep_directory: Path) -> Plan:
     if stored is not None:
         _refuse_changes(directory, stored, config)
     old = _stored_plan(directory, stored, config)
+    remove_unfinished(directory)
     if old is None or old.config.without_run() != config.without_run():
         drawn = replace(checked_plan(given, directory=sweep_directory), config=config)
         plan = _extended(directory, old, drawn)
@@ -75,8 +77,8 @@ def finished(directory: Path, plan: Plan) -> bool:
 
 def _stored(directory: Path) -> Config | None:
     """The configuration that a dataset was begun with; None unless it is there from its first key to its last."""
-    path = directory / CONFIG
     try:
+        path = config_path(directory)
         config = load(path)
         whole = path.read_text(encoding="utf-8") == resolved_yaml(config)
     except (ConfigError, OSError):

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
+from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.files import check_regular
+
 CONFIG = "config.yaml"
 PLAN = "plan.parquet"
 THROWS = "throws.parquet"
@@ -28,3 +33,17 @@ def shard_name(collection: str, number: int) -> str:
         number: Number of the shard, counted from 0.
     """
     return f"{collection}_{number:05d}{SHARD_SUFFIX}"
+
+
+def config_path(directory: Path) -> Path:
+    """Path of the configuration in a dataset's directory.
+
+    Raises:
+        ConfigError: If something else than a file of the directory has its name.
+    """
+    path = directory / CONFIG
+    try:
+        check_regular(path)
+    except DatasetError as error:
+        raise ConfigError(error.message, hint=error.hint) from error
+    return path

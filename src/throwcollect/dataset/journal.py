@@ -16,8 +16,8 @@ from types import TracebackType
 from typing import Any, Literal, get_args
 
 from throwcollect.dataset.directory import JOURNAL
-from throwcollect.dataset.files import unwritable, write_all
 from throwcollect.errors import DatasetError
+from throwcollect.files import open_log, unwritable, write_all
 
 _LOCK_S = 5.0
 """Whoever was killed a moment ago may still hold it."""
@@ -52,8 +52,7 @@ class Journal:
     def __init__(self, directory: Path) -> None:
         self._path = directory / JOURNAL
         try:
-            self._path.parent.mkdir(exist_ok=True)
-            self._descriptor = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o666)
+            self._descriptor = open_log(self._path, os.O_RDWR | os.O_CREAT | os.O_APPEND)
         except OSError as error:
             raise unwritable(self._path, error) from error
         if not self._locked():
@@ -114,10 +113,10 @@ def read_journal(path: Path) -> Iterator[dict[str, Any]]:
         path: The file; if it is missing, nothing happened.
     """
     try:
-        file = path.open("rb")
+        descriptor = open_log(path, os.O_RDONLY)
     except OSError:
         return
-    with file:
+    with open(descriptor, "rb") as file:
         for line in file:
             try:
                 entry = json.loads(line)

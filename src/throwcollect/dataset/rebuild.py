@@ -12,15 +12,16 @@ from throwcollect.config.loader import load
 from throwcollect.dataset.bag import FileSummary, dataset_metadata
 from throwcollect.dataset.card import Provenance, data_card
 from throwcollect.dataset.digest import combined_digest
-from throwcollect.dataset.directory import CARD, CONFIG, METADATA, PLAN, THROWS
-from throwcollect.dataset.files import write_file
+from throwcollect.dataset.directory import CARD, METADATA, PLAN, THROWS, config_path
 from throwcollect.dataset.mcap_reader import StoredEpisode
+from throwcollect.dataset.recovery import remove_unfinished
 from throwcollect.dataset.throws import Row, ThrowsTable, encode_table, read_throws_table
 from throwcollect.dataset.verify_episode import EpisodeCheck, RowJudge
 from throwcollect.dataset.verify_shard import ShardCheck
 from throwcollect.dataset.verify_tables import shard_of, wrong_trials
 from throwcollect.episode.channels import Channels
 from throwcollect.errors import DatasetError
+from throwcollect.files import write_file
 from throwcollect.robots.description import full_description
 from throwcollect.sweep.plan import Plan, Trial
 from throwcollect.tasks.throw import Outcome, ThrowResult
@@ -60,9 +61,10 @@ def rebuild(directory: Path) -> Rebuilt:
             cannot be written.
         ConfigError: If the ``config.yaml`` is wrong.
     """
-    config = load(directory / CONFIG)
+    config = load(config_path(directory))
     plan = Plan.read(directory / PLAN, config)
     repair = f"throwcollect dataset repair {directory} OUTPUT"
+    remove_unfinished(directory)
     if unfinished := sorted(path.name for path in directory.glob("*.part")):
         raise DatasetError(
             f"{directory}: holds {unfinished[0]}: it is not collected to its end",

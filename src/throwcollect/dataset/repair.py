@@ -11,7 +11,7 @@ import numpy as np
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
 from throwcollect.config.values import reason_not_sweepable
-from throwcollect.dataset.directory import CONFIG, PLAN, SHARD_SUFFIX, THROWS
+from throwcollect.dataset.directory import CONFIG, PLAN, SHARD_SUFFIX, THROWS, config_path
 from throwcollect.dataset.judging import judged
 from throwcollect.dataset.new_directory import new_directory
 from throwcollect.dataset.rebuild import earlier_rows, reason_lost
@@ -100,7 +100,7 @@ def repair(directory: Path, output: Path, *, remake: Remake) -> Repaired:
 
 def _configuration(directory: Path) -> Config:
     try:
-        return load(directory / CONFIG)
+        return load(config_path(directory))
     except ConfigError as error:
         raise DatasetError(
             f"{directory}: {CONFIG} cannot be read, and nothing else holds the configuration",

@@ -20,15 +20,15 @@ from throwcollect.config.schema import Config
 from throwcollect.dataset.bag import FileSummary, dataset_metadata
 from throwcollect.dataset.card import Provenance, data_card
 from throwcollect.dataset.digest import combined_digest
-from throwcollect.dataset.directory import CARD, CONFIG, METADATA, PLAN, THROWS, TRIALS, shard_name
-from throwcollect.dataset.files import remove, write_file
+from throwcollect.dataset.directory import CARD, CONFIG, METADATA, PLAN, THROWS, TRIALS, config_path, shard_name
 from throwcollect.dataset.journal import Event, Journal
-from throwcollect.dataset.recovery import recover_shard
+from throwcollect.dataset.recovery import recover_shard, remove_unfinished
 from throwcollect.dataset.shard import FinishedShard, OpenShard
 from throwcollect.dataset.throws import Place, Row, ThrowsTable, encode_table
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.message import Episode
 from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.files import remove, write_file
 from throwcollect.robots.description import full_description
 from throwcollect.sweep.plan import Plan, Trial
 from throwcollect.sweep.points import Points
@@ -139,7 +139,7 @@ class DatasetWriter:
                 raise DatasetError(f"{directory}: holds no {name}", expected="a dataset that was created")
         with ExitStack() as undo:
             journal = undo.enter_context(Journal(directory))
-            plan = Plan.read(directory / PLAN, load(directory / CONFIG))
+            plan = Plan.read(directory / PLAN, load(config_path(directory)))
             undo.pop_all()
         return cls(directory, plan, journal=journal, growing=plan.config.grows)
 
@@ -158,6 +158,7 @@ class DatasetWriter:
         Raises:
             DatasetError: If files cannot be read or written.
         """
+        remove_unfinished(self._directory)
         for name in (METADATA, THROWS):
             remove(self._directory / name)
         found = 0

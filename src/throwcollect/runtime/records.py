@@ -26,6 +26,7 @@ from typing import Any, Literal
 from pydantic import TypeAdapter, ValidationError
 
 from throwcollect.errors import ConfigError
+from throwcollect.files import beside, write_all
 from throwcollect.runtime.supervisor import NodeState
 
 STATE_VARIABLE = "THROWCOLLECT_STATE"
@@ -159,10 +160,9 @@ class OpenRun:
         """
         self._record = record
         path = self._runs / f"{self.run}.json"
-        beside = path.with_suffix(".new")
         try:
-            beside.write_bytes(_ADAPTER.dump_json(record, indent=1))
-            beside.replace(path)
+            with beside(path) as descriptor:
+                write_all(descriptor, _ADAPTER.dump_json(record, indent=1))
         except OSError as error:
             raise _unusable(path, error) from error
 
