@@ -22,6 +22,7 @@ from throwcollect.coordinator.resume import begun, finished, resume
 from throwcollect.dataset.directory import CONFIG, PLAN, TRIALS, config_path
 from throwcollect.dataset.inspect import info
 from throwcollect.dataset.journal import collected_s
+from throwcollect.dataset.lock import held_together
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.runtime.choice import choose
 from throwcollect.runtime.detached import start_launcher, wait_for_nodes
@@ -99,29 +100,39 @@ def go_on(directory: Path, *, path: Path | None, overrides: Sequence[str], detac
 
 
 def _collect(request: _Request, *, detach: bool, json: bool) -> None:
-    config, directory = request.config, request.directory
+    directory = request.directory
     records = Records()
-    with display(quiet=json, bar=not detach) as shown:
-        left = left_in(records, directory)
-        if left is not None:
-            run, config = _taken_over(records, left, config)
-            shown.say(f"run {run.run}: its launcher had died; it goes on where its containers are")
+    # The directory is held until the launcher, which may be another process, holds it itself.
+    with ExitStack() as held:
+        with display(quiet=json, bar=not detach) as shown:
+            ready = _ready(records, request, shown, held)
+            if ready is not None and not detach:
+                with Interruptions() as interruptions:
+                    run, config = ready
+                    summary = launch(run, config, onlooker=shown, interruptions=lambda: interruptions.count)
+        if ready is None:
+            print_summary(info(directory).as_dict(), directory, as_json=json)
+        elif detach:
+            _detach(records, ready[0], json=json)
         else:
-            plan = None
-            if request.resumed:
-                plan = resume(config, directory, sweep_directory=request.sweep_directory)
-                if finished(directory, plan):
-                    shown.say(f"{directory}: every trial has ended, nothing is left to do")
-                    print_summary(info(directory).as_dict(), directory, as_json=json)
-                    return
-            run = _prepared(records, request, plan, shown)
-        if not detach:
-            with Interruptions() as interruptions:
-                summary = launch(run, config, onlooker=shown, interruptions=lambda: interruptions.count)
-    if detach:
-        _detach(records, run, json=json)
-    else:
-        print_summary(summary, None if run.record.volume else directory, as_json=json)
+            print_summary(summary, None if run.record.volume else directory, as_json=json)
+
+
+def _ready(records: Records, request: _Request, shown: Display, held: ExitStack) -> tuple[OpenRun, Config] | None:
+    """A run that is ready to be launched, and its configuration; None if there is nothing left to do."""
+    config, directory = request.config, request.directory
+    left = left_in(records, directory)
+    if left is not None:
+        run, config = _taken_over(records, left, config)
+        shown.say(f"run {run.run}: its launcher had died; it goes on where its containers are")
+        return run, config
+    plan = None
+    if request.resumed:
+        plan = resume(config, directory, sweep_directory=request.sweep_directory)
+        if finished(directory, plan):
+            shown.say(f"{directory}: every trial has ended, nothing is left to do")
+            return None
+    return _prepared(records, request, plan, shown, held), config
 
 
 def serve(run: str, lock: int) -> None:
@@ -143,8 +154,11 @@ def serve(run: str, lock: int) -> None:
         launch(inherited, config, onlooker=shown, interruptions=lambda: interruptions.count)
 
 
-def _prepared(records: Records, request: _Request, plan: Plan | None, shown: Display) -> OpenRun:
-    """A run that is ready to be launched; nothing is left behind if that fails."""
+def _prepared(records: Records, request: _Request, plan: Plan | None, shown: Display, held: ExitStack) -> OpenRun:
+    """A run that is ready to be launched; nothing is left behind if that fails.
+
+    Until `held` is closed, nobody else prepares a run into its directory.
+    """
     config = request.config
     with ExitStack() as undo:
         run = records.new(config.name)
@@ -162,11 +176,13 @@ def _prepared(records: Records, request: _Request, plan: Plan | None, shown: Dis
                 expected="a dataset in a directory",
             )
         directory = run.directory / "data" if volume else request.directory
+        made = not directory.exists()
         if plan is None:
             if (config.trials or 0) >= _MANY_TRIALS and not config.grows:
                 shown.say(f"plan: checking {config.trials} trials against limits and collisions, about 5 ms each")
-            made = not directory.exists()
             plan = prepare(config, directory, sweep_directory=request.sweep_directory)
+        held.enter_context(held_together(directory))
+        if not request.resumed:
             undo.callback(_remove_plan, directory, made=made)
         runtime = runtime or choose(config, say=shown.say, warn=shown.warn)
         record = Record(

@@ -12,6 +12,7 @@ from throwcollect.config.schema import Config
 from throwcollect.config.values import differences
 from throwcollect.coordinator.prepare import checked_plan, listed_points, self_contained
 from throwcollect.dataset.directory import CONFIG, METADATA, PLAN, TRIALS, config_path
+from throwcollect.dataset.lock import held_alone
 from throwcollect.dataset.reader import read_throws
 from throwcollect.dataset.recovery import remove_unfinished
 from throwcollect.errors import ConfigError, DatasetError, Problem
@@ -38,9 +39,15 @@ def resume(config: Config, directory: Path, *, sweep_directory: Path) -> Plan:
 
     Raises:
         ConfigError: If the configuration is another one, or has fewer trials, or other ones.
-        DatasetError: If files cannot be written, or both the stored configuration and the plan are damaged.
+        DatasetError: If another process changes the dataset, files cannot be written, or both the stored configuration
+            and the plan are damaged.
     """
-    given, config = config, self_contained(config)
+    with held_alone(directory):
+        return _resumed(config, directory, sweep_directory)
+
+
+def _resumed(given: Config, directory: Path, sweep_directory: Path) -> Plan:
+    config = self_contained(given)
     stored = _stored(directory)
     if stored is not None:
         _refuse_changes(directory, stored, config)

@@ -6,7 +6,6 @@ the event. Nothing is read back from it to make the dataset; it is there for peo
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
 import time
@@ -16,11 +15,9 @@ from types import TracebackType
 from typing import Any, Literal, get_args
 
 from throwcollect.dataset.directory import JOURNAL
+from throwcollect.dataset.lock import lock
 from throwcollect.errors import DatasetError
 from throwcollect.files import open_log, unwritable, write_all
-
-_LOCK_S = 5.0
-"""Whoever was killed a moment ago may still hold it."""
 
 Event = Literal["opened", "recovered", "planned", "lease", "commit", "fail", "lost", "shard", "finished"]
 """
@@ -55,11 +52,11 @@ class Journal:
             self._descriptor = open_log(self._path, os.O_RDWR | os.O_CREAT | os.O_APPEND)
         except OSError as error:
             raise unwritable(self._path, error) from error
-        if not self._locked():
+        try:
+            lock(self._descriptor, directory)
+        except DatasetError:
             os.close(self._descriptor)
-            raise DatasetError(
-                f"{directory}: another process collects into it", hint="throwcollect ps lists the runs of this machine"
-            )
+            raise
         self.earlier_s = collected_s(directory)
         size = os.fstat(self._descriptor).st_size
         if size and os.pread(self._descriptor, 1, size - 1) != b"\n":
@@ -86,18 +83,6 @@ class Journal:
     def close(self) -> None:
         """Let other processes have it."""
         os.close(self._descriptor)
-
-    def _locked(self) -> bool:
-        deadline = time.monotonic() + _LOCK_S
-        while True:
-            try:
-                fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError:
-                if time.monotonic() > deadline:
-                    return False
-                time.sleep(0.05)
-            else:
-                return True
 
     def _append(self, data: bytes) -> None:
         try:

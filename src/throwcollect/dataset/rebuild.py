@@ -13,6 +13,7 @@ from throwcollect.dataset.bag import FileSummary, dataset_metadata
 from throwcollect.dataset.card import Provenance, data_card
 from throwcollect.dataset.digest import combined_digest
 from throwcollect.dataset.directory import CARD, METADATA, PLAN, THROWS, config_path
+from throwcollect.dataset.lock import held_alone
 from throwcollect.dataset.mcap_reader import StoredEpisode
 from throwcollect.dataset.recovery import remove_unfinished
 from throwcollect.dataset.throws import Row, ThrowsTable, encode_table, read_throws_table
@@ -57,10 +58,15 @@ def rebuild(directory: Path) -> Rebuilt:
         directory: Directory of a dataset.
 
     Raises:
-        DatasetError: If the plan or a recording is missing or damaged, the dataset is still being collected, or a file
-            cannot be written.
+        DatasetError: If the plan or a recording is missing or damaged, another process changes the dataset, it is not
+            collected to its end, or a file cannot be written.
         ConfigError: If the ``config.yaml`` is wrong.
     """
+    with held_alone(directory):
+        return _rebuilt(directory)
+
+
+def _rebuilt(directory: Path) -> Rebuilt:
     config = load(config_path(directory))
     plan = Plan.read(directory / PLAN, config)
     repair = f"throwcollect dataset repair {directory} OUTPUT"

@@ -16,6 +16,7 @@ from throwcollect import ros
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.progress import Progress
 from throwcollect.dataset.inspect import info
+from throwcollect.dataset.lock import held_together
 from throwcollect.errors import ConfigError, DatasetError, Interrupted, ThrowcollectError, WorkerError
 from throwcollect.runtime.events import EventLog, RunEvent
 from throwcollect.runtime.listening import Listening
@@ -85,13 +86,14 @@ def launch(
     Raises:
         ConfigError: If the configuration cannot be used after all.
         WorkerError: If nodes cannot be started or kept alive.
-        DatasetError: If the dataset cannot be written.
+        DatasetError: If another process changes the dataset, or it cannot be written.
         Interrupted: If the user stopped the collection.
     """
     notes = _Notes(run, onlooker)
     code, message, summary = 1, "internal error", None
     try:
-        summary = _Launcher(run, config, notes, onlooker, interruptions).run_to_the_end()
+        with held_together(Path(run.record.directory)):
+            summary = _Launcher(run, config, notes, onlooker, interruptions).run_to_the_end()
         code, message = 0, ""
         return summary
     except ThrowcollectError as error:

@@ -313,7 +313,7 @@ def test_closing_the_plan_finishes_what_is_complete(trials: Trials, tmp_path: Pa
 def test_two_processes_cannot_collect_into_one_directory(
     trials: Trials, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("throwcollect.dataset.journal._LOCK_S", 0.0)
+    monkeypatch.setattr("throwcollect.dataset.lock.PATIENCE_S", 0.0)
     create(tmp_path / "dataset", trials.plan)
     writer = DatasetWriter.open(tmp_path / "dataset")
     with pytest.raises(DatasetError, match="another process collects into it"):
