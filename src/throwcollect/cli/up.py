@@ -39,13 +39,23 @@ _MANY_TRIALS = 1000
 
 @dataclass(frozen=True)
 class _Request:
-    """What the user asked for: the configuration, where its file lies, the dataset's directory, when, and if anew."""
+    """What the user asked for.
+
+    Attributes:
+        config: The configuration.
+        sweep_directory: Where its file lies.
+        directory: Directory of the dataset.
+        started: When.
+        resumed: Whether the directory holds a dataset, with which the run goes on.
+        check: Whether the files of a finished dataset are compared byte for byte.
+    """
 
     config: Config
     sweep_directory: Path
     directory: Path
     started: datetime
     resumed: bool
+    check: bool = False
 
 
 def collect(path: Path, *, overrides: Sequence[str], output: Path | None, detach: bool, json: bool) -> None:
@@ -70,7 +80,9 @@ def collect(path: Path, *, overrides: Sequence[str], output: Path | None, detach
         _collect(_Request(config, path.parent, directory, started, resumed=False), detach=detach, json=json)
 
 
-def go_on(directory: Path, *, path: Path | None, overrides: Sequence[str], detach: bool, json: bool) -> None:
+def go_on(
+    directory: Path, *, path: Path | None, overrides: Sequence[str], detach: bool, json: bool, check: bool = False
+) -> None:
     """Go on with the dataset that an earlier collection has left, and print as `collect` does.
 
     Args:
@@ -79,6 +91,7 @@ def go_on(directory: Path, *, path: Path | None, overrides: Sequence[str], detac
         overrides: What replaces keys of it.
         detach: Whether to return as soon as the nodes are started.
         json: Whether to print JSON.
+        check: Whether the files of a finished dataset are compared byte for byte, and not only by their sizes.
 
     Raises:
         ConfigError: If there is no such dataset, or the configuration is another one.
@@ -96,7 +109,8 @@ def go_on(directory: Path, *, path: Path | None, overrides: Sequence[str], detac
             hint = f"throwcollect up CONFIG --resume {directory}, if the dataset's own file is damaged"
             raise ConfigError(error.problems, hint=error.hint if path else hint) from error
         sweep_directory = directory if path is None else path.parent
-        _collect(_Request(config, sweep_directory, directory, started, resumed=True), detach=detach, json=json)
+        request = _Request(config, sweep_directory, directory, started, resumed=True, check=check)
+        _collect(request, detach=detach, json=json)
 
 
 def _collect(request: _Request, *, detach: bool, json: bool) -> None:
@@ -128,7 +142,7 @@ def _ready(records: Records, request: _Request, shown: Display, held: ExitStack)
         return run, config
     plan = None
     if request.resumed:
-        plan = resume(config, directory, sweep_directory=request.sweep_directory)
+        plan = resume(config, directory, sweep_directory=request.sweep_directory, check=request.check, say=shown.say)
         if finished(directory, plan):
             shown.say(f"{directory}: every trial has ended, nothing is left to do")
             return None
