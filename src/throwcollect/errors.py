@@ -6,7 +6,7 @@
     ├── ConfigError                  exit 2   the request is wrong; nothing has been started
     │   └── PlanError                exit 2   the sweep yields no trial that could be run
     ├── WorkerError                  exit 3   a process of the run could not be started or was lost for good
-    ├── LossError                    exit 5   a dataset is there, but trials of it are lost
+    ├── LossError                    exit 5   a dataset is there, but trials of it are lost or doubtful
     ├── DatasetError                 exit 4   a dataset is missing, torn or contradicts itself
     │   └── ForeignPlanError         exit 4   a plan was made for another configuration
     ├── RequestError                 exit 1   what a client asks of a running simulation cannot be done
@@ -101,7 +101,7 @@ class WorkerError(ThrowcollectError):
 
 
 class LossError(ThrowcollectError):
-    """A dataset was collected or mended to its end, but trials of it are lost."""
+    """A dataset was collected or mended to its end, but trials of it are lost or doubtful."""
 
     exit_code = 5
 

@@ -16,6 +16,7 @@ from datetime import datetime, timedelta, timezone
 from pathlib import Path
 
 from throwcollect.errors import ConfigError
+from throwcollect.files import beside, write_all
 
 KEY_VARIABLE = "THROWCOLLECT_KEY"
 """Names the directory of the key of the run that a process belongs to."""
@@ -79,11 +80,8 @@ class RunKey:
             self.directory.mkdir(mode=0o700, parents=True, exist_ok=True)
             # The private key comes last: whoever waits for a key waits for that file.
             for path, data in ((self.certificate, certificate), (self.private_key, private_key)):
-                beside = path.with_suffix(".new")
-                beside.unlink(missing_ok=True)
-                with open(os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
-                    file.write(data)
-                beside.replace(path)
+                with beside(path, mode=0o600) as descriptor:
+                    write_all(descriptor, data)
         except OSError as error:
             raise ConfigError(f"{self.directory}: the key of the run cannot be written: {error.strerror}") from error
 

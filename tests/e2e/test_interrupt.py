@@ -3,6 +3,7 @@
 import io
 import json
 import os
+import shutil
 import signal
 from collections import Counter
 from collections.abc import Iterator
@@ -189,6 +190,21 @@ def test_a_killed_coordinator_is_started_again_and_takes_in_what_is_there(
     assert "coordinator was lost (ended by SIGKILL) and is started again" in err
     assert fingerprints(tmp_path / "data") == fingerprints(reference)
     assert next(event["episodes"] for event in events(tmp_path / "data") if event["event"] == "recovered") > 0
+
+
+def test_a_finished_dataset_whose_recording_was_cut_goes_on_to_the_same_files(
+    config: Path, reference: Path, tmp_path: Path
+) -> None:
+    directory = Path(shutil.copytree(reference, tmp_path / "data"))
+    said = call("resume", directory, "--check")
+    assert (said.returncode, "every trial has ended, nothing is left to do" in said.stderr) == (0, True)
+    shard = directory / "small_00000.mcap"
+    size = shard.stat().st_size
+    os.truncate(shard, size * 2 // 3)
+    said = call("resume", directory, "-n", "2", "--runtime", "local")
+    assert said.returncode == 0, said.stderr
+    assert f"{directory}: small_00000.mcap: " in said.stderr
+    assert fingerprints(directory) == fingerprints(reference)
 
 
 def test_a_power_cut_costs_what_had_not_reached_the_disk(

@@ -240,6 +240,19 @@ def test_a_run_in_the_foreground_is_a_run_like_any_other(config: Path, records: 
         f"throwcollect: {tmp_path / 'data'}: run {run} collects into it\n"
         f"  try: throwcollect wait --run {run} follows it\n"
     )
+    # Somebody whose records do not have the run is kept out as well, before anything is changed.
+    plan = (tmp_path / "data" / "plan.parquet").read_bytes()
+    third = subprocess.run(
+        command("resume", tmp_path / "data", "--trials", str(MANY + 1)),
+        env={**os.environ, STATE_VARIABLE: str(tmp_path / "other")},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert (third.returncode, third.stdout) == (4, "")
+    assert f"throwcollect: {tmp_path / 'data'}: another process collects into it" in third.stderr
+    assert (tmp_path / "data" / "plan.parquet").read_bytes() == plan
     table = call("ps").stdout.splitlines()
     assert table[0].split() == ["RUN", "RUNTIME", "SIMULATIONS", "THROWS", "STATUS", "DATASET"]
     assert [line.split()[:2] for line in table[1:]] == [

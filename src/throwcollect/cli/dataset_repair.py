@@ -9,6 +9,7 @@ from pathlib import Path
 import typer
 
 from throwcollect.coordinator.prepare import checked_plan
+from throwcollect.dataset.directory import THROWS
 from throwcollect.dataset.rebuild import rebuild
 from throwcollect.dataset.repair import repair
 from throwcollect.errors import LossError
@@ -39,7 +40,7 @@ def show_repaired(directory: Path, output: Path, *, json: bool) -> None:
     """Mend a dataset into a new directory and print what was wrong and what is lost.
 
     Raises:
-        LossError: If trials are lost.
+        LossError: If trials are lost, or have other episodes than the table of throws had.
         DatasetError: If configuration and plan cannot be had, or files cannot be read or written.
         ConfigError: If the new directory holds something already.
     """
@@ -56,4 +57,11 @@ def show_repaired(directory: Path, output: Path, *, json: bool) -> None:
         count = len(repaired.lost)
         raise LossError(
             f"{output}: {count} trial{'s are' if count > 1 else ' is'} lost", hint=command("resume", output)
+        )
+    if repaired.differing:
+        first = repaired.differing[0].trial
+        raise LossError(
+            f"{output}: {counted(len(repaired.differing), 'episode')} kept, such as that of trial {first}, "
+            f"which {THROWS} had otherwise",
+            hint=f"throwcollect dataset replay {output} --trial {first} simulates it again and compares",
         )

@@ -127,6 +127,9 @@ def resume_(
     settings: SetOption = None,
     runtime: RuntimeOption = None,
     trials: TrialsOption = None,
+    check: Annotated[
+        bool, typer.Option("--check", help="If it is finished, compare every byte of its files, not only their sizes.")
+    ] = False,
     detach: DetachOption = False,
     json: JsonOption = False,
 ) -> None:
@@ -134,7 +137,7 @@ def resume_(
     from throwcollect.cli.up import go_on
 
     overrides = _overrides(settings, trials=trials, run__simulations=simulations, run__runtime=runtime)
-    go_on(directory, path=None, overrides=overrides, detach=detach, json=json)
+    go_on(directory, path=None, overrides=overrides, detach=detach, json=json, check=check)
 
 
 @app.command(rich_help_panel=RUNS)

@@ -19,8 +19,9 @@ from throwcollect.config.loader import load, loaded
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.prepare import more_trials, prepare, self_contained
 from throwcollect.coordinator.resume import begun, finished, resume
-from throwcollect.dataset.directory import CONFIG, PLAN, TRIALS
+from throwcollect.dataset.directory import CONFIG, PLAN, TRIALS, config_path
 from throwcollect.dataset.inspect import info
+from throwcollect.dataset.lock import held_together
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.runtime.choice import choose
 from throwcollect.runtime.detached import start_launcher, wait_for_nodes
@@ -37,13 +38,23 @@ _MANY_TRIALS = 1000
 
 @dataclass(frozen=True)
 class _Request:
-    """What the user asked for: the configuration, where its file lies, the dataset's directory, when, and if anew."""
+    """What the user asked for.
+
+    Attributes:
+        config: The configuration.
+        sweep_directory: Where its file lies.
+        directory: Directory of the dataset.
+        started: When.
+        resumed: Whether the directory holds a dataset, with which the run goes on.
+        check: Whether the files of a finished dataset are compared byte for byte.
+    """
 
     config: Config
     sweep_directory: Path
     directory: Path
     started: datetime
     resumed: bool
+    check: bool = False
 
 
 def collect(path: Path, *, overrides: Sequence[str], output: Path | None, detach: bool, json: bool) -> None:
@@ -68,7 +79,9 @@ def collect(path: Path, *, overrides: Sequence[str], output: Path | None, detach
         _collect(_Request(config, path.parent, directory, started, resumed=False), detach=detach, json=json)
 
 
-def go_on(directory: Path, *, path: Path | None, overrides: Sequence[str], detach: bool, json: bool) -> None:
+def go_on(
+    directory: Path, *, path: Path | None, overrides: Sequence[str], detach: bool, json: bool, check: bool = False
+) -> None:
     """Go on with the dataset that an earlier collection has left, and print as `collect` does.
 
     Args:
@@ -77,6 +90,7 @@ def go_on(directory: Path, *, path: Path | None, overrides: Sequence[str], detac
         overrides: What replaces keys of it.
         detach: Whether to return as soon as the nodes are started.
         json: Whether to print JSON.
+        check: Whether the files of a finished dataset are compared byte for byte, and not only by their sizes.
 
     Raises:
         ConfigError: If there is no such dataset, or the configuration is another one.
@@ -89,41 +103,52 @@ def go_on(directory: Path, *, path: Path | None, overrides: Sequence[str], detac
         raise ConfigError(f"{directory}: holds no dataset", expected="a directory that throwcollect up has made")
     with ExitStack() as places:
         try:
-            config = places.enter_context(loaded(path or directory / CONFIG, overrides))
+            config = places.enter_context(loaded(path or config_path(directory), overrides))
         except ConfigError as error:
             hint = f"{command('up', 'CONFIG', '--resume', directory)}, if the dataset's own file is damaged"
             raise ConfigError(error.problems, hint=error.hint if path else hint) from error
         sweep_directory = directory if path is None else path.parent
-        _collect(_Request(config, sweep_directory, directory, started, resumed=True), detach=detach, json=json)
+        request = _Request(config, sweep_directory, directory, started, resumed=True, check=check)
+        _collect(request, detach=detach, json=json)
 
 
 def _collect(request: _Request, *, detach: bool, json: bool) -> None:
-    config, directory = request.config, request.directory
+    directory = request.directory
     records = Records()
-    with display(quiet=json, bar=not detach) as shown:
-        left = left_in(records, directory)
-        if left is not None:
-            run, config = _taken_over(records, left, config)
-            fate = "died" if left.status == "died" else "given up"
-            shown.say(f"run {run.run}: its launcher had {fate}; it goes on where its containers are")
+    # The directory is held until the launcher, which may be another process, holds it itself.
+    with ExitStack() as held:
+        with display(quiet=json, bar=not detach) as shown:
+            ready = _ready(records, request, shown, held)
+            if ready is not None and not detach:
+                with Interruptions() as interruptions:
+                    run, config = ready
+                    summary, lost = launch(run, config, onlooker=shown, interruptions=lambda: interruptions.count)
+        if ready is None:
+            print_summary(info(directory).as_dict(), directory, as_json=json)
+        elif detach:
+            _detach(records, ready[0], json=json)
         else:
-            plan = None
-            if request.resumed:
-                plan = resume(config, directory, sweep_directory=request.sweep_directory)
-                if finished(directory, plan):
-                    shown.say(f"{directory}: every trial has ended, nothing is left to do")
-                    print_summary(info(directory).as_dict(), directory, as_json=json)
-                    return
-            run = _prepared(records, request, plan, shown)
-        if not detach:
-            with Interruptions() as interruptions:
-                summary, lost = launch(run, config, onlooker=shown, interruptions=lambda: interruptions.count)
-    if detach:
-        _detach(records, run, json=json)
-        return
-    print_summary(summary, None if run.record.volume else directory, as_json=json)
-    if lost is not None:
-        raise lost
+            print_summary(summary, None if run.record.volume else directory, as_json=json)
+            if lost is not None:
+                raise lost
+
+
+def _ready(records: Records, request: _Request, shown: Display, held: ExitStack) -> tuple[OpenRun, Config] | None:
+    """A run that is ready to be launched, and its configuration; None if there is nothing left to do."""
+    config, directory = request.config, request.directory
+    left = left_in(records, directory)
+    if left is not None:
+        run, config = _taken_over(records, left, config)
+        fate = "died" if left.status == "died" else "given up"
+        shown.say(f"run {run.run}: its launcher had {fate}; it goes on where its containers are")
+        return run, config
+    plan = None
+    if request.resumed:
+        plan = resume(config, directory, sweep_directory=request.sweep_directory, check=request.check, say=shown.say)
+        if finished(directory, plan):
+            shown.say(f"{directory}: every trial has ended, nothing is left to do")
+            return None
+    return _prepared(records, request, plan, shown, held), config
 
 
 def serve(run: str, lock: int) -> None:
@@ -141,12 +166,15 @@ def serve(run: str, lock: int) -> None:
     """
     with display(quiet=True) as shown, Interruptions() as interruptions:
         inherited = Records().inherited(run, lock)
-        config = load(Path(inherited.record.directory) / CONFIG)
+        config = load(config_path(Path(inherited.record.directory)))
         launch(inherited, config, onlooker=shown, interruptions=lambda: interruptions.count)
 
 
-def _prepared(records: Records, request: _Request, plan: Plan | None, shown: Display) -> OpenRun:
-    """A run that is ready to be launched; nothing is left behind if that fails."""
+def _prepared(records: Records, request: _Request, plan: Plan | None, shown: Display, held: ExitStack) -> OpenRun:
+    """A run that is ready to be launched; nothing is left behind if that fails.
+
+    Until `held` is closed, nobody else prepares a run into its directory.
+    """
     config = request.config
     with ExitStack() as undo:
         run = records.new(config.name)
@@ -164,11 +192,13 @@ def _prepared(records: Records, request: _Request, plan: Plan | None, shown: Dis
                 expected="a dataset in a directory",
             )
         directory = run.directory / "data" if volume else request.directory
+        made = not directory.exists()
         if plan is None:
             if (config.trials or 0) >= _MANY_TRIALS and not config.grows:
                 shown.say(f"plan: checking {config.trials} trials against limits and collisions, about 5 ms each")
-            made = not directory.exists()
             plan = prepare(config, directory, sweep_directory=request.sweep_directory)
+        held.enter_context(held_together(directory))
+        if not request.resumed:
             undo.callback(_remove_plan, directory, made=made)
         runtime = runtime or choose(config, say=shown.say, warn=shown.warn)
         record = Record(
@@ -207,7 +237,7 @@ def _remove_plan(directory: Path, *, made: bool) -> None:
 def _taken_over(records: Records, left: Run, config: Config) -> tuple[OpenRun, Config]:
     """A run that has no launcher any more, with its own configuration."""
     record = left.record
-    own = load(Path(record.directory) / CONFIG)
+    own = load(config_path(Path(record.directory)))
     if own.without_run() != self_contained(config).without_run():
         raise ConfigError(
             f"{record.directory}: run {record.run} collects into it, with another configuration",

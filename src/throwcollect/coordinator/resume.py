@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,14 +11,20 @@ from throwcollect.config.problems import quoted
 from throwcollect.config.schema import Config
 from throwcollect.config.values import differences
 from throwcollect.coordinator.prepare import checked_plan, listed_points, self_contained
-from throwcollect.dataset.directory import CONFIG, METADATA, PLAN, TRIALS
-from throwcollect.dataset.files import remove, write_file
+from throwcollect.dataset.completeness import is_as_written, missing_or_damaged
+from throwcollect.dataset.directory import CONFIG, METADATA, PLAN, SOURCES, TRIALS, config_path
+from throwcollect.dataset.lock import held_alone
 from throwcollect.dataset.reader import read_throws
-from throwcollect.errors import ConfigError, DatasetError, Problem
+from throwcollect.dataset.recovery import remove_unfinished
+from throwcollect.dataset.verify_tables import wrong_trials
+from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError, Problem
+from throwcollect.files import check_regular, is_there, remove, write_file
 from throwcollect.sweep.plan import Plan, Trial
 from throwcollect.sweep.table import encode_points
 from throwcollect.tasks.throw import Outcome
 from throwcollect.wording import command
+
+Say = Callable[[str], None]
 
 _MAY_GROW = ("trials", "until.landed")
 
@@ -28,40 +34,89 @@ def begun(directory: Path) -> bool:
     return (directory / CONFIG).is_file() or (directory / PLAN).is_file()
 
 
-def resume(config: Config, directory: Path, *, sweep_directory: Path) -> Plan:
+def resume(
+    config: Config, directory: Path, *, sweep_directory: Path, check: bool = False, say: Say = lambda _: None
+) -> Plan:
     """Have a dataset's directory hold a configuration and its plan, of which some trials may have run already.
+
+    A finished dataset of which a file is missing or damaged counts as unfinished from then on.
 
     Args:
         config: The configuration to go on with. It may differ in how it is run, and have more trials.
         directory: Directory of the dataset.
         sweep_directory: Where a relative `sweep.file` is looked for, should the plan be made anew.
+        check: Whether the files of a finished dataset are compared byte for byte, and not only by their sizes.
+        say: Told what of a finished dataset is missing or damaged.
 
     Raises:
         ConfigError: If the configuration is another one, or has fewer trials, or other ones.
-        DatasetError: If files cannot be written, or both the stored configuration and the plan are damaged.
+        DatasetError: If another process changes the dataset, files cannot be written, or something is damaged that
+            cannot be made again.
     """
-    given, config = config, self_contained(config)
-    stored = _stored(directory)
-    if stored is not None:
-        _refuse_changes(directory, stored, config)
-    old = _stored_plan(directory, stored, config)
-    if old is None or old.config.without_run() != config.without_run():
+    with held_alone(directory):
+        stored = _stored(directory)
+        if stored is not None:
+            _refuse_changes(directory, stored, self_contained(config))
+        old = _stored_plan(directory, stored, self_contained(config))
+        damaged = _damaged(directory, old, check=check, say=say)
+        check_regular(directory / TRIALS)
+        if TRIALS in damaged and sweep_directory.samefile(directory):
+            raise DatasetError(
+                f"{directory / TRIALS}: is missing or damaged, and nothing else holds the list of trials",
+                hint=f"throwcollect up CONFIG --resume {directory}, with the file that sweep.file of CONFIG names",
+            )
+        if old is not None and PLAN in damaged and (not config.grows or wrong_trials(old)):
+            # It is drawn again; one that grew with the results cannot be, and stays if its trials are what they were.
+            old = None
+        remove_unfinished(directory)
+        return _written(config, directory, sweep_directory, stored, old, damaged)
+
+
+def _written(
+    given: Config,
+    directory: Path,
+    sweep_directory: Path,
+    stored: Config | None,
+    old: Plan | None,
+    damaged: Collection[str],
+) -> Plan:
+    config = self_contained(given)
+    if old is None or TRIALS in damaged or old.config.without_run() != config.without_run():
         drawn = replace(checked_plan(given, directory=sweep_directory), config=config)
         plan = _extended(directory, old, drawn)
         if (listed := listed_points(given, directory=sweep_directory)) is not None:
             write_file(directory / TRIALS, encode_points(listed))
     else:
         plan = replace(old, config=config)
-    if stored is not None and stored.without_run() != config.without_run():
-        # It was perhaps finished by the configuration that it had; by this one it is not.
+    if damaged or (stored is not None and stored.without_run() != config.without_run()):
+        # It was perhaps finished by the configuration that it had, or with files that are not there any more.
         remove(directory / METADATA)
     # A finished dataset stays as it is, and says nothing of how it is run.
     kept = config.without_run() if finished(directory, plan) else config
+    replanned = old is None or plan.trials != old.trials or kept.without_run() != old.config.without_run()
     if stored != kept:
+        if replanned:
+            # A plan that does not belong to its configuration is nobody's; a missing one is made again.
+            remove(directory / PLAN)
         write_file(directory / CONFIG, resolved_yaml(kept).encode())
-    if old is None or plan.trials != old.trials or kept.without_run() != old.config.without_run():
+    if replanned or PLAN in damaged:
         plan.write(directory / PLAN)
     return plan
+
+
+def _damaged(directory: Path, plan: Plan | None, *, check: bool, say: Say) -> frozenset[str]:
+    """Names of the files of a finished dataset that are missing or damaged; none if it is not finished."""
+    if not is_there(directory / METADATA):
+        return frozenset()
+    findings = missing_or_damaged(directory, plan, in_full=check)
+    for finding in findings:
+        say(f"{directory}: {finding}")
+    if any(finding.file == SOURCES for finding in findings):
+        raise DatasetError(
+            f"{directory / SOURCES}: is missing or damaged, and nothing else says where the trials come from",
+            hint="derive the dataset again",
+        )
+    return frozenset(finding.file for finding in findings)
 
 
 def finished(directory: Path, plan: Plan) -> bool:
@@ -76,8 +131,8 @@ def finished(directory: Path, plan: Plan) -> bool:
 
 def _stored(directory: Path) -> Config | None:
     """The configuration that a dataset was begun with; None unless it is there from its first key to its last."""
-    path = directory / CONFIG
     try:
+        path = config_path(directory)
         config = load(path)
         whole = path.read_text(encoding="utf-8") == resolved_yaml(config)
     except (ConfigError, OSError):
@@ -89,6 +144,11 @@ def _stored_plan(directory: Path, stored: Config | None, config: Config) -> Plan
     try:
         return Plan.read(directory / PLAN, stored or config)
     except DatasetError as error:
+        if stored is not None and isinstance(error, ForeignPlanError) and not is_as_written(directory, CONFIG):
+            raise ForeignPlanError(
+                f"{error.message} than {CONFIG}; one of the two was changed, and nothing says which",
+                hint=f"restore {CONFIG}, or remove {PLAN} if it is the one that is wrong",
+            ) from error
         if stored is None:
             # A power cut may have cost the configuration; then only the plan can tell that it was this one.
             hint = f"{command('up', 'CONFIG', '--resume', directory)}, as at first"

@@ -17,9 +17,9 @@ from ruamel.yaml.error import YAMLError
 from ruamel.yaml.events import AliasEvent
 
 from throwcollect.dataset.directory import FORMAT
-from throwcollect.dataset.files import read_text
 from throwcollect.episode.channels import Channel
 from throwcollect.errors import DatasetError
+from throwcollect.files import read_text
 from throwcollect.interfaces import type_hash
 
 VERSION = 9

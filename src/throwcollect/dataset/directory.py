@@ -5,6 +5,9 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.files import check_regular
+
 DIRECTORY_VARIABLE = "THROWCOLLECT_DIRECTORY"
 """Directory of the dataset as its user knows it, for processes that see it elsewhere; empty if there is none."""
 
@@ -44,3 +47,17 @@ def known_directory(directory: Path) -> Path | None:
     """
     known = os.environ.get(DIRECTORY_VARIABLE, str(directory))
     return Path(known) if known else None
+
+
+def config_path(directory: Path) -> Path:
+    """Path of the configuration in a dataset's directory.
+
+    Raises:
+        ConfigError: If something else than a file of the directory has its name.
+    """
+    path = directory / CONFIG
+    try:
+        check_regular(path)
+    except DatasetError as error:
+        raise ConfigError(error.message, hint=error.hint) from error
+    return path

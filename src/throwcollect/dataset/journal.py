@@ -6,7 +6,6 @@ the event. Nothing is read back from it to make the dataset; it is there for peo
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
 import time
@@ -16,11 +15,9 @@ from types import TracebackType
 from typing import Any, Literal, get_args
 
 from throwcollect.dataset.directory import JOURNAL
-from throwcollect.dataset.files import unwritable, write_all
+from throwcollect.dataset.lock import lock
 from throwcollect.errors import DatasetError
-
-_LOCK_S = 5.0
-"""Whoever was killed a moment ago may still hold it."""
+from throwcollect.files import open_log, unwritable, write_all
 
 Event = Literal["opened", "exposed", "recovered", "planned", "lease", "commit", "fail", "lost", "shard", "finished"]
 """
@@ -50,15 +47,14 @@ class Journal:
     def __init__(self, directory: Path) -> None:
         self._path = directory / JOURNAL
         try:
-            self._path.parent.mkdir(exist_ok=True)
-            self._descriptor = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o666)
+            self._descriptor = open_log(self._path, os.O_RDWR | os.O_CREAT | os.O_APPEND)
         except OSError as error:
             raise unwritable(self._path, error) from error
-        if not self._locked():
+        try:
+            lock(self._descriptor, directory)
+        except DatasetError:
             os.close(self._descriptor)
-            raise DatasetError(
-                f"{directory}: another process collects into it", hint="throwcollect ps lists the runs of this machine"
-            )
+            raise
         self._earlier_s = collected_s(directory) or 0.0
         self._opened = time.time()
         size = os.fstat(self._descriptor).st_size
@@ -92,18 +88,6 @@ class Journal:
         """Let other processes have it."""
         os.close(self._descriptor)
 
-    def _locked(self) -> bool:
-        deadline = time.monotonic() + _LOCK_S
-        while True:
-            try:
-                fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError:
-                if time.monotonic() > deadline:
-                    return False
-                time.sleep(0.05)
-            else:
-                return True
-
     def _append(self, data: bytes) -> None:
         try:
             write_all(self._descriptor, data)
@@ -118,10 +102,10 @@ def read_journal(path: Path) -> Iterator[dict[str, Any]]:
         path: The file; if it is missing, nothing happened.
     """
     try:
-        file = path.open("rb")
+        descriptor = open_log(path, os.O_RDONLY)
     except OSError:
         return
-    with file:
+    with open(descriptor, "rb") as file:
         for line in file:
             try:
                 entry = json.loads(line)

@@ -20,8 +20,8 @@ from typing import Any
 
 from throwcollect.dataset.digest import is_digest
 from throwcollect.dataset.directory import CONFIG, MANIFEST, METADATA, PLAN, SHARD_SUFFIX, SOURCES, THROWS, TRIALS
-from throwcollect.dataset.files import read_text
 from throwcollect.errors import DatasetError
+from throwcollect.files import read_text
 
 _PROFILE = "data-package"
 _HASH = "sha256:"

@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import mmap
 import os
-import stat
 import struct
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -22,6 +21,7 @@ from throwcollect.dataset.mcap_file import EPISODE, MAGIC
 from throwcollect.episode.chunk import CHUNK_HEADER_BYTES, CHUNK_MARK, CHUNK_MARK_OFFSET, Chunk
 from throwcollect.episode.message import Episode, make_episode
 from throwcollect.errors import DatasetError
+from throwcollect.files import open_regular, unreadable
 
 _RECORD_HEADER = struct.Struct("<BQ")
 _R = TypeVar("_R", covariant=True)
@@ -197,17 +197,14 @@ def mapped(path: Path) -> Iterator[McapContents]:
         DatasetError: If the file is missing, cannot be read, or is no regular file.
     """
     try:
-        # Opening a pipe would wait for somebody to write into it.
-        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+        descriptor = open_regular(path)
         try:
-            status = os.fstat(descriptor)
-            if not stat.S_ISREG(status.st_mode):
-                raise DatasetError(f"{path}: cannot be read: not a file")
-            data = mmap.mmap(descriptor, 0, access=mmap.ACCESS_READ) if status.st_size else b""
+            size = os.fstat(descriptor).st_size
+            data = mmap.mmap(descriptor, 0, access=mmap.ACCESS_READ) if size else b""
         finally:
             os.close(descriptor)
     except OSError as error:
-        raise DatasetError(f"{path}: cannot be read: {error.strerror}") from error
+        raise unreadable(path, error) from error
     try:
         yield McapContents(data)
     finally:

@@ -9,8 +9,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from throwcollect.dataset.files import unwritable
 from throwcollect.errors import ConfigError
+from throwcollect.files import unwritable
 
 _PERMISSIONS = 0o755
 

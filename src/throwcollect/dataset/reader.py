@@ -13,7 +13,7 @@ import pyarrow.compute as pc
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
 from throwcollect.dataset.bag import from_yaml
-from throwcollect.dataset.directory import CONFIG, METADATA, PLAN, THROWS
+from throwcollect.dataset.directory import METADATA, PLAN, THROWS, config_path
 from throwcollect.dataset.mcap_reader import opened
 from throwcollect.dataset.throws import read_throws_table
 from throwcollect.episode.message import Episode
@@ -51,7 +51,7 @@ class Dataset:
             ConfigError: If its ``config.yaml`` is wrong.
         """
         bag = read_bag_metadata(directory)
-        config = load(directory / CONFIG)
+        config = load(config_path(directory))
         plan = Plan.read(directory / PLAN, config)
         return cls(directory, config, plan, read_throws(directory, plan), bag)
 

@@ -12,17 +12,19 @@ from throwcollect.config.loader import load
 from throwcollect.dataset.bag import FileSummary, dataset_metadata
 from throwcollect.dataset.card import Provenance, data_card
 from throwcollect.dataset.digest import combined_digest
-from throwcollect.dataset.directory import CARD, CONFIG, MANIFEST, METADATA, PLAN, SHARD_SUFFIX, THROWS
-from throwcollect.dataset.files import write_file
+from throwcollect.dataset.directory import CARD, MANIFEST, METADATA, PLAN, SHARD_SUFFIX, THROWS, config_path
 from throwcollect.dataset.journal import was_open
+from throwcollect.dataset.lock import held_alone
 from throwcollect.dataset.manifest import entry_of, entry_of_file, manifest_text, promised_names
 from throwcollect.dataset.mcap_reader import StoredEpisode
+from throwcollect.dataset.recovery import remove_unfinished
 from throwcollect.dataset.throws import Row, ThrowsTable, encode_table, read_throws_table
 from throwcollect.dataset.verify_episode import EpisodeCheck, RowJudge
 from throwcollect.dataset.verify_shard import ShardCheck
 from throwcollect.dataset.verify_tables import shard_of, wrong_trials
 from throwcollect.episode.channels import Channels
 from throwcollect.errors import DatasetError
+from throwcollect.files import write_file
 from throwcollect.robots.description import full_description
 from throwcollect.sweep.plan import Plan, Trial
 from throwcollect.tasks.throw import Outcome, ThrowResult
@@ -59,13 +61,19 @@ def rebuild(directory: Path) -> Rebuilt:
         directory: Directory of a dataset.
 
     Raises:
-        DatasetError: If the plan or a recording is missing or damaged, the dataset is still being collected, or a file
-            cannot be written.
+        DatasetError: If the plan or a recording is missing or damaged, another process changes the dataset, it is not
+            collected to its end, or a file cannot be written.
         ConfigError: If the ``config.yaml`` is wrong.
     """
-    config = load(directory / CONFIG)
+    with held_alone(directory):
+        return _rebuilt(directory)
+
+
+def _rebuilt(directory: Path) -> Rebuilt:
+    config = load(config_path(directory))
     plan = Plan.read(directory / PLAN, config)
     repair = command("dataset", "repair", directory, "OUTPUT")
+    remove_unfinished(directory)
     if unfinished := sorted(path.name for path in directory.glob("*.part")):
         raise DatasetError(
             f"{directory}: holds {unfinished[0]}: it is not collected to its end",

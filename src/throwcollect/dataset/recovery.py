@@ -12,7 +12,7 @@ from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from throwcollect.dataset.files import remove, unwritable
+from throwcollect.dataset.directory import CARD, CONFIG, MANIFEST, METADATA, PLAN, SOURCES, THROWS, TRIALS
 from throwcollect.dataset.judging import judged
 from throwcollect.dataset.mcap_file import EpisodeRun, McapFile, episode_run
 from throwcollect.dataset.mcap_reader import mapped
@@ -20,6 +20,7 @@ from throwcollect.dataset.salvage import salvage
 from throwcollect.dataset.shard import FinishedShard, OpenShard
 from throwcollect.episode.channels import Channels
 from throwcollect.errors import DatasetError
+from throwcollect.files import is_there, remove, unwritable
 from throwcollect.sweep.plan import Plan
 from throwcollect.tasks.throw import ThrowResult
 
@@ -63,6 +64,18 @@ class _Found:
     run: EpisodeRun
 
 
+def remove_unfinished(directory: Path) -> None:
+    """Remove what is left of files beside the recordings whose writer was killed; the files themselves stay.
+
+    Raises:
+        DatasetError: If something cannot be removed.
+    """
+    for name in (CONFIG, PLAN, TRIALS, SOURCES, THROWS, CARD, MANIFEST, METADATA):
+        remove(directory / f"{name}.new")
+    # So were plans called by earlier versions.
+    remove(directory / f"{PLAN}.part")
+
+
 def recover_shard(shard: OpenShard, plan: Plan, channels: Channels, *, keep: bool) -> RecoveredShard:
     """Take in what is left of a shard.
 
@@ -103,7 +116,7 @@ def recover_shard(shard: OpenShard, plan: Plan, channels: Channels, *, keep: boo
 def _whole_episodes(path: Path, plan: Plan, channels: Channels, wanted: Collection[int]) -> dict[int, _Found]:
     """Episodes of a file that are as they would be if they were collected again, by trial."""
     found: dict[int, _Found] = {}
-    if not path.exists():
+    if not is_there(path):
         return found
     for salvaged in salvage(path):
         episode = salvaged.stored.episode

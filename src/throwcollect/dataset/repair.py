@@ -11,7 +11,7 @@ import numpy as np
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
 from throwcollect.config.values import reason_not_sweepable
-from throwcollect.dataset.directory import CONFIG, PLAN, SHARD_SUFFIX, THROWS
+from throwcollect.dataset.directory import CONFIG, PLAN, SHARD_SUFFIX, THROWS, config_path
 from throwcollect.dataset.judging import judged
 from throwcollect.dataset.new_directory import new_directory
 from throwcollect.dataset.rebuild import earlier_rows, reason_lost
@@ -21,6 +21,7 @@ from throwcollect.dataset.verify_episode import EpisodeCheck
 from throwcollect.dataset.verify_tables import wrong_trials
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.episode.channels import Channels
+from throwcollect.episode.message import Episode
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError
 from throwcollect.robots.description import full_description
 from throwcollect.sweep.parquet import read_parquet
@@ -45,6 +46,23 @@ class LostTrial:
 
 
 @dataclass(frozen=True)
+class DifferingEpisode:
+    """An episode that was kept although it is not the one that the table of throws has, as that was found nowhere.
+
+    Attributes:
+        trial: Number of its trial.
+        file: Name of the file that it was found in.
+        digest: Its digest.
+        expected: The digest in the table of throws.
+    """
+
+    trial: int
+    file: str
+    digest: str
+    expected: str
+
+
+@dataclass(frozen=True)
 class Repaired:
     """What became of a dataset.
 
@@ -52,12 +70,14 @@ class Repaired:
         trials: Number of trials of the plan.
         episodes: Number of episodes that were kept.
         lost: Trials that have no whole episode, and had one or may have had one.
+        differing: Episodes that were kept although the table of throws has others.
         remarks: What else was not as it should be, a sentence each.
     """
 
     trials: int
     episodes: int
     lost: tuple[LostTrial, ...]
+    differing: tuple[DifferingEpisode, ...]
     remarks: tuple[str, ...]
 
     def as_dict(self) -> dict[str, object]:
@@ -68,8 +88,11 @@ class Repaired:
 def repair(directory: Path, output: Path, *, remake: Remake) -> Repaired:
     """Write a sound dataset with all whole and correct episodes of a damaged one.
 
-    Episodes are looked for in all MCAP files, finished or not, and judged anew. Whatever else there is to a dataset is
-    made from the configuration and the plan. Trials without an episode are `lost` in it.
+    Episodes are looked for in all MCAP files, finished or not, and judged anew. Where the table of throws can be read,
+    its digest says which episode of a trial is the right one. If that is not found, another one that nothing else
+    speaks against is kept, and that is said: only a replay can tell whether the episode or the table was changed.
+    Whatever else there is to a dataset is made from the configuration and the plan. Trials without an episode are
+    `lost` in it.
 
     Args:
         directory: Directory of the damaged dataset; it stays as it is.
@@ -87,20 +110,22 @@ def repair(directory: Path, output: Path, *, remake: Remake) -> Repaired:
     with new_directory(output) as beside:
         writer = DatasetWriter.create(beside, plan)
         try:
-            sorting = _Sorting(plan, writer, remarks)
+            digests = {trial: row["digest"] for trial, row in earlier.items() if row["digest"] is not None}
+            sorting = _Sorting(plan, writer, digests, remarks)
             for path in sorted(directory.iterdir()):
                 if SHARD_SUFFIX in path.suffixes:
                     sorting.take(path)
+            sorting.settle(directory)
             lost = sorting.give_up(earlier)
             writer.finish(wall_s=None)
         finally:
             writer.close()
-    return Repaired(len(plan.trials), len(sorting.taken), lost, tuple(remarks))
+    return Repaired(len(plan.trials), len(sorting.taken), lost, tuple(sorting.differing), tuple(remarks))
 
 
 def _configuration(directory: Path) -> Config:
     try:
-        return load(directory / CONFIG)
+        return load(config_path(directory))
     except ConfigError as error:
         raise DatasetError(
             f"{directory}: {CONFIG} cannot be read, and nothing else holds the configuration",
@@ -169,13 +194,19 @@ class _Sorting:
     """Sorts salvaged episodes into those that are written and those that are not.
 
     Attributes:
+        digests: Digests of the right episodes, by trial, as far as they are known.
         taken: File and digest of the episode of each trial that was written.
+        differing: Episodes that were written and have another digest than the right one.
+        waiting: Episodes that have another digest than the right one, by trial, in the order in which they were found.
     """
 
     plan: Plan
     writer: DatasetWriter
+    digests: Mapping[int, str]
     remarks: list[str]
     taken: dict[int, tuple[str, str]] = field(default_factory=dict)
+    differing: list[DifferingEpisode] = field(default_factory=list)
+    waiting: dict[int, list[DifferingEpisode]] = field(default_factory=dict)
     rejected: dict[int, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -183,7 +214,7 @@ class _Sorting:
         self._check = EpisodeCheck(self.plan, {})
 
     def take(self, path: Path) -> None:
-        """Write all whole and correct episodes of a file, each trial's first one."""
+        """Write all right episodes of a file, each trial's first one; those that are not the table's wait."""
         try:
             for salvaged in salvage(path):
                 self._take(path.name, salvaged)
@@ -204,9 +235,34 @@ class _Sorting:
             self.remarks.append(f"{place}: {kind} episode of trial {trial} was taken from {where} already")
         elif problem := next(self._check.content_problems(episode, self._channels), None):
             self.rejected[trial] = f"{place}: {problem}"
+        elif (right := self.digests.get(trial, episode.digest)) != episode.digest:
+            found = DifferingEpisode(trial, name, digest=episode.digest, expected=right)
+            self.waiting.setdefault(trial, []).append(found)
         else:
-            self.writer.append(episode, judged(self.plan, episode))
-            self.taken[trial] = (name, episode.digest)
+            self._write(name, episode)
+
+    def settle(self, directory: Path) -> None:
+        """Write the first of the episodes that wait where no right one was found, and say what became of them.
+
+        Args:
+            directory: Where their files are.
+        """
+        for trial, found in sorted(self.waiting.items()):
+            for each in found:
+                other = f"an episode with digest {each.digest}, not {each.expected} as in {THROWS}"
+                told = f"{each.file}: trial {trial}: {other}"
+                if trial in self.taken:
+                    where, digest = self.taken[trial]
+                    kind = "right" if digest == each.expected else "first"
+                    self.remarks.append(f"{told}; the {kind} one was taken from {where}")
+                else:
+                    self._write(each.file, _found_again(directory / each.file, each))
+                    self.differing.append(each)
+                    self.remarks.append(f"{told}; kept, as nothing else speaks against it")
+
+    def _write(self, name: str, episode: Episode) -> None:
+        self.writer.append(episode, judged(self.plan, episode))
+        self.taken[episode.header.trial] = (name, episode.digest)
 
     def give_up(self, earlier: Mapping[int, Row]) -> tuple[LostTrial, ...]:
         """Write down the trials that have no episode; returns those that were not lost before."""
@@ -220,3 +276,12 @@ class _Sorting:
                 lost.append(LostTrial(trial.number, reason))
             self.writer.append_lost(trial.number, reason)
         return tuple(lost)
+
+
+def _found_again(path: Path, wanted: DifferingEpisode) -> Episode:
+    """An episode that was found in a file before; one at a time is in memory."""
+    for salvaged in salvage(path):
+        episode = salvaged.stored.episode
+        if (episode.header.trial, episode.digest) == (wanted.trial, wanted.digest):
+            return episode
+    raise DatasetError(f"{path}: was changed while it was read")

@@ -14,12 +14,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from throwcollect.dataset.bag import FileSummary
-from throwcollect.dataset.files import replacing, unwritable, write_all
 from throwcollect.dataset.manifest import FileEntry
 from throwcollect.dataset.mcap_file import EpisodeRun, McapFile, episode_run
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.message import Episode
 from throwcollect.errors import DatasetError
+from throwcollect.files import open_regular, replacing, unwritable, write_all
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ class OpenShard:
             DatasetError: If the file cannot be written.
         """
         try:
-            self._descriptor = os.open(self.part, os.O_RDWR)
+            self._descriptor = open_regular(self.part, os.O_RDWR)
             self._cut(self._descriptor, size)
         except OSError as error:
             raise unwritable(self.part, error) from error
@@ -93,7 +93,7 @@ class OpenShard:
         start = self._size
         try:
             if self._descriptor is None:
-                self._descriptor = os.open(self.part, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666)
+                self._descriptor = open_regular(self.part, os.O_RDWR | os.O_CREAT | os.O_EXCL)
             if not start:
                 McapFile(self._write, self._channels, start_ns=episode.chunk.start_ns)
             offset = self._size

@@ -11,7 +11,7 @@ import numpy as np
 
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
-from throwcollect.dataset.directory import CONFIG, PLAN, THROWS, TRIALS, shard_name
+from throwcollect.dataset.directory import CONFIG, PLAN, THROWS, TRIALS, config_path, shard_name
 from throwcollect.dataset.findings import Finding
 from throwcollect.dataset.throws import REFUSED, read_throws_table
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError
@@ -53,7 +53,7 @@ def check_tables(directory: Path) -> Tables:
     """
     tables = Tables()
     try:
-        tables.config = load(directory / CONFIG)
+        tables.config = load(config_path(directory))
     except ConfigError as error:
         tables.findings += [
             Finding(CONFIG, f"line {each.line}" if each.line else "", ": ".join(filter(None, [each.key, each.message])))

@@ -29,17 +29,19 @@ from throwcollect.dataset.directory import (
     SOURCES,
     THROWS,
     TRIALS,
+    config_path,
     shard_name,
 )
-from throwcollect.dataset.files import remove, write_file
 from throwcollect.dataset.journal import Event, Journal, was_open
+from throwcollect.dataset.lock import held_alone, held_together
 from throwcollect.dataset.manifest import FileEntry, entry_of, entry_of_file, manifest_text
-from throwcollect.dataset.recovery import recover_shard
+from throwcollect.dataset.recovery import recover_shard, remove_unfinished
 from throwcollect.dataset.shard import FinishedShard, OpenShard
 from throwcollect.dataset.throws import Place, Row, ThrowsTable, encode_table
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.message import Episode
 from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.files import remove, write_file
 from throwcollect.robots.description import full_description
 from throwcollect.sweep.plan import Plan, Trial
 from throwcollect.sweep.points import Points
@@ -66,9 +68,17 @@ def create(directory: Path, plan: Plan, *, listed: Points | None = None) -> None
     made = not directory.exists()
     try:
         directory.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise _unusable(directory, error) from error
+    with held_alone(directory):
+        _fill(directory, plan, listed, made=made)
+
+
+def _fill(directory: Path, plan: Plan, listed: Points | None, *, made: bool) -> None:
+    try:
         taken = sorted(path.name for path in directory.iterdir())
     except OSError as error:
-        raise ConfigError(f"{directory}: cannot be used as directory of a dataset: {error.strerror}") from error
+        raise _unusable(directory, error) from error
     if taken:
         begun = PLAN in taken or CONFIG in taken
         raise ConfigError(
@@ -83,6 +93,10 @@ def create(directory: Path, plan: Plan, *, listed: Points | None = None) -> None
             write_file(directory / TRIALS, encode_points(listed))
         plan.write(directory / PLAN)
         undo.pop_all()
+
+
+def _unusable(directory: Path, error: OSError) -> ConfigError:
+    return ConfigError(f"{directory}: cannot be used as directory of a dataset: {error.strerror}")
 
 
 def _clear(directory: Path, *, remove: bool) -> None:
@@ -110,7 +124,7 @@ class DatasetWriter:
     Args:
         directory: A directory as `create` leaves it.
         plan: The plan that lies there.
-        journal: Told what happens; None for datasets that are written in one go. It is closed with the writer.
+        journal: Told what happens; None for datasets that are written in one go.
         growing: Whether trials may still be added to the plan, until `close_plan`.
     """
 
@@ -125,6 +139,7 @@ class DatasetWriter:
         self._shards: dict[int, OpenShard] = {}
         self._rows: dict[int, dict[int, Row]] = {}
         self._finished: dict[int, _Finished] = {}
+        self._held = ExitStack()
         self._expect(plan.trials)
 
     @classmethod
@@ -149,11 +164,13 @@ class DatasetWriter:
         for name in (CONFIG, PLAN):
             if not (directory / name).is_file():
                 raise DatasetError(f"{directory}: holds no {name}", expected="a dataset that was created")
-        with ExitStack() as undo:
-            journal = undo.enter_context(Journal(directory))
-            plan = Plan.read(directory / PLAN, load(directory / CONFIG))
-            undo.pop_all()
-        return cls(directory, plan, journal=journal, growing=plan.config.grows)
+        with ExitStack() as held:
+            held.enter_context(held_together(directory))
+            journal = held.enter_context(Journal(directory))
+            plan = Plan.read(directory / PLAN, load(config_path(directory)))
+            writer = cls(directory, plan, journal=journal, growing=plan.config.grows)
+            writer._held = held.pop_all()
+        return writer
 
     def recover(self, tell: Tell | None = None) -> int:
         """Take in what earlier writers have left: every episode that is whole stays, everything else is removed.
@@ -170,6 +187,7 @@ class DatasetWriter:
         Raises:
             DatasetError: If files cannot be read or written.
         """
+        remove_unfinished(self._directory)
         for name in (METADATA, MANIFEST, THROWS):
             remove(self._directory / name)
         found = 0
@@ -323,9 +341,8 @@ class DatasetWriter:
         """Close all files; what is written stays."""
         for shard in self._shards.values():
             shard.close()
-        if self._journal is not None:
-            self._journal.close()
-            self._journal = None
+        self._held.close()
+        self._journal = None
 
     def _has(self, name: str) -> bool:
         return (self._directory / name).exists()

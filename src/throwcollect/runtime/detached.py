@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from throwcollect.errors import Interrupted, WorkerError
+from throwcollect.files import open_log
 from throwcollect.runtime.node_logs import NodeLogs
 from throwcollect.runtime.nodes import LAUNCHER
 from throwcollect.runtime.records import OpenRun, Record, Records
@@ -32,8 +33,7 @@ def start_launcher(run: OpenRun) -> subprocess.Popen[bytes]:
     path = NodeLogs(Path(run.record.logs)).path(LAUNCHER)
     command = [sys.executable, "-m", "throwcollect", "launch", run.run, "--lock", str(run.lock)]
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with path.open("ab") as log:
+        with open(open_log(path), "ab") as log:
             return subprocess.Popen(
                 command,
                 stdin=subprocess.DEVNULL,

@@ -12,6 +12,7 @@ from docker.client import DockerClient
 from docker.errors import NotFound
 from docker.models.containers import Container
 
+from throwcollect.files import open_log
 from throwcollect.runtime.docker_clock import EngineClock
 from throwcollect.runtime.docker_engine import ENGINE_ERRORS, in_words
 from throwcollect.runtime.docker_options import LOG_LABEL
@@ -105,8 +106,8 @@ class NodeContainer:
                     return
                 with suppress(NotFound):
                     self._client.api.remove_container(options["name"], v=True, force=True)
-                self._log.parent.mkdir(parents=True, exist_ok=True)
-                offset = self._log.stat().st_size if self._log.exists() else 0
+                with open(open_log(self._log), "ab") as log:
+                    offset = log.tell()
                 labels = {**options["labels"], LOG_LABEL: str(offset)}
                 container = self._client.containers.create(**{**options, "labels": labels})
                 for network in networks:
@@ -134,10 +135,10 @@ class NodeContainer:
             container: The container.
             offset: Where in the file its output begins; what is there already is not written again.
         """
-        with self._log.open("ab", buffering=0) as log:
+        with open(open_log(self._log), "ab", buffering=0) as log:
             while not self._closed.is_set():
                 try:
-                    known = self._log.stat().st_size - offset
+                    known = log.tell() - offset
                     for chunk in container.logs(stream=True, follow=True):
                         self._clock.heard()
                         log.write(chunk[known:])

@@ -9,6 +9,7 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import Literal
 
+from throwcollect.files import open_log
 from throwcollect.runtime.supervisor import NodeState
 from throwcollect.wording import counted
 
@@ -102,8 +103,7 @@ class EventLog:
             json.dumps({key: value for key, value in asdict(event).items() if value is not None}) for event in events
         ]
         if lines:
-            self._path.parent.mkdir(parents=True, exist_ok=True)
-            with self._path.open("a", encoding="utf-8") as file:
+            with open(open_log(self._path), "a", encoding="utf-8") as file:
                 file.write("\n".join([*lines, ""]))
 
 

@@ -16,6 +16,7 @@ from throwcollect import ros
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.progress import Progress
 from throwcollect.dataset.inspect import info, loss
+from throwcollect.dataset.lock import held_together
 from throwcollect.errors import ConfigError, DatasetError, Interrupted, LossError, ThrowcollectError, WorkerError
 from throwcollect.run_key import RunKey
 from throwcollect.runtime.events import EventLog, RunEvent
@@ -94,7 +95,7 @@ def launch(
     Raises:
         ConfigError: If the configuration cannot be used after all.
         WorkerError: If nodes cannot be started or kept alive.
-        DatasetError: If the dataset cannot be written.
+        DatasetError: If another process changes the dataset, or it cannot be written.
         Interrupted: If the user stopped the collection.
     """
     notes = _Notes(run, onlooker)
@@ -102,7 +103,8 @@ def launch(
     place: Place | None = None
     try:
         place = place_of(run.record, config, run.key, warn=onlooker.warn)
-        summary = _Launcher(run, config, place, notes, onlooker, interruptions).run_to_the_end()
+        with held_together(Path(run.record.directory)):
+            summary = _Launcher(run, config, place, notes, onlooker, interruptions).run_to_the_end()
         lost = loss(summary["outcomes"], hint=goes_on(run.record))
         code, message = (0, "") if lost is None else (lost.exit_code, str(lost))
         return summary, lost

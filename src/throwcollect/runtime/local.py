@@ -14,6 +14,7 @@ from pathlib import Path
 
 from throwcollect.config.run import RunConfig
 from throwcollect.errors import WorkerError
+from throwcollect.files import open_log
 from throwcollect.run_key import RunKey
 from throwcollect.runtime.node_logs import NodeLogs
 from throwcollect.runtime.nodes import ROUTER, NodeExit, node_environment, protocol_of
@@ -82,9 +83,7 @@ class LocalRuntime:
         if name == ROUTER:
             self._reserved.close()
         try:
-            path = self._logs.path(name)
-            path.parent.mkdir(parents=True, exist_ok=True)
-            with path.open("ab") as log:
+            with open(open_log(self._logs.path(name)), "ab") as log:
                 self._processes[name] = subprocess.Popen(
                     [sys.executable, "-m", "throwcollect", *arguments],
                     stdin=subprocess.DEVNULL,

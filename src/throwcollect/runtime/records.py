@@ -29,6 +29,7 @@ from typing import Any, Literal
 from pydantic import TypeAdapter, ValidationError
 
 from throwcollect.errors import ConfigError
+from throwcollect.files import beside, write_all
 from throwcollect.run_key import RunKey
 from throwcollect.runtime.supervisor import NodeState
 from throwcollect.wording import command
@@ -180,11 +181,9 @@ class OpenRun:
         """
         self._record = record
         path = self._runs / f"{self.run}.json"
-        beside = path.with_suffix(".new")
         try:
-            with open(os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600), "wb") as file:
-                file.write(_ADAPTER.dump_json(record, indent=1))
-            beside.replace(path)
+            with beside(path, mode=0o600) as descriptor:
+                write_all(descriptor, _ADAPTER.dump_json(record, indent=1))
         except OSError as error:
             raise _unusable(path, error) from error
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from throwcollect.errors import DatasetError
+from throwcollect.files import open_regular, unreadable
 
 _MOST_ROWS = 20_000_000
 _MOST_VALUES = 2_000_000_000
@@ -20,19 +21,21 @@ def read_parquet(path: Path) -> Any:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    if path.exists() and not path.is_file():
-        raise DatasetError(f"{path}: is no file")
     try:
-        with pq.ParquetFile(path, page_checksum_verification=True) as file:
+        descriptor = open_regular(path)
+    except FileNotFoundError as error:
+        raise DatasetError(f"{path}: is missing") from error
+    except PermissionError as error:
+        raise DatasetError(f"{path}: may not be read", hint="check who may read it") from error
+    except OSError as error:
+        raise unreadable(path, error) from error
+    try:
+        with open(descriptor, "rb") as opened, pq.ParquetFile(opened, page_checksum_verification=True) as file:
             rows, columns = file.metadata.num_rows, file.metadata.num_columns
             if not 0 <= rows <= _MOST_ROWS or rows * columns > _MOST_VALUES:
                 raise DatasetError(f"{path}: is damaged: announces {rows} rows of {columns} columns")
             table = file.read()
         table.validate(full=True)
-    except FileNotFoundError as error:
-        raise DatasetError(f"{path}: is missing") from error
-    except PermissionError as error:
-        raise DatasetError(f"{path}: may not be read", hint="check who may read it") from error
     except (OSError, ValueError, MemoryError, pa.ArrowException) as error:
         # Whatever the bytes of a name or a text are not valid as ends as one of these, at the latest when validated.
         raise DatasetError(f"{path}: is damaged: {_first_line(error)}") from error

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import os
+import io
 import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -15,6 +15,7 @@ import numpy as np
 from throwcollect.config.schema import Config
 from throwcollect.config.values import reason_not_sweepable, with_values
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError, PlanError, Problem
+from throwcollect.files import write_file
 from throwcollect.sweep.digest import config_digest, trial_digests
 from throwcollect.sweep.parquet import read_parquet
 from throwcollect.sweep.points import Points
@@ -98,12 +99,9 @@ class Plan:
         ]
         schema = _schema(self.keys).with_metadata({_FORMAT_KEY: _FORMAT, _CONFIG_KEY: config_digest(self.config)})
         table = pa.table([pa.array(column, kind) for column, kind in zip(columns, schema.types, strict=True)], schema)
-        beside = path.with_name(path.name + ".part")
-        try:
-            pq.write_table(table, beside, compression="zstd", write_page_checksum=True)
-            os.replace(beside, path)
-        except OSError as error:
-            raise DatasetError(f"{path}: the plan cannot be written: {error.strerror or error}") from error
+        buffer = io.BytesIO()
+        pq.write_table(table, buffer, compression="zstd", write_page_checksum=True)
+        write_file(path, buffer.getvalue())
 
     @classmethod
     def read(cls, path: Path, config: Config) -> Plan:

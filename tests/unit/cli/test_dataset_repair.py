@@ -2,12 +2,14 @@ import json
 import signal
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from tests.unit.dataset.conftest import Collection
 
 from throwcollect.cli.main import main
+from throwcollect.episode.record import EpisodeHeader, Samples
 
 Run = Callable[..., int]
 
@@ -100,5 +102,21 @@ def test_repair_lists_what_is_lost_and_ends_with_5(
     assert run("dataset", "repair", source, tmp_path / "again", "--json") == 5
     found = json.loads(capsys.readouterr().out)
     assert found["lost"] == [{"trial": 0, "reason": "no whole episode of it was left"}]
-    assert (found["trials"], found["episodes"], found["remarks"]) == (3, 2, [])
+    assert (found["trials"], found["episodes"], found["differing"], found["remarks"]) == (3, 2, [], [])
     assert run("dataset", "verify", output) == 0
+
+
+def test_repair_that_keeps_another_episode_than_the_tables_ends_with_3(
+    run: Run, source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def forged(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
+        return replace(samples, effort=samples.effort * 1.01), header
+
+    other = Collection({"trials": 3}).collect(tmp_path / "other", change=forged)
+    (source / "quick_00000.mcap").write_bytes((other / "quick_00000.mcap").read_bytes())
+    output = tmp_path / "output"
+    assert run("dataset", "repair", source, output) == 3
+    told = capsys.readouterr()
+    assert told.out.count("as in throws.parquet; kept, as nothing else speaks against it") == 3
+    assert f"{output}: 3 episodes kept, such as that of trial 0, which throws.parquet had otherwise" in told.err
+    assert f"try: throwcollect dataset replay {output} --trial 0" in told.err

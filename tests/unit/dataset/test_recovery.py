@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import closing, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -271,6 +271,33 @@ def test_a_shard_that_may_still_get_trials_is_not_finished(
     assert files_of(directory) == expected
 
 
+def test_a_plan_killed_while_it_grows_leaves_nothing_beside_it(trials: Trials, tmp_path: Path) -> None:
+    first = replace(trials.plan, trials=trials.plan.trials[:1])
+    call, died = 0, True
+    while died:
+        directory = tmp_path / str(call)
+        create(directory, first)
+        begun = DatasetWriter(directory, first, growing=True)
+        with KilledAt(call) as killed:
+            begun.extend(trials.plan.trials[1:2])
+        abandon(begun)
+        with closing(DatasetWriter.open(directory)) as writer:
+            assert len(writer.plan.trials) in (1, 2)
+            writer.recover()
+        assert {path.name for path in directory.iterdir()} == {"config.yaml", "plan.parquet", "logs"}
+        call, died = call + 1, killed.died
+    assert call > 2
+
+
+def test_what_earlier_versions_left_of_files_is_removed(trials: Trials, tmp_path: Path) -> None:
+    create(tmp_path / "dataset", trials.plan)
+    for name in ("plan.parquet.part", "config.yaml.new", "datapackage.json.new"):
+        (tmp_path / "dataset" / name).write_bytes(b"half")
+    with closing(DatasetWriter.open(tmp_path / "dataset")) as writer:
+        writer.recover()
+    assert {path.name for path in (tmp_path / "dataset").iterdir()} == {"config.yaml", "plan.parquet", "logs"}
+
+
 def test_closing_the_plan_finishes_what_is_complete(trials: Trials, tmp_path: Path) -> None:
     directory = tmp_path / "dataset"
     first = replace(trials.plan, trials=trials.plan.trials[:1])
@@ -286,7 +313,7 @@ def test_closing_the_plan_finishes_what_is_complete(trials: Trials, tmp_path: Pa
 def test_two_processes_cannot_collect_into_one_directory(
     trials: Trials, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("throwcollect.dataset.journal._LOCK_S", 0.0)
+    monkeypatch.setattr("throwcollect.dataset.lock.PATIENCE_S", 0.0)
     create(tmp_path / "dataset", trials.plan)
     writer = DatasetWriter.open(tmp_path / "dataset")
     with pytest.raises(DatasetError, match="another process collects into it"):

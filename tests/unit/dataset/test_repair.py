@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +13,7 @@ import pytest
 
 from throwcollect.config.schema import Config
 from throwcollect.dataset.mcap_reader import opened
-from throwcollect.dataset.repair import LostTrial, repair
+from throwcollect.dataset.repair import DifferingEpisode, LostTrial, repair
 from throwcollect.dataset.salvage import salvage
 from throwcollect.dataset.verify import verify
 from throwcollect.dataset.writer import DatasetWriter
@@ -41,6 +43,12 @@ def chunk_of(directory: Path, trial: int) -> int:
     offset = pq.read_table(directory / "throws.parquet")["chunk_offset"].to_pylist()[trial]
     assert isinstance(offset, int)
     return offset
+
+
+def digest_of(directory: Path, trial: int) -> str:
+    digest = pq.read_table(directory / "throws.parquet")["digest"].to_pylist()[trial]
+    assert isinstance(digest, str)
+    return digest
 
 
 def same_files(one: Path, other: Path) -> bool:
@@ -165,6 +173,51 @@ def test_an_episode_of_no_trial_of_the_plan_is_left_out(make_collection: Any, da
     assert [remark.partition(": ")[0] for remark in repaired.remarks] == ["quick_00002.mcap"] * 2
     assert "an episode of trial 8, which the plan does not run" in repaired.remarks[1]
     assert repaired.lost == ()
+
+
+def forged(samples: Any, header: Any) -> Any:
+    """Efforts that nothing can tell from those that were."""
+    return replace(samples, effort=samples.effort * (1.01 if header.trial == 4 else 1.0)), header
+
+
+def test_the_episode_of_the_table_is_taken_wherever_it_lies(
+    make_collection: Any, collected: Path, dataset: Path, output: Path
+) -> None:
+    other = make_collection().collect(dataset.parent / "other", change=forged)
+    (dataset / SHARD).rename(dataset / "quick_00007.mcap")
+    shutil.copy(other / SHARD, dataset / SHARD)
+    right, wrong = digest_of(dataset, 4), digest_of(other, 4)
+    repaired = repair(dataset, output, remake=never)
+    assert (repaired.episodes, repaired.lost, repaired.differing) == (7, (), ())
+    assert same_files(output, collected)
+    told = [remark for remark in repaired.remarks if "trial 4" in remark]
+    assert told == [
+        f"{SHARD}: trial 4: an episode with digest {wrong}, not {right} as in throws.parquet; "
+        "the right one was taken from quick_00007.mcap"
+    ]
+
+
+def test_an_episode_that_is_not_the_one_of_the_table_is_kept_with_a_remark(
+    make_collection: Any, dataset: Path, output: Path
+) -> None:
+    other = make_collection().collect(dataset.parent / "other", change=forged)
+    shutil.copy(other / SHARD, dataset / SHARD)
+    right, wrong = digest_of(dataset, 4), digest_of(other, 4)
+    repaired = repair(dataset, output, remake=never)
+    assert (repaired.episodes, repaired.lost) == (7, ())
+    assert repaired.differing == (DifferingEpisode(4, SHARD, digest=wrong, expected=right),)
+    assert repaired.remarks == (
+        f"{SHARD}: trial 4: an episode with digest {wrong}, not {right} as in throws.parquet; kept, as nothing else "
+        "speaks against it",
+    )
+    assert verify(output) == []
+
+
+def test_without_a_table_no_episode_differs_from_it(make_collection: Any, dataset: Path, output: Path) -> None:
+    other = make_collection().collect(dataset.parent / "other", change=forged)
+    shutil.copy(other / SHARD, dataset / SHARD)
+    (dataset / "throws.parquet").unlink()
+    assert repair(dataset, output, remake=never).remarks == ()
 
 
 def test_the_plan_is_made_again_from_the_table_of_throws(collected: Path, dataset: Path, output: Path) -> None:

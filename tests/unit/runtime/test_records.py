@@ -317,7 +317,7 @@ def test_a_full_disk_is_named(state: Path, monkeypatch: pytest.MonkeyPatch) -> N
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(Path, "replace", full)
+    monkeypatch.setattr("throwcollect.files.os.write", full)
     with pytest.raises(ConfigError, match="runs cannot be remembered there: No space left on device") as caught:
         run.write(record(run))
     assert "free space there" in str(caught.value)

@@ -18,7 +18,6 @@ from throwcollect.dataset.derive.row_result import row_result
 from throwcollect.dataset.derive.source import Source
 from throwcollect.dataset.derive.union import list_of_trials
 from throwcollect.dataset.directory import CARD, SOURCES
-from throwcollect.dataset.files import write_file
 from throwcollect.dataset.inspect import info
 from throwcollect.dataset.new_directory import new_directory
 from throwcollect.dataset.reader import Dataset
@@ -27,6 +26,7 @@ from throwcollect.episode.channels import Channels
 from throwcollect.episode.message import Episode
 from throwcollect.episode.restamp import Restamper
 from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.files import write_file
 from throwcollect.robots.description import full_description
 from throwcollect.sweep.plan import Plan, make_trials
 from throwcollect.wording import command

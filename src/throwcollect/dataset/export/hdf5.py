@@ -15,8 +15,8 @@ from throwcollect.dataset.export.card import Layout, signal_lines
 from throwcollect.dataset.export.npz import as_array
 from throwcollect.dataset.export.signals import Signal
 from throwcollect.dataset.export.source import Source, Throw
-from throwcollect.dataset.files import write_all
 from throwcollect.errors import ConfigError
+from throwcollect.files import write_all
 
 ACTION = "command_position_rad"
 _BESIDE = ("time_s", "command_velocity_radps", "command_acceleration_radps2")

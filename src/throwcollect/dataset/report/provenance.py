@@ -6,9 +6,11 @@ from throwcollect.dataset.directory import CARD, CONFIG
 from throwcollect.dataset.inspect import Info
 from throwcollect.dataset.reader import Dataset
 from throwcollect.errors import DatasetError
+from throwcollect.files import read_text
 from throwcollect.sweep.digest import config_digest
 
 _HEADING = "## Provenance"
+_MOST_BYTES = 10_000_000
 
 
 def provenance(dataset: Dataset, info: Info) -> dict[str, str]:
@@ -24,8 +26,8 @@ def provenance(dataset: Dataset, info: Info) -> dict[str, str]:
 
 def _card_facts(dataset: Dataset) -> dict[str, str]:
     try:
-        text = (dataset.directory / CARD).read_text(encoding="utf-8", errors="replace")
-    except OSError:
+        text = read_text(dataset.directory / CARD, most_bytes=_MOST_BYTES)
+    except DatasetError:
         return {}
     rows = [
         [cell.strip() for cell in line.strip("|").split("|")]
@@ -41,8 +43,4 @@ def config_text(dataset: Dataset) -> str:
     Raises:
         DatasetError: If it cannot be read.
     """
-    path = dataset.directory / CONFIG
-    try:
-        return path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise DatasetError(f"{path}: cannot be read: {error.strerror}") from error
+    return read_text(dataset.directory / CONFIG, most_bytes=_MOST_BYTES)

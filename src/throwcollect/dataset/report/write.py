@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 
-from throwcollect.dataset.files import write_file
 from throwcollect.dataset.new_directory import new_directory
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.report.facts import Facts, gather
 from throwcollect.errors import ConfigError
+from throwcollect.files import write_file
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,9 @@ from pathlib import Path
 from scipy.spatial.transform import Rotation
 
 from throwcollect.config.schema import BallConfig
-from throwcollect.dataset.files import unwritable
 from throwcollect.episode.topics import BALL
 from throwcollect.errors import DatasetError
+from throwcollect.files import unwritable
 from throwcollect.robots.description import SPOON
 from throwcollect.robots.model import share_directory
 

@@ -9,7 +9,6 @@ from typing import Any
 
 from throwcollect.dataset.bag import FileSummary, bag_information, to_yaml
 from throwcollect.dataset.directory import METADATA
-from throwcollect.dataset.files import unwritable
 from throwcollect.dataset.new_directory import new_directory
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.throws import Row
@@ -20,6 +19,7 @@ from throwcollect.dataset.viewer.viewed import ViewedThrow
 from throwcollect.episode.channels import Channel
 from throwcollect.episode.record import Samples
 from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.files import unwritable
 from throwcollect.robots.description import full_description
 
 RECORDING = "throws.mcap"

@@ -1,0 +1,92 @@
+"""Whether all that a finished dataset promises is still there: cheaply by names and sizes, or in full by every byte."""
+
+from __future__ import annotations
+
+import os
+import stat
+from collections.abc import Iterator
+from pathlib import Path
+
+from throwcollect.dataset.directory import CONFIG, MANIFEST, METADATA, PLAN, THROWS
+from throwcollect.dataset.findings import Finding
+from throwcollect.dataset.manifest import FileEntry, entry_of_file, read_manifest
+from throwcollect.dataset.mcap_file import MAGIC
+from throwcollect.dataset.throws import read_throws_table
+from throwcollect.dataset.verify import verify
+from throwcollect.errors import DatasetError
+from throwcollect.files import is_there, open_regular
+from throwcollect.sweep.plan import Plan
+
+
+def missing_or_damaged(directory: Path, plan: Plan | None, *, in_full: bool) -> list[Finding]:
+    """What of a finished dataset is not as it was written.
+
+    Files are compared with the manifest. A dataset of a version that wrote none has to have the recordings that its
+    table of throws names, each with the beginning and the end of an MCAP file; in full, it is verified.
+
+    Args:
+        directory: Directory of a dataset that has its ``metadata.yaml``.
+        plan: Its trials; None if they cannot be read.
+        in_full: Whether the contents of all files are compared, and not only their sizes.
+    """
+    if plan is None and not is_there(directory / MANIFEST):
+        return [Finding(PLAN, "", "is missing or damaged")]
+    if plan is not None and not is_there(directory / MANIFEST):
+        return list(_without_manifest(directory, plan, in_full=in_full))
+    try:
+        entries = read_manifest(directory)
+    except DatasetError as error:
+        return [Finding(MANIFEST, "", str(error).removeprefix(f"{directory / MANIFEST}: "))]
+    return list(_changed(directory, entries, in_full=in_full))
+
+
+def is_as_written(directory: Path, name: str) -> bool:
+    """Whether the manifest says of a file that it is as it was written; False if there is no manifest that does.
+
+    Args:
+        directory: Directory of a dataset.
+        name: Name of the file.
+    """
+    try:
+        return entry_of_file(directory / name) in read_manifest(directory)
+    except DatasetError:
+        return False
+
+
+def _changed(directory: Path, entries: tuple[FileEntry, ...], *, in_full: bool) -> Iterator[Finding]:
+    for entry in entries:
+        path = directory / entry.path
+        try:
+            found = path.lstat()
+        except OSError:
+            yield Finding(entry.path, "", "is missing")
+            continue
+        if not stat.S_ISREG(found.st_mode):
+            yield Finding(entry.path, "", "is not a file")
+        elif found.st_size != entry.bytes:
+            yield Finding(entry.path, "", f"has {found.st_size} bytes instead of {entry.bytes}")
+        elif in_full and entry_of_file(path) != entry:
+            yield Finding(entry.path, "", "has other contents than were written")
+
+
+def _without_manifest(directory: Path, plan: Plan, *, in_full: bool) -> Iterator[Finding]:
+    try:
+        shards = set(read_throws_table(directory / THROWS, plan)["shard"].drop_null().to_pylist())
+    except DatasetError as error:
+        yield Finding(THROWS, "", str(error).removeprefix(f"{directory / THROWS}: "))
+        return
+    if in_full:
+        promised = {CONFIG, PLAN, THROWS, METADATA, *shards}
+        yield from (finding for finding in verify(directory) if finding.file in promised)
+        return
+    for name in sorted(shards):
+        try:
+            descriptor = open_regular(directory / Path(name).name)
+        except OSError as error:
+            yield Finding(name, "", "is missing" if isinstance(error, FileNotFoundError) else "is not a file")
+            continue
+        with open(descriptor, "rb") as file:
+            begins = file.read(len(MAGIC))
+            file.seek(-min(len(MAGIC), os.fstat(descriptor).st_size), os.SEEK_END)
+            if begins != MAGIC or file.read() != MAGIC:
+                yield Finding(name, "", "is cut off, or is no MCAP file")

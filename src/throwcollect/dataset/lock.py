@@ -1,0 +1,103 @@
+"""Keeps two processes from changing one dataset: a lock on its directory, wherever the second of them runs.
+
+Whoever prepares a dataset, goes on with it or makes files of it anew holds the lock alone, before it looks at anything.
+The launcher and the coordinator of a run hold it together as long as they live. So nobody can prepare the dataset while
+it is collected into, not even while a coordinator that was lost is started again.
+
+Between its preparation and its launch a run lets go for a moment. If somebody else takes the lock just then, the run
+ends before anything is started; and should that other one be ready by then and launch a run, too, then the journal,
+which only one coordinator can hold (see `journal`), decides between the two. Whichever that is, it reads configuration
+and plan when nobody can change them any more, and they fit each other.
+
+The lock is one of the kernel (flock) on the directory itself. So it leaves nothing behind, holds across containers and
+other names of the directory, and goes with the process. On NFS it is known to the processes of one machine alone.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from throwcollect.errors import DatasetError
+from throwcollect.files import unreadable
+
+PATIENCE_S = 5.0
+"""Whoever was killed a moment ago may still hold a lock."""
+_RETRY_S = 0.05
+
+
+@contextmanager
+def held_alone(directory: Path) -> Iterator[None]:
+    """Keep all others from changing a dataset while the block lasts.
+
+    Args:
+        directory: Its directory.
+
+    Raises:
+        DatasetError: If another process changes it, or it cannot be locked.
+    """
+    with _held(directory, alone=True):
+        yield
+
+
+@contextmanager
+def held_together(directory: Path) -> Iterator[None]:
+    """Keep all others but the processes of a run from changing its dataset while the block lasts.
+
+    Args:
+        directory: Directory of the dataset.
+
+    Raises:
+        DatasetError: If another process changes it, or it cannot be locked.
+    """
+    with _held(directory, alone=False):
+        yield
+
+
+def lock(descriptor: int, directory: Path, *, alone: bool = True) -> None:
+    """Lock an open file or directory of a dataset until it is closed.
+
+    Args:
+        descriptor: Its descriptor.
+        directory: Directory of the dataset, for messages.
+        alone: Whether nobody else may hold the lock.
+
+    Raises:
+        DatasetError: If another process holds it, or it cannot be locked.
+    """
+    # A preparation that goes on just now makes a run begin with another plan; that is nothing to wait for.
+    deadline = time.monotonic() + (PATIENCE_S if alone else 0.0)
+    while True:
+        try:
+            fcntl.flock(descriptor, (fcntl.LOCK_EX if alone else fcntl.LOCK_SH) | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            if time.monotonic() >= deadline:
+                raise DatasetError(
+                    f"{directory}: another process collects into it, or changes it",
+                    hint="throwcollect ps lists the runs of this machine",
+                ) from error
+            time.sleep(_RETRY_S)
+        except OSError as error:
+            raise DatasetError(
+                f"{directory}: cannot be locked: {error.strerror}",
+                hint="choose a directory on a file system that has locks (flock)",
+            ) from error
+        else:
+            return
+
+
+@contextmanager
+def _held(directory: Path, *, alone: bool) -> Iterator[None]:
+    try:
+        descriptor = os.open(directory, os.O_RDONLY | os.O_DIRECTORY)
+    except OSError as error:
+        raise unreadable(directory, error) from error
+    try:
+        lock(descriptor, directory, alone=alone)
+        yield
+    finally:
+        os.close(descriptor)

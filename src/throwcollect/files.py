@@ -1,0 +1,235 @@
+"""Files that appear whole or not at all, that lie where they seem to lie, and errors that say what is wrong.
+
+A dataset may come from anybody, so a name in its directory may be a symbolic link to any file of the user, a pipe that
+blocks whoever opens it, or a second name of a file elsewhere. Nothing here follows such a name: a file is read, written
+or cut only if it is a regular file in the very directory that it is looked for in. That directory itself is the user's
+choice, and may be reached through links.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from throwcollect.errors import DatasetError
+
+_MOVE_HERE = "put the file itself, or a copy of it, in that place; or remove it"
+_HINTS = {
+    errno.ENOSPC: "free space on that disk",
+    errno.EDQUOT: "free space within your quota",
+    errno.EFBIG: "raise the limit on file sizes (ulimit -f), or lower record.trials_per_shard",
+    errno.EACCES: "check who may write there",
+    errno.EROFS: "choose a directory that can be written",
+    errno.ELOOP: _MOVE_HERE,
+    errno.ENXIO: _MOVE_HERE,
+    errno.EMLINK: _MOVE_HERE,
+}
+_REASONS = {
+    errno.ELOOP: "a symbolic link leads elsewhere",
+    errno.ENXIO: "not a file",
+    errno.EMLINK: "it has another name (hard link), under which it would change, too",
+}
+"""What these numbers mean here; the system's texts are about other cases."""
+
+
+def unwritable(path: Path, error: OSError) -> DatasetError:
+    """The error that says that a path cannot be written, and why."""
+    return DatasetError(f"{path}: cannot be written: {_reason(error)}", hint=_HINTS.get(error.errno or 0))
+
+
+def unreadable(path: Path, error: OSError) -> DatasetError:
+    """The error that says that a path cannot be read, and why."""
+    hint = _MOVE_HERE if error.errno in _REASONS else None
+    return DatasetError(f"{path}: cannot be read: {_reason(error)}", hint=hint)
+
+
+def _reason(error: OSError) -> str:
+    # Some libraries fill the text of an error with their own; the number is the system's.
+    number = error.errno or 0
+    return _REASONS.get(number) or (os.strerror(number) if number else str(error))
+
+
+def open_regular(path: Path, flags: int = os.O_RDONLY, *, folder: int | None = None) -> int:
+    """Open a regular file; a link is not followed and a pipe not waited for.
+
+    Args:
+        path: The file; its name alone if `folder` is given.
+        flags: As for `os.open`. A file that is opened for writing must have no other name.
+        folder: Descriptor of the directory that it is in; None if `path` says that.
+
+    Returns:
+        Its descriptor.
+
+    Raises:
+        OSError: If it cannot be opened; see `unwritable` and `unreadable`.
+    """
+    descriptor = os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK, 0o666, dir_fd=folder)
+    status = os.fstat(descriptor)
+    wrong = 0 if stat.S_ISREG(status.st_mode) else errno.ENXIO
+    if flags & os.O_ACCMODE != os.O_RDONLY and status.st_nlink > 1:
+        wrong = errno.EMLINK
+    if wrong:
+        os.close(descriptor)
+        raise OSError(wrong, _REASONS[wrong], str(path))
+    return descriptor
+
+
+def open_log(path: Path, flags: int = os.O_WRONLY | os.O_CREAT | os.O_APPEND) -> int:
+    """Open a file in a folder of its own, such as ``logs``, which is made if it is missing and must not be a link.
+
+    Args:
+        path: The file.
+        flags: As for `open_regular`; without ``os.O_CREAT`` nothing is made.
+
+    Raises:
+        OSError: If it cannot be opened, or the folder cannot be made.
+    """
+    if path.parent.is_symlink():
+        raise OSError(errno.ELOOP, _REASONS[errno.ELOOP], str(path.parent))
+    if flags & os.O_CREAT:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    folder = os.open(path.parent, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+    try:
+        return open_regular(Path(path.name), flags, folder=folder)
+    finally:
+        os.close(folder)
+
+
+def is_there(path: Path) -> bool:
+    """Whether something has this name, be it only a link that leads nowhere."""
+    return os.path.lexists(path)
+
+
+def check_regular(path: Path) -> None:
+    """Make sure that a name under which others will open a file does not lead elsewhere; all else is theirs to report.
+
+    Raises:
+        DatasetError: If it is that of something else than a regular file, such as a link.
+    """
+    try:
+        os.close(open_regular(path))
+    except OSError as error:
+        if error.errno in _REASONS:
+            raise unreadable(path, error) from error
+
+
+@contextmanager
+def beside(path: Path, *, mode: int = 0o666) -> Iterator[int]:
+    """A new file that takes the place of `path` when the block ends well, and vanishes when it does not.
+
+    While it is written, it is called ``<name>.new``. What already has that name was left by a process that was killed,
+    or put there by somebody else, and is removed.
+
+    Args:
+        path: The file.
+        mode: Who may do what with it, before the process's mask.
+
+    Yields:
+        File descriptor to write to.
+
+    Raises:
+        OSError: If the file cannot be written.
+    """
+    new = path.with_name(f"{path.name}.new")
+    new.unlink(missing_ok=True)
+    descriptor = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW, mode)
+    try:
+        try:
+            yield descriptor
+        finally:
+            os.close(descriptor)
+        os.replace(new, path)
+    except BaseException:
+        with suppress(OSError):
+            new.unlink()
+        raise
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[int]:
+    """A new file as `beside` makes it, which survives a power cut from the end of the block on.
+
+    Args:
+        path: The file.
+
+    Yields:
+        File descriptor to write to.
+
+    Raises:
+        DatasetError: If the file cannot be written.
+    """
+    try:
+        with beside(path) as descriptor:
+            yield descriptor
+            os.fsync(descriptor)
+        sync_directory(path.parent)
+    except OSError as error:
+        raise unwritable(path, error) from error
+
+
+def remove(path: Path) -> None:
+    """Remove a file, if it is there.
+
+    Raises:
+        DatasetError: If it cannot be removed.
+    """
+    try:
+        path.unlink(missing_ok=True)
+    except OSError as error:
+        raise DatasetError(f"{path}: cannot be removed: {error.strerror}") from error
+
+
+def sync_directory(directory: Path) -> None:
+    """Make names in a directory survive a power cut.
+
+    Raises:
+        OSError: If the directory cannot be opened or synchronised.
+    """
+    descriptor = os.open(directory, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def write_all(descriptor: int, data: bytes) -> None:
+    """Write all bytes, however many calls it takes.
+
+    Raises:
+        OSError: If the system writes no more of them.
+    """
+    view = memoryview(data)
+    while view:
+        view = view[os.write(descriptor, view) :]
+
+
+def read_text(path: Path, *, most_bytes: int) -> str:
+    """UTF-8 text of a regular file.
+
+    Raises:
+        DatasetError: If it is missing, no such file, no such text, or larger than `most_bytes`.
+    """
+    try:
+        with open(open_regular(path), "rb") as file:
+            data = file.read(most_bytes + 1)
+        if len(data) > most_bytes:
+            raise DatasetError(f"{path}: cannot be read: larger than {most_bytes} bytes")
+        return data.decode("utf-8")
+    except OSError as error:
+        raise unreadable(path, error) from error
+    except UnicodeDecodeError as error:
+        raise DatasetError(f"{path}: cannot be read: no UTF-8 text: byte {error.start}") from error
+
+
+def write_file(path: Path, data: bytes) -> None:
+    """Write a whole file at once, in place of any file of that name.
+
+    Raises:
+        DatasetError: If it cannot be written.
+    """
+    with replacing(path) as descriptor:
+        write_all(descriptor, data)

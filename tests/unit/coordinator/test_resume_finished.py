@@ -1,0 +1,153 @@
+"""A finished dataset of which something is missing or damaged is gone on with, and ends as it was."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from tests.unit.dataset.conftest import Collection
+
+from throwcollect.coordinator.resume import finished, resume
+from throwcollect.dataset.manifest import entry_of_file, manifest_text, promised_names
+from throwcollect.dataset.writer import DatasetWriter, create
+from throwcollect.errors import DatasetError
+from throwcollect.tasks.throw import ThrowResult
+
+TRIALS = 4
+SHARD = "quick_00001.mcap"
+
+
+class Trials:
+    """Episodes and results of a collection, made once."""
+
+    def __init__(self) -> None:
+        self.collection = Collection({"trials": TRIALS, "record": {"trials_per_shard": 2}})
+        self.plan = self.collection.plan
+        self.episodes = [self.collection.episode(trial) for trial in range(TRIALS)]
+        self.results: list[ThrowResult] = [self.collection.result(episode) for episode in self.episodes]
+
+    def run(self, directory: Path) -> set[int]:
+        """Have a coordinator run what is missing; the trials that were not run again."""
+        kept: set[int] = set()
+        writer = DatasetWriter.open(directory)
+        writer.recover(lambda trial, _: kept.add(trial))
+        for trial in sorted({*range(TRIALS)} - kept):
+            writer.append(self.episodes[trial], self.results[trial])
+        writer.finish(wall_s=1.0)
+        writer.close()
+        return kept
+
+    def go_on(self, directory: Path, *, check: bool = False) -> tuple[set[int] | None, list[str]]:
+        """Resume; the trials that were not run again, None if nothing was left to do; and what was said."""
+        said: list[str] = []
+        plan = resume(self.plan.config, directory, sweep_directory=directory, check=check, say=said.append)
+        return None if finished(directory, plan) else self.run(directory), said
+
+
+@pytest.fixture(scope="module")
+def trials() -> Trials:
+    return Trials()
+
+
+@pytest.fixture(scope="module")
+def sound(trials: Trials, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    directory = tmp_path_factory.mktemp("sound") / "dataset"
+    create(directory, trials.plan)
+    trials.run(directory)
+    return directory
+
+
+@pytest.fixture
+def promised(sound: Path, tmp_path: Path) -> Path:
+    """A dataset with a manifest."""
+    directory = Path(shutil.copytree(sound, tmp_path / "dataset"))
+    entries = [entry_of_file(directory / name) for name in promised_names(directory)]
+    (directory / "datapackage.json").write_text(manifest_text("quick", entries))
+    return directory
+
+
+@pytest.fixture(params=["manifest", "no manifest"])
+def dataset(request: pytest.FixtureRequest, promised: Path) -> Path:
+    """A dataset with or, as earlier versions wrote it, without a manifest."""
+    if request.param == "no manifest":
+        (promised / "datapackage.json").unlink()
+    return promised
+
+
+def contents(directory: Path) -> dict[str, bytes]:
+    others = ("README.md", "datapackage.json")
+    return {path.name: path.read_bytes() for path in directory.iterdir() if path.is_file() and path.name not in others}
+
+
+def deleted(path: Path) -> None:
+    path.unlink()
+
+
+def cut(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[:-100])
+
+
+def flipped(path: Path) -> None:
+    data = bytearray(path.read_bytes())
+    data[len(data) - len(data) // 3] ^= 1
+    path.write_bytes(data)
+
+
+def test_a_finished_dataset_stays_as_it_is(trials: Trials, dataset: Path) -> None:
+    before = {path: path.stat().st_mtime_ns for path in dataset.rglob("*")}
+    assert trials.go_on(dataset) == (None, [])
+    assert trials.go_on(dataset, check=True) == (None, [])
+    assert {path: path.stat().st_mtime_ns for path in dataset.rglob("*")} == before
+
+
+@pytest.mark.parametrize(
+    ("damage", "check", "kept"),
+    [(deleted, False, {0, 1}), (cut, False, {0, 1, 2, 3}), (flipped, True, {0, 1, 2})],
+)
+def test_a_damaged_recording_is_gone_on_with_to_the_same_bytes(
+    trials: Trials, sound: Path, dataset: Path, damage: Callable[[Path], None], check: bool, kept: set[int]
+) -> None:
+    damage(dataset / SHARD)
+    found, said = trials.go_on(dataset, check=check)
+    assert found == kept
+    assert said
+    assert all(line.startswith(f"{dataset}: {SHARD}: ") for line in said)
+    assert contents(dataset) == contents(sound)
+
+
+@pytest.mark.parametrize("name", ["throws.parquet", "plan.parquet"])
+def test_damaged_tables_are_written_again(trials: Trials, sound: Path, promised: Path, name: str) -> None:
+    flipped(promised / name)
+    assert trials.go_on(promised, check=True)[0] == {*range(TRIALS)}
+    assert contents(promised) == contents(sound)
+
+
+def test_a_damaged_manifest_counts_as_damage(trials: Trials, sound: Path, promised: Path) -> None:
+    (promised / "datapackage.json").write_text("{}")
+    assert trials.go_on(promised)[0] == {*range(TRIALS)}
+    assert contents(promised) == contents(sound)
+
+
+def test_what_cannot_be_made_again_is_said_and_nothing_is_changed(trials: Trials, promised: Path) -> None:
+    dataset = promised
+    entries = [entry_of_file(dataset / name) for name in promised_names(dataset)]
+    (dataset / "sources.parquet").write_bytes(b"from there")
+    entries.append(entry_of_file(dataset / "sources.parquet"))
+    (dataset / "datapackage.json").write_text(manifest_text("quick", entries))
+    (dataset / "sources.parquet").unlink()
+    before = contents(dataset)
+    with pytest.raises(DatasetError, match=r"sources\.parquet: is missing or damaged, and nothing else says"):
+        trials.go_on(dataset)
+    assert contents(dataset) == before
+
+
+def test_a_configuration_that_was_changed_is_not_taken_for_the_plans(trials: Trials, dataset: Path) -> None:
+    text = (dataset / "config.yaml").read_text()
+    (dataset / "config.yaml").write_text(text.replace("seed: 0", "seed: 1"))
+    before = contents(dataset)
+    other = trials.plan.config.model_copy(update={"seed": 1})
+    with pytest.raises(DatasetError, match=r"one of the two was changed, and nothing says which"):
+        resume(other, dataset, sweep_directory=dataset)
+    assert contents(dataset) == before

@@ -1,0 +1,167 @@
+"""A dataset may come from anybody: nothing that lies in it makes us read, change or remove what lies elsewhere."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+from tests.unit.dataset.conftest import Collection
+from tests.unit.dataset.mutations import SETTINGS, no_plan
+
+from throwcollect.coordinator.resume import resume
+from throwcollect.dataset.derive.choice import filtered
+from throwcollect.dataset.rebuild import rebuild
+from throwcollect.dataset.repair import repair
+from throwcollect.dataset.verify import verify
+from throwcollect.dataset.writer import DatasetWriter
+from throwcollect.errors import DatasetError, ThrowcollectError
+
+BEGUN = "quick_00001.mcap.part"
+UNFINISHED = (
+    "config.yaml.new",
+    "plan.parquet.part",
+    "plan.parquet.new",
+    "throws.parquet.new",
+    "metadata.yaml.new",
+    "quick_00000.mcap.new",
+)
+REPLACED = ("plan.parquet", "throws.parquet", "metadata.yaml", "README.md", "config.yaml")
+REFUSED = ("quick_00000.mcap", BEGUN, "logs", "logs/journal.jsonl")
+
+
+@pytest.fixture(scope="module")
+def source() -> Collection:
+    return Collection(SETTINGS)
+
+
+@pytest.fixture(scope="module")
+def sound(source: Collection, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return source.collect(tmp_path_factory.mktemp("sound") / "dataset")
+
+
+def go_on(directory: Path, source: Collection) -> None:
+    """What `up --resume` does in its processes."""
+    resume(source.config, directory, sweep_directory=directory)
+    writer = DatasetWriter.open(directory)
+    try:
+        there: list[int] = []
+        writer.recover(lambda trial, _: there.append(trial))
+        writer.extend(())
+        source.fill(writer, [trial for trial in range(len(source.plan.trials)) if trial not in there])
+        writer.finish(wall_s=1.0)
+    finally:
+        writer.close()
+
+
+USES: dict[str, Callable[[Path, Collection, Path], object]] = {
+    "resume": lambda directory, source, _: go_on(directory, source),
+    "rebuild": lambda directory, _source, _: rebuild(directory),
+    "repair": lambda directory, _source, output: repair(directory, output, remake=no_plan),
+    "filter": lambda directory, _source, output: filtered(directory, output, where="outcome == 'landed'"),
+    "verify": lambda directory, _source, _: verify(directory),
+}
+
+
+def lead_out(directory: Path, name: str, outside: Path) -> None:
+    """Have a name of the dataset lead to a file, or a directory, with the same contents outside."""
+    place = directory / name
+    outside.mkdir(parents=True)
+    target = outside / "target"
+    if name == "logs":
+        target.mkdir()
+        (target / "journal.jsonl").write_text("mine")
+    elif place.exists():
+        shutil.move(place, target)
+    elif name == BEGUN:
+        shutil.move(directory / "quick_00001.mcap", target)
+    else:
+        target.write_text("mine")
+    place.parent.mkdir(exist_ok=True)
+    place.symlink_to(target)
+
+
+def contents(directory: Path) -> dict[str, bytes]:
+    return {str(path.relative_to(directory)): path.read_bytes() for path in directory.rglob("*") if path.is_file()}
+
+
+@pytest.mark.parametrize("use", USES)
+def test_links_in_the_place_of_files_that_are_written_are_not_followed(
+    source: Collection, sound: Path, tmp_path: Path, use: str
+) -> None:
+    directory = Path(shutil.copytree(sound, tmp_path / "dataset"))
+    names = (*UNFINISHED, "quick_00000.mcap.part") if use == "resume" else UNFINISHED
+    for number, name in enumerate(names):
+        lead_out(directory, name, tmp_path / "outside" / str(number))
+    before = contents(tmp_path / "outside")
+    USES[use](directory, source, tmp_path / "output")
+    assert contents(tmp_path / "outside") == before
+    if use == "resume":
+        assert verify(directory) == []
+
+
+@pytest.mark.parametrize(
+    ("use", "name"), [*(("resume", name) for name in REPLACED), *(("rebuild", name) for name in REPLACED[1:4])]
+)
+def test_a_link_in_the_place_of_a_file_that_can_be_made_again_is_replaced_by_it(
+    source: Collection, sound: Path, tmp_path: Path, use: str, name: str
+) -> None:
+    directory = Path(shutil.copytree(sound, tmp_path / "dataset"))
+    lead_out(directory, name, tmp_path / "outside")
+    before = contents(tmp_path / "outside")
+    USES[use](directory, source, tmp_path / "output")
+    assert contents(tmp_path / "outside") == before
+    assert use == "rebuild" or not (directory / name).is_symlink()
+    assert name == "README.md" or (directory / name).read_bytes() == (sound / name).read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("use", "name"),
+    [
+        *(("resume", name) for name in REFUSED),
+        *((use, name) for use in ("rebuild", "filter") for name in ("config.yaml", "plan.parquet", "quick_00000.mcap")),
+    ],
+)
+def test_a_link_in_the_place_of_any_other_file_is_refused_in_one_message(
+    source: Collection, sound: Path, tmp_path: Path, use: str, name: str
+) -> None:
+    directory = Path(shutil.copytree(sound, tmp_path / "dataset"))
+    lead_out(directory, name, tmp_path / "outside")
+    before = contents(tmp_path / "outside")
+    with pytest.raises(ThrowcollectError, match=rf"{name}.*: cannot be .*: a symbolic link leads elsewhere\n  try: "):
+        USES[use](directory, source, tmp_path / "output")
+    assert contents(tmp_path / "outside") == before
+
+
+@pytest.mark.parametrize("name", ["config.yaml", "plan.parquet", "quick_00000.mcap", "logs/journal.jsonl"])
+def test_a_pipe_in_the_place_of_a_file_makes_nobody_wait(
+    source: Collection, sound: Path, tmp_path: Path, name: str
+) -> None:
+    directory = Path(shutil.copytree(sound, tmp_path / "dataset"))
+    (directory / name).unlink(missing_ok=True)
+    (directory / name).parent.mkdir(exist_ok=True)
+    os.mkfifo(directory / name)
+    for use in ("verify", "resume"):
+        with suppress(ThrowcollectError):
+            USES[use](directory, source, tmp_path / "output")
+
+
+def test_a_file_with_a_second_name_is_not_changed_in_its_place(source: Collection, sound: Path, tmp_path: Path) -> None:
+    directory = Path(shutil.copytree(sound, tmp_path / "dataset"))
+    shutil.move(directory / "quick_00001.mcap", tmp_path / "mine")
+    os.link(tmp_path / "mine", directory / BEGUN)
+    before = (tmp_path / "mine").read_bytes()
+    with pytest.raises(DatasetError, match=r"quick_00001\.mcap\.part: cannot be written: it has another name"):
+        go_on(directory, source)
+    assert (tmp_path / "mine").read_bytes() == before
+
+
+def test_a_directory_may_be_reached_through_a_link(source: Collection, sound: Path, tmp_path: Path) -> None:
+    directory = Path(shutil.copytree(sound, tmp_path / "dataset"))
+    (tmp_path / "named").symlink_to(directory)
+    (directory / "quick_00001.mcap").unlink()
+    go_on(tmp_path / "named", source)
+    assert verify(tmp_path / "named") == []

@@ -1,0 +1,103 @@
+"""Two processes never change one dataset, wherever the second of them runs."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+from tests.unit.dataset.conftest import Collection
+from tests.unit.dataset.mutations import SETTINGS
+
+from throwcollect.coordinator.resume import resume
+from throwcollect.dataset.lock import held_alone, held_together
+from throwcollect.dataset.rebuild import rebuild
+from throwcollect.dataset.writer import DatasetWriter, create
+from throwcollect.errors import DatasetError
+
+BUSY = r"dataset: another process collects into it, or changes it\n  try: throwcollect ps"
+
+
+@pytest.fixture(autouse=True)
+def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("throwcollect.dataset.lock.PATIENCE_S", 0.0)
+
+
+@pytest.fixture
+def begun(tmp_path: Path) -> Path:
+    create(tmp_path / "dataset", Collection(SETTINGS).plan)
+    return tmp_path / "dataset"
+
+
+def go_on(directory: Path) -> None:
+    more = Collection({**SETTINGS, "trials": 3}).config
+    resume(more, directory, sweep_directory=directory)
+
+
+def contents(directory: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in directory.iterdir() if path.is_file()}
+
+
+@pytest.mark.parametrize("change", [go_on, rebuild])
+def test_nobody_changes_a_dataset_that_is_collected_into(begun: Path, change: Callable[[Path], object]) -> None:
+    before = contents(begun)
+    with closing(DatasetWriter.open(begun)) as writer:
+        with pytest.raises(DatasetError, match=BUSY):
+            change(begun)
+        assert contents(begun) == before
+        writer.recover()
+
+
+def test_nobody_changes_a_dataset_whose_coordinator_is_started_again(begun: Path) -> None:
+    with held_together(begun):
+        DatasetWriter.open(begun).close()
+        with pytest.raises(DatasetError, match=BUSY):
+            go_on(begun)
+
+
+def test_nobody_begins_to_collect_into_a_dataset_that_is_prepared(begun: Path) -> None:
+    with held_alone(begun), pytest.raises(DatasetError, match=BUSY):
+        DatasetWriter.open(begun)
+    DatasetWriter.open(begun).close()
+
+
+def test_two_collections_cannot_be_prepared_in_one_directory(tmp_path: Path) -> None:
+    (tmp_path / "dataset").mkdir()
+    with held_alone(tmp_path / "dataset"), pytest.raises(DatasetError, match=BUSY):
+        create(tmp_path / "dataset", Collection(SETTINGS).plan)
+    assert list((tmp_path / "dataset").iterdir()) == []
+
+
+def test_another_name_of_the_directory_is_the_same_directory(begun: Path, tmp_path: Path) -> None:
+    (tmp_path / "link").symlink_to(begun)
+    with (
+        held_together(begun),
+        pytest.raises(DatasetError, match="link: another process"),
+        held_alone(tmp_path / "link"),
+    ):
+        pass
+
+
+def test_who_has_just_been_killed_is_waited_for(begun: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("throwcollect.dataset.lock.PATIENCE_S", 60.0)
+    code = "import fcntl, os, sys, time; fcntl.flock(os.open(sys.argv[1], 0), 1); print(flush=True); time.sleep(60)"
+    with subprocess.Popen([sys.executable, "-c", code, str(begun)], stdout=subprocess.PIPE) as other:
+        assert other.stdout is not None
+        other.stdout.readline()
+        other.kill()
+        with held_alone(begun):
+            pass
+
+
+def test_nothing_is_left_of_a_lock(tmp_path: Path) -> None:
+    with held_alone(tmp_path):
+        pass
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_directory_that_is_not_there_cannot_be_locked(tmp_path: Path) -> None:
+    with pytest.raises(DatasetError, match=r"gone: cannot be read: No such file"), held_together(tmp_path / "gone"):
+        pass
