@@ -52,7 +52,7 @@ def _taken_in(
         delivery = unpack(message, _SIGNER)
         episode = delivery.episode
         assignment = assignments[episode.header.trial]
-        if acceptance.foreign(delivery, assignment, "") or acceptance.unsound(plan, episode):
+        if acceptance.foreign(delivery, assignment, "") or acceptance.unsound(episode, assignment):
             raise ValueError(f"trial {episode.header.trial} is refused")
         result = judge(
             episode.samples(),

@@ -120,7 +120,7 @@ class Coordinator(Node):
         """
         episode, assignment = self._backlog.popleft()
         trial = episode.header.trial
-        if (problem := self._acceptance.unsound(self._writer.plan, episode)) is not None:
+        if (problem := self._acceptance.unsound(episode, assignment)) is not None:
             simulation = self._leases.deliverer(trial)
             self._assignments[trial] = assignment
             self._give_back(

@@ -6,7 +6,6 @@ It follows from the files alone and its text is canonical: equal files give equa
 
 from __future__ import annotations
 
-import errno
 import hashlib
 import json
 import os
@@ -21,7 +20,7 @@ from typing import Any
 from throwcollect.dataset.digest import is_digest
 from throwcollect.dataset.directory import CONFIG, MANIFEST, METADATA, PLAN, SHARD_SUFFIX, SOURCES, THROWS, TRIALS
 from throwcollect.errors import DatasetError
-from throwcollect.files import read_text
+from throwcollect.files import open_regular, read_text, unreadable
 
 _PROFILE = "data-package"
 _HASH = "sha256:"
@@ -60,16 +59,12 @@ def entry_of_file(path: Path) -> FileEntry:
     """
     digest, size = hashlib.sha256(), 0
     try:
-        # A link is not followed, and opening a pipe would wait for somebody to write into it.
-        with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOFOLLOW), "rb") as file:
-            if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
-                raise DatasetError(f"{path}: is not a file")
+        with open(open_regular(path), "rb") as file:
             while block := file.read(_BLOCK):
                 digest.update(block)
                 size += len(block)
     except OSError as error:
-        reason = "it is a symbolic link" if error.errno == errno.ELOOP else error.strerror
-        raise DatasetError(f"{path}: cannot be read: {reason}") from error
+        raise unreadable(path, error) from error
     return FileEntry(path.name, size, digest.hexdigest())
 
 

@@ -139,7 +139,7 @@ class EpisodeCheck:
         except ConfigError as error:
             yield f"the plan has values that cannot be: {error}"
             return
-        yield from _stamp_problems(episode, samples, config)
+        yield from stamp_problems(episode, samples, config)
 
     def _physics_problems(self, episode: Episode) -> Iterator[str]:
         """What the simulation cannot have recorded."""
@@ -198,7 +198,17 @@ def _record_problems(stored: StoredEpisode, run: EpisodeRun) -> Iterator[str]:
         yield f"the metadata at byte {stored.facts.offset} do not fit the chunk (digest, trial or header)"
 
 
-def _stamp_problems(episode: Episode, samples: Samples, config: Config) -> Iterator[str]:
+def stamp_problems(episode: Episode, samples: Samples, config: Config) -> Iterator[str]:
+    """Everything that is wrong with the times of an episode.
+
+    Args:
+        episode: The episode.
+        samples: Its samples.
+        config: Configuration of its trial.
+
+    Yields:
+        What is wrong, a sentence each.
+    """
     stamps, header = samples.stamps_ns, episode.header
     if not episode.table.are_timed_by(stamps):
         yield "times or numbers of the message records differ from the stamps of /joint_states"
