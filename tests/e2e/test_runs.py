@@ -3,12 +3,12 @@
 import json
 import os
 import re
-import shutil
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
@@ -271,11 +271,18 @@ def test_a_run_in_the_foreground_is_a_run_like_any_other(config: Path, records: 
 def test_a_run_whose_record_cannot_be_written_goes_on(config: Path, records: Records, tmp_path: Path) -> None:
     running = start(config, tmp_path / "data", 1, "--trials", "4")
     running.wait_until(lambda: bool(records.ids()))
-    shutil.rmtree(tmp_path / "state" / "runs")
+    in_the_way = tmp_path / "state" / "runs" / f"{records.ids()[0]}.new"
+
+    def stands() -> bool:
+        # For a moment, a record may just be written there.
+        with suppress(FileExistsError):
+            in_the_way.mkdir()
+        return in_the_way.is_dir()
+
+    running.wait_until(stands)
     code, _, err = running.finish()
     assert code == 0, err
     assert err.count("what happens in this run is not written down any more: ") == 1
-    (tmp_path / "state" / "runs").mkdir()
 
 
 def test_ctrl_c_leaves_a_run_that_is_only_watched(config: Path, records: Records, tmp_path: Path) -> None:

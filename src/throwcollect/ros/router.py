@@ -18,7 +18,7 @@ import zenoh
 
 from throwcollect.errors import ConfigError, ThrowcollectError
 from throwcollect.run_key import RunKey
-from throwcollect.session_config import in_words, router_config
+from throwcollect.session_config import PROTECTED, in_words, router_config
 
 DEFAULT_LISTEN = "tcp/127.0.0.1:7447"
 """Reachable from this host alone, at the port that nodes connect to by default."""
@@ -87,10 +87,13 @@ def serve(listen: str = DEFAULT_LISTEN, key_directory: Path | None = None) -> No
             there is none. None for the key that the environment names.
 
     Raises:
-        ConfigError: If the endpoint is malformed, the router cannot listen on it, or its key cannot be read.
+        ConfigError: If the endpoint is malformed or knows of no key, the router cannot listen on it, or its key cannot
+            be read.
     """
     if key_directory is None:
         key = RunKey.of_environment()
+    elif not listen.startswith(PROTECTED):
+        raise ConfigError(f"--key: {listen} lets anybody in, whatever key there is", expected="tls/..., or no --key")
     else:
         key = RunKey(key_directory.absolute())
         if not key.exists:

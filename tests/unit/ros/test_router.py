@@ -110,6 +110,12 @@ def test_the_command_makes_a_key_where_there_is_none_and_keeps_the_one_that_is_t
     assert keys[0] == keys[1]
 
 
+def test_a_key_that_would_keep_nobody_out_is_refused(tmp_path):
+    with pytest.raises(ConfigError, match=r"--key: tcp/127.0.0.1:0 lets anybody in"):
+        serve("tcp/127.0.0.1:0", tmp_path / "new")
+    assert not (tmp_path / "new").exists()
+
+
 def test_the_key_of_the_environment_is_used_and_never_made(monkeypatch, tmp_path):
     monkeypatch.setenv(KEY_VARIABLE, str(tmp_path / "gone"))
     with pytest.raises(ConfigError, match=r"cannot be read: .*gone/key.pem"):
