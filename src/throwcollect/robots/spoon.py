@@ -128,6 +128,9 @@ def way_out(tool: ToolConfig, radius: float, up: NDArray[np.float64]) -> float:
     # A ball that lies on the edges of the floor or of the rim is held as by walls along its surface there.
     sine = min(max(math.cos(lean), tool.cup_floor_radius_m / radius), tool.cup_rim_radius_m / radius)
     steepness = math.tan(math.asin(min(sine, 1.0))) * math.cos(math.pi / tool.cup_walls)
-    turns = math.pi / tool.cup_walls * (2 * np.arange(tool.cup_walls) + 1)
-    ways = np.column_stack([np.full(tool.cup_walls, steepness), np.cos(turns), np.sin(turns)])
-    return float(np.arcsin((ways @ up).min() / math.hypot(steepness, 1.0)))
+    along, across, sideways = map(float, up)
+    climbs = []
+    for number in range(tool.cup_walls):
+        turn = math.pi * (2 * number + 1) / tool.cup_walls
+        climbs.append(steepness * along + math.cos(turn) * across + math.sin(turn) * sideways)
+    return math.asin(min(climbs) / math.hypot(steepness, 1.0))

@@ -54,9 +54,11 @@ class SpoonMotion:
         robot = self._robot
         pinocchio.forwardKinematics(robot.model, robot.data, position[robot.order], velocity[robot.order])
         gripper = pinocchio.updateFramePlacement(robot.model, robot.data, robot.gripper)
-        at_seat = self._seat.actInv(pinocchio.getFrameVelocity(robot.model, robot.data, robot.gripper))
-        turned: NDArray[np.float64] = (gripper * self._seat).rotation @ at_seat.linear
-        return turned
+        # Of the point, first along the axes of the seat, then along those of the world.
+        along_seat = self._seat.actInv(pinocchio.getFrameVelocity(robot.model, robot.data, robot.gripper))
+        turn = pinocchio.SE3((gripper * self._seat).rotation, np.zeros(3))
+        velocity_in_world: NDArray[np.float64] = turn.act(along_seat).linear
+        return velocity_in_world
 
 
 class _Robot:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import operator
 
 import numpy as np
 
@@ -40,7 +41,7 @@ def lost_before_start(samples: Samples, header: EpisodeHeader, *, config: Config
     held = [contact.start_ns for contact in header.contacts if contact.body == "spoon"]
     if held and min(held) > header.start_ns:
         seat = SpoonMotion(config).place(samples.position[0])
-        if np.linalg.norm(samples.ball_position[0] - seat) > config.tool.cup_rim_radius_m:
+        if math.dist(samples.ball_position[0], seat) > config.tool.cup_rim_radius_m:
             held = []
     if held:
         return None
@@ -50,9 +51,9 @@ def lost_before_start(samples: Samples, header: EpisodeHeader, *, config: Config
 def drop(samples: Samples, header: EpisodeHeader, release: BallState, *, config: Config) -> str | None:
     """Reason why a ball that left the spoon was not thrown by it, if it was not.
 
-    The spoon threw the ball if it moved the way that the ball then took, and not much slower than the ball falls
-    through the depth of the cup. A spoon that brakes lets the ball roll on over its rim; so it is asked for its
-    highest speed in the time that the ball needs for the radius of the rim.
+    The spoon threw the ball if it moved the way that the ball then took, at a quarter or more of the speed of a fall
+    through the depth of the cup. A spoon that brakes lets the ball roll on over its rim; so its highest speed counts
+    of the time that the ball, at its speed, needs for the radius of the rim.
 
     Args:
         samples: The whole trial.
@@ -61,7 +62,7 @@ def drop(samples: Samples, header: EpisodeHeader, release: BallState, *, config:
         config: Configuration of the trial.
     """
     speed = math.hypot(*release.velocity)
-    direction = np.array(release.velocity) / (speed or 1.0)
+    direction = [part / (speed or 1.0) for part in release.velocity]
     least = _LEAST_SHARE * math.sqrt(2 * config.scene.gravity_mps2 * config.tool.cup_depth_m)
     release_ns = header.start_ns + round(release.time_s * _NS_PER_S)
     since_ns = release_ns - (config.tool.cup_rim_radius_m / speed * _NS_PER_S if speed else math.inf)
@@ -69,16 +70,17 @@ def drop(samples: Samples, header: EpisodeHeader, release: BallState, *, config:
     spoon = SpoonMotion(config)
     fastest = -math.inf
     for row in range(last, -1, -1):
-        fastest = max(fastest, float(direction @ spoon.velocity(samples.position[row], samples.velocity[row])))
+        velocity = spoon.velocity(samples.position[row], samples.velocity[row]).tolist()
+        fastest = max(fastest, sum(map(operator.mul, direction, velocity)))
         if fastest >= least:
             return None
         if samples.stamps_ns[row] <= since_ns:
             break
-    moved = np.linalg.norm(spoon.place(samples.position[last]) - spoon.place(samples.position[0]))
+    moved = math.dist(spoon.place(samples.position[last]), spoon.place(samples.position[0]))
     height = release.position[2] - samples.ball_position[0, 2]
-    work = config.scene.gravity_mps2 * height + (speed**2 - float((samples.ball_linear_velocity[0] ** 2).sum())) / 2
+    work = config.scene.gravity_mps2 * height + (speed**2 - math.hypot(*samples.ball_linear_velocity[0]) ** 2) / 2
     return (
         f"the spoon did not throw the ball: it left at {release.time_s:.3f} s with {speed:.2f} m/s, and the spoon went "
-        f"that way at {fastest:.2f} m/s, not {least:.2f} m/s; until then, the spoon had moved by {moved * 1000:.1f} mm "
-        f"and done {work:.2f} J/kg of work on the ball"
+        f"that way at {fastest:z.2f} m/s, not {least:.2f} m/s; until then, the spoon had moved by {moved * 1000:.1f} mm "
+        f"and done {work:z.2f} J/kg of work on the ball"
     )

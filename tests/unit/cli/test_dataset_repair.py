@@ -4,6 +4,8 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 from tests.unit.dataset.conftest import Collection
 
@@ -58,7 +60,44 @@ def test_rebuild_says_what_it_wrote(run: Run, source: Path, capsys: pytest.Captu
     assert (source / "throws.parquet").read_bytes() == before
     assert run("dataset", "rebuild", source, "--json") == 0
     found = json.loads(capsys.readouterr().out)
-    assert found == {"trials": 3, "episodes": 3, "lost": [], "written": ["throws.parquet", "metadata.yaml"]}
+    assert found == {
+        "trials": 3,
+        "episodes": 3,
+        "lost": [],
+        "rejudged": [],
+        "written": ["throws.parquet", "metadata.yaml"],
+    }
+
+
+def test_rebuild_says_what_is_judged_otherwise(run: Run, source: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """As in a dataset of before an outcome was known."""
+    table = pq.read_table(source / "throws.parquet")
+    card, metadata = (source / "README.md").read_text(), (source / "metadata.yaml").read_bytes()
+
+    def misjudge(trials: int) -> None:
+        column = table.schema.get_field_index("outcome")
+        outcomes = pa.array(["dropped"] * trials + ["landed"] * (3 - trials))
+        pq.write_table(table.set_column(column, table.schema.field(column), outcomes), source / "throws.parquet")
+        (source / "README.md").write_text(card.replace("| landed | 3 |", "| dropped | 2 |\n| landed | 1 |") + "mine\n")
+
+    misjudge(2)
+    assert run("dataset", "verify", source) == 4
+    assert "trial 1: throws.parquet has outcome = 'dropped', the episode gives 'landed'; to have it judged anew: " in (
+        capsys.readouterr().out
+    )
+    assert run("dataset", "rebuild", source) == 0
+    assert capsys.readouterr().out == (
+        f"{source}: 3 trials, 3 episodes; wrote throws.parquet, metadata.yaml, README.md\n"
+        "2 throws are judged otherwise: trial 0: dropped -> landed, trial 1: dropped -> landed\n"
+    )
+    assert (source / "README.md").read_text() == card + "mine\n"
+    assert (source / "metadata.yaml").read_bytes() == metadata
+    assert run("dataset", "verify", source) == 0
+    misjudge(1)
+    capsys.readouterr()
+    assert run("dataset", "rebuild", source, "--json") == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["rejudged"] == [{"trial": 0, "before": "dropped", "after": "landed"}]
 
 
 def test_rebuild_of_a_damaged_dataset_hints_at_repair(
