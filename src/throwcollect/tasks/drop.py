@@ -81,6 +81,6 @@ def drop(samples: Samples, header: EpisodeHeader, release: BallState, *, config:
     work = config.scene.gravity_mps2 * height + (speed**2 - math.hypot(*samples.ball_linear_velocity[0]) ** 2) / 2
     return (
         f"the spoon did not throw the ball: it left at {release.time_s:.3f} s with {speed:.2f} m/s, and the spoon went "
-        f"that way at {fastest:z.2f} m/s, not {least:.2f} m/s; until then, the spoon had moved by {moved * 1000:.1f} mm "
-        f"and done {work:z.2f} J/kg of work on the ball"
+        f"that way at {fastest:z.2f} m/s, not {least:.2f} m/s; until then, the spoon had moved by "
+        f"{moved * 1000:.1f} mm and done {work:z.2f} J/kg of work on the ball"
     )
