@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json as jsonlib
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
@@ -31,9 +32,16 @@ def show_rebuilt(directory: Path, *, json: bool) -> None:
         return
     found = f"{counted(rebuilt.trials, 'trial')}, {counted(rebuilt.episodes, 'episode')}"
     typer.echo(f"{directory}: {found}; wrote {', '.join(rebuilt.written)}")
+    if rejudged := rebuilt.rejudged:
+        changes = [f"trial {each.trial}: {each.before} -> {each.after}" for each in rejudged]
+        verb = "is" if len(rejudged) == 1 else "are"
+        typer.echo(f"{counted(len(rejudged), 'throw')} {verb} judged otherwise: {_named(changes)}")
     if rebuilt.lost:
-        named = ", ".join(map(str, rebuilt.lost[:_MOST_NAMED]))
-        typer.echo(f"lost: {named}{' and more' if len(rebuilt.lost) > _MOST_NAMED else ''}")
+        typer.echo(f"lost: {_named([str(trial) for trial in rebuilt.lost])}")
+
+
+def _named(things: Sequence[str]) -> str:
+    return ", ".join(things[:_MOST_NAMED]) + (" and more" if len(things) > _MOST_NAMED else "")
 
 
 def show_repaired(directory: Path, output: Path, *, json: bool) -> None:

@@ -187,7 +187,7 @@ class ThrowConfig(Section):
         "arm_right_6_joint": 0.0,
         "arm_right_7_joint": -0.1,
     }
-    """Joint angles at the start of each trial; the spoon must open upwards."""
+    """Joint angles at the start of each trial; the spoon must hold the ball, or the trial is refused."""
     end: dict[Joint, Angle] = {
         "torso_1_joint": 0.0,
         "arm_right_1_joint": 1.5,
@@ -195,7 +195,8 @@ class ThrowConfig(Section):
         "arm_right_4_joint": -0.5,
         "arm_right_7_joint": 0.5,
     }
-    """Joint angles at the end of the motion. The joints named here are the moving ones, even if end equals start."""
+    """Joint angles at the end of the motion. The joints named here are the moving ones, even if end equals start.
+    One of them must move the spoon."""
     duration_s: Annotated[float, Field(ge=0.1, le=10)] = 1.0
     """Duration of the motion (tau of a DMP)."""
     trajectory: Trajectory = MinimumJerk()

@@ -8,9 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import pyarrow as pa
+
 from throwcollect.config.loader import load
 from throwcollect.dataset.bag import FileSummary, dataset_metadata
-from throwcollect.dataset.card import Provenance, data_card
+from throwcollect.dataset.card import Provenance, data_card, outcome_lines
 from throwcollect.dataset.digest import combined_digest
 from throwcollect.dataset.directory import CARD, MANIFEST, METADATA, PLAN, SHARD_SUFFIX, THROWS, config_path
 from throwcollect.dataset.journal import was_open
@@ -24,7 +26,7 @@ from throwcollect.dataset.verify_shard import ShardCheck
 from throwcollect.dataset.verify_tables import shard_of, wrong_trials
 from throwcollect.episode.channels import Channels
 from throwcollect.errors import DatasetError
-from throwcollect.files import write_file
+from throwcollect.files import read_text, write_file
 from throwcollect.robots.description import full_description
 from throwcollect.sweep.plan import Plan, Trial
 from throwcollect.tasks.throw import Outcome, ThrowResult
@@ -32,6 +34,22 @@ from throwcollect.wording import command
 
 NO_EPISODE = "no file holds an episode of it"
 """Reason of a lost trial of which nothing else is known."""
+_MOST_CARD_BYTES = 10_000_000
+
+
+@dataclass(frozen=True)
+class Rejudged:
+    """A trial that ends otherwise than the table of throws said.
+
+    Attributes:
+        trial: Its number.
+        before: Outcome in the table that was there.
+        after: Outcome now.
+    """
+
+    trial: int
+    before: str
+    after: str
 
 
 @dataclass(frozen=True)
@@ -42,12 +60,14 @@ class Rebuilt:
         trials: Number of trials of the plan.
         episodes: Number of episodes.
         lost: Trials that should have an episode and have none.
+        rejudged: Trials whose outcome is another one than before.
         written: Names of the files that were written.
     """
 
     trials: int
     episodes: int
     lost: tuple[int, ...]
+    rejudged: tuple[Rejudged, ...]
     written: tuple[str, ...]
 
 
@@ -55,7 +75,8 @@ def rebuild(directory: Path) -> Rebuilt:
     """Write ``throws.parquet``, the manifest and ``metadata.yaml`` anew, and the data card if it is missing.
 
     They follow from the configuration, the plan and the recordings, which are checked as `verify` does. The table that
-    is there, if it can be read, says why trials are lost and which recordings there should be.
+    is there, if it can be read, says why trials are lost and which recordings there should be. Where the recordings are
+    judged otherwise than it says, the data card that is there gets the new numbers of outcomes.
 
     Args:
         directory: Directory of a dataset.
@@ -103,11 +124,26 @@ def _rebuilt(directory: Path) -> Rebuilt:
         provenance = Provenance.of_this_machine(simulations=None, wall_s=None, was_open=was_open(directory))
         write_file(directory / CARD, data_card(config.without_run(), throws, provenance).encode())
         written.append(CARD)
+    rejudged = tuple(
+        Rejudged(trial, before["outcome"], row["outcome"])
+        for row in rows
+        if (before := earlier.get(trial := row["trial"])) and before["outcome"] != row["outcome"]
+    )
+    if rejudged and CARD not in written:
+        _correct_card(directory / CARD, table.table(earlier.values()), throws)
+        written.append(CARD)
     metadata = dataset_metadata(recordings.summaries, channels.all, digest).encode()
     write_file(directory / MANIFEST, _manifest(directory, config.name, recordings.summaries, metadata).encode())
     write_file(directory / METADATA, metadata)
     lost = tuple(row["trial"] for row in rows if row["outcome"] == Outcome.LOST.value)
-    return Rebuilt(len(rows), len(recordings.rows), lost, tuple(written))
+    return Rebuilt(len(rows), len(recordings.rows), lost, rejudged, tuple(written))
+
+
+def _correct_card(path: Path, before: pa.Table, after: pa.Table) -> None:
+    """Put the numbers of outcomes into a data card; all else in it stays, as people write there, too."""
+    card = read_text(path, most_bytes=_MOST_CARD_BYTES)
+    lines, instead = ("\n".join(outcome_lines(table)) for table in (before, after))
+    write_file(path, card.replace(lines, instead, 1).encode())
 
 
 def _manifest(directory: Path, name: str, recordings: Sequence[FileSummary], metadata: bytes) -> str:

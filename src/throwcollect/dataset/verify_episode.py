@@ -166,7 +166,8 @@ def _row_problems(expected: Mapping[str, Any], row: Mapping[str, Any]) -> Iterat
     if wrong:
         told = ", ".join(f"{name} = {row[name]!r}, the episode gives {expected[name]!r}" for name in wrong[:_MOST_TOLD])
         more = f"; {len(wrong) - _MOST_TOLD} more columns differ" if len(wrong) > _MOST_TOLD else ""
-        yield f"throws.parquet has {told}{more}"
+        hint = "; to have it judged anew: throwcollect dataset rebuild" if "outcome" in wrong else ""
+        yield f"throws.parquet has {told}{more}{hint}"
 
 
 def _message_problems(episode: Episode, channels: Channels) -> Iterator[str]:

@@ -1,4 +1,4 @@
-"""Whether Talos can follow a joint trajectory: position, velocity and effort limits, and collisions with itself."""
+"""Whether Talos can throw with a joint trajectory: limits, collisions with itself, and a spoon that holds the ball."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from throwcollect.robots.clearance import GRIPPER, MARGIN_M, Clearance, spoon_mo
 from throwcollect.robots.description import joint_model, locked_joints, start_posture
 from throwcollect.robots.interpolation import sample_quintic
 from throwcollect.robots.model import joint_limits
-from throwcollect.robots.spoon import ball_seat, inertia
+from throwcollect.robots.spoon import ball_seat, inertia, way_out
 from throwcollect.robots.talos import JOINTS
 from throwcollect.robots.trajectory import JointTrajectory
 
@@ -21,6 +21,8 @@ _CHECKED_HZ = 100
 _CHECKED_LEAST = 100
 _CLEARANCE_STEP_RAD = 0.02
 _POSITION_SLACK_RAD = 1e-6
+_LOWEST_WAY_OUT_RAD = -0.02
+"""A way out that goes down less than this is level but for rounding: the ball takes a second or more to leave."""
 
 Motion = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
 
@@ -45,19 +47,22 @@ class Feasibility:
         gripper = self._model.frames[self._model.getFrameId(GRIPPER, pinocchio.BODY)]
         self._hand = gripper.parentJoint
         self._gripper_placement = gripper.placement
+        chain = list(self._model.supports[self._hand])[1:]
+        self._carrying = [JOINTS.index(self._model.names[joint]) for joint in chain]
         self._bare_hand = self._model.inertias[self._hand].copy()
         self._limits = joint_limits()
         self._tool = config.tool
         self._clearance = Clearance(self._model, config.tool)
 
     def check(self, config: Config, trajectory: JointTrajectory) -> str | None:
-        """Reason why the robot cannot follow a trajectory, if there is one.
+        """Reason why the robot cannot throw with a trajectory, if there is one.
 
         The curve between the points is checked at 100 Hz and at 100 instants at least, for collisions whenever a joint
         has gone on by 0.02 rad. Joints that the trajectory does not move rest at the trial's start posture. Torques are
         those of inverse dynamics plus viscous friction; the spoon and the ball count as part of the hand throughout,
         also after the ball has left. The effort of locked joints is not limited, as they are simulated as rigid.
-        Collisions are those of the robot and the spoon; what the ball hits is for the judge of the throw.
+        Collisions are those of the robot and the spoon; what the ball hits is for the judge of the throw. The spoon
+        has to move, and to hold the ball in the start posture (see `spoon.way_out`).
 
         Args:
             config: Configuration of the trial.
@@ -65,8 +70,8 @@ class Feasibility:
 
         Returns:
             None if it is feasible, else one sentence with joint or links, instant, value and limit: of the first kind
-            that is violated, in the order position, velocity, effort, collision. Of limits, it tells the worst
-            violation; of collisions, the first.
+            that is violated, in the order position, velocity, effort, collision, spoon that rests, ball that does
+            not. Of limits, it tells the worst violation; of collisions, the first.
 
         Raises:
             ConfigError: If the posture or the choice of locked joints is wrong, or the ball does not fit the spoon.
@@ -106,7 +111,26 @@ class Feasibility:
                 f"{' and '.join(approach.links)} {_gap(approach.distance_m)} at {times[rows[approach.index]]:.3f} s; "
                 f"they must stay {MARGIN_M * 1000:.3g} mm apart"
             )
-        return None
+        if np.ptp(positions[:, self._carrying], axis=0).max() <= _POSITION_SLACK_RAD:
+            carrying = ", ".join(JOINTS[column] for column in self._carrying)
+            return f"task.end moves no joint that carries the spoon; these do: {carrying}"
+        return self._loss(config, posture)
+
+    def _loss(self, config: Config, posture: NDArray[np.float64]) -> str | None:
+        """Reason why the ball does not stay in the spoon of the still robot, if there is one."""
+        pinocchio.forwardKinematics(self._model, self._data, self._model_order(posture))
+        spoon = self._data.oMi[self._hand] * self._gripper_placement * spoon_mount(config.tool)
+        up = spoon.rotation[2]
+        tool, radius = config.tool, config.ball.radius_m
+        slope = way_out(tool, radius, up)
+        if slope >= _LOWEST_WAY_OUT_RAD:
+            return None
+        tilt = math.acos(max(-1.0, min(1.0, float(up[0]))))
+        safe = way_out(tool, radius, np.array([1.0, 0.0, 0.0]))
+        return (
+            f"task.start does not hold the ball: it tilts the spoon by {tilt:.3g} rad, so that the ball rolls out, "
+            f"{-slope:.3g} rad downwards; up to {safe:.3g} rad, a tilt in any direction is safe"
+        )
 
     def efforts(self, config: Config, motion: Motion) -> NDArray[np.float64]:
         """Torques that a motion needs, with spoon and ball in the hand.
@@ -140,8 +164,9 @@ class Feasibility:
         return self._clearance
 
     def _model_order(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values of joints in the order of the model; the last axis is that of the joints."""
         ordered = np.empty_like(values)
-        ordered[:, self._columns] = values
+        ordered[..., self._columns] = values
         return ordered
 
 

@@ -202,7 +202,7 @@ def _check_some_left(reasons: list[str], trials: int) -> None:
     listed = [f"{count} × {examples[kind]}" for kind, count in Counter(kinds).most_common(_MOST_REASONS)]
     raise PlanError(
         [Problem(f"{counted(trials, 'trial')}, all refused: {'; '.join(listed)}", key="sweep")],
-        hint="sweep over smaller ranges or slower motions",
+        hint="sweep over smaller ranges or slower motions, or change task.start and task.end",
     )
 
 

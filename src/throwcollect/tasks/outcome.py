@@ -11,9 +11,11 @@ class Outcome(str, Enum):
     """How a trial ended."""
 
     LANDED = "landed"
-    """Released once, and crossed the landing plane without touching the robot, within all limits."""
+    """Thrown, and crossed the landing plane without touching the robot, within all limits."""
     NOT_RELEASED = "not_released"
     """The ball never left the spoon for good."""
+    DROPPED = "dropped"
+    """The ball left the spoon by its own weight: the spoon did not throw it, or had lost it before the start."""
     RECAUGHT = "recaught"
     """The spoon touched the ball again after its release."""
     SELF_HIT = "self_hit"

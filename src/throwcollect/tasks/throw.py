@@ -14,6 +14,7 @@ from throwcollect.robots.interpolation import sample_positions
 from throwcollect.robots.model import JointLimits
 from throwcollect.robots.talos import JOINTS
 from throwcollect.robots.trajectory import JointTrajectory
+from throwcollect.tasks.drop import drop, lost_before_start
 from throwcollect.tasks.flight import NS_PER_S, Flight, flight_after, release_of, without_impact
 from throwcollect.tasks.outcome import BallState, Outcome, Peak, ThrowResult
 
@@ -39,14 +40,16 @@ def judge(
     that landed keeps its landing under any outcome:
 
     1. ``tracking_failed``: a sample is not finite (then nothing is measured), or a goal was canceled or aborted.
-    2. ``not_released``: no contact with the spoon ended for at least `task.recatch_gap_s` or to the end of the record.
-    3. ``self_hit`` or ``recaught``: between release and landing the ball touched a link of the robot, or the spoon
+    2. ``dropped``: the ball was not in the spoon at the start.
+    3. ``not_released``: no contact with the spoon ended for at least `task.recatch_gap_s` or to the end of the record.
+    4. ``dropped``: the spoon hardly moved, or not the way of the ball, when the ball left it (see `drop`).
+    5. ``self_hit`` or ``recaught``: between release and landing the ball touched a link of the robot, or the spoon
        again; what it touched first decides.
-    4. ``timeout``: the ball's lowest point did not cross the landing plane downwards after the release.
-    5. ``limit_violated``: the measured position or velocity of a joint exceeds its limit, or its torque reaches it.
+    6. ``timeout``: the ball's lowest point did not cross the landing plane downwards after the release.
+    7. ``limit_violated``: the measured position or velocity of a joint exceeds its limit, or its torque reaches it.
        Limits count with a tolerance of 0.1 % (of half the range, for positions). Held joints may rest at the end of
        their range, so positions count for the moving joints only, velocities and torques for all.
-    6. ``landed``.
+    8. ``landed``.
 
     Release, apex and landing lie between samples: positions on the cubic through the positions and velocities of both
     neighbours, velocities linear between them. If the ground has pressed on the ball by the sample after the landing,
@@ -70,18 +73,23 @@ def judge(
             flight = without_impact(flight, (min(impacts) - header.start_ns) / NS_PER_S, config=config)
         result = _flight_measures(result, flight, config)
         touched = _touches(header, release_ns, result.landing.time_s if result.landing else math.inf)
-    outcome, reason = _outcome(result, header, touched)
+    outcome, reason = _outcome(result, samples, header, config, touched)
     return replace(result, outcome=outcome, reason=reason, recontacts=None if touched is None else len(touched))
 
 
-def _outcome(result: ThrowResult, header: EpisodeHeader, touched: list[Contact] | None) -> tuple[Outcome, str | None]:
+def _outcome(
+    result: ThrowResult, samples: Samples, header: EpisodeHeader, config: Config, touched: list[Contact] | None
+) -> tuple[Outcome, str | None]:
     for goal in header.goals:
         if goal.status in _FAILED_GOALS:
             detail = f": {goal.error_string}" if goal.error_string else f" with error code {goal.error_code}"
             return Outcome.TRACKING_FAILED, f"{goal.controller} {_FAILED_GOALS[goal.status]} its goal{detail}"
+    if reason := lost_before_start(samples, header, config=config):
+        return Outcome.DROPPED, reason
     if result.release is None:
-        held = any(contact.body == "spoon" for contact in header.contacts)
-        return Outcome.NOT_RELEASED, "the ball stayed in the spoon" if held else "the ball was never in the spoon"
+        return Outcome.NOT_RELEASED, "the ball stayed in the spoon"
+    if reason := drop(samples, header, result.release, config=config):
+        return Outcome.DROPPED, reason
     if touched:
         first = touched[0]
         time_s = (first.start_ns - header.start_ns) / NS_PER_S

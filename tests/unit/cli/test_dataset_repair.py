@@ -5,6 +5,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 from tests.unit.dataset.conftest import Collection
 
@@ -66,8 +68,44 @@ def test_rebuild_says_what_it_wrote(run: Run, source: Path, capsys: pytest.Captu
     assert (source / "throws.parquet").read_bytes() == before
     assert run("dataset", "rebuild", source, "--json") == 0
     found = json.loads(capsys.readouterr().out)
-    written = ["throws.parquet", "datapackage.json", "metadata.yaml"]
-    assert found == {"trials": 3, "episodes": 3, "lost": [], "written": written}
+    assert found == {
+        "trials": 3,
+        "episodes": 3,
+        "lost": [],
+        "rejudged": [],
+        "written": ["throws.parquet", "datapackage.json", "metadata.yaml"],
+    }
+
+
+def test_rebuild_says_what_is_judged_otherwise(run: Run, source: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """As in a dataset of before an outcome was known."""
+    table = pq.read_table(source / "throws.parquet")
+    card, metadata = (source / "README.md").read_text(), (source / "metadata.yaml").read_bytes()
+
+    def misjudge(trials: int) -> None:
+        column = table.schema.get_field_index("outcome")
+        outcomes = pa.array(["dropped"] * trials + ["landed"] * (3 - trials))
+        pq.write_table(table.set_column(column, table.schema.field(column), outcomes), source / "throws.parquet")
+        (source / "README.md").write_text(card.replace("| landed | 3 |", "| dropped | 2 |\n| landed | 1 |") + "mine\n")
+
+    misjudge(2)
+    assert run("dataset", "verify", source) == 4
+    assert "trial 1: throws.parquet has outcome = 'dropped', the episode gives 'landed'; to have it judged anew: " in (
+        capsys.readouterr().out
+    )
+    assert run("dataset", "rebuild", source) == 0
+    assert capsys.readouterr().out == (
+        f"{source}: 3 trials, 3 episodes; wrote throws.parquet, datapackage.json, metadata.yaml, README.md\n"
+        "2 throws are judged otherwise: trial 0: dropped -> landed, trial 1: dropped -> landed\n"
+    )
+    assert (source / "README.md").read_text() == card + "mine\n"
+    assert (source / "metadata.yaml").read_bytes() == metadata
+    assert run("dataset", "verify", source) == 0
+    misjudge(1)
+    capsys.readouterr()
+    assert run("dataset", "rebuild", source, "--json") == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["rejudged"] == [{"trial": 0, "before": "dropped", "after": "landed"}]
 
 
 def test_rebuild_of_a_damaged_dataset_hints_at_repair(
@@ -106,7 +144,7 @@ def test_repair_lists_what_is_lost_and_ends_with_5(
     assert run("dataset", "verify", output) == 0
 
 
-def test_repair_that_keeps_another_episode_than_the_tables_ends_with_3(
+def test_repair_that_keeps_another_episode_than_the_tables_ends_with_5(
     run: Run, source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def forged(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
@@ -115,7 +153,7 @@ def test_repair_that_keeps_another_episode_than_the_tables_ends_with_3(
     other = Collection({"trials": 3}).collect(tmp_path / "other", change=forged)
     (source / "quick_00000.mcap").write_bytes((other / "quick_00000.mcap").read_bytes())
     output = tmp_path / "output"
-    assert run("dataset", "repair", source, output) == 3
+    assert run("dataset", "repair", source, output) == 5
     told = capsys.readouterr()
     assert told.out.count("as in throws.parquet; kept, as nothing else speaks against it") == 3
     assert f"{output}: 3 episodes kept, such as that of trial 0, which throws.parquet had otherwise" in told.err

@@ -119,8 +119,8 @@ def test_stronger_robot_can_do_the_long_throw(reason):
 
 
 def test_effort_of_held_joints_is_limited_only_where_they_are_simulated(reason):
-    """An arm that carries too much is no matter as long as it is rigid and only the head moves."""
-    task = {"start": {**TASK.start, "head_1_joint": 0.0}, "end": {"head_1_joint": 0.1}}
+    """An arm that carries too much is no matter as long as it is rigid and only the torso moves."""
+    task = {"start": TASK.start, "end": {"torso_1_joint": 0.1}}
     assert reason(Config(task=task, tool={"mass_kg": 2.0})) is None
     assert reason(Config(task=task, tool={"mass_kg": 2.0}, robot={"locked": "none"})).startswith("arm_right_")
 
@@ -175,8 +175,34 @@ def test_spoon_against_the_leg_is_refused_until_it_is_short_enough(reason):
     task = {"start": start, "end": {**start, "arm_right_1_joint": 0.7, "arm_right_6_joint": 1.0}, "duration_s": 6.0}
     refusal = reason(Config(task=task))
     assert refusal.startswith("leg_left_3_link and spoon overlap at 5.")
-    assert reason(Config(task=task, tool={"handle_length_m": 0.05})) is None
+    assert reason(Config(task=task, tool={"handle_length_m": 0.05})).startswith("task.start does not hold the ball")
     assert reason(Config(task=task)) == refusal
+
+
+@pytest.mark.parametrize("joint", ["arm_left_4_joint", "head_1_joint", "arm_right_4_joint"])
+def test_throw_that_does_not_move_the_spoon_is_refused(reason, joint):
+    start = {**TASK.start, "arm_left_4_joint": -1.9, "head_1_joint": 0.0}
+    end = {joint: start[joint] + (0.0 if "right" in joint else 0.3)}
+    assert reason(Config(task={"start": start, "end": end})) == (
+        "task.end moves no joint that carries the spoon; these do: torso_1_joint, torso_2_joint, arm_right_1_joint, "
+        "arm_right_2_joint, arm_right_3_joint, arm_right_4_joint, arm_right_5_joint, arm_right_6_joint, "
+        "arm_right_7_joint"
+    )
+
+
+def test_throw_of_one_joint_that_carries_the_spoon_is_feasible(reason):
+    assert reason(Config(task={"start": TASK.start, "end": {"torso_1_joint": 0.3}})) is None
+
+
+def test_start_posture_that_does_not_hold_the_ball_is_refused(reason):
+    assert reason(throw(start={"arm_right_5_joint": 1.5})) == (
+        "task.start does not hold the ball: it tilts the spoon by 1.48 rad, so that the ball rolls out, 0.824 rad "
+        "downwards; up to 0.594 rad, a tilt in any direction is safe"
+    )
+    assert reason(throw(start={"arm_right_5_joint": 0.55})) is None
+    assert "task.start does not hold" in reason(throw(start={"arm_right_5_joint": 0.55}, tool={"cup_depth_m": 0.02}))
+    half_sitting_arm = {"torso_1_joint": 0.0}
+    assert "task.start does not hold" in reason(Config(task={"start": half_sitting_arm, "end": {"torso_1_joint": 0.3}}))
 
 
 def test_handle_may_reach_into_the_hand(reason):

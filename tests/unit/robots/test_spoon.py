@@ -3,7 +3,7 @@ import pytest
 
 from throwcollect.config.schema import ToolConfig
 from throwcollect.errors import ConfigError
-from throwcollect.robots.spoon import ball_seat, boxes, inertia
+from throwcollect.robots.spoon import ball_seat, boxes, inertia, way_out
 
 
 def gaps(tool, centre):
@@ -52,3 +52,36 @@ def test_the_walls_close_the_rim():
     corner = np.array([first.size[0] / 2, -first.size[1] / 2, first.size[2] / 2])
     other = corner * [1, 1, -1]
     assert first.placement.act(corner) == pytest.approx(second.placement.act(other))
+
+
+def tilted(tilt, azimuth=0.0):
+    return np.array([np.cos(tilt), np.sin(tilt) * np.cos(azimuth), np.sin(tilt) * np.sin(azimuth)])
+
+
+@pytest.mark.parametrize(("walls", "turn"), [(4, np.pi / 4), (6, np.pi / 6), (9, np.pi)])
+@pytest.mark.parametrize("radius", [0.006, 0.025, 0.07, 0.09])
+def test_a_cup_is_left_between_two_walls_when_it_is_tilted_by_the_slope_of_the_upright_one(walls, turn, radius):
+    tool = ToolConfig(cup_walls=walls)
+    slope = way_out(tool, radius, tilted(0.0))
+    # The way between two walls rises away from the axis, so a tilt away from it lowers it.
+    for tilt in (0.1, slope, slope + 0.1):
+        assert way_out(tool, radius, tilted(tilt, turn + np.pi)) == pytest.approx(slope - tilt, abs=1e-9)
+    assert way_out(tool, radius, tilted(slope, turn + np.pi / walls)) > 0
+
+
+def test_the_normals_of_the_walls_bound_the_tilts_at_which_the_ball_stays():
+    """At rest the weight is carried by pushes of the walls, so it lies in the cone of their normals."""
+    tool = ToolConfig()
+    normals = [-wall.placement.rotation[:, 1] for wall in boxes(tool)[1:]]
+    for azimuth in np.linspace(0, 2 * np.pi, 37):
+        for tilt in (0.3, 0.55, 0.58, 0.61, 0.66, 0.7):
+            up = tilted(tilt, azimuth)
+            inside = all(np.linalg.det([normals[i], normals[(i + 1) % 6], up]) > 0 for i in range(6))
+            assert (way_out(tool, 0.025, up) > 0) == inside
+
+
+def test_a_deeper_cup_and_a_ball_on_a_narrower_rim_hold_differently():
+    upright = tilted(0.0)
+    assert way_out(ToolConfig(cup_depth_m=0.05), 0.025, upright) > way_out(ToolConfig(), 0.025, upright)
+    assert way_out(ToolConfig(), 0.1, upright) < way_out(ToolConfig(), 0.025, upright)
+    assert way_out(ToolConfig(cup_floor_radius_m=0.024), 0.025, upright) > way_out(ToolConfig(), 0.025, upright)

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from throwcollect.config.schema import Config
 from throwcollect.episode.record import Contact, GoalOutcome
 from throwcollect.robots.model import joint_limits
+from throwcollect.robots.spoon_motion import SpoonMotion
 from throwcollect.robots.talos import JOINTS
 from throwcollect.tasks.flight import ballistic_positions
 from throwcollect.tasks.throw import Outcome, judge
@@ -106,9 +107,71 @@ def test_ball_that_stays_in_the_spoon_is_not_released():
     assert result.velocity_peak is not None
 
 
-def test_ball_that_was_never_in_the_spoon_is_not_released():
+def test_ball_that_had_left_the_spoon_before_the_start_is_dropped_even_if_the_spoon_hits_it_later():
+    lost = "the ball had left the spoon before the start, in the sim.settle_s = 0.05 s for settling"
     result = judged(*episode(contacts=()))
-    assert (result.outcome, result.reason) == (Outcome.NOT_RELEASED, "the ball was never in the spoon")
+    assert (result.outcome, result.reason, result.release) == (Outcome.DROPPED, lost, None)
+    result = judged(*episode(contacts=(("spoon", 0.6, RELEASE_S),)))
+    assert (result.outcome, result.reason) == (Outcome.DROPPED, lost)
+    assert result.landing is not None
+
+
+def test_ball_on_a_bounce_at_the_start_is_in_the_spoon():
+    samples, header = episode(contacts=(("spoon", 0.01, RELEASE_S),))
+    samples.ball_position[0] = SpoonMotion(Config()).place(samples.position[0])
+    samples.ball_position[0, 2] += 0.01
+    assert judged(samples, header).outcome is Outcome.LANDED
+
+
+def test_ball_that_leaves_a_still_spoon_is_dropped_with_the_evidence_and_keeps_its_landing():
+    """Only the left arm moves, and the ball leaves the right hand."""
+    task = {"start": {**Config().task.start, "arm_left_4_joint": -1.9}, "end": {"arm_left_4_joint": -0.5}}
+    config = Config(task=task)
+    samples, header = episode(config)
+    samples.ball_linear_velocity[samples.stamps_ns < header.start_ns + RELEASE_S * 1e9] = 0.0
+    result = judged(samples, header, config)
+    assert result.outcome is Outcome.DROPPED
+    assert result.reason.startswith("the spoon did not throw the ball: it left at 0.637 s with ")
+    assert "and the spoon went that way at 0.00 m/s, not 0.20 m/s; until then, the spoon had moved by 0.0 mm" in (
+        result.reason
+    )
+    assert result.reason.endswith(" J/kg of work on the ball")
+    assert result.landing is not None
+
+
+def test_ball_that_leaves_before_the_swing_is_dropped():
+    assert judged(*episode(contacts=(("spoon", 0.0, 0.044),))).outcome is Outcome.DROPPED
+
+
+def test_ball_that_leaves_against_the_swing_is_dropped():
+    assert judged(*episode(velocity=-VELOCITY)).outcome is Outcome.DROPPED
+
+
+def test_ball_that_leaves_at_rest_is_dropped():
+    samples, header = episode(velocity=np.zeros(3))
+    samples.velocity[:] = 0.0
+    assert judged(samples, header).outcome is Outcome.DROPPED
+
+
+def test_ball_that_rolls_on_over_the_rim_of_a_spoon_that_brakes_is_thrown():
+    samples, header = episode()
+    times = (samples.stamps_ns - header.start_ns) / 1e9
+    for stop, outcome in ((RELEASE_S - 0.01, Outcome.LANDED), (RELEASE_S - 0.1, Outcome.DROPPED)):
+        samples.velocity[times > stop] = 0.0
+        assert judged(samples, header).outcome is outcome
+
+
+def test_ball_that_is_thrown_downwards_is_thrown():
+    """It lost energy on the way down, which says nothing about whether the spoon threw it."""
+    start, end = dict(Config().task.start), dict(Config().task.end)
+    config = Config(task={"start": {**start, **end}, "end": {joint: start[joint] for joint in end}})
+    samples, header = episode(config)
+    row = int(RELEASE_S * 250)
+    down = SpoonMotion(config).velocity(samples.position[row], samples.velocity[row])
+    assert down[2] < -0.3
+    samples, header = episode(config, velocity=down, origin=ORIGIN - [0.0, 0.0, 0.4])
+    samples.ball_position[0] = ORIGIN
+    assert judged(samples, header, config).outcome is Outcome.LANDED
 
 
 @pytest.mark.parametrize(("gap", "released_at"), [(0.0199, 0.65), (0.02, 0.6)])
@@ -252,9 +315,16 @@ def test_outcomes_come_in_their_documented_order():
     samples, header = episode(contacts=(HELD, ("head_2_link", 0.7, 0.71)), duration_s=1.2, end_reason="rest")
     samples.effort[100, ELBOW] = 1e3
     assert judged(samples, header).outcome is Outcome.SELF_HIT
+    later = header.contacts[1].start_ns
     header = replace(header, contacts=header.contacts[:1])
     assert judged(samples, header).outcome is Outcome.TIMEOUT
-    assert judged(samples, replace(header, contacts=())).outcome is Outcome.NOT_RELEASED
+    still = replace(samples, velocity=0 * samples.velocity)
+    assert judged(still, replace(header, contacts=(*header.contacts, Contact("head_2_link", later, None)))).outcome is (
+        Outcome.DROPPED
+    )
+    lasting = (replace(header.contacts[0], end_ns=None),)
+    assert judged(still, replace(header, contacts=lasting)).outcome is Outcome.NOT_RELEASED
+    assert judged(samples, replace(header, contacts=())).outcome is Outcome.DROPPED
     goal = GoalOutcome("torso_controller", 6, -5, "")
     result = judged(samples, replace(header, contacts=(), goals=(goal,)))
     assert result.outcome is Outcome.TRACKING_FAILED
@@ -286,7 +356,7 @@ def test_any_contacts_give_an_outcome_without_nan(contacts):
     spans = [(body, start, None if length is None else min(start + length, 1.4)) for body, start, length in contacts]
     result = judged(*episode(contacts=tuple(spans)))
     assert (result.reason is None) == (result.outcome is Outcome.LANDED)
-    assert (result.release is None) == (result.outcome is Outcome.NOT_RELEASED)
+    assert result.release is not None or result.outcome in (Outcome.NOT_RELEASED, Outcome.DROPPED)
     if result.release is not None:
         assert result.apex.position[2] >= result.release.position[2]
     for state in (result.release, result.apex, result.landing):

@@ -35,6 +35,7 @@ _STYLES = {
     Outcome.SELF_HIT.value: Style("#D55E00", "x", "X"),
     Outcome.RECAUGHT.value: Style("#CC79A7", "triangle-up", "^"),
     Outcome.NOT_RELEASED.value: Style("#56B4E9", "square", "s"),
+    Outcome.DROPPED.value: Style("#8A63D2", "star-triangle-down", "<"),
     Outcome.TIMEOUT.value: Style("#009E73", "triangle-down", "v"),
     Outcome.TRACKING_FAILED.value: Style("#999933", "cross", "P"),
     Outcome.LOST.value: Style("#7F7F7F", "hexagon", "h"),
