@@ -52,12 +52,13 @@ def create(directory: Path, plan: Plan, *, listed: Points | None = None) -> None
         ConfigError: If the directory holds files already, or cannot be made.
         DatasetError: If the files cannot be written; nothing is left behind then.
     """
-    made = not directory.exists()
     try:
+        made = not directory.exists()
         directory.mkdir(parents=True, exist_ok=True)
         taken = sorted(path.name for path in directory.iterdir())
-    except OSError as error:
-        raise ConfigError(f"{directory}: cannot be used as directory of a dataset: {error.strerror}") from error
+    except (OSError, RecursionError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "it has too many levels"
+        raise ConfigError(f"{directory}: cannot be used as directory of a dataset: {reason}") from error
     if taken:
         begun = PLAN in taken or CONFIG in taken
         raise ConfigError(
