@@ -13,7 +13,7 @@ from throwcollect import ros
 from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError, WorkerError
 from throwcollect.runtime.nodes import node_environment
 from throwcollect.runtime.records import Records
-from throwcollect.runtime.runs import find, living
+from throwcollect.runtime.runs import id_of, living
 
 _SLICE_S = 0.2
 """rclpy looks at signals between two waits only."""
@@ -79,7 +79,8 @@ def joined(run: str | None) -> Iterator[Session]:
         Interrupted: If the user leaves; the message is empty, as that is how one leaves.
     """
     if run is not None:
-        record = living(find(Records(), run))
+        records = Records()
+        record = living(records.get(id_of(records, run)))
         if record.endpoint is None:
             raise WorkerError(f"run {record.run} has no router yet", hint="try once more")
         os.environ.update(node_environment(record.endpoint, record.domain_id))
