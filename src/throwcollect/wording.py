@@ -1,8 +1,32 @@
-"""How messages put what they count."""
+"""How messages put numbers, and what may stand in them."""
 
 from __future__ import annotations
+
+_LONGEST_LINE = 1000
 
 
 def counted(number: int, noun: str) -> str:
     """A number and what it counts, such as ``1 trial`` and ``0 trials``."""
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
+def printable(text: str) -> str:
+    """A message for a terminal: in lines that are not endless, and without characters that would steer it."""
+    return "\n".join(_printable_line(line) for line in text.split("\n"))
+
+
+def _printable_line(line: str) -> str:
+    if len(line) > _LONGEST_LINE:
+        line = f"{line[: _LONGEST_LINE // 2]} [...] {line[-_LONGEST_LINE // 2 :]}"
+    if line.isprintable():
+        return line
+    return "".join(each if each.isprintable() else ascii(each)[1:-1] for each in line)
+
+
+def is_text(text: str) -> bool:
+    """Whether a name that the system gave can be written as UTF-8: that of a file may hold any bytes."""
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        return False
+    return True

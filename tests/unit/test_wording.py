@@ -1,8 +1,18 @@
 import pytest
 
-from throwcollect.wording import counted
+from throwcollect.wording import counted, is_text, printable
 
 
 @pytest.mark.parametrize(("number", "said"), [(0, "0 trials"), (1, "1 trial"), (2, "2 trials")])
 def test_one_alone_is_singular(number: int, said: str) -> None:
     assert counted(number, "trial") == said
+
+
+def test_a_message_is_printed_without_what_would_steer_a_terminal_and_without_end() -> None:
+    assert printable("no run 'a\x1b[2J\udcff'\n  try: x") == "no run 'a\\x1b[2J\\udcff'\n  try: x"
+    assert printable("a" + 5000 * "b" + "c") == "a" + 499 * "b" + " [...] " + 499 * "b" + "c"
+
+
+def test_a_name_that_is_no_text_is_told_from_one_that_is() -> None:
+    assert is_text("größe")
+    assert not is_text("a\udcff")

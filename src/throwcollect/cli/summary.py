@@ -11,6 +11,7 @@ from typing import Any
 import typer
 
 from throwcollect.cli.dataset import describe
+from throwcollect.cli.streams import ensure_written
 
 
 def print_summary(summary: Mapping[str, Any], directory: Path | None, *, as_json: bool) -> None:
@@ -20,10 +21,14 @@ def print_summary(summary: Mapping[str, Any], directory: Path | None, *, as_json
         summary: What `dataset info` says, and ``wall_s`` [s].
         directory: Directory of the dataset; None if it is in a volume.
         as_json: Whether to print one JSON document.
+
+    Raises:
+        OutputError: If it cannot be printed.
     """
     if as_json:
         typer.echo(json.dumps(summary, indent=2))
-        return
-    sys.stdout.write(describe(summary))
-    if directory is not None:
+    else:
+        sys.stdout.write(describe(summary))
+    if directory is not None and not as_json:
         typer.echo(f"look into it: throwcollect dataset info {directory}   (or open the .mcap files in Foxglove)")
+    ensure_written(hint=f"throwcollect dataset info {directory} prints it again" if directory is not None else None)

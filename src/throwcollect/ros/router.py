@@ -16,6 +16,7 @@ from queue import Empty, SimpleQueue
 import zenoh
 
 from throwcollect.errors import ConfigError, ThrowcollectError
+from throwcollect.interruption import stop_signals
 from throwcollect.session_config import in_words, router_config
 
 DEFAULT_LISTEN = "tcp/127.0.0.1:7447"
@@ -76,7 +77,7 @@ def _free_port(address: str) -> int:
 
 
 def serve(listen: str = DEFAULT_LISTEN) -> None:
-    """Run a router until SIGTERM or SIGINT, after printing one line that says where it listens.
+    """Run a router until SIGTERM, SIGINT or SIGHUP, after printing one line that says where it listens.
 
     Args:
         listen: Endpoint to listen on; port 0 takes a free one.
@@ -86,7 +87,7 @@ def serve(listen: str = DEFAULT_LISTEN) -> None:
     """
     # Not `sigwait`: libraries start threads when they are imported, and one of those would take the signal and die.
     stop: SimpleQueue[int] = SimpleQueue()
-    for number in (signal.SIGTERM, signal.SIGINT):
+    for number in stop_signals():
         signal.signal(number, lambda received, _frame: stop.put(received))
     with router(listen) as endpoint:
         print(f"router listening on {endpoint}", flush=True)
