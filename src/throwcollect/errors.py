@@ -9,6 +9,7 @@
     ├── LossError                    exit 5   a dataset is there, but trials of it are lost or doubtful
     ├── DatasetError                 exit 4   a dataset is missing, torn or contradicts itself
     │   └── ForeignPlanError         exit 4   a plan was made for another configuration
+    ├── OutputError                  exit 6   all is done, but the result could not be printed
     ├── RequestError                 exit 1   what a client asks of a running simulation cannot be done
     └── Interrupted                  exit 130 stopped by the user; what is finished is on disk
 
@@ -21,6 +22,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+
+_MOST_PROBLEMS = 20
+"""Problems of a configuration that are told; the others are counted."""
 
 
 class ThrowcollectError(Exception):
@@ -79,15 +83,24 @@ class ConfigError(ThrowcollectError):
         problems: All problems that were found, at least one; or a single sentence.
         expected: What would have been right.
         hint: One command or one edit that gets further.
+        more: Number of problems beside these, which are only counted.
     """
 
     exit_code = 2
 
     def __init__(
-        self, problems: str | Sequence[Problem], *, expected: str | None = None, hint: str | None = None
+        self,
+        problems: str | Sequence[Problem],
+        *,
+        expected: str | None = None,
+        hint: str | None = None,
+        more: int = 0,
     ) -> None:
         self.problems = [Problem(problems)] if isinstance(problems, str) else list(problems)
-        super().__init__("\n".join(map(str, self.problems)), expected=expected, hint=hint)
+        lines = list(map(str, self.problems[:_MOST_PROBLEMS]))
+        if untold := len(self.problems) - len(lines) + more:
+            lines.append(f"and {untold} more")
+        super().__init__("\n".join(lines), expected=expected, hint=hint)
 
 
 class PlanError(ConfigError):
@@ -114,6 +127,12 @@ class DatasetError(ThrowcollectError):
 
 class ForeignPlanError(DatasetError):
     """A plan was made for another configuration than the one beside it."""
+
+
+class OutputError(ThrowcollectError):
+    """What was asked for is done, but its result could not be written to standard output."""
+
+    exit_code = 6
 
 
 class RequestError(ThrowcollectError):

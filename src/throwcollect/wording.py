@@ -1,8 +1,10 @@
-"""How messages put what they count, and the commands that they recommend."""
+"""How messages put what they count, the commands that they recommend, and what may stand in them."""
 
 from __future__ import annotations
 
 import shlex
+
+_LONGEST_LINE = 1000
 
 
 def counted(number: int, noun: str) -> str:
@@ -17,3 +19,25 @@ def command(*words: object) -> str:
         words: What follows ``throwcollect``; a path may have blanks.
     """
     return shlex.join(["throwcollect", *map(str, words)])
+
+
+def printable(text: str) -> str:
+    """A message for a terminal: in lines that are not endless, and without characters that would steer it."""
+    return "\n".join(_printable_line(line) for line in text.split("\n"))
+
+
+def _printable_line(line: str) -> str:
+    if len(line) > _LONGEST_LINE:
+        line = f"{line[: _LONGEST_LINE // 2]} [...] {line[-_LONGEST_LINE // 2 :]}"
+    if line.isprintable():
+        return line
+    return "".join(each if each.isprintable() else ascii(each)[1:-1] for each in line)
+
+
+def is_text(text: str) -> bool:
+    """Whether a name that the system gave can be written as UTF-8: that of a file may hold any bytes."""
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        return False
+    return True

@@ -19,7 +19,9 @@ import pytest
 
 from tests.e2e.collection import call, command, write_config
 from throwcollect.cli.main import main
+from throwcollect.interruption import stop_signals
 from throwcollect.robots.model import share_directory
+from throwcollect.runtime.records import Records
 
 pytestmark = pytest.mark.e2e
 
@@ -41,7 +43,7 @@ def say(
 ) -> Iterator[Callable[..., Said]]:
     """The command, called in this process, as most mistakes are found before any other is started."""
     monkeypatch.chdir(tmp_path)
-    before = signal.getsignal(signal.SIGTERM)
+    before = [(number, signal.getsignal(number)) for number in stop_signals()]
 
     def run(*arguments: str) -> Said:
         monkeypatch.setattr(sys, "argv", ["throwcollect", *arguments])
@@ -52,7 +54,8 @@ def say(
         raise AssertionError("the command did not exit")
 
     yield run
-    signal.signal(signal.SIGTERM, before)
+    for number, handler in before:
+        signal.signal(number, handler)
 
 
 @pytest.fixture
@@ -93,6 +96,14 @@ def small(tmp_path: Path) -> Path:
             ["coordinator", "data", "--config", "grid.yaml"],
             "grid.yaml:1: trials: should be at most 1, as the sweep has no more points, got 4\n",
         ),
+        (["plan", "huge.yaml"], "huge.yaml:1: sweep.parameters.ball.mass_kg.count: should be a whole number from 1 to"),
+        (["config", "small.yaml", "--set", "a." * 5000 + "a=1"], "a.a.a."),
+        (["up", "small.yaml", "--output", "o" * 300], "ooo"),
+        (["up", "-d", "small.yaml", "--output", "o" * 6000], "ooo"),
+        (["up", "small.yaml", "--output", "o/" * 2000], "o/o/"),
+        (["up", "pipe"], "pipe: should be a YAML file, got a pipe or a device"),
+        (["plan", "/dev/zero"], "/dev/zero: should be a YAML file, got a pipe or a device"),
+        (["plan", "b\udcff.yaml"], "b\\udcff.yaml: should be UTF-8 text\n"),
         (["plan", *LIST, "sweep.file=no.csv", "bare.yaml"], "sweep.file: there is no file no.csv"),
         (
             ["plan", *LIST, "sweep.file=torn.parquet", "bare.yaml"],
@@ -111,6 +122,9 @@ def test_a_wrong_request_is_one_message(
     (tmp_path / "bare.yaml").write_text("trials: 2\n")
     grid = "{sampler: grid, parameters: {ball.mass_kg: {values: [0.04]}}}"
     (tmp_path / "grid.yaml").write_text(f"trials: 4\nsweep: {grid}\n")
+    huge = "{sampler: grid, parameters: {ball.mass_kg: {min: 0.03, max: 0.04, count: 99999999999}}}"
+    (tmp_path / "huge.yaml").write_text(f"sweep: {huge}\n")
+    os.mkfifo(tmp_path / "pipe")
     (tmp_path / "torn.parquet").write_bytes(b"PAR1")
     (tmp_path / "bad.csv").write_text("ball.mass_kg\n0.04\nx\n")
     before = sorted(tmp_path.iterdir())
@@ -118,6 +132,7 @@ def test_a_wrong_request_is_one_message(
     assert said.code == 2
     assert said.out == ""
     assert said.err.startswith(f"throwcollect: {message}")
+    assert len(said.err) < 1500
     assert sorted(tmp_path.iterdir()) == before
 
 
@@ -361,12 +376,41 @@ def test_a_reader_that_leaves_is_no_error(arguments: list[str], small: Path) -> 
     assert said.stderr.removesuffix("2 trials, 0 refused\n") == ""
 
 
+@pytest.mark.parametrize("lost", ["both", "messages"])
+def test_a_collection_outlives_its_readers(lost: str, small: Path, tmp_path: Path) -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    collecting = subprocess.run(
+        command("up", "-n", "1", small, "--output", tmp_path / "data"),
+        stdin=subprocess.DEVNULL,
+        stdout=writing if lost == "both" else subprocess.PIPE,
+        stderr=writing,
+        timeout=60,
+        check=False,
+    )
+    os.close(writing)
+    assert collecting.returncode == (5 if lost == "both" else 0)
+    (run,) = [run for run in Records().all() if run.record.directory == str(tmp_path / "data")]
+    assert (run.record.exit_code, run.record.message, run.record.trials_ended) == (0, "", 2)
+    assert (tmp_path / "data" / "metadata.yaml").exists()
+
+
+def test_ctrl_c_while_libraries_are_loaded_is_no_error(small: Path, tmp_path: Path) -> None:
+    # What the command line is made of, in which Ctrl-C arrives while it is loaded.
+    (tmp_path / "typer.py").write_text("import os, signal, time\nos.kill(os.getpid(), signal.SIGINT)\ntime.sleep(9)\n")
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])}
+    said = subprocess.run(
+        command("plan", small), capture_output=True, text=True, timeout=60, env=environment, check=False
+    )
+    assert (said.returncode, said.stdout, said.stderr) == (130, "", "")
+
+
 def test_output_that_cannot_be_written_is_an_error(small: Path) -> None:
     with Path("/dev/full").open("w") as full:
         said = subprocess.run(
             command("config", small), stdout=full, stderr=subprocess.PIPE, text=True, timeout=60, check=False
         )
-    assert said.returncode == 1
+    assert said.returncode == 5
     assert said.stderr == "throwcollect: the output cannot be written: No space left on device\n"
 
 

@@ -111,7 +111,7 @@ def test_ctrl_c_before_any_simulation_is_ready(config: Path, tmp_path: Path, sta
     assert_gone(nodes)
 
 
-@pytest.mark.parametrize(("number", "share"), [(signal.SIGINT, 0.3), (signal.SIGTERM, 0.7)])
+@pytest.mark.parametrize(("number", "share"), [(signal.SIGINT, 0.3), (signal.SIGHUP, 0.7)])
 def test_an_interruption_finishes_what_runs(
     number: signal.Signals, share: float, config: Path, reference: Path, tmp_path: Path, started: list[Running]
 ) -> None:

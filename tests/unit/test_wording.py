@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from throwcollect.wording import command, counted
+from throwcollect.wording import command, counted, is_text, printable
 
 
 @pytest.mark.parametrize(("number", "said"), [(0, "0 trials"), (1, "1 trial"), (2, "2 trials")])
@@ -23,3 +23,13 @@ def test_all_recommended_commands_are_made_so() -> None:
     )
     found = [path.name for path in sources.rglob("*.py") if by_hand.search(path.read_text(encoding="utf-8"))]
     assert not found
+
+
+def test_a_message_is_printed_without_what_would_steer_a_terminal_and_without_end() -> None:
+    assert printable("no run 'a\x1b[2J\udcff'\n  try: x") == "no run 'a\\x1b[2J\\udcff'\n  try: x"
+    assert printable("a" + 5000 * "b" + "c") == "a" + 499 * "b" + " [...] " + 499 * "b" + "c"
+
+
+def test_a_name_that_is_no_text_is_told_from_one_that_is() -> None:
+    assert is_text("größe")
+    assert not is_text("a\udcff")

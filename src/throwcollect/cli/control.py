@@ -8,7 +8,7 @@ from throwcollect.cli.interruptions import Interruptions
 from throwcollect.errors import Interrupted
 from throwcollect.runtime.control import down, stop
 from throwcollect.runtime.records import Records
-from throwcollect.runtime.runs import died, failure, find, living
+from throwcollect.runtime.runs import died, failure, living, to_change
 from throwcollect.runtime.scaling import scale
 from throwcollect.wording import counted
 
@@ -20,7 +20,7 @@ def change_scale(named: str | None, simulations: int) -> None:
         ConfigError: If there is no such run, or it cannot have that number.
         WorkerError: If its launcher does not answer.
     """
-    run = find(Records(), named)
+    run = to_change(Records(), named, command=f"scale {simulations}")
     scale(run, simulations)
     typer.echo(f"{run.record.run}: {run.record.simulations} -> {counted(simulations, 'simulation')}")
 
@@ -35,7 +35,7 @@ def stop_run(named: str | None) -> None:
         Interrupted: If the user did not want to wait.
     """
     records = Records()
-    run = find(records, named)
+    run = to_change(records, named, command="stop")
     living(run)
     typer.echo(f"{run.record.run}: finishing the running trials", err=True)
     with Interruptions() as interruptions:

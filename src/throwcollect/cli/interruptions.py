@@ -1,13 +1,15 @@
-"""Ctrl-C while nodes run."""
+"""Ctrl-C, and whatever else asks to stop, while nodes run."""
 
 from __future__ import annotations
 
 import signal
 from types import FrameType, TracebackType
 
+from throwcollect.interruption import stop_signals
+
 
 class Interruptions:
-    """Counts SIGINT and SIGTERM instead of letting them raise, so that all nodes are seen to their end.
+    """Counts the signals that ask to stop instead of letting them raise, so that all nodes are seen to their end.
 
     Use it as a context manager, in the main thread.
 
@@ -19,7 +21,7 @@ class Interruptions:
         self.count = 0
 
     def __enter__(self) -> Interruptions:
-        self._previous = {number: signal.signal(number, self._note) for number in (signal.SIGINT, signal.SIGTERM)}
+        self._previous = {number: signal.signal(number, self._note) for number in stop_signals()}
         return self
 
     def __exit__(

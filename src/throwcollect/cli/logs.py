@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
 import typer
@@ -12,7 +13,7 @@ from throwcollect.errors import ConfigError
 from throwcollect.runtime.events import EVENTS, parse
 from throwcollect.runtime.logs import Tail, log_files
 from throwcollect.runtime.records import Record, Records
-from throwcollect.runtime.runs import find
+from throwcollect.runtime.runs import to_watch
 
 _POLL_S = 0.2
 
@@ -24,7 +25,7 @@ def show_logs(named: str | None, nodes: Sequence[str], *, follow: bool) -> None:
         ConfigError: If there is no such run or no such node.
     """
     records = Records()
-    run = find(records, named, ended=True)
+    run = to_watch(records, named, say=partial(typer.echo, err=True))
     logs = Path(run.record.logs)
     _check_names(run.record, nodes, log_files(logs))
     tails: dict[str, Tail] = {}
@@ -49,7 +50,7 @@ def show_events(named: str | None, *, json: bool) -> None:
         ConfigError: If there is no such run.
     """
     records = Records()
-    run = find(records, named, ended=True)
+    run = to_watch(records, named, say=partial(typer.echo, err=True))
     tail = Tail(Path(run.record.logs) / EVENTS)
     goes_on = True
     while goes_on:

@@ -1,23 +1,18 @@
-"""Commands, options and exit codes; every command's work is done elsewhere and imported when it is called."""
+"""Commands and options; every command's work is done elsewhere and imported when it is called."""
 
 from __future__ import annotations
 
-import errno
-import os
-import signal
-import sys
-import traceback
-from contextlib import suppress
 from pathlib import Path
 from typing import Annotated
 
 import typer
-from typer.exceptions import TyperException
 
 import throwcollect
 from throwcollect.cli.dataset_commands import DatasetArgument, JsonOption, dataset_app
+from throwcollect.cli.execution import execute
 from throwcollect.cli.ros import ros_app
-from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError
+from throwcollect.cli.streams import end_with_reader, only_log
+from throwcollect.errors import ConfigError
 
 app = typer.Typer(
     name="throwcollect",
@@ -60,9 +55,6 @@ FollowOption = Annotated[bool, typer.Option("-f", "--follow", help="Go on until 
 
 DEFAULT_CONFIG = Path("throwcollect.yaml")
 RUNS = "Runs"
-
-
-_OUTPUT_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
 
 def _overrides(settings: list[str] | None, **options: str | None) -> list[str]:
@@ -168,6 +160,7 @@ def logs(
     """Print what the nodes of a run print."""
     from throwcollect.cli.logs import show_logs
 
+    end_with_reader()
     show_logs(run, nodes or (), follow=follow)
 
 
@@ -176,6 +169,7 @@ def events(run: RunOption = None, json: JsonOption = False) -> None:
     """Print what happens in a run, from its start until it ends: nodes started, ready, lost and so on."""
     from throwcollect.cli.logs import show_events
 
+    end_with_reader()
     show_events(run, json=json)
 
 
@@ -216,6 +210,7 @@ def launch(run: str, lock: Annotated[int, typer.Option("--lock", help="Descripto
     """Launch a prepared run, as `up -d` does."""
     from throwcollect.cli.up import serve
 
+    only_log()
     serve(run, lock)
 
 
@@ -245,6 +240,7 @@ def plan(
     """Print the trials without running them."""
     from throwcollect.cli.show import show_plan
 
+    end_with_reader()
     show_plan(path, _overrides(settings, trials=trials), json=json)
 
 
@@ -299,6 +295,7 @@ def router(
     """Run the router that all nodes connect to."""
     from throwcollect.ros.router import serve
 
+    only_log()
     serve(listen, key)
 
 
@@ -315,6 +312,7 @@ def sim(
     from throwcollect.runtime.nodes import simulation_name_of
     from throwcollect.sim.main import run
 
+    only_log()
     run(config, name=name or simulation_name_of(gethostname()))
 
 
@@ -329,6 +327,7 @@ def coordinator(
     """Collect into a directory that holds `config.yaml` and `plan.parquet`, or into a new one with --config."""
     from throwcollect.cli.nodes import coordinate
 
+    only_log()
     coordinate(directory, config=config)
 
 
@@ -357,46 +356,5 @@ def health(
 
 
 def main() -> None:
-    """Entry point: run a command, print errors as messages, exit with their codes."""
-    # What cleans up after Ctrl-C does so after SIGTERM, too.
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
-    try:
-        code = app(prog_name="throwcollect", standalone_mode=False) or 0
-        if code == Interrupted.exit_code:
-            raise Interrupted("interrupted")
-        print(end="", flush=True)
-    except (BrokenPipeError, SystemExit) as end:
-        # Whoever reads our output has seen enough; Typer makes an exit of that.
-        code = 0 if BrokenPipeError in (type(end), type(end.__context__)) else 1
-    except Exception as error:  # noqa: BLE001 - the one place where the unexpected becomes a message
-        if os.environ.get("THROWCOLLECT_DEBUG"):
-            traceback.print_exc()
-        message, code = _told(error)
-        if message:
-            with suppress(OSError):
-                typer.echo(f"throwcollect: {message}", err=True)
-    _drop_what_cannot_be_written()
-    sys.exit(code)
-
-
-def _told(error: Exception) -> tuple[str, int]:
-    """Message and exit code of an error."""
-    if isinstance(error, ThrowcollectError):
-        return str(error), error.exit_code
-    if isinstance(error, TyperException):
-        message = error.format_message()
-        command = getattr(getattr(error, "ctx", None), "command_path", "throwcollect")
-        # Without any argument, the help has been printed already.
-        return (f"{message}\n  try: {command} --help" if message else ""), error.exit_code
-    if isinstance(error, OSError) and error.errno in _OUTPUT_ERRORS and error.filename is None:
-        return f"the output cannot be written: {error.strerror}", 1
-    where = "  try: THROWCOLLECT_DEBUG=1 shows where; please report it"
-    return f"internal error: {type(error).__name__}: {error}\n{where}", 1
-
-
-def _drop_what_cannot_be_written() -> None:
-    """What standard output still holds would be written at exit, and fail there again."""
-    try:
-        print(end="", flush=True)
-    except OSError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+    """Run the command that the command line asks for, and exit with its code."""
+    execute(app)

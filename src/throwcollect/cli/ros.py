@@ -6,6 +6,8 @@ from typing import Annotated
 
 import typer
 
+from throwcollect.cli.streams import end_with_reader
+
 ros_app = typer.Typer(help="Look into the ROS graph, as the command `ros2` does.", no_args_is_help=True)
 topic_app = typer.Typer(help="Topics: list, echo, hz, info.", no_args_is_help=True)
 node_app = typer.Typer(help="Nodes: list, info.", no_args_is_help=True)
@@ -78,6 +80,7 @@ def topic_echo(
     """Print the messages of a topic as YAML."""
     from throwcollect.cli.ros_topics import echo
 
+    end_with_reader()
     echo(run, topic, kind, once=once, field=field, full=full)
 
 
@@ -92,6 +95,7 @@ def topic_hz(
     """Print how often messages arrive."""
     from throwcollect.cli.ros_topics import show_rate
 
+    end_with_reader()
     show_rate(run, topic, window=window)
 
 

@@ -13,7 +13,7 @@ from throwcollect import ros
 from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError, WorkerError
 from throwcollect.runtime.nodes import joining_environment
 from throwcollect.runtime.records import Records
-from throwcollect.runtime.runs import find, living
+from throwcollect.runtime.runs import living, to_change
 
 _SLICE_S = 0.2
 """rclpy looks at signals between two waits only."""
@@ -101,7 +101,7 @@ def way_into(named: str | None) -> Mapping[str, str]:
         ConfigError: If there is no such run, or it has ended.
         WorkerError: If the run has no router (any more).
     """
-    run = find(Records(), named)
+    run = to_change(Records(), named, command="ros env")
     record = living(run)
     if record.endpoint is None:
         raise WorkerError(f"run {record.run} has no router yet", hint="try once more")

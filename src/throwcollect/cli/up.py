@@ -13,6 +13,7 @@ from pathlib import Path
 import typer
 
 from throwcollect.cli.interruptions import Interruptions
+from throwcollect.cli.streams import ensure_written
 from throwcollect.cli.summary import print_summary
 from throwcollect.cli.terminal import Display, display
 from throwcollect.config.loader import load, loaded
@@ -72,6 +73,7 @@ def collect(path: Path, *, overrides: Sequence[str], output: Path | None, detach
         WorkerError: If nodes cannot be started or kept alive.
         DatasetError: If the dataset cannot be written.
         Interrupted: If the user stopped the collection.
+        OutputError: If the dataset is complete, but its summary cannot be printed.
     """
     started = datetime.now(timezone.utc)
     with loaded(path, overrides) as config:
@@ -97,6 +99,7 @@ def go_on(
         WorkerError: If nodes cannot be started or kept alive.
         DatasetError: If the dataset cannot be written.
         Interrupted: If the user stopped the collection.
+        OutputError: If the dataset is complete, but its summary cannot be printed.
     """
     started = datetime.now(timezone.utc)
     if not begun(directory):
@@ -212,6 +215,7 @@ def _prepared(records: Records, request: _Request, plan: Plan | None, shown: Dis
             started=request.started,
             launcher=os.getpid(),
             simulations=config.run.simulations,
+            begun_in=os.getcwd(),
         )
         # Finds what cannot be had of what the configuration asks for.
         place_of(record, config, run.key, warn=shown.warn).close()
@@ -260,6 +264,7 @@ def _detach(records: Records, run: OpenRun, *, json: bool) -> None:
     if json:
         where = {"volume": record.volume} if record.volume else {"directory": record.directory}
         typer.echo(jsonlib.dumps({"run": record.run, **where}, indent=2))
-        return
-    typer.echo(record.run)
-    typer.echo(f"follow it: {command('wait', '--run', record.run)}   (or ps, logs -f, stop)", err=True)
+    else:
+        typer.echo(record.run)
+        typer.echo(f"follow it: {command('wait', '--run', record.run)}   (or ps, logs -f, stop)", err=True)
+    ensure_written(hint=f"run {record.run} goes on; throwcollect ps lists it")

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
+
+import typer
 
 from throwcollect.cli.interruptions import Interruptions
 from throwcollect.cli.summary import print_summary
@@ -12,7 +15,7 @@ from throwcollect.runtime.events import EVENTS, parse
 from throwcollect.runtime.listening import follow
 from throwcollect.runtime.logs import Tail
 from throwcollect.runtime.records import Records
-from throwcollect.runtime.runs import died, failure, find
+from throwcollect.runtime.runs import died, failure, to_watch
 from throwcollect.wording import command
 
 
@@ -24,9 +27,10 @@ def wait_for(named: str | None, *, json: bool) -> None:
         ConfigError: If there is no such run.
         WorkerError: If its launcher died.
         Interrupted: If the user leaves; the run goes on.
+        OutputError: If the summary cannot be printed.
     """
     records = Records()
-    run = find(records, named, ended=True)
+    run = to_watch(records, named, say=partial(typer.echo, err=True))
     events = Tail(Path(run.record.logs) / EVENTS)
     events.skip()
     with display(quiet=json) as shown, Interruptions() as interruptions:

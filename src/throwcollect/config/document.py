@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import stat
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -9,15 +10,15 @@ from typing import Any
 
 from ruamel.yaml import YAML
 from ruamel.yaml.constructor import SafeConstructor
-from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from ruamel.yaml.error import YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
-from throwcollect.config.problems import Location, dotted
+from throwcollect.config.problems import Location, dotted, quoted
+from throwcollect.config.yaml_nodes import MOST_LEVELS, MOST_VALUES, compose, line, reason
 from throwcollect.errors import ConfigError, Problem
 
 _TAG = "tag:yaml.org,2002:"
 _MOST_BYTES = 5_000_000
-_MOST_VALUES = 100_000
 _SWEPT = ("sweep", "parameters")
 _SWEPT_FIELDS = ("min", "max", "scale", "count", "values")
 
@@ -43,15 +44,18 @@ class Document:
         self._count = 0
         self._lines: dict[Location, int | None] = {}
         try:
-            node = _compose(_text_of(path))
+            node = compose(_text_of(path))
         except YAMLError as error:
-            raise ConfigError([Problem(f"not valid YAML: {_reason(error)}", path=path, line=_line(error))]) from error
+            raise ConfigError([Problem(f"not valid YAML: {reason(error)}", path=path, line=line(error))]) from error
         if node is None:
             raise ConfigError([Problem("the file is empty", path=path)], expected="keys such as task and sweep")
         if not isinstance(node, MappingNode):
             problem = Problem("the file should hold keys and values", path=path, line=node.start_mark.line + 1)
             raise ConfigError([problem], expected="keys such as task and sweep")
-        self.values = self._plain(node, (), in_file=True)
+        values = self._plain(node, (), in_file=True)
+        if not isinstance(values, dict):
+            raise ConfigError(self.problems)
+        self.values = values
 
     def problem(self, location: Location, sentence: str) -> Problem:
         """A problem with the value or key at a location, wherever that was written."""
@@ -82,16 +86,19 @@ class Document:
         key, equals, text = assignment.partition("=")
         key = key.strip()
         if not equals or not all(key.split(".")):
-            self.problems.append(Problem(f"an override should be KEY=VALUE, got {assignment!r}"))
+            self.problems.append(Problem(f"an override should be KEY=VALUE, got {quoted(assignment)}"))
             return
         try:
-            node = _compose(text)
+            node = compose(text)
         except YAMLError as error:
-            self.problems.append(Problem(f"not valid YAML: {_reason(error)}; got {text!r}", key))
+            self.problems.append(Problem(f"not valid YAML: {reason(error)}; got {quoted(text)}", key))
+            return
+        *above, last = _parts(key)
+        if len(above) >= MOST_LEVELS:
+            self.problems.append(Problem("the key is nested too deeply", key))
             return
         holder: Any = self.values
         location: Location = ()
-        *above, last = _parts(key)
         for part in above:
             index = _index(holder, part)
             location = (*location, index)
@@ -101,7 +108,7 @@ class Document:
             holder = holder[index] if _holds(holder, index) else None
         index = _index(holder, last)
         if not isinstance(holder, dict) and not _holds(holder, index):
-            self.problems.append(Problem(f"nothing of this name can be set; got {text!r}", key))
+            self.problems.append(Problem(f"nothing of this name can be set; got {quoted(text)}", key))
             return
         location = (*location, index)
         self._lines = {known: line for known, line in self._lines.items() if known[: len(location)] != location}
@@ -112,11 +119,14 @@ class Document:
         if node is None:
             return None
         self._count += 1
-        if self._count > _MOST_VALUES:
+        if self._count > MOST_VALUES:
             # Aliases of aliases make a short text as large as they like.
-            raise ConfigError([Problem(f"holds more than {_MOST_VALUES} values", path=self._path)])
+            raise ConfigError([Problem(f"holds more than {MOST_VALUES} values", path=self._path)])
         if node in inside:
             self._note(node, location, "an alias cannot be inside its own anchor", in_file=in_file)
+            return None
+        if len(inside) >= MOST_LEVELS:
+            self._note(node, location, "values are nested too deeply", in_file=in_file)
             return None
         inside = (*inside, node)
         if isinstance(node, MappingNode) and node.tag == _TAG + "map":
@@ -158,6 +168,10 @@ class Document:
 
 def _text_of(path: Path) -> str:
     try:
+        if not stat.S_ISREG(kind := path.stat().st_mode):
+            # Reading a pipe or a device may wait for ever.
+            got = "a directory" if stat.S_ISDIR(kind) else "a pipe or a device"
+            raise ConfigError([Problem(f"should be a YAML file, got {got}", path=path)])
         with path.open("rb") as file:
             data = file.read(_MOST_BYTES + 1)
         if len(data) > _MOST_BYTES:
@@ -165,8 +179,6 @@ def _text_of(path: Path) -> str:
         return data.decode("utf-8")
     except FileNotFoundError as error:
         raise ConfigError([Problem("no such file", path=path)]) from error
-    except IsADirectoryError as error:
-        raise ConfigError([Problem("should be a YAML file, got a directory", path=path)]) from error
     except PermissionError as error:
         raise ConfigError([Problem("no permission to read the file", path=path)]) from error
     except OSError as error:
@@ -175,25 +187,6 @@ def _text_of(path: Path) -> str:
         line = error.object.count(b"\n", 0, error.start) + 1
         sentence = f"should be UTF-8 text, got the byte 0x{error.object[error.start]:02x}"
         raise ConfigError([Problem(sentence, path=path, line=line)]) from error
-
-
-def _compose(text: str) -> Node | None:
-    try:
-        node: Node | None = YAML(typ="safe", pure=True).compose(text)
-    except RecursionError as error:
-        raise YAMLError("values are nested too deeply") from error
-    return node
-
-
-def _reason(error: YAMLError) -> str:
-    if isinstance(error, MarkedYAMLError):
-        return ", ".join(filter(None, [error.problem, error.context]))
-    return str(error).partition("\n")[0]
-
-
-def _line(error: YAMLError) -> int | None:
-    mark = (error.problem_mark or error.context_mark) if isinstance(error, MarkedYAMLError) else None
-    return mark.line + 1 if mark else None
 
 
 @cache

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from difflib import get_close_matches
 from typing import Annotated
 
 from pydantic import AfterValidator, Field, WithJsonSchema
@@ -30,10 +29,21 @@ class ContradictionError(ValueError):
         super().__init__("; ".join(f"{key}: {sentence}" for key, sentence in self.sentences.items()))
 
 
+class UnknownJointError(ValueError):
+    """A joint that the robot does not have.
+
+    Args:
+        name: The name that was given.
+    """
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        super().__init__(f"Talos has no joint {name!r}")
+
+
 def _known_joint(name: str) -> str:
     if name not in JOINT_NAMES:
-        near = get_close_matches(name, JOINT_NAMES, 1)
-        raise ValueError(f"Talos has no joint {name!r}" + (f"; did you mean '{near[0]}'?" if near else ""))
+        raise UnknownJointError(name)
     return name
 
 

@@ -13,7 +13,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from throwcollect.config.document import Document
-from throwcollect.config.problems import Finding, Location, dotted, findings
+from throwcollect.config.problems import MOST_EXAMINED, Finding, Location, dotted, findings
 from throwcollect.config.schema import Config, Range
 from throwcollect.config.values import reason_not_sweepable, with_values
 from throwcollect.errors import ConfigError
@@ -55,12 +55,12 @@ def loaded(path: Path, overrides: Sequence[str] = ()) -> Iterator[Config]:
     document = Document(path)
     for assignment in overrides:
         document.override(assignment)
-    config, found = _checked(document.values)
+    config, found, more = _checked(document.values)
     problems = [document.problem(each.location, each.sentence) for each in found]
     unknown = sum(each.unknown for each in found)
     rest = sorted([*document.problems, *problems[unknown:]], key=lambda problem: problem.line or 0)
     if rest or unknown or config is None:
-        raise ConfigError([*problems[:unknown], *rest])
+        raise ConfigError([*problems[:unknown], *rest], more=more)
     try:
         yield config
     except ConfigError as error:
@@ -91,25 +91,31 @@ def _character(character: str) -> str:
     return character if plain else f"\\U{ord(character):08x}"
 
 
-def _checked(values: dict[str, Any]) -> tuple[Config | None, list[Finding]]:
-    """Validate values; after a problem go on with defaults in the place of what was wrong, to find what else is."""
+def _checked(values: dict[str, Any]) -> tuple[Config | None, list[Finding], int]:
+    """Validate values; after a problem go on with defaults in the place of what was wrong, to find what else is.
+
+    Returns:
+        The configuration, if there is any; what is wrong; and how much more is, if that is too much to be told.
+    """
     values = deepcopy(values)
     found: list[Finding] = []
     replaced: set[Location] = set()
     config = None
-    while config is None:
+    more = 0
+    while config is None and len(found) < MOST_EXAMINED:
         try:
             config = Config.model_validate(values, strict=True)
             fresh = list(_sweep_findings(config))
         except ValidationError as error:
             fresh = findings(error, values)
+            more += max(0, error.error_count() - MOST_EXAMINED)
         found += [finding for finding in fresh if not any(_about(finding, location) for location in replaced)]
         places = {finding.location[: 3 if finding.location[:2] == _PARAMETERS else 2] for finding in fresh}
         removed = {place for place in places if _remove(values, place)}
         replaced |= places
         if not removed:
             break
-    return config, sorted(found, key=lambda finding: not finding.unknown)
+    return config, sorted(found, key=lambda finding: not finding.unknown), more
 
 
 def _about(finding: Finding, location: Location) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Any
@@ -11,11 +11,16 @@ from typing import Any
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from throwcollect.config.kinds import ContradictionError
+from throwcollect.config.kinds import JOINT_NAMES, ContradictionError, UnknownJointError
 from throwcollect.config.shape import Shape, shape_of
 
 _RANGE_ERRORS = ("greater_than", "greater_than_equal", "less_than", "less_than_equal")
 _LONGEST_QUOTE = 60
+_LONGEST_WORD = 200
+"""What is longer is no word that was misspelt."""
+
+MOST_EXAMINED = 200
+"""What pydantic finds beyond that is counted and not put into words, as nobody would read them."""
 
 Location = tuple[str | int, ...]
 """Keys and list indices from the root of a configuration to a value."""
@@ -53,8 +58,8 @@ def unknown_key(name: str, known: list[str]) -> str:
         name: The key.
         known: All keys that would be right in its place.
     """
-    if near := get_close_matches(name, known, 1):
-        return f"unknown key; did you mean '{near[0]}'?"
+    if meant := _did_you_mean(name, known):
+        return f"unknown key{meant}"
     return "unknown key; " + (f"known keys here: {', '.join(known)}" if known else "no keys are expected here")
 
 
@@ -72,7 +77,7 @@ def quoted(value: Any) -> str:
 
 
 def findings(error: ValidationError, values: Any, *, above: Location = ()) -> list[Finding]:
-    """Everything that pydantic found, one finding a key, unknown keys first.
+    """What pydantic found, or the first 200 of it: one finding a key, unknown keys first.
 
     Args:
         error: What pydantic raised.
@@ -80,7 +85,7 @@ def findings(error: ValidationError, values: Any, *, above: Location = ()) -> li
         above: Where in a configuration these values are.
     """
     found: dict[Location, Finding] = {}
-    for details in error.errors(include_url=False):
+    for details in error.errors(include_url=False)[:MOST_EXAMINED]:
         for finding in _findings(details, values, above):
             # A union reports once for each alternative; the sentence speaks of all of them anyway.
             found.setdefault(finding.location, finding)
@@ -107,6 +112,9 @@ def _findings(details: ErrorDetails, values: Any, above: Location) -> Iterator[F
     elif isinstance(cause, ContradictionError):
         for key, sentence in cause.sentences.items():
             yield Finding((*location, *_split(key)), sentence)
+    elif isinstance(cause, UnknownJointError):
+        sentence = f"Talos has no joint {quoted(cause.name)}{_did_you_mean(cause.name, JOINT_NAMES)}"
+        yield Finding(location, sentence, unknown=details["loc"][-1:] == ("[key]",))
     elif cause is not None:
         yield Finding(location, str(cause), unknown=details["loc"][-1:] == ("[key]",))
     elif kind == "missing":
@@ -120,8 +128,13 @@ def _findings(details: ErrorDetails, values: Any, above: Location) -> Iterator[F
 
 
 def _should_be(words: str, value: Any, choices: list[str]) -> str:
-    near = get_close_matches(value, choices, 1) if isinstance(value, str) else []
-    return f"should be {words}, got {quoted(value)}" + (f"; did you mean '{near[0]}'?" if near else "")
+    return f"should be {words}, got {quoted(value)}{_did_you_mean(value, choices)}"
+
+
+def _did_you_mean(value: Any, choices: Sequence[str]) -> str:
+    looks_like_a_word = isinstance(value, str) and len(value) <= _LONGEST_WORD
+    near = get_close_matches(value, choices, 1) if looks_like_a_word else []
+    return f"; did you mean '{near[0]}'?" if near else ""
 
 
 def _radians(kind: str, shape: Shape, value: Any) -> str:

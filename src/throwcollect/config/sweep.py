@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, Discriminator, Field, PositiveInt, Tag, model_validator
+from pydantic import BaseModel, Discriminator, Field, Tag, model_validator
 
 from throwcollect.config.kinds import ContradictionError
 from throwcollect.config.section import Section
@@ -25,7 +25,7 @@ class Range(Section):
     """Upper bound, in the unit of the key."""
     scale: Literal["linear", "log"] = "linear"
     """Whether the value or its logarithm is spread evenly."""
-    count: PositiveInt | None = None
+    count: Annotated[int, Field(ge=1, le=10_000_000)] | None = None
     """Number of grid points, both ends included; for the sampler `grid` only."""
 
     @model_validator(mode="after")

@@ -15,6 +15,7 @@ from throwcollect.dataset.directory import known_directory
 from throwcollect.dataset.inspect import info, loss
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.errors import Interrupted, WorkerError
+from throwcollect.interruption import stop_signals
 from throwcollect.tasks.throw import ThrowResult
 from throwcollect.wording import command, counted
 
@@ -28,7 +29,7 @@ _TELL_EVERY_S = 10.0
 def run(directory: Path) -> None:
     """Collect every trial of the plan in `directory` that has no episode yet, and finish the dataset.
 
-    SIGINT and SIGTERM drain: running trials are finished and written within `run.grace_s`, no new one is started.
+    SIGINT, SIGTERM and SIGHUP drain: running trials are finished and written within `run.grace_s`, none is started.
 
     Args:
         directory: Directory of the dataset, as `prepare` or `resume` left it.
@@ -55,8 +56,8 @@ def run(directory: Path) -> None:
     def drain(_number: int, _frame: FrameType | None) -> None:
         node.drain()
 
-    signal.signal(signal.SIGINT, drain)
-    signal.signal(signal.SIGTERM, drain)
+    for number in stop_signals():
+        signal.signal(number, drain)
     executor = ros.SingleThreadedExecutor()
     executor.add_node(node)
     # What is here now stays until the end; the garbage collector need not go through it again and again.

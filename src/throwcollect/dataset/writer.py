@@ -65,10 +65,10 @@ def create(directory: Path, plan: Plan, *, listed: Points | None = None) -> None
         ConfigError: If the directory holds files already, or cannot be made.
         DatasetError: If the files cannot be written; nothing is left behind then.
     """
-    made = not directory.exists()
     try:
+        made = not directory.exists()
         directory.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
+    except (OSError, RecursionError) as error:
         raise _unusable(directory, error) from error
     with held_alone(directory):
         _fill(directory, plan, listed, made=made)
@@ -95,8 +95,9 @@ def _fill(directory: Path, plan: Plan, listed: Points | None, *, made: bool) -> 
         undo.pop_all()
 
 
-def _unusable(directory: Path, error: OSError) -> ConfigError:
-    return ConfigError(f"{directory}: cannot be used as directory of a dataset: {error.strerror}")
+def _unusable(directory: Path, error: OSError | RecursionError) -> ConfigError:
+    reason = error.strerror if isinstance(error, OSError) else "it has too many levels"
+    return ConfigError(f"{directory}: cannot be used as directory of a dataset: {reason}")
 
 
 def _clear(directory: Path, *, remove: bool) -> None:

@@ -17,6 +17,7 @@ from queue import Empty, SimpleQueue
 import zenoh
 
 from throwcollect.errors import ConfigError, ThrowcollectError
+from throwcollect.interruption import stop_signals
 from throwcollect.run_key import RunKey
 from throwcollect.session_config import PROTECTED, in_words, router_config
 
@@ -79,7 +80,7 @@ def _free_port(address: str) -> int:
 
 
 def serve(listen: str = DEFAULT_LISTEN, key_directory: Path | None = None) -> None:
-    """Run a router until SIGTERM or SIGINT, after printing one line that says where it listens.
+    """Run a router until SIGTERM, SIGINT or SIGHUP, after printing one line that says where it listens.
 
     Args:
         listen: Endpoint to listen on; port 0 takes a free one.
@@ -100,7 +101,7 @@ def serve(listen: str = DEFAULT_LISTEN, key_directory: Path | None = None) -> No
             key.create()
     # Not `sigwait`: libraries start threads when they are imported, and one of those would take the signal and die.
     stop: SimpleQueue[int] = SimpleQueue()
-    for number in (signal.SIGTERM, signal.SIGINT):
+    for number in stop_signals():
         signal.signal(number, lambda received, _frame: stop.put(received))
     with router(listen, key) as endpoint:
         print(f"router listening on {endpoint}", flush=True)

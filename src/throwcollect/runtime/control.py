@@ -5,12 +5,12 @@ from __future__ import annotations
 import os
 import signal
 import time
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from contextlib import suppress
 
 from throwcollect.errors import ConfigError, ThrowcollectError, WorkerError
 from throwcollect.runtime.records import Record, Records, Run
-from throwcollect.runtime.runs import id_of, living, on_engine
+from throwcollect.runtime.runs import id_of, living, on_engine, to_change
 from throwcollect.wording import command
 
 _POLL_S = 0.05
@@ -53,8 +53,8 @@ def down(records: Records, named: str | None, *, volumes: bool) -> tuple[str, li
 
     Args:
         records: All runs.
-        named: As `find` takes it, or the id of a run of which only an engine knows; None for the only one that lives,
-            or whose launcher died.
+        named: As `to_change` takes it, or the id of a run of which only an engine knows; None for the only one of the
+            current directory that lives, or whose launcher died.
         volumes: Whether a volume that holds the dataset is removed, too.
 
     Returns:
@@ -65,7 +65,11 @@ def down(records: Records, named: str | None, *, volumes: bool) -> tuple[str, li
         WorkerError: If something cannot be ended or removed.
     """
     held = {found.run_id for found in on_engine()}
-    run = _to_end(records, named, held)
+    # What an engine holds besides may be somebody else's, so that has to be named.
+    if named is None:
+        run = to_change(records, None, command="down -v" if volumes else "down", died=True).record.run
+    else:
+        run = named if named in held else id_of(records, named)
     record: Record | None = None
     with suppress(ConfigError):
         record = records.get(run).record
@@ -82,22 +86,6 @@ def down(records: Records, named: str | None, *, volumes: bool) -> tuple[str, li
         raise
     taken.forget()
     return run, removed
-
-
-def _to_end(records: Records, named: str | None, held: Collection[str]) -> str:
-    if named is not None:
-        return named if named in held else id_of(records, named)
-    # What an engine holds besides may be somebody else's, so that has to be named.
-    candidates = [run.record.run for run in records.all() if run.status != "ended"]
-    if len(candidates) == 1:
-        return candidates[0]
-    if candidates:
-        raise ConfigError(
-            f"{len(candidates)} runs live or have left something",
-            expected=", ".join(candidates),
-            hint="name one of them with --run",
-        )
-    raise ConfigError("no run lives or has left anything", hint="throwcollect ps -a lists those that have ended")
 
 
 def _end_launcher(records: Records, record: Record) -> None:

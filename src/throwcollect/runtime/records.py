@@ -68,6 +68,7 @@ class Record:
         left: Whether containers of it may be left, as its launcher could not remove them or did not come to it.
         message: The error that it ended with, as it was printed; empty if there was none.
         summary: What its dataset holds, as `dataset info` says it; None if it is not finished.
+        begun_in: Absolute path of the directory in which it was begun; empty if an older version did not note it.
         version: Version of this layout.
     """
 
@@ -90,6 +91,7 @@ class Record:
     left: bool = False
     message: str = ""
     summary: dict[str, Any] | None = None
+    begun_in: str = ""
     version: Literal[1] = _VERSION
 
     @property
@@ -332,7 +334,13 @@ class Records:
 def _state_directory() -> Path:
     """A directory of this user alone; not that of the login, which vanishes when the last terminal is closed."""
     named = os.environ.get(STATE_VARIABLE)
-    path = Path(named).absolute() if named else Path(tempfile.gettempdir()) / f"throwcollect-{os.getuid()}"
+    try:
+        path = Path(named).absolute() if named else Path(tempfile.gettempdir()) / f"throwcollect-{os.getuid()}"
+    except FileNotFoundError as error:
+        raise ConfigError(
+            "runs cannot be remembered: no directory for temporary files can be written",
+            hint=f"name a directory in {STATE_VARIABLE}",
+        ) from error
     try:
         path.mkdir(mode=0o700, parents=bool(named), exist_ok=True)
         # A link that the user has named is the user's own choice.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,13 +19,41 @@ _SOCKET = "/var/run/docker.sock"
 _MOST_LISTED = 5
 
 
-def find(records: Records, named: str | None, *, ended: bool = False) -> Run:
-    """The run that a user means.
+def to_change(records: Records, named: str | None, *, command: str, died: bool = False) -> Run:
+    """The run that a command is to change.
 
     Args:
         records: All runs.
-        named: Id, unique beginning of one, or directory of the dataset; None for the only one that lives.
-        ended: Whether, if none lives, the latest that has ended is meant.
+        named: Id, unique beginning of one, or directory of the dataset; None for the only one that lives and belongs to
+            the current directory: it was begun there, or its dataset lies below.
+        command: The command without its option ``--run``, which a message adds.
+        died: Whether a run whose launcher died may be meant, too.
+
+    Raises:
+        ConfigError: If there is no such run, or more than one, or the only one belongs to another directory.
+    """
+    if named is not None:
+        return records.get(id_of(records, named))
+    runs = records.all()
+    there = [run for run in runs if run.status == "running" or (died and run.status == "died")]
+    here = [run for run in there if _belongs_here(run.record)]
+    if not here and len(there) == 1:
+        record = there[0].record
+        raise ConfigError(
+            f"no run of this directory lives; {record.run} {_origin(record)}",
+            hint=f"throwcollect {command} --run {record.run}, if that one is meant",
+        )
+    return _only(here or there, runs)
+
+
+def to_watch(records: Records, named: str | None, *, say: Callable[[str], object]) -> Run:
+    """The run that a command is to look at.
+
+    Args:
+        records: All runs.
+        named: As `to_change` takes it; None for the only one that lives, or else the latest that has ended, of the
+            current directory or, if that has none, of any.
+        say: Is told which one is meant if it belongs to another directory.
 
     Raises:
         ConfigError: If there is no such run, or more than one.
@@ -33,17 +61,35 @@ def find(records: Records, named: str | None, *, ended: bool = False) -> Run:
     if named is not None:
         return records.get(id_of(records, named))
     runs = records.all()
-    living = [run for run in runs if run.status == "running"]
+    here = [run for run in runs if _belongs_here(run.record)]
+    known = here or runs
+    living = [run for run in known if run.status == "running"]
+    run = known[-1] if known and not living else _only(living, runs)
+    if not here:
+        say(f"run {run.record.run}, which {_origin(run.record)}")
+    return run
+
+
+def _only(living: Sequence[Run], runs: Sequence[Run]) -> Run:
     if len(living) == 1:
         return living[0]
     if living:
         raise ConfigError(
             f"{len(living)} runs live", expected=_listed(_latest_first(living)), hint="name one of them with --run"
         )
-    if ended and runs:
-        return runs[-1]
     over = f"; of those that are over, there is {_listed(_latest_first(runs))}" if runs else ""
     raise ConfigError(f"no run lives{over}", hint="throwcollect up -d starts one" if not runs else "name it with --run")
+
+
+def _belongs_here(record: Record) -> bool:
+    """Whether a run was begun in the current directory, or its dataset lies below that."""
+    here = os.getcwd()
+    dataset = None if record.volume else Path(os.path.realpath(record.directory))
+    return record.begun_in == here or (dataset is not None and dataset.is_relative_to(here))
+
+
+def _origin(record: Record) -> str:
+    return f"was begun in {record.begun_in}" if record.begun_in else f"collects into {record.dataset}"
 
 
 def id_of(records: Records, named: str) -> str:

@@ -9,6 +9,7 @@ from types import FrameType
 
 from throwcollect import ros
 from throwcollect.config.loader import load
+from throwcollect.interruption import stop_signals
 from throwcollect.sim.node import SimulationNode
 from throwcollect.sim.simulation import Simulation
 
@@ -25,7 +26,7 @@ def _take_inputs(executor: ros.Executor) -> None:
 
 
 def run(config: Path, *, name: str) -> None:
-    """Serve one simulation until SIGTERM or SIGINT, or until a client sets its state to quitting.
+    """Serve one simulation until SIGTERM, SIGINT or SIGHUP, or until a client sets its state to quitting.
 
     Inputs are looked at between slices of a running trial; otherwise the process sleeps until one arrives.
 
@@ -49,8 +50,8 @@ def run(config: Path, *, name: str) -> None:
         nonlocal stopped
         stopped = True
 
-    signal.signal(signal.SIGINT, stop)
-    signal.signal(signal.SIGTERM, stop)
+    for number in stop_signals():
+        signal.signal(number, stop)
     # What is here now stays until the end; the garbage collector need not go through it again and again.
     gc.freeze()
     print(f"{name} is ready", flush=True)

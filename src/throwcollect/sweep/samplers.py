@@ -113,16 +113,18 @@ def places(parameter: Parameter, values: NDArray[np.float64]) -> NDArray[np.floa
 
 
 def _grid(parameters: dict[str, Parameter], trials: int | None) -> Points:
-    axes = [_axis(parameter) for parameter in parameters.values()]
-    shape = tuple(len(axis) for axis in axes)
-    size = math.prod(shape)
+    size = math.prod(len(each.values) if isinstance(each, Values) else _count(each) for each in parameters.values())
     if trials is None and size > _MOST_TRIALS:
         raise PlanError(
             [Problem(f"the grid has {size} points", key="sweep.parameters")], expected=f"at most {_MOST_TRIALS}"
         )
-    indices = np.unravel_index(np.arange(_checked_count(trials, size)), shape)
-    columns = [axis[index] for axis, index in zip(axes, indices, strict=True)]
-    return Points(tuple(parameters), np.column_stack(columns))
+    places = np.arange(_checked_count(trials, size))
+    columns = []
+    for parameter in reversed(parameters.values()):
+        axis = _axis(parameter)
+        columns.append(axis[places % len(axis)])
+        places //= len(axis)
+    return Points(tuple(parameters), np.column_stack(columns[::-1]))
 
 
 def _axis(parameter: Parameter) -> NDArray[np.float64]:

@@ -9,5 +9,16 @@ def test_signals_are_counted_and_then_what_they_were() -> None:
         assert interruptions.count == 0
         signal.raise_signal(signal.SIGINT)
         signal.raise_signal(signal.SIGTERM)
-        assert interruptions.count == 2
+        signal.raise_signal(signal.SIGHUP)
+        assert interruptions.count == 3
     assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == before
+
+
+def test_a_hangup_that_is_ignored_stays_so() -> None:
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with Interruptions() as interruptions:
+            signal.raise_signal(signal.SIGHUP)
+            assert interruptions.count == 0
+    finally:
+        signal.signal(signal.SIGHUP, before)

@@ -1,3 +1,6 @@
+import os
+import time
+
 import pytest
 
 from throwcollect.config.document import Document
@@ -131,3 +134,46 @@ def test_dots_in_swept_keys_part_nothing_but_their_fields(read, key):
 def test_yaml_errors_name_the_line(read):
     with pytest.raises(ConfigError, match=r"run\.yaml:2: not valid YAML: mapping values are not allowed here"):
         read("a: 1\nb: c: d\n")
+
+
+def chained(levels: int) -> str:
+    """A text that is nested by its aliases alone."""
+    return "k0: &k0 [1]\n" + "".join(f"k{n}: &k{n} [*k{n - 1}]\n" for n in range(1, levels))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "a: " + 100_000 * "[",
+        "a: " + 300 * "{a: ",
+        "".join(f"{' ' * level}a:\n" for level in range(900)),
+        chained(900),
+    ],
+)
+def test_what_is_nested_too_deeply_is_refused_at_once(text, read):
+    begun = time.process_time()
+    try:
+        message = read(text).problems[0].message
+    except ConfigError as error:
+        message = str(error)
+    assert "values are nested too deeply" in message
+    assert time.process_time() - begun < 5
+
+
+def test_an_override_that_is_nested_too_deeply_is_a_problem(read):
+    document = read("a: 1\n")
+    document.override("b." * 5000 + "c=1")
+    assert [problem.message for problem in document.problems] == ["the key is nested too deeply"]
+    assert document.values == {"a": 1}
+
+
+@pytest.mark.parametrize(("text", "message"), [("!!set {a, b}\n", "the tag set"), ("!x {a: 1}\n", "the tag !x")])
+def test_a_file_whose_tag_is_not_that_of_keys_and_values_is_a_problem(text, message, read):
+    with pytest.raises(ConfigError, match=f"run.yaml:1: {message} means nothing here"):
+        read(text)
+
+
+def test_a_pipe_is_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(ConfigError, match="pipe: should be a YAML file, got a pipe or a device"):
+        Document(tmp_path / "pipe")

@@ -345,7 +345,7 @@ def test_a_default_in_the_place_of_a_wrong_value_causes_no_further_problems(prob
             b"a: 1\n---\nb: 2\n",
             "run.yaml:2: not valid YAML: but found another document, expected a single document in the stream",
         ),
-        (b"a: " + 600 * b"[", "run.yaml: not valid YAML: values are nested too deeply"),
+        (b"a: " + 600 * b"[", "run.yaml:1: not valid YAML: values are nested too deeply"),
         (b"name: " + 5_000_000 * b"x", "run.yaml: larger than 5000000 bytes"),
     ],
 )
@@ -593,3 +593,36 @@ def test_until_is_enough_for_samplers_that_draw(tmp_path):
     assert config.grows
     path.write_text(resolved_yaml(config))
     assert load(path) == config
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("unknown_{}: 1\n", "unknown_0: unknown key; known keys here: name"),
+        ("name: a\n", "name: the key is here twice, first in line 1"),
+    ],
+)
+def test_of_very_many_problems_the_first_are_told_and_the_others_counted(line, message, tmp_path):
+    path = tmp_path / "many.yaml"
+    path.write_text("name: a\n" + "".join(line.format(number) for number in range(500)))
+    with pytest.raises(ConfigError) as caught:
+        load(path)
+    lines = str(caught.value).splitlines()
+    assert len(lines) == 21
+    assert lines[0].startswith(f"{path}:2: {message}")
+    assert lines[-1] == "and 480 more"
+
+
+def test_suggestions_are_not_looked_for_where_nobody_would_read_them(tmp_path, monkeypatch):
+    asked = []
+
+    def near(word, known, count):
+        asked.append(word)
+        return []
+
+    monkeypatch.setattr("throwcollect.config.problems.get_close_matches", near)
+    path = tmp_path / "many.yaml"
+    path.write_text("task: {end: {" + ", ".join(f"joint_{number}: 1" for number in range(500)) + "}}\n")
+    with pytest.raises(ConfigError, match=r"task\.end\.joint_0: Talos has no joint 'joint_0'\n"):
+        load(path)
+    assert len(asked) <= 200

@@ -18,7 +18,7 @@ from throwcollect.config.shape import json_schema, shape_of
         (("task", "trajectory", "weights", "torso_1_joint", 3), "a number"),
         (("sweep", "parameters"), "keys, each with {min: …, max: …} or {values: …}"),
         (("sweep", "parameters", "ball.mass_kg", "min"), "a number in kg"),
-        (("sweep", "parameters", "ball.mass_kg", "count"), "a whole number above 0 or null"),
+        (("sweep", "parameters", "ball.mass_kg", "count"), "a whole number from 1 to 10000000 or null"),
         (("sweep", "parameters", "ball.mass_kg", "values"), "a list of numbers in kg"),
         (("nowhere",), "anything"),
     ],

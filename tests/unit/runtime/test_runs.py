@@ -10,17 +10,29 @@ from throwcollect.errors import ConfigError, DatasetError, Interrupted, Throwcol
 from throwcollect.runtime import docker_engine
 from throwcollect.runtime import runs as module
 from throwcollect.runtime.docker_options import NODE_LABEL, RUN_LABEL
-from throwcollect.runtime.records import STATE_VARIABLE, Record, Records
-from throwcollect.runtime.runs import died, failure, find, left_in, living
+from throwcollect.runtime.records import STATE_VARIABLE, Record, Records, Run
+from throwcollect.runtime.runs import died, failure, left_in, living, to_change, to_watch
 
 NOW = datetime.now(timezone.utc)
 Make = Callable[..., Record]
+
+
+def find(records: Records, named: str | None) -> Run:
+    return to_change(records, named, command="stop")
+
+
+def watched(records: Records) -> tuple[Record, list[str]]:
+    """The run that is looked at without being named, and what is said of it."""
+    said: list[str] = []
+    return to_watch(records, None, say=said.append).record, said
 
 
 @pytest.fixture
 def records(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Records:
     monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "state"))
     monkeypatch.setattr(module, "on_engine", list)
+    # Runs are made in directories below.
+    monkeypatch.chdir(tmp_path)
     return Records()
 
 
@@ -113,12 +125,62 @@ def test_without_a_name_it_is_the_only_one_that_lives(records: Records, make: Ma
         find(records, None)
 
 
-def test_if_none_lives_it_may_be_the_latest(records: Records, make: Make) -> None:
+def test_what_is_looked_at_may_have_ended(records: Records, make: Make) -> None:
     latest = make("a", "ended")
     make("b", "ended", age_h=1)
-    assert find(records, None, ended=True).record == latest
+    assert watched(records) == (latest, [])
     living = make("c", "lives", age_h=9)
-    assert find(records, None, ended=True).record == living
+    assert watched(records) == (living, [])
+
+
+@pytest.mark.parametrize(
+    "elsewhere", [{"begun_in": "/other", "directory": "/other/data"}, {"directory": "/other/data"}]
+)
+def test_a_run_of_another_directory_is_not_changed_without_its_name(
+    elsewhere: dict[str, str], records: Records, make: Make
+) -> None:
+    record = make("a", "lives", **elsewhere)
+    origin = "was begun in /other" if "begun_in" in elsewhere else "collects into /other/data"
+    with pytest.raises(ConfigError) as caught:
+        to_change(records, None, command="scale 4")
+    assert str(caught.value) == (
+        f"no run of this directory lives; a-0123 {origin}\n"
+        "  try: throwcollect scale 4 --run a-0123, if that one is meant"
+    )
+    assert to_change(records, "a", command="scale 4").record == record
+    assert watched(records) == (record, [f"run a-0123, which {origin}"])
+
+
+def test_a_run_belongs_to_where_it_was_begun_and_to_where_its_dataset_lies(
+    records: Records, make: Make, tmp_path: Path
+) -> None:
+    make("a", "lives", begun_in="/other", directory="/other/data")
+    begun = make("b", "lives", begun_in=str(tmp_path), directory="/other/more")
+    assert find(records, None).record == begun
+    assert watched(records) == (begun, [])
+    make("c", "lives", begun_in="/other")
+    with pytest.raises(ConfigError, match=r"2 runs live\n  expected: .-0123, .-0123\n"):
+        find(records, None)
+
+
+def test_what_ended_here_is_looked_at_before_what_lives_elsewhere(records: Records, make: Make) -> None:
+    make("a", "lives", begun_in="/other", directory="/other/data")
+    ended = make("b", "ended", age_h=1)
+    assert watched(records) == (ended, [])
+
+
+def test_a_run_whose_dataset_is_in_a_volume_belongs_to_where_it_was_begun_alone(records: Records, make: Make) -> None:
+    record = make("a", "lives", begun_in="/other", volume="v")
+    with pytest.raises(ConfigError, match=r"a-0123 was begun in /other"):
+        find(records, None)
+    assert watched(records) == (record, ["run a-0123, which was begun in /other"])
+
+
+def test_whose_launcher_died_may_be_ended(records: Records, make: Make) -> None:
+    record = make("a", "died")
+    assert to_change(records, None, command="down", died=True).record == record
+    with pytest.raises(ConfigError, match="no run lives"):
+        find(records, None)
 
 
 @pytest.mark.parametrize(

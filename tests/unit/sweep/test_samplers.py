@@ -126,6 +126,13 @@ def test_the_first_points_of_an_endless_grid_need_no_endless_memory():
         drawn(endless, sampler="grid", trials=None)
 
 
+def test_a_grid_beyond_all_numbers_of_points_still_has_first_ones():
+    endless = {f"ball.{key}": Range(min=0.01, max=0.02, count=10**7) for key in ("mass_kg", "radius_m", "friction")}
+    assert drawn(endless, sampler="grid", trials=2)[0].tolist() == [0.01, 0.01, 0.01]
+    with pytest.raises(PlanError, match="the grid has 1000000000000000000000 points"):
+        drawn(endless, sampler="grid", trials=None)
+
+
 def test_more_trials_than_a_grid_has_are_an_error():
     with pytest.raises(PlanError, match=r"^trials: should be at most 18, as the sweep has no more points, got 19$"):
         drawn(GRID, sampler="grid", trials=19)

@@ -1,0 +1,74 @@
+"""A command from its command line to its exit code: every error becomes a message here."""
+
+from __future__ import annotations
+
+import errno
+import os
+import signal
+import sys
+import traceback
+from contextlib import suppress
+from typing import NoReturn
+
+import typer
+from typer.exceptions import TyperException
+
+from throwcollect.cli.streams import ReaderGone, ensure_written
+from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError
+from throwcollect.interruption import stop_signals
+from throwcollect.wording import is_text, printable
+
+_WRONG_PATHS = (errno.ENAMETOOLONG, errno.ELOOP, errno.EACCES, errno.ENOTDIR)
+"""What a path that somebody has named may lead to."""
+
+
+def execute(app: typer.Typer) -> NoReturn:
+    """Run a command, print errors as messages, exit with their codes."""
+    for number in stop_signals():
+        # What cleans up after Ctrl-C does so after the others, too.
+        signal.signal(number, signal.default_int_handler)
+    try:
+        _check_surroundings()
+        code = app(prog_name="throwcollect", standalone_mode=False) or 0
+        if code == Interrupted.exit_code:
+            raise Interrupted("interrupted")
+        ensure_written(reader_may_leave=True)
+    except ReaderGone:
+        code = 0
+    except Exception as error:  # noqa: BLE001 - the one place where the unexpected becomes a message
+        if os.environ.get("THROWCOLLECT_DEBUG"):
+            traceback.print_exc()
+        message, code = _told(error)
+        if message:
+            typer.echo(f"throwcollect: {printable(message)}", err=True)
+    with suppress(ReaderGone):
+        sys.stdout.flush()
+    sys.exit(code)
+
+
+def _check_surroundings() -> None:
+    """Refuse what would end up in names of files and in records, and cannot."""
+    try:
+        here = os.getcwd()
+    except OSError as error:
+        raise ConfigError(
+            f"the current directory cannot be used: {error.strerror}", hint="go to another one"
+        ) from error
+    for word in (*sys.argv[1:], here):
+        if not is_text(word):
+            raise ConfigError(f"{word}: should be UTF-8 text")
+
+
+def _told(error: Exception) -> tuple[str, int]:
+    """Message and exit code of an error."""
+    if isinstance(error, ThrowcollectError):
+        return str(error), error.exit_code
+    if isinstance(error, TyperException):
+        message = error.format_message()
+        command = getattr(getattr(error, "ctx", None), "command_path", "throwcollect")
+        # Without any argument, the help has been printed already.
+        return (f"{message}\n  try: {command} --help" if message else ""), error.exit_code
+    if isinstance(error, OSError) and error.errno in _WRONG_PATHS and error.filename is not None:
+        return f"{error.filename}: {error.strerror}", ConfigError.exit_code
+    where = "  try: THROWCOLLECT_DEBUG=1 shows where; please report it"
+    return f"internal error: {type(error).__name__}: {error}\n{where}", 1

@@ -1,0 +1,78 @@
+"""Output whose readers leave, and streams that were closed: in processes of their own, as they have but three."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+PROLOGUE = """
+import os, sys
+from throwcollect.cli import streams
+streams.open_streams()
+def lose(number):
+    reading, writing = os.pipe()
+    os.dup2(writing, number)
+    os.close(reading)
+"""
+
+
+def run(code: str, closed: tuple[int, ...] = ()) -> subprocess.CompletedProcess[str]:
+    def close() -> None:
+        for number in closed:
+            os.close(number)
+
+    return subprocess.run(
+        [sys.executable, "-c", PROLOGUE + code],
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+        preexec_fn=close,
+    )
+
+
+@pytest.mark.parametrize("closed", [(0,), (1,), (2,), (0, 1, 2)])
+def test_a_closed_stream_is_opened_so_that_no_file_takes_its_place(closed: tuple[int, ...]) -> None:
+    code = (
+        "print('result'); print('message', file=sys.stderr); sys.stdin.read(); sys.stdout.flush()\n"
+        "number = os.open('/', os.O_RDONLY)\n"
+        "child = os.spawnlp(os.P_WAIT, 'sh', 'sh', '-c', 'test -e /proc/self/fd/0 -a -e /proc/self/fd/1')\n"
+        "os._exit(0 if number > 2 and child == 0 else 1)"
+    )
+    said = run(code, closed)
+    assert said.returncode == 0, said.stderr
+    assert said.stdout == ("" if 1 in closed else "result\n")
+    assert said.stderr == ("" if 2 in closed else "message\n")
+
+
+@pytest.mark.parametrize(
+    ("call", "said_last"),
+    [
+        ("streams.ensure_written(hint='look')", "OutputError: the output cannot be written: Broken pipe\n  try: look"),
+        ("streams.ensure_written(reader_may_leave=True)", "goes on"),
+        ("streams.only_log(); streams.ensure_written()", "goes on"),
+        ("streams.end_with_reader(); print(2, flush=True)", "ReaderGone"),
+    ],
+)
+def test_a_reader_that_leaves_ends_nothing_but_what_is_done_for_it(call: str, said_last: str) -> None:
+    first = "" if "end_with_reader" in call else "print(1, flush=True)\n"
+    said = run(f"lose(1)\n{first}{call}\nprint('goes on', file=sys.stderr)")
+    assert said.stderr.rstrip().endswith(said_last)
+
+
+def test_what_cannot_be_said_is_dropped() -> None:
+    said = run("lose(2)\nfor _ in range(3): print('warning', file=sys.stderr)\nprint('done')")
+    assert (said.returncode, said.stdout) == (0, "done\n")
+
+
+def test_a_full_disk_is_an_error_even_if_the_reader_may_leave() -> None:
+    said = run("os.dup2(os.open('/dev/full', os.O_WRONLY), 1)\nprint(1)\nstreams.ensure_written(reader_may_leave=True)")
+    assert "OutputError: the output cannot be written: No space left on device" in said.stderr
+    # Nothing is tried again when the process ends.
+    assert "Exception ignored" not in said.stderr
+
+
+def test_a_name_that_is_no_text_can_be_printed() -> None:
+    assert run("print('a\\udcffb')").stdout == "a\\udcffb\n"
