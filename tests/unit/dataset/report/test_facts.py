@@ -17,9 +17,11 @@ from throwcollect.dataset.report.facts import gather
 from throwcollect.dataset.report.failures import Failure, failures
 from throwcollect.dataset.report.landing import Landings
 from throwcollect.dataset.report.limits import joint_peaks
-from throwcollect.dataset.report.outcomes import Outcomes
+from throwcollect.dataset.report.outcomes import Outcomes, style_of
 from throwcollect.dataset.report.thinning import thinned
 from throwcollect.dataset.report.throughput import throughput
+from throwcollect.dataset.throws import REFUSED
+from throwcollect.tasks.outcome import Outcome
 
 
 def landed(distance: list[float], angle: list[float]) -> Landings:
@@ -185,3 +187,9 @@ def test_the_journal_is_where_the_throughput_comes_from(dataset: Path) -> None:
     assert (found.commits, found.edges_s[-1]) == (11, 10.0)
     journal.unlink()
     assert gather(Dataset.open(dataset)).throughput is None
+
+
+def test_every_outcome_is_drawn_in_a_way_of_its_own() -> None:
+    styles = [style_of(name) for name in (*(outcome.value for outcome in Outcome), REFUSED, "unheard of")]
+    for part in ("colour", "symbol", "marker"):
+        assert len({getattr(style, part) for style in styles}) == len(styles)
