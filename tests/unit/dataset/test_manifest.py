@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import random
@@ -16,7 +17,7 @@ from tests.unit.dataset.conftest import Collection
 from tests.unit.dataset.mutations import SETTINGS, no_plan
 
 from throwcollect.dataset.derive.choice import filtered
-from throwcollect.dataset.manifest import changed_sizes, entry_of_file, promised_names, read_manifest
+from throwcollect.dataset.manifest import RunningHash, changed_sizes, entry_of_file, promised_names, read_manifest
 from throwcollect.dataset.mcap_reader import opened
 from throwcollect.dataset.rebuild import rebuild
 from throwcollect.dataset.repair import repair
@@ -167,6 +168,15 @@ def test_an_entry_that_no_dataset_has_is_refused(dataset: Path, key: str, value:
     (dataset / MANIFEST).write_text(json.dumps(document, indent=2) + "\n")
     with pytest.raises(DatasetError, match=MANIFEST):
         read_manifest(dataset)
+
+
+def test_a_hash_that_runs_beside_the_writing_is_that_of_all_bytes_in_order() -> None:
+    source = random.Random(0)
+    parts = [source.randbytes(source.randrange(400_000)) for _ in range(20)]
+    running = RunningHash()
+    for part in parts:
+        running.update(part)
+    assert running.hexdigest() == hashlib.sha256(b"".join(parts)).hexdigest()
 
 
 def test_links_are_not_followed(dataset: Path, tmp_path: Path) -> None:

@@ -21,9 +21,8 @@ def recorded(collection: Collection, *, as_trial: int) -> Episode:
     by_ns = collection.config.trial_start_ns(as_trial) - header.start_ns
     contacts = tuple(
         Contact(each.body, each.start_ns + by_ns, None if each.end_ns is None else each.end_ns + by_ns)
-        for each in header.contacts
+        for each in (*header.contacts, Contact("ground", int(samples.stamps_ns[-1]), None))
     )
-    assert any(each.end_ns is None for each in contacts)
     elapsed = samples.stamps_ns - header.start_ns
     targets = {
         name: ControllerSamples(elapsed, *(np.full((len(samples), len(CONTROLLERS[name])), 0.5) for _ in range(4)))
