@@ -75,8 +75,14 @@ class Running:
 
 
 def start(config: Path, directory: Path, simulations: int, *options: str, **environment: str) -> Running:
+    wanted = ("up", "-n", str(simulations), "--runtime", "local", config, "--output", directory, *options)
+    return launched(directory, *wanted, **environment)
+
+
+def launched(directory: Path, *arguments: str | Path, **environment: str) -> Running:
+    """A running command that collects into a directory."""
     process = subprocess.Popen(
-        command("up", "-n", str(simulations), "--runtime", "local", config, "--output", directory, *options),
+        command(*arguments),
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

@@ -1,0 +1,190 @@
+"""Attacks a collection in all ways that have a seed, and counts what was noticed; a small one runs with the tests.
+
+``python -m tests.campaign`` takes about an hour and prints the table of ``docs/reliability.md``. Its kinds:
+
+- *flips*: single bits of the promised files of a collected dataset; each must be seen by comparing with the manifest,
+  and each hundredth also by the whole of `verify`.
+- *forgeries*: episodes in which all hashes fit, of many plans; physics, plan or configuration must tell them all. Swapped
+  trials are left out, as two of one plan may be too alike to tell without a replay.
+- *kills*: collections whose nodes, coordinator or launcher get signals at any moment, gone on with until they are
+  finished; the files must be those of an undisturbed collection.
+
+Intruders, impostors and links have no seed: `tests/e2e/test_intruders.py`, `tests/e2e/test_impostors.py` and
+`tests/unit/dataset/test_links.py` try each of theirs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import random
+import signal
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import psutil
+
+from tests.e2e.collection import Running, collect, fingerprints, launched, start, write_config
+from tests.unit.dataset.conftest import Collection
+from tests.unit.dataset.test_forgeries import FORGED, FORGERIES, problems
+from throwcollect.dataset.manifest import promised_names
+from throwcollect.dataset.verify import verify
+from throwcollect.dataset.verify_manifest import manifest_findings
+
+MANIFEST = "datapackage.json"
+_TOO_ALIKE = "swapped trials"
+TRIALS = 40
+SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGSTOP)
+_WHOLE_VERIFY_EVERY = 100
+_MOST_DISTURBANCES = 8
+_FROZEN_S = 1.0
+
+
+@dataclass
+class Count:
+    """What came of one kind of attack.
+
+    Attributes:
+        tried: How many there were.
+        missed: Those that nobody noticed, or that changed a dataset, in words.
+    """
+
+    tried: int = 0
+    missed: list[str] = field(default_factory=list)
+
+
+def flips(directory: Path, count: int, source: random.Random) -> Count:
+    """Flip single bits of a dataset, one at a time; the dataset is as it was when this returns."""
+    result = Count()
+    names = [*promised_names(directory), MANIFEST]
+    for number in range(count):
+        # All files alike, however large they are.
+        path = directory / source.choice(names)
+        whole = path.read_bytes()
+        place, bit = source.randrange(len(whole)), source.randrange(8)
+        damaged = bytearray(whole)
+        damaged[place] ^= 1 << bit
+        path.write_bytes(damaged)
+        seen = bool(list(manifest_findings(directory, None)))
+        if number % _WHOLE_VERIFY_EVERY == 0:
+            seen = seen and bool(verify(directory))
+        path.write_bytes(whole)
+        result.tried += 1
+        if not seen:
+            result.missed.append(f"bit {bit} of byte {place} of {path.name}")
+    return result
+
+
+def forgeries(plans: int, source: random.Random) -> Count:
+    """Forge one episode of each of many plans in every way that is known."""
+    result = Count()
+    for _ in range(plans):
+        seed = source.randrange(2**32)
+        collection = Collection({"seed": seed})
+        for name, (forge, _) in FORGERIES.items():
+            if name == _TOO_ALIKE:
+                continue
+            result.tried += 1
+            if not list(problems(collection, forge)):
+                result.missed.append(f"{name} of trial {FORGED} with seed {seed}")
+    return result
+
+
+def kills(config: Path, reference: Path, scratch: Path, count: int, source: random.Random) -> Count:
+    """Send signals to the parties of collections, `count` in all, and compare what is collected in the end."""
+    result = Count()
+    wanted = fingerprints(reference)
+    while result.tried < count:
+        directory = scratch / f"killed-{result.tried}"
+        said: list[str] = []
+        running = start(config, directory, 2)
+        code = -1
+        while code != 0 and len(said) < _MOST_DISTURBANCES:
+            for done in _disturbances(running, source):
+                said.append(done)
+                result.tried += 1
+            code, _, err = running.finish()
+            if code != 0:
+                running = _gone_on(config, directory)
+        if code != 0:
+            code, _, err = running.finish()
+        if code != 0:
+            result.missed.append(f"exit code {code} after {said}: {err}")
+        elif fingerprints(directory) != wanted:
+            result.missed.append(f"other files after {said}")
+        if left := [
+            each for each in psutil.process_iter(["cmdline"]) if str(directory) in (each.info["cmdline"] or [])
+        ]:
+            result.missed.append(f"{len(left)} processes left after {said}")
+    return result
+
+
+def _gone_on(config: Path, directory: Path) -> Running:
+    """The collection into a directory once more: from what is there, or from its beginning if nothing is."""
+    begun = (directory / "plan.parquet").exists() or (directory / "config.yaml").exists()
+    where = ("--resume", directory) if begun else ("--output", directory)
+    return launched(directory, "up", "-n", "2", "--runtime", "local", config, *where)
+
+
+def _disturbances(running: Running, source: random.Random) -> Iterator[str]:
+    """Up to three signals to parties of a collection; yields what was done."""
+    for _ in range(source.randrange(1, 4)):
+        time.sleep(source.uniform(0.2, 4.0))
+        if running.process.poll() is not None:
+            return
+        launcher = psutil.Process(running.process.pid)
+        parties = [launcher, *launcher.children()]
+        victim, number = source.choice(parties), source.choice(SIGNALS)
+        try:
+            name = victim.cmdline()[-1]
+            victim.send_signal(number)
+            if number == signal.SIGSTOP:
+                time.sleep(source.uniform(0.0, _FROZEN_S))
+                victim.send_signal(signal.SIGCONT)
+        except psutil.NoSuchProcess:
+            continue
+        yield f"{number.name} to {'the launcher' if victim == launcher else name}"
+
+
+def run(*, seed: int, flip_count: int, plans: int, kill_count: int, scratch: Path) -> dict[str, Count]:
+    """Collect a dataset, attack it and its like, and count."""
+    source = random.Random(seed)
+    config = write_config(scratch, trials=TRIALS)
+    reference = scratch / "reference"
+    collect(config, reference, 1)
+    return {
+        "flips": flips(reference, flip_count, source),
+        "forgeries": forgeries(plans, source),
+        "kills": kills(config, reference, scratch, kill_count, source),
+    }
+
+
+def main() -> int:
+    """Run a long campaign and print its counts."""
+    parser = argparse.ArgumentParser(prog="python -m tests.campaign", description=__doc__)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--flips", type=int, default=20_000)
+    parser.add_argument("--plans", type=int, default=50, help="plans of which an episode is forged in each way")
+    parser.add_argument("--kills", type=int, default=100)
+    wanted = parser.parse_args()
+    with tempfile.TemporaryDirectory(prefix="throwcollect-campaign-") as scratch:
+        counts = run(
+            seed=wanted.seed,
+            flip_count=wanted.flips,
+            plans=wanted.plans,
+            kill_count=wanted.kills,
+            scratch=Path(scratch),
+        )
+    print("| attack | tried | missed |\n|---|---|---|")
+    for kind, count in counts.items():
+        print(f"| {kind} | {count.tried} | {len(count.missed)} |")
+    for missed in (each for count in counts.values() for each in count.missed):
+        print(f"missed: {missed}", file=sys.stderr)
+    return 1 if any(count.missed for count in counts.values()) else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,17 @@
+"""A small campaign of attacks; `python -m tests.campaign` runs a long one."""
+
+from pathlib import Path
+
+import pytest
+
+from tests.campaign import run
+
+pytestmark = pytest.mark.e2e
+
+
+def test_no_attack_is_missed(tmp_path: Path) -> None:
+    counts = run(seed=1, flip_count=300, plans=1, kill_count=2, scratch=tmp_path)
+    assert {kind: count.missed for kind, count in counts.items()} == {"flips": [], "forgeries": [], "kills": []}
+    assert counts["flips"].tried == 300
+    assert counts["forgeries"].tried >= 30
+    assert counts["kills"].tried >= 2
