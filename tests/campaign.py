@@ -4,8 +4,8 @@
 
 - *flips*: single bits of the promised files of a collected dataset; each must be seen by comparing with the manifest,
   and each hundredth also by the whole of `verify`.
-- *forgeries*: episodes in which all hashes fit, of many plans; physics, plan or configuration must tell them all. Swapped
-  trials are left out, as two of one plan may be too alike to tell without a replay.
+- *forgeries*: episodes in which all hashes fit, of many plans; physics, plan or configuration must tell them all.
+  Swapped trials are left out, as two of one plan may be too alike to tell without a replay.
 - *kills*: collections whose nodes, coordinator or launcher get signals at any moment, gone on with until they are
   finished; the files must be those of an undisturbed collection.
 
