@@ -75,7 +75,8 @@ def _free_port(address: str) -> int:
         with socket.socket(family, socket.SOCK_STREAM) as probe:
             probe.bind((host, 0))
             return int(probe.getsockname()[1])
-    except OSError as error:
+    except (OSError, UnicodeError) as error:
+        # A name of a host that has too long a part is none in Unicode.
         raise ConfigError(f"cannot listen on {address!r}: {error}", expected="such as tcp/127.0.0.1:0") from error
 
 

@@ -29,6 +29,7 @@ def test_a_busy_port_is_one_clear_error(endpoint):
     [
         ("nonsense", "Endpoints must be of the form"),
         ("tcp/nowhere.invalid:0", "cannot listen on"),
+        ("tcp/" + 70 * "x" + ":0", "cannot listen on"),
         ("tcp/127.0.0.1:99999", "invalid port value\n"),
     ],
 )
