@@ -71,5 +71,5 @@ def show_repaired(directory: Path, output: Path, *, json: bool) -> None:
         raise LossError(
             f"{output}: {counted(len(repaired.differing), 'episode')} kept, such as that of trial {first}, "
             f"which {THROWS} had otherwise",
-            hint=f"throwcollect dataset replay {output} --trial {first} simulates it again and compares",
+            hint=f"{command('dataset', 'replay', output, '--trial', first)} simulates it again and compares",
         )

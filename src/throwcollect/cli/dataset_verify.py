@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json as jsonlib
-import shlex
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -16,7 +15,7 @@ from throwcollect.dataset.verify import verify
 from throwcollect.dataset.verify_plan import CHECKED_AGAIN
 from throwcollect.errors import DatasetError
 from throwcollect.replay.audit import chosen_trials, replayed
-from throwcollect.wording import counted
+from throwcollect.wording import command, counted
 
 _SUGGESTED = 100
 """Throws that are suggested for a replay."""
@@ -63,12 +62,13 @@ def _replay_findings(directory: Path, count: int) -> Iterator[Finding]:
 
 def _not_checked(directory: Path, replay: int | None) -> str:
     """What was not looked at in a dataset in which nothing is wrong, and the command that does."""
+    dataset = Dataset.open(directory)
     if replay is not None:
-        told = f"replayed: {counted(replay, 'throw')} at most, the same bit for bit"
+        told = f"replayed: {counted(min(replay, len(dataset)), 'throw')}, the same bit for bit"
     else:
-        command = f"throwcollect dataset verify {shlex.quote(str(directory))} --replay {_SUGGESTED}"
-        told = f"not checked: whether the simulation gives the same throws again ({command})"
-    run = sum(trial.refused is None for trial in Dataset.open(directory).plan.trials)
+        more = command("dataset", "verify", directory, "--replay", _SUGGESTED)
+        told = f"not checked: whether the simulation gives the same throws again ({more})"
+    run = sum(trial.refused is None for trial in dataset.plan.trials)
     if run > CHECKED_AGAIN:
         told += f"; whether the robot can do them was checked of {CHECKED_AGAIN} of {run} trials"
     return told

@@ -70,16 +70,7 @@ def run(directory: Path) -> None:
                 f"interrupted; what is finished is in {known or 'the volume'}",
                 hint=command("resume", known) if known else None,
             )
-        config = writer.plan.config
-        said = check_by_replay(
-            directory,
-            writer.digests(),
-            count=config.run.replay,
-            seed=config.seed,
-            meanwhile=lambda: executor.spin_once(timeout_sec=_IDLE_S),
-        )
-        if said is not None:
-            print(said, flush=True)
+        _check(directory, writer, executor)
         writer.finish()
     finally:
         writer.close()
@@ -115,3 +106,22 @@ def _collect(node: Coordinator, writer: DatasetWriter, executor: ros.Executor) -
             told = now
             print(node.report().line, flush=True)
     print(node.report().line, flush=True)
+
+
+def _check(directory: Path, writer: DatasetWriter, executor: ros.Executor) -> None:
+    """Simulate some trials again; the node answers meanwhile.
+
+    Raises:
+        DatasetError: If a trial came out otherwise.
+        WorkerError: If trials cannot be simulated again.
+    """
+    config = writer.plan.config
+    said = check_by_replay(
+        directory,
+        writer.digests(),
+        count=config.run.replay,
+        seed=config.seed,
+        meanwhile=lambda: executor.spin_once(timeout_sec=_IDLE_S),
+    )
+    if said is not None:
+        print(said, flush=True)

@@ -63,7 +63,7 @@ def resume(
         if TRIALS in damaged and sweep_directory.samefile(directory):
             raise DatasetError(
                 f"{directory / TRIALS}: is missing or damaged, and nothing else holds the list of trials",
-                hint=f"throwcollect up CONFIG --resume {directory}, with the file that sweep.file of CONFIG names",
+                hint=f"{command('up', 'CONFIG', '--resume', directory)}, with the file that sweep.file of CONFIG names",
             )
         if old is not None and PLAN in damaged and (not config.grows or wrong_trials(old)):
             # It is drawn again; one that grew with the results cannot be, and stays if its trials are what they were.

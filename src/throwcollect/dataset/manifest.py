@@ -21,6 +21,7 @@ from throwcollect.dataset.digest import is_digest
 from throwcollect.dataset.directory import CONFIG, MANIFEST, METADATA, PLAN, SHARD_SUFFIX, SOURCES, THROWS, TRIALS
 from throwcollect.errors import DatasetError
 from throwcollect.files import open_regular, read_text, unreadable
+from throwcollect.wording import command
 
 _PROFILE = "data-package"
 _HASH = "sha256:"
@@ -147,7 +148,7 @@ def named_manifest(directory: Path) -> tuple[str, tuple[FileEntry, ...]]:
     """Name of the collection that a manifest has, and its entries; see `read_manifest`."""
     path = directory / MANIFEST
     if not os.path.lexists(path):
-        raise DatasetError(f"{path}: is missing", hint=f"throwcollect dataset rebuild {directory}")
+        raise DatasetError(f"{path}: is missing", hint=command("dataset", "rebuild", directory))
     text = read_text(path, most_bytes=_MOST_BYTES)
     try:
         document = json.loads(text)

@@ -9,6 +9,7 @@ from throwcollect.dataset.directory import MANIFEST
 from throwcollect.dataset.findings import Finding
 from throwcollect.dataset.manifest import FileEntry, entry_of_file, named_manifest, promised_names
 from throwcollect.errors import DatasetError
+from throwcollect.wording import command
 
 
 def manifest_findings(directory: Path, name: str | None) -> Iterator[Finding]:
@@ -19,7 +20,8 @@ def manifest_findings(directory: Path, name: str | None) -> Iterator[Finding]:
         name: Name of the collection; None if it is not known.
     """
     if not (directory / MANIFEST).exists():
-        problem = f"is missing, so changed bytes may go unnoticed; throwcollect dataset rebuild {directory} writes it"
+        rebuild = command("dataset", "rebuild", directory)
+        problem = f"is missing, so changed bytes may go unnoticed; {rebuild} writes it"
         yield Finding(MANIFEST, "", problem)
         return
     try:

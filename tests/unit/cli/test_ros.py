@@ -315,6 +315,7 @@ def test_a_run_is_joined_by_its_name_or_directory(
         launcher=os.getpid(),
         simulations=1,
         endpoint=endpoint,
+        begun_in=os.getcwd(),
     )
     run.write(record)
     override = f'mode="client";connect/endpoints=["{endpoint}"]'

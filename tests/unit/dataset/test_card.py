@@ -50,7 +50,7 @@ def test_a_container_knows_its_host_only_if_it_is_told(
         monkeypatch.delenv(HOST_VARIABLE, raising=False)
     else:
         monkeypatch.setenv(HOST_VARIABLE, told)
-    provenance = Provenance.of_this_machine(simulations=1, wall_s=1.0)
+    provenance = Provenance.of_this_machine(simulations=1, wall_s=1.0, was_open=False)
     assert provenance.host == host
     card = data_card(load(dataset / "config.yaml"), pq.read_table(dataset / "throws.parquet"), provenance)
     assert (f"| host | {host} |" in card) == (host is not None)

@@ -12,6 +12,7 @@ from tests.unit.runtime.engine import Engine, engine_at
 
 from throwcollect.config.schema import Config
 from throwcollect.errors import WorkerError
+from throwcollect.run_key import RunKey
 from throwcollect.runtime import docker as module
 from throwcollect.runtime import docker_clock, docker_engine, docker_watch
 from throwcollect.runtime.docker import DockerRuntime
@@ -44,8 +45,12 @@ def make(engine: Engine, tmp_path: Path, warnings: list[str]) -> Iterator[Callab
 
     def make() -> DockerRuntime:
         directory = tmp_path / "my data"
+        key = RunKey(tmp_path / "key")
+        key.create()
         made.append(
-            DockerRuntime("run-1a2b", CONFIG, directory=directory, logs=tmp_path / "logs", warn=warnings.append)
+            DockerRuntime(
+                "run-1a2b", CONFIG, directory=directory, logs=tmp_path / "logs", key=key, warn=warnings.append
+            )
         )
         made[-1].open()
         return made[-1]

@@ -53,7 +53,8 @@ def engine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Engine]:
 
 @pytest.fixture
 def run(engine: Engine, tmp_path: Path) -> OpenRun:
-    (tmp_path / "logs").mkdir()
+    for name in ("logs", "data"):
+        (tmp_path / name).mkdir()
     run = Records().new("throws")
     record = Record(
         run=run.run,
