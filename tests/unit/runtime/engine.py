@@ -60,6 +60,12 @@ class Engine:
                 return 200, {"DockerRootDir": self.root}
             case "GET", "networks":
                 return 200, []
+            case "POST", "volumes", "create":
+                return 201, {"Name": body["Name"], "Labels": body["Labels"]}
+            case "GET", "volumes":
+                return 200, {"Volumes": []}
+            case "GET", "volumes", name:
+                return 200, {"Name": name}
             case "POST", "networks", "create":
                 return 201, {"Id": "net"}
             case "GET", "networks", name:
@@ -67,7 +73,8 @@ class Engine:
             case "GET", "images", *_:
                 return 200, {"Id": "image", "Config": {"Labels": {}}}
             case "POST", "containers", "create":
-                return 201, {"Id": self.create(query["name"][0], body["Labels"]), "Warnings": []}
+                name = query.get("name", ["without-name"])[0]
+                return 201, {"Id": self.create(name, body["Labels"]), "Warnings": []}
             case "GET", "containers", "json":
                 return 200, [self._listed(each) for each in self.containers.values()]
             case _, "containers", key, *action:
@@ -100,6 +107,8 @@ class Engine:
             del self.containers[key]
         elif action == ["json"]:
             return 200, self.containers[key]
+        elif action == ["archive"]:
+            return 200, None
         elif action == ["start"]:
             state |= {"Status": "running", "Running": True}
         elif action in (["stop"], ["kill"]):
@@ -115,7 +124,8 @@ class _Handler(BaseHTTPRequestHandler):
         parts = urlsplit(self.path)
         path = re.sub(r"^/v[0-9.]+(?=/)", "", parts.path)
         length = int(self.headers.get("Content-Length") or 0)
-        body = json.loads(self.rfile.read(length)) if length else None
+        content = self.rfile.read(length)
+        body = json.loads(content) if content.startswith(b"{") else None
         asked = f"{self.command} {path}"
         self.engine.asked.append(asked)
         if self.engine.withheld is not None and re.search(self.engine.withheld, asked):
@@ -131,7 +141,7 @@ class _Handler(BaseHTTPRequestHandler):
         self.end_headers()
         self.wfile.write(content)
 
-    do_GET = do_POST = do_DELETE = _answer  # noqa: N815
+    do_GET = do_POST = do_PUT = do_DELETE = _answer  # noqa: N815
 
     def _stream(self, for_s: float | None) -> None:
         """Nothing happens, and nobody prints anything."""

@@ -167,9 +167,11 @@ def test_an_answer_that_does_not_come_in_time_is_said_in_our_words(
     engine.withheld = "version"
     with pytest.raises(WorkerError, match=r"no Docker engine answers at unix://\S+: no answer in time"):
         docker_engine.connect(timeout_s=0.1)
-    engine.withheld = "POST /containers/create"
+    engine.answer_all()
+    engine.released.clear()
     monkeypatch.setattr(module, "_SILENCE_S", 0.3)
     runtime = make()
+    engine.withheld = "POST /containers/create"
     monkeypatch.setattr(module, "_SILENCE_S", 10.0)
     runtime.start("sim_0", ["sim"])
     ends: list[NodeExit] = []
