@@ -11,7 +11,8 @@ from ruamel.yaml.scanner import Scanner, ScannerError
 
 MOST_LEVELS = 50
 """Levels of values inside values."""
-MOST_VALUES = 100_000
+MOST_VALUES = 30_000
+"""More than 500 weights for each of 32 joints; a text with so many takes a few seconds to be looked at."""
 
 _MOST_TOKENS = 5 * MOST_VALUES
 """A key and its value are four."""
