@@ -389,7 +389,7 @@ def test_a_collection_outlives_its_readers(lost: str, small: Path, tmp_path: Pat
         check=False,
     )
     os.close(writing)
-    assert collecting.returncode == (5 if lost == "both" else 0)
+    assert collecting.returncode == (6 if lost == "both" else 0)
     (run,) = [run for run in Records().all() if run.record.directory == str(tmp_path / "data")]
     assert (run.record.exit_code, run.record.message, run.record.trials_ended) == (0, "", 2)
     assert (tmp_path / "data" / "metadata.yaml").exists()
@@ -410,7 +410,7 @@ def test_output_that_cannot_be_written_is_an_error(small: Path) -> None:
         said = subprocess.run(
             command("config", small), stdout=full, stderr=subprocess.PIPE, text=True, timeout=60, check=False
         )
-    assert said.returncode == 5
+    assert said.returncode == 6
     assert said.stderr == "throwcollect: the output cannot be written: No space left on device\n"
 
 

@@ -29,9 +29,15 @@ def reference(config: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_a_collection_is_whole(reference: Path) -> None:
     assert verify(reference) == []
-    assert {"metadata.yaml", "plan.parquet", "throws.parquet", "config.yaml", "small_00000.mcap"} == set(
-        fingerprints(reference)
-    )
+    promised = {
+        "metadata.yaml",
+        "plan.parquet",
+        "throws.parquet",
+        "config.yaml",
+        "small_00000.mcap",
+        "datapackage.json",
+    }
+    assert set(fingerprints(reference)) == promised
 
 
 def test_stored_throws_come_out_of_the_simulation_again(reference: Path) -> None:

@@ -271,7 +271,7 @@ def test_a_run_in_the_foreground_is_a_run_like_any_other(config: Path, records: 
 def test_a_run_whose_record_cannot_be_written_goes_on(config: Path, records: Records, tmp_path: Path) -> None:
     running = start(config, tmp_path / "data", 1, "--trials", "4")
     running.wait_until(lambda: bool(records.ids()))
-    in_the_way = tmp_path / "state" / "runs" / f"{records.ids()[0]}.new"
+    in_the_way = tmp_path / "state" / "runs" / f"{records.ids()[0]}.json.new"
 
     def stands() -> bool:
         # For a moment, a record may just be written there.

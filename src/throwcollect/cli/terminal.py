@@ -50,7 +50,7 @@ class _Lines:
     def __init__(self, *, quiet: bool) -> None:
         self._quiet = quiet
         self._next = 0.0
-        self._ended = -1
+        self._said: Progress | None = None
 
     def __enter__(self) -> _Lines:
         return self
@@ -64,9 +64,10 @@ class _Lines:
         now = time.monotonic()
         # The last trial is told at once, but only once: reports go on while the dataset is checked and finished.
         over = progress.ended >= progress.total
-        if (over and progress.ended == self._ended) or (not over and now < self._next):
+        told = self._said is not None and self._said.outcomes == progress.outcomes
+        if (over and told) or (not over and now < self._next):
             return
-        self._next, self._ended = now + _LINE_EVERY_S, progress.ended
+        self._next, self._said = now + _LINE_EVERY_S, progress
         self.say(progress.line)
 
     def say(self, line: str) -> None:
