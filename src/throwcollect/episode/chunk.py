@@ -7,7 +7,6 @@ of each channel (MCAP specification, records Message, Chunk and Message Index).
 
 from __future__ import annotations
 
-import hashlib
 import struct
 import threading
 from collections.abc import Mapping
@@ -200,15 +199,12 @@ class ChunkEncoder:
         )  # fmt: skip
         self._dtype = _row_type({topic.name: topic.layout for topic in channels.recorded.values()})
 
-    def encode(self, samples: Samples, controllers: Mapping[str, ControllerSamples] | None = None) -> tuple[Chunk, str]:
+    def encode(self, samples: Samples, controllers: Mapping[str, ControllerSamples] | None = None) -> Chunk:
         """Encode and compress an episode.
 
         Args:
             samples: The samples, at least one.
             controllers: Set points of each controller whose state is recorded, by its name.
-
-        Returns:
-            The chunk, and SHA-256 of its uncompressed records in hexadecimal.
 
         Raises:
             KeyError: If the set points of a recorded controller are missing.
@@ -222,14 +218,13 @@ class ChunkEncoder:
             column["sequence"] = np.arange(len(samples))
             column["log_time"] = column["publish_time"] = samples.stamps_ns
             topic.fill(column["message"], recording)
-        chunk = Chunk(
+        return Chunk(
             data=self._compressor.compress(table.data),
             uncompressed_size=table.nbytes,
             crc=crc32(table.data),
             start_ns=int(samples.stamps_ns[0]),
             end_ns=int(samples.stamps_ns[-1]),
         )
-        return chunk, hashlib.sha256(table.data).hexdigest()
 
     def message(
         self, topic: str, samples: Samples, index: int, controllers: Mapping[str, ControllerSamples] | None = None

@@ -1,8 +1,8 @@
 """The one message that carries an episode from a simulation to whoever collects: std_msgs/UInt8MultiArray.
 
-Its layout names the parts of its data: ``header``, an `EpisodeHeader` in JSON; ``sha256``, that of the uncompressed
-message records in hexadecimal; ``conditions``, what it was simulated with, in JSON; ``chunk``, an MCAP Chunk record;
-``signature``, that of everything before it.
+Its layout names the parts of its data: ``header``, an `EpisodeHeader` in JSON; ``conditions``, what it was simulated
+with, in JSON; ``chunk``, an MCAP Chunk record; and ``signature``, that of everything before it. Whoever takes it in
+hashes the records, so no hash is ever believed, and none is computed twice.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from throwcollect.errors import DatasetError
 from throwcollect.interfaces import get_message
 from throwcollect.run_key import Signer
 
-_PARTS = ("header", "sha256", "conditions", "chunk", "signature")
+_PARTS = ("header", "conditions", "chunk", "signature")
 _SHA256 = re.compile(rb"[0-9a-f]{64}")
 _HEADER = TypeAdapter(EpisodeHeader)
 _LATEST_NS = 2**62
@@ -43,13 +43,23 @@ class Episode:
     Attributes:
         header: What is known besides the samples.
         chunk: The recorded messages, compressed.
-        records_sha256: SHA-256 of the uncompressed message records in hexadecimal, as the simulation computed it.
+        said_sha256: SHA-256 of the uncompressed message records in hexadecimal, as it was written beside them; None if
+            nobody has said it yet.
     """
 
-    def __init__(self, header: EpisodeHeader, chunk: Chunk, records_sha256: str) -> None:
+    def __init__(self, header: EpisodeHeader, chunk: Chunk, said_sha256: str | None = None) -> None:
         self.header = header
         self.chunk = chunk
-        self.records_sha256 = records_sha256
+        self.said_sha256 = said_sha256
+
+    @cached_property
+    def records_sha256(self) -> str:
+        """SHA-256 of the uncompressed message records in hexadecimal: as it was said, or else worked out.
+
+        Raises:
+            DatasetError: If it has to be worked out and the chunk is damaged.
+        """
+        return self.said_sha256 or hashlib.sha256(self.contents).hexdigest()
 
     @cached_property
     def header_json(self) -> str:
@@ -157,7 +167,7 @@ class Delivery(NamedTuple):
 
 def pack(episode: Episode, conditions: str, signer: Signer) -> bytes:
     """The CDR bytes of the message that carries an episode."""
-    parts = [episode.header_json.encode(), episode.records_sha256.encode(), conditions.encode(), episode.chunk.record()]
+    parts = [episode.header_json.encode(), conditions.encode(), episode.chunk.record()]
     signature = signer.sign(*parts).encode()
     return b"".join((_prefix([*map(len, parts), len(signature)]), *parts, signature))
 
@@ -193,14 +203,14 @@ def unpack(message: bytes, signer: Signer) -> Delivery:
         raise DatasetError(f"episode: {len(message) - length} bytes of data", expected=f"{sum(sizes)} as announced")
     whole = memoryview(message)
     ends = list(itertools.accumulate(sizes, initial=length))
-    header, sha256, conditions, chunk, signature = (whole[start:end] for start, end in itertools.pairwise(ends))
+    header, conditions, chunk, signature = (whole[start:end] for start, end in itertools.pairwise(ends))
     if not signer.has_signed(bytes(signature).decode(errors="replace"), whole[length : ends[-2]]):
         raise DatasetError("episode: is not signed with the key of this run")
     try:
         text = bytes(conditions).decode()
     except UnicodeDecodeError as error:
         raise DatasetError("episode: its conditions are no UTF-8 text") from error
-    return Delivery(make_episode(bytes(header), bytes(sha256), Chunk.parse(chunk)), text)
+    return Delivery(Episode(header_from_json(bytes(header)), Chunk.parse(chunk)), text)
 
 
 def make_episode(header: bytes | str, records_sha256: bytes, chunk: Chunk) -> Episode:

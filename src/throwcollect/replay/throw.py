@@ -65,6 +65,4 @@ class Replayer:
         while (ended := simulation.episode()) is None:
             simulation.advance(watched=False)
         header, samples, states = ended
-        return Delivery(
-            Episode(header, *self._encoder.encode(samples, states)), simulation.trial.conditions().to_json()
-        )
+        return Delivery(Episode(header, self._encoder.encode(samples, states)), simulation.trial.conditions().to_json())

@@ -133,7 +133,7 @@ class SimulationNode(Node):
             controller.publish_state()
         if (episode := simulation.episode()) is not None:
             header, samples, states = episode
-            whole = Episode(header, *self._encoder.encode(samples, states))
+            whole = Episode(header, self._encoder.encode(samples, states))
             self._episodes.publish(pack(whole, simulation.trial.conditions().to_json(), self._signer))
         self._control.follow_up()
 

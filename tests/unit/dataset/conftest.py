@@ -116,7 +116,7 @@ class Collection:
             )
             for name in ("arm_right_controller", "torso_controller")
         }
-        return Episode(header, *self.encoder.encode(samples, targets))
+        return Episode(header, self.encoder.encode(samples, targets))
 
     def result(self, episode: Episode) -> ThrowResult:
         config = self.plan.config_of(self.plan.trials[episode.header.trial])

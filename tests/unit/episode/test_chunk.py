@@ -53,7 +53,7 @@ def messages_of(contents: bytes) -> list[tuple[int, Message]]:
 
 def test_a_chunk_has_one_message_per_channel_and_sample(full: ChunkEncoder, make_samples: Any, targets: Any) -> None:
     samples = make_samples(50)
-    messages = [message for _, message in messages_of(full.encode(samples, targets)[0].decompress())]
+    messages = [message for _, message in messages_of(full.encode(samples, targets).decompress())]
     assert [message.channel_id for message in messages] == [3, 4, 5, 6, 8, 11] * 50
     assert [message.sequence for message in messages[::6]] == list(range(50))
     assert [message.log_time for message in messages[3::6]] == samples.stamps_ns.tolist()
@@ -63,7 +63,7 @@ def test_a_chunk_has_one_message_per_channel_and_sample(full: ChunkEncoder, make
 def test_a_message_made_alone_has_the_bytes_of_the_chunk(full: ChunkEncoder, make_samples: Any, targets: Any) -> None:
     """What a listener receives live is what the dataset holds."""
     samples = make_samples(50)
-    table = MessageTable(full.encode(samples, targets)[0].decompress(), 50)
+    table = MessageTable(full.encode(samples, targets).decompress(), 50)
     topics = {
         3: "/joint_states",
         4: "/ball/odometry",
@@ -88,7 +88,7 @@ def test_what_is_not_recorded_cannot_be_made(encoder: ChunkEncoder, full: ChunkE
 @pytest.mark.parametrize("count", [1, 2, 500])
 def test_samples_survive(encoder: ChunkEncoder, make_samples: Any, count: int) -> None:
     samples = make_samples(count)
-    read = MessageTable(encoder.encode(samples)[0].decompress(), count).samples
+    read = MessageTable(encoder.encode(samples).decompress(), count).samples
     for field in fields(Samples):
         assert np.allclose(getattr(samples, field.name), getattr(read, field.name), rtol=0, atol=1e-14)
     assert np.array_equal(samples.stamps_ns, read.stamps_ns)
@@ -97,13 +97,13 @@ def test_samples_survive(encoder: ChunkEncoder, make_samples: Any, count: int) -
 
 def test_equal_samples_give_equal_chunks(make_samples: Any) -> None:
     encoders = [ChunkEncoder(Channels(Config(), URDF), level=3) for _ in range(2)]
-    chunk, sha256 = encoders[0].encode(make_samples(30))
-    assert (chunk, sha256) == encoders[1].encode(make_samples(30))
+    chunk = encoders[0].encode(make_samples(30))
+    assert chunk == encoders[1].encode(make_samples(30))
     assert sha256 == hashlib.sha256(chunk.decompress()).hexdigest()
 
 
 def test_the_record_is_the_one_that_the_mcap_library_reads(encoder: ChunkEncoder, make_samples: Any) -> None:
-    chunk = encoder.encode(make_samples(20))[0]
+    chunk = encoder.encode(make_samples(20))
     read = McapChunk.read(ReadDataStream(io.BytesIO(chunk.record()[9:])))
     assert (read.compression, read.data, read.uncompressed_size) == ("zstd", chunk.data, len(chunk.decompress()))
     assert (read.message_start_time, read.message_end_time) == (10**10, 10**10 + 19 * 4_000_000)
@@ -112,7 +112,7 @@ def test_the_record_is_the_one_that_the_mcap_library_reads(encoder: ChunkEncoder
 
 
 def test_message_indexes_point_at_the_messages(encoder: ChunkEncoder, make_samples: Any) -> None:
-    contents = encoder.encode(make_samples(20))[0].decompress()
+    contents = encoder.encode(make_samples(20)).decompress()
     table = MessageTable(contents, 20)
     for channel in (3, 4):
         index = MessageIndex.read(ReadDataStream(io.BytesIO(table.message_index(channel)[9:])))
@@ -123,7 +123,7 @@ def test_message_indexes_point_at_the_messages(encoder: ChunkEncoder, make_sampl
 
 @pytest.mark.parametrize("at", [0, 5, 40, 45, 49, 52, -1])
 def test_a_record_that_is_not_such_a_chunk_is_refused(encoder: ChunkEncoder, make_samples: Any, at: int) -> None:
-    record = bytearray(encoder.encode(make_samples(20))[0].record())
+    record = bytearray(encoder.encode(make_samples(20)).record())
     if at == -1:
         del record[-1]
     else:
@@ -133,7 +133,7 @@ def test_a_record_that_is_not_such_a_chunk_is_refused(encoder: ChunkEncoder, mak
 
 
 def test_damage_is_refused_before_it_is_believed(encoder: ChunkEncoder, make_samples: Any) -> None:
-    chunk = encoder.encode(make_samples(20))[0]
+    chunk = encoder.encode(make_samples(20))
     bomb = zstandard.ZstdCompressor().compress(bytes(50_000_000))
     for data, message in [
         (chunk.data[:-1], "cannot be decompressed"),
@@ -148,7 +148,7 @@ def test_damage_is_refused_before_it_is_believed(encoder: ChunkEncoder, make_sam
 
 
 def test_records_that_are_no_table_are_refused(encoder: ChunkEncoder, make_samples: Any) -> None:
-    contents = encoder.encode(make_samples(20))[0].decompress()
+    contents = encoder.encode(make_samples(20)).decompress()
     row = len(contents) // 20
     changed = bytearray(contents)
     changed[3 * row + 9] = 9
@@ -167,7 +167,7 @@ def test_records_that_are_no_table_are_refused(encoder: ChunkEncoder, make_sampl
 
 
 def test_records_of_other_topics_hold_no_samples(encoder: ChunkEncoder, make_samples: Any) -> None:
-    contents = encoder.encode(make_samples(2))[0].decompress()
+    contents = encoder.encode(make_samples(2)).decompress()
     size = 9 + struct.unpack_from("<Q", contents, 1)[0]
     with pytest.raises(DatasetError, match="no messages of /ball/odometry"):
         _ = MessageTable(contents[:size], 1).samples
@@ -178,7 +178,7 @@ def test_records_of_other_topics_hold_no_samples(encoder: ChunkEncoder, make_sam
 
 def test_times_are_compared_with_stamps(encoder: ChunkEncoder, make_samples: Any) -> None:
     samples = make_samples(5)
-    contents = bytearray(encoder.encode(samples)[0].decompress())
+    contents = bytearray(encoder.encode(samples).decompress())
     assert MessageTable(bytes(contents), 5).are_timed_by(samples.stamps_ns)
     contents[len(contents) // 5 + 11] ^= 1
     assert not MessageTable(bytes(contents), 5).are_timed_by(samples.stamps_ns)

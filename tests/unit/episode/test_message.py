@@ -29,25 +29,25 @@ def encoder() -> ChunkEncoder:
 
 @pytest.fixture
 def sent(encoder: ChunkEncoder, header: EpisodeHeader, make_samples: Any) -> Episode:
-    return Episode(header, *encoder.encode(make_samples(50)))
+    return Episode(header, encoder.encode(make_samples(50)))
 
 
 def test_an_episode_arrives_as_it_was_sent(sent: Episode, make_samples: Any) -> None:
     episode, conditions = unpack(pack(sent, CONDITIONS, SIGNER), SIGNER)
     assert conditions == CONDITIONS
-    assert vars(episode) == {"header": sent.header, "chunk": sent.chunk, "records_sha256": sent.records_sha256}
+    assert vars(episode) == {"header": sent.header, "chunk": sent.chunk, "said_sha256": None}
+    assert episode.digest == sent.digest
     assert episode.samples().ball_position.tolist() == make_samples(50).ball_position.tolist()
 
 
 def test_the_message_is_a_stock_one_that_names_its_parts(sent: Episode) -> None:
     message = deserialize(pack(sent, CONDITIONS, SIGNER), get_message("std_msgs/msg/UInt8MultiArray"))
     sizes = {part.label: part.size for part in message.layout.dim}
-    assert list(sizes) == ["header", "sha256", "conditions", "chunk", "signature"]
+    assert list(sizes) == ["header", "conditions", "chunk", "signature"]
     data, parts = message.data.tobytes(), {}
     for name, size in sizes.items():
         parts[name], data = data[:size], data[size:]
     assert header_from_json(parts["header"]) == sent.header
-    assert parts["sha256"].decode() == hashlib.sha256(sent.contents).hexdigest()
     assert parts["conditions"].decode() == CONDITIONS
     assert parts["chunk"] == sent.chunk.record()
     assert SIGNER.has_signed(parts.pop("signature").decode(), *parts.values())
@@ -59,14 +59,14 @@ def test_the_digest_covers_header_and_messages_but_not_their_packing(
     records = hashlib.sha256(sent.chunk.decompress()).digest()
     assert sent.digest == hashlib.sha256(header_to_json(header).encode() + b"\0" + records).hexdigest()
     packer = ChunkEncoder(Channels(Config(), full_description(Config())), level=9)
-    packed_more = Episode(header, *packer.encode(make_samples(50)))
+    packed_more = Episode(header, packer.encode(make_samples(50)))
     assert packed_more.chunk.data != sent.chunk.data
     assert packed_more.digest == sent.digest
     others = [
         Episode(replace(header, end_reason="rest"), sent.chunk, sent.records_sha256),
         Episode(replace(header, contacts=header.contacts[:1]), sent.chunk, sent.records_sha256),
         Episode(replace(header, goals=()), sent.chunk, sent.records_sha256),
-        Episode(header, *encoder.encode(make_samples(50, seed=1))),
+        Episode(header, encoder.encode(make_samples(50, seed=1))),
     ]
     assert len({sent.digest, *(other.digest for other in others)}) == 5
 
@@ -137,7 +137,7 @@ def test_a_message_of_another_layout_is_refused(sent: Episode) -> None:
 
 @pytest.fixture(scope="module")
 def whole(encoder: ChunkEncoder, header: EpisodeHeader, make_samples: Any) -> bytes:
-    return pack(Episode(replace(header, samples=3), *encoder.encode(make_samples(3))), CONDITIONS, SIGNER)
+    return pack(Episode(replace(header, samples=3), encoder.encode(make_samples(3))), CONDITIONS, SIGNER)
 
 
 @settings(max_examples=300)

@@ -16,7 +16,7 @@ from throwcollect.robots.description import full_description
 @pytest.fixture(scope="module")
 def contents(make_samples: Any) -> bytes:
     config = Config.model_validate({"name": "rows", "sweep": {"parameters": {"task.duration_s": {"min": 1, "max": 2}}}})
-    return ChunkEncoder(Channels(config, full_description(config)), level=1).encode(make_samples(20))[0].decompress()
+    return ChunkEncoder(Channels(config, full_description(config)), level=1).encode(make_samples(20)).decompress()
 
 
 def test_every_column_lies_where_it_was_written(contents: bytes, make_samples: Any) -> None:

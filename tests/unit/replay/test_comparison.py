@@ -31,7 +31,7 @@ HEADER = EpisodeHeader(0, 16_000_000_000, "landed", (Contact("spoon", 16_000_000
 
 
 def episode(samples: Samples = SAMPLES, header: EpisodeHeader = HEADER) -> Episode:
-    return Episode(header, *ENCODER.encode(samples))
+    return Episode(header, ENCODER.encode(samples))
 
 
 def test_the_same_throw_has_no_differences() -> None:
