@@ -30,6 +30,7 @@ import psutil
 from tests.e2e.collection import Running, collect, fingerprints, launched, start, write_config
 from tests.unit.dataset.conftest import Collection
 from tests.unit.dataset.test_forgeries import FORGED, FORGERIES, problems
+from throwcollect.config.loader import load
 from throwcollect.dataset.manifest import promised_names
 from throwcollect.dataset.verify import verify
 from throwcollect.dataset.verify_manifest import manifest_findings
@@ -59,6 +60,7 @@ class Count:
 def flips(directory: Path, count: int, source: random.Random) -> Count:
     """Flip single bits of a dataset, one at a time; the dataset is as it was when this returns."""
     result = Count()
+    collection = load(directory / "config.yaml").name
     names = [*promised_names(directory), MANIFEST]
     for number in range(count):
         # All files alike, however large they are.
@@ -68,7 +70,7 @@ def flips(directory: Path, count: int, source: random.Random) -> Count:
         damaged = bytearray(whole)
         damaged[place] ^= 1 << bit
         path.write_bytes(damaged)
-        seen = bool(list(manifest_findings(directory, None)))
+        seen = bool(list(manifest_findings(directory, collection)))
         if number % _WHOLE_VERIFY_EVERY == 0:
             seen = seen and bool(verify(directory))
         path.write_bytes(whole)
