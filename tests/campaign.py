@@ -141,7 +141,7 @@ def _disturbances(running: Running, source: random.Random) -> Iterator[str]:
         parties = [launcher, *launcher.children()]
         victim, number = source.choice(parties), source.choice(SIGNALS)
         try:
-            name = victim.cmdline()[-1]
+            name = " ".join(victim.cmdline()[-1:])
             victim.send_signal(number)
             if number == signal.SIGSTOP:
                 time.sleep(source.uniform(0.0, _FROZEN_S))

@@ -8,6 +8,7 @@ from typing import Any
 from throwcollect.errors import DatasetError
 from throwcollect.files import open_regular, unreadable
 
+_OPENED = "/proc/self/fd/{}"
 _MOST_ROWS = 20_000_000
 _MOST_VALUES = 2_000_000_000
 
@@ -30,7 +31,12 @@ def read_parquet(path: Path) -> Any:
     except OSError as error:
         raise unreadable(path, error) from error
     try:
-        with open(descriptor, "rb") as opened, pq.ParquetFile(opened, page_checksum_verification=True) as file:
+        # By its descriptor's name and not as a Python object: Arrow's own threads would call or free that, and one that
+        # still waits for the interpreter when this process ends takes the process down.
+        with (
+            open(descriptor, "rb"),
+            pq.ParquetFile(_OPENED.format(descriptor), page_checksum_verification=True) as file,
+        ):
             rows, columns = file.metadata.num_rows, file.metadata.num_columns
             if not 0 <= rows <= _MOST_ROWS or rows * columns > _MOST_VALUES:
                 raise DatasetError(f"{path}: is damaged: announces {rows} rows of {columns} columns")
