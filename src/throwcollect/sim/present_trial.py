@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 from throwcollect.build import build_digest
 from throwcollect.config.schema import Config
-from throwcollect.control import GoalResult, Refusal, TrajectoryGoal
-from throwcollect.control.outcome import ErrorCode
+from throwcollect.control import ErrorCode, GoalResult, Refusal, TrajectoryGoal
 from throwcollect.episode.record import GoalOutcome
 from throwcollect.errors import RequestError
 from throwcollect.trial.conditions import Conditions, Settings
