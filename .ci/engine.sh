@@ -78,6 +78,6 @@ if ! docker image inspect "$base" > /dev/null 2>&1; then
 fi
 need docker-compose docker-compose
 .ci/compose.sh || echo "no Compose v2 for the tests"
-"$python" docker/wheelhouse.py "$wheelhouse"
+"$python" docker/wheelhouse.py --ros "$wheelhouse"
 "$python" -m throwcollect image build --base "$base" --wheelhouse "$wheelhouse" 2> build/image.log \
     || { tail -n 25 build/image.log; exit 1; }

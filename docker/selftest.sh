@@ -1,6 +1,8 @@
 #!/bin/sh
-# Fails if something is missing in the image: loads every module, makes a plan, runs every kind of node, reads the result.
+# Fails if something is missing in the image: loads every module, and on each backend that the arguments name makes a plan,
+# runs every kind of node, and reads the result.
 set -eu
+quickstart=$(cd "$(dirname "$0")" && pwd)/quickstart.yaml
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 cd "$work"
@@ -21,6 +23,8 @@ for module in pkgutil.walk_packages(throwcollect.__path__, "throwcollect."):
                 raise
 PYTHON
 throwcollect --help > help
-throwcollect up -n 1 --runtime local --trials 4 --output dataset "$(dirname "$0")/quickstart.yaml"
-throwcollect dataset info dataset > info
-throwcollect dataset verify dataset
+for backend; do
+    throwcollect up -n 1 --runtime local --trials 4 --set run.ros="$backend" --output "$backend" "$quickstart"
+    throwcollect dataset info "$backend" > info
+    throwcollect dataset verify "$backend"
+done

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from fnmatch import fnmatchcase
 from pathlib import Path, PurePosixPath
 
@@ -53,12 +53,26 @@ DROPPED = (
     # The second of two bindings to the same library.
     "zstandard/_cffi*",
     "zstandard/backend_cffi*",
+    # Of ROS' wheels: what compiles against them, tools, and modules that only make a wheel one of a platform.
+    "*.data/data/bin/fastdds",
+    "*.data/data/bin/fast-discovery-server-*",
+    "*.data/data/bin/nodesize_dbg",
+    "*.data/data/bin/ros-discovery",
+    "*.data/data/lib/cmake/*",
+    "*.data/data/lib/foonathan_memory/*",
+    "*.data/data/share/*",
+    "*.data/data/tools/*",
+    "*/_dummy.*.so",
+    "*_s.c",
+    "*_s.ep.*.c",
     # Nothing here prints source code in colour.
     "pygments/lexers/[a-z]*.py",
     # Nothing installs or removes packages later on.
     "*.dist-info/RECORD",
 )
 
+KEPT_OF_ROS = ("*.data/data/share/ament_index/*",)
+"""What tells which RMWs are installed."""
 CMEEL = "cmeel.prefix/*"
 """Where Pinocchio's packages put what others put into ``/usr``."""
 KEPT_OF_CMEEL = (
@@ -69,6 +83,15 @@ KEPT_OF_CMEEL = (
     "cmeel.prefix/share/example-robot-data/robots/talos_data/*",
 )
 
+ENVIRONMENT = "environment.data/data"
+"""Directory of the environment, where wheels put what is in their ``*.data/data``."""
+
+COPIED = "ros_*.libs/*"
+"""Libraries that ROS' wheels hold beside their own: the loader searches all these directories, and one copy does."""
+
+LOADED_BY_NAME = "lib*__rosidl_typesupport_*_c.so"
+"""What ROS loads when a type is first used with Fast DDS, without any library saying that it needs it."""
+
 LIBRARY = re.compile(r"lib[^.]*\.so(\.\d+)*")
 """File names of libraries; those of modules say for which Python: ``lib.cpython-311-x86_64-linux-gnu.so``."""
 
@@ -77,8 +100,10 @@ def kept(path: str) -> bool:
     """Whether a file stays, as far as its name tells.
 
     Args:
-        path: Relative to the directory of the packages, with slashes.
+        path: Relative to the directory of the packages, with slashes; or as a wheel has what goes elsewhere.
     """
+    if any(fnmatchcase(path, pattern) for pattern in KEPT_OF_ROS):
+        return True
     if fnmatchcase(path, CMEEL) and not any(fnmatchcase(path, pattern) for pattern in KEPT_OF_CMEEL):
         return False
     return not any(fnmatchcase(path, pattern) for pattern in DROPPED)
@@ -97,13 +122,28 @@ def unreached(files: Mapping[str, Callable[[], bytes]]) -> set[str]:
     """
     shared = {path: needed(content) for path, read in files.items() if ".so" in path and is_elf(content := read())}
     libraries = {path for path in shared if LIBRARY.fullmatch(PurePosixPath(path).name)}
-    reached = set(shared) - libraries
+    by_name = {path for path in libraries if fnmatchcase(PurePosixPath(path).name, LOADED_BY_NAME)}
+    reached = set(shared) - libraries | by_name
     fresh = set(reached)
     while fresh:
         names = {name for path in fresh for name in shared[path]}
         fresh = {path for path in libraries - reached if PurePosixPath(path).name in names}
         reached |= fresh
     return libraries - reached
+
+
+def repeated(files: Iterable[str]) -> set[str]:
+    """Copies of libraries that ROS' wheels hold more than once, but for the first one of each name.
+
+    Args:
+        files: What stays, by path.
+
+    Returns:
+        Paths of the copies; their names have the hash of their content.
+    """
+    copies = [path for path in sorted(files) if fnmatchcase(path, COPIED)]
+    first = {PurePosixPath(path).name: path for path in reversed(copies)}
+    return set(copies) - set(first.values())
 
 
 def slim(directory: Path) -> None:
@@ -113,8 +153,14 @@ def slim(directory: Path) -> None:
         directory: Such as ``lib/python3.11/site-packages`` of an environment.
     """
     files = {path.relative_to(directory).as_posix(): path for path in directory.rglob("*") if not path.is_dir()}
+    if (directory / "ros_wheels_bootstrapper").is_dir():
+        environment = directory.parents[2]
+        beside = [path for path in environment.rglob("*") if directory.parents[0] not in path.parents]
+        files |= {
+            f"{ENVIRONMENT}/{path.relative_to(environment).as_posix()}": path for path in beside if path.is_file()
+        }
     staying = {name: path for name, path in files.items() if kept(name)}
-    superfluous = unreached({name: path.read_bytes for name, path in staying.items()})
+    superfluous = unreached({name: path.read_bytes for name, path in staying.items()}) | repeated(staying)
     for name, path in files.items():
         if name not in staying or name in superfluous:
             path.unlink()
@@ -123,6 +169,10 @@ def slim(directory: Path) -> None:
     for path in sorted(directory.rglob("*"), reverse=True):
         if path.is_dir() and not any(path.iterdir()):
             path.rmdir()
+
+
+def _is_plain(path: Path) -> bool:
+    return path.is_file() and not path.is_symlink()
 
 
 if __name__ == "__main__":

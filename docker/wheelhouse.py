@@ -1,5 +1,6 @@
-"""Fills a directory with everything that pip needs to build the image without network: ``python3 wheelhouse.py DIR``.
+"""Fills a directory with everything that pip needs to build the image without network: `python3 wheelhouse.py DIR`.
 
+`--ros` adds genuine ROS 2: the wheels of the extra `ros`, which `packaging/ros_wheels.py` collects and builds.
 Wheels of the dependencies in `pyproject.toml`, slimmed as the image will be, and of what builds throwcollect itself. A
 directory that was filled for the same dependencies by the same rules is left as it is. Runs on Python 3.11 and later,
 with pip.
@@ -7,6 +8,7 @@ with pip.
 
 from __future__ import annotations
 
+import argparse
 import base64
 import hashlib
 import platform
@@ -21,9 +23,14 @@ from pathlib import Path
 
 import tomllib
 from elf import is_elf, stripped
-from slim import kept, unreached
+from slim import kept, repeated, unreached
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.append(str(ROOT / "packaging"))
+import ros_wheels  # noqa: E402 - beside the image's own scripts, as `make ros` needs it too
+
+ROS_WHEELS = ROOT / "build" / "wheelhouse-ros"
+"""Where the wheels of ROS are kept as they are; `make ros` has them there too."""
 PYTHON = "3.11"
 """Version in the image; pybullet has no wheels for later ones."""
 GLIBC_MINOR = 36
@@ -38,10 +45,31 @@ def requirements() -> list[str]:
     return [*project["project"]["dependencies"], *project["build-system"]["requires"], "pip"]
 
 
-def digest() -> str:
-    """Hash over everything that determines what is in the wheelhouse."""
+def digest(*, ros: bool) -> str:
+    """Hash over everything that determines what is in the wheelhouse.
+
+    Args:
+        ros: Whether ROS is in it.
+    """
     scripts = [(Path(__file__).parent / name).read_bytes() for name in ("elf.py", "slim.py", "wheelhouse.py")]
-    return hashlib.sha256(b"\0".join([*scripts, "\n".join(requirements()).encode()])).hexdigest()
+    more = [ros_wheels.digest().encode()] if ros else []
+    return hashlib.sha256(b"\0".join([*scripts, "\n".join(requirements()).encode(), *more])).hexdigest()
+
+
+def add_ros(directory: Path) -> None:
+    """Add the wheels of the extra `ros` to downloaded ones.
+
+    Args:
+        directory: Where they go; what is there in some version stays in that one.
+
+    Raises:
+        subprocess.CalledProcessError: If a wheel cannot be had or built; pip has said why.
+    """
+    ros_wheels.fill(ROS_WHEELS)
+    there = {path.name.partition("-")[0].lower() for path in directory.glob("*.whl")}
+    for wheel in ROS_WHEELS.glob("*.whl"):
+        if wheel.name.partition("-")[0].lower() not in there:
+            shutil.copyfile(wheel, directory / wheel.name)
 
 
 def download(directory: Path) -> None:
@@ -72,7 +100,7 @@ def repack(wheels: list[Path], directory: Path) -> None:
     files: dict[str, Callable[[], bytes]] = {
         name: partial(archive.read, name) for archive in archives.values() for name in archive.namelist() if kept(name)
     }
-    superfluous = unreached(files)
+    superfluous = unreached(files) | repeated(files)
     for wheel, archive in archives.items():
         names = [name for name in archive.namelist() if name in files and name not in superfluous]
         _write_wheel(directory / wheel.name, archive, [name for name in names if not name.endswith("/")])
@@ -97,17 +125,18 @@ def _write_wheel(target: Path, archive: zipfile.ZipFile, names: list[str]) -> No
         slimmed.writestr(zipfile.ZipInfo(record, _EPOCH), "".join([*rows, f"{record},,\n"]))
 
 
-def main(directory: Path) -> None:
+def main(directory: Path, *, ros: bool = False) -> None:
     """Fill a directory, unless it is up to date.
 
     Args:
         directory: The wheelhouse; everything in it is replaced.
+        ros: Whether genuine ROS 2 is wanted too.
 
     Raises:
         subprocess.CalledProcessError: If a wheel cannot be downloaded.
     """
     stamp = directory / STAMP
-    if stamp.is_file() and stamp.read_text(encoding="ascii") == digest():
+    if stamp.is_file() and stamp.read_text(encoding="ascii") == digest(ros=ros):
         print(f"{directory}: up to date")
         return
     if directory.exists() and (
@@ -116,6 +145,8 @@ def main(directory: Path) -> None:
         sys.exit(f"{directory}: holds {foreign[0].name}, which is no wheel; name a new or empty directory")
     with tempfile.TemporaryDirectory() as downloads:
         download(Path(downloads))
+        if ros:
+            add_ros(Path(downloads))
         wheels = sorted(Path(downloads).glob("*.whl"))
         shutil.rmtree(directory, ignore_errors=True)
         directory.mkdir(parents=True)
@@ -123,9 +154,13 @@ def main(directory: Path) -> None:
         before, after = (
             sum(path.stat().st_size for path in place.glob("*.whl")) for place in (Path(downloads), directory)
         )
-    stamp.write_text(digest(), encoding="ascii")
+    stamp.write_text(digest(ros=ros), encoding="ascii")
     print(f"{directory}: {len(wheels)} wheels, {after / 1e6:.0f} MB ({before / 1e6:.0f} MB before slimming)")
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition(":")[0])
+    parser.add_argument("--ros", action="store_true", help="add genuine ROS 2")
+    parser.add_argument("directory", type=Path)
+    arguments = parser.parse_args()
+    main(arguments.directory, ros=arguments.ros)

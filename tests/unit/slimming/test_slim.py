@@ -94,6 +94,19 @@ def test_a_stripped_library_is_shorter_and_still_loads(library: bytes, tmp_path:
         ("cmeel.prefix/lib/python3.11/site-packages/pinocchio/__init__.py", True),
         ("cmeel.prefix/bin/assimp", False),
         ("throwcollect/interfaces/definitions/std_srvs/srv/Trigger.srv", True),
+        ("ros_std_msgs-5.3.6.data/data/lib/libstd_msgs__rosidl_generator_c.so", True),
+        ("ros_std_msgs-5.3.6.data/data/lib/python3.11/site-packages/std_msgs/msg/_string.py", True),
+        ("ros_std_msgs-5.3.6.data/data/lib/python3.11/site-packages/std_msgs/msg/_string_s.c", False),
+        ("ros_std_msgs-5.3.6.data/data/share/std_msgs/cmake/std_msgsConfig.cmake", False),
+        ("ros_std_msgs-5.3.6.data/data/include/std_msgs/std_msgs/msg/string.h", False),
+        (
+            "ros_rmw_fastrtps_cpp-8.4.3.data/data/share/ament_index/resource_index/rmw_typesupport/rmw_fastrtps_cpp",
+            True,
+        ),
+        ("ros_fastrtps-2.14.5.data/data/bin/fast-discovery-server", True),
+        ("ros_fastrtps-2.14.5.data/data/bin/fast-discovery-server-1.0.1", False),
+        ("std_msgs/_dummy.cpython-311-x86_64-linux-gnu.so", False),
+        ("environment.data/data/bin/python3", True),
     ],
 )
 def test_a_file_stays_if_a_node_may_load_it(path: str, stays: bool) -> None:
@@ -123,6 +136,53 @@ def test_of_libraries_those_stay_that_a_module_loads_by_whatever_way() -> None:
     }
     superfluous = unreached({name: (lambda content=content: content) for name, content in files.items()})
     assert superfluous == {"cmeel.prefix/lib/liba.so.1.2.3", "other.libs/libd.so", "other.libs/libe.so"}
+
+
+def test_libraries_that_ros_loads_by_name_stay_with_what_they_need() -> None:
+    from slim import unreached
+
+    files = {
+        "data/lib/libtf2_msgs__rosidl_typesupport_fastrtps_c.so": elf("libstd_msgs__rosidl_typesupport_fastrtps_c.so"),
+        "data/lib/libstd_msgs__rosidl_typesupport_fastrtps_c.so": elf("libfastcdr.so.2"),
+        "data/lib/libtf2_msgs__rosidl_typesupport_introspection_cpp.so": elf(),
+        "data/lib/libfastcdr.so": elf(),
+        "data/lib/libfastcdr.so.2": elf(),
+    }
+    superfluous = unreached({name: (lambda content=content: content) for name, content in files.items()})
+    assert superfluous == {"data/lib/libtf2_msgs__rosidl_typesupport_introspection_cpp.so", "data/lib/libfastcdr.so"}
+
+
+def test_of_libraries_that_several_wheels_of_ros_hold_one_copy_stays() -> None:
+    from slim import repeated
+
+    files = [
+        "ros_rcl.libs/libssl-60.so.1",
+        "ros_a.libs/libssl-60.so.1",
+        "ros_a.libs/libx.so",
+        "numpy.libs/libssl-60.so.1",
+    ]
+    assert repeated(files) == {"ros_rcl.libs/libssl-60.so.1"}
+
+
+def test_an_environment_with_ros_is_slimmed_beside_its_packages_too(tmp_path: Path) -> None:
+    from slim import slim
+
+    packages = tmp_path / "lib" / "python3.11" / "site-packages"
+    stays = [
+        "bin/python",
+        "bin/fast-discovery-server",
+        "lib/libstd_msgs__rosidl_typesupport_fastrtps_c.so",
+        "lib/python3.11/site-packages/ros_wheels_bootstrapper/__init__.py",
+        "share/ament_index/resource_index/rmw_typesupport/rmw_fastrtps_cpp",
+    ]
+    goes = ["bin/fastdds", "include/std_msgs/std_msgs/msg/string.h", "lib/libother.so", "share/std_msgs/msg/String.msg"]
+    for name in [*stays, *goes]:
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_bytes(elf())
+    slim(packages)
+    assert sorted(path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*") if path.is_file()) == sorted(
+        stays
+    )
 
 
 def test_a_directory_is_slimmed_and_slimming_it_again_changes_nothing(tmp_path: Path) -> None:
@@ -226,6 +286,26 @@ def test_a_directory_with_anything_else_in_it_is_not_replaced(wheelhouse: Module
     with pytest.raises(SystemExit, match=r"holds thesis.tex, which is no wheel"):
         wheelhouse.main(tmp_path)
     assert (tmp_path / "thesis.tex").exists()
+
+
+def test_wheels_of_ros_are_added_if_wanted_but_for_what_is_there(
+    wheelhouse: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def collect(directory: Path) -> None:
+        for name in ("one-2", "ros_rclpy-7"):
+            with zipfile.ZipFile(directory / f"{name}-py3-none-any.whl", "w") as wheel:
+                wheel.writestr(f"{name}.dist-info/RECORD", "")
+
+    ros = tmp_path / "ros"
+    ros.mkdir()
+    monkeypatch.setattr(wheelhouse, "ROS_WHEELS", ros)
+    monkeypatch.setattr(wheelhouse.ros_wheels, "fill", collect)
+    monkeypatch.setattr(wheelhouse, "download", fill)
+    target = tmp_path / "wheels"
+    names = ["one-1-py3-none-any.whl", "two-1-py3-none-any.whl"]
+    for wanted, found in ((True, [*names[:1], "ros_rclpy-7-py3-none-any.whl", *names[1:]]), (False, names)):
+        wheelhouse.main(target, ros=wanted)
+        assert sorted(path.name for path in target.glob("*.whl")) == found
 
 
 def test_the_wheels_are_those_of_the_dependencies_of_the_project() -> None:

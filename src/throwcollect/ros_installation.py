@@ -1,0 +1,106 @@
+"""What of genuine ROS 2 this Python finds, without importing any of it.
+
+Apart from `ros`, whose import already needs the answer.
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+import re
+import sys
+from importlib.metadata import PackageNotFoundError, version
+from importlib.util import find_spec
+from pathlib import Path
+
+# Not from `interfaces`, whose import health checks cannot afford.
+DEFINITIONS = Path(__file__).parent / "interfaces" / "definitions"
+"""Definitions of interfaces, by package and kind."""
+PACKAGES = (
+    "action_msgs",
+    "builtin_interfaces",
+    "control_msgs",
+    "controller_manager_msgs",
+    "geometry_msgs",
+    "nav_msgs",
+    "rcl_interfaces",
+    "rosgraph_msgs",
+    "sensor_msgs",
+    "simulation_interfaces",
+    "std_msgs",
+    "tf2_msgs",
+    "trajectory_msgs",
+    "unique_identifier_msgs",
+)
+"""Packages whose interfaces nodes use."""
+
+_BY_PIP = "CPython 3.11 on Linux, x86-64, with glibc"
+_SETUP = "source the setup script of a ROS 2 Jazzy that has it (/opt/ros/jazzy/setup.sh)"
+_CLONE = Path(__file__).parents[2]
+_INTERFACES = "packaging/ros_interfaces"
+
+
+def missing() -> list[str]:
+    """What nodes need of genuine ROS 2 and Python does not find: rclpy itself, else packages, or single interfaces."""
+    if _directory("rclpy") is None:
+        return ["rclpy"]
+    lacking = []
+    for package in PACKAGES:
+        directory = _directory(package)
+        if directory is None:
+            lacking.append(package)
+            continue
+        for path in sorted((DEFINITIONS / package).glob("*/*")):
+            kind = path.parent.name
+            if not (directory / kind / f"_{module_name(path.stem)}.py").is_file():
+                lacking.append(f"{package}/{kind}/{path.stem}")
+    return lacking
+
+
+def rmws() -> list[str]:
+    """Names of the RMW implementations that are installed, in alphabetical order."""
+    prefixes = [*filter(None, os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)), sys.prefix]
+    index = Path("share", "ament_index", "resource_index", "rmw_typesupport")
+    names = {path.name for prefix in prefixes for path in (Path(prefix) / index).glob("rmw_*")}
+    return sorted(names - {"rmw_implementation"})
+
+
+def rclpy_version() -> str | None:
+    """Version of rclpy, as its wheel or else its package says it; None where neither is there."""
+    for distribution in ("ros-rclpy", "rclpy"):
+        try:
+            return version(distribution)
+        except PackageNotFoundError:
+            continue
+    return None
+
+
+def how_to_install() -> str:
+    """What makes rclpy and all interfaces available to this Python: a command where wheels are for it."""
+    if not _has_wheels():
+        this = f"{platform.python_implementation()} {platform.python_version()} on {platform.system()}"
+        return f"{_SETUP}: by pip it is for {_BY_PIP} alone, and this is {this}, {platform.machine()}"
+    if (_CLONE / _INTERFACES).is_dir():
+        return f"pip install {_CLONE / _INTERFACES} -e '{_CLONE}[ros]', or {_SETUP}"
+    return f"in a clone of throwcollect: pip install ./{_INTERFACES} '.[ros]', or {_SETUP}"
+
+
+def module_name(interface: str) -> str:
+    """Name of the module that an interface is in, without its underscore: ``SpawnEntity`` is in ``spawn_entity``."""
+    words = re.sub(r"(.)([A-Z][a-z]+)", r"\1_\2", interface)
+    return re.sub(r"([a-z0-9])([A-Z])", r"\1_\2", words).lower()
+
+
+def _has_wheels() -> bool:
+    python = (sys.implementation.name, *sys.version_info[:2])
+    return python == ("cpython", 3, 11) and (platform.system(), platform.machine(), platform.libc_ver()[0]) == (
+        "Linux",
+        "x86_64",
+        "glibc",
+    )
+
+
+def _directory(package: str) -> Path | None:
+    spec = find_spec(package)
+    # A directory of that name without a module in it, as may lie in the working directory, is no package of ROS.
+    return Path(spec.origin).parent if spec is not None and spec.origin else None

@@ -1,0 +1,117 @@
+"""The project that builds the wheel of interfaces, as far as it goes without ROS' generators."""
+
+import re
+import sys
+import tarfile
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+if sys.version_info < (3, 11):
+    pytest.skip("the wheel is for Python 3.11", allow_module_level=True)
+
+import tomllib
+
+ROOT = Path(__file__).parents[3]
+PROJECT = ROOT / "packaging" / "ros_interfaces"
+DEFINITIONS = ROOT / "src" / "throwcollect" / "interfaces" / "definitions"
+
+
+@pytest.fixture(autouse=True)
+def _backend(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(PROJECT))
+    monkeypatch.setattr("sys.dont_write_bytecode", True)
+    monkeypatch.delenv("SOURCE_DATE_EPOCH", raising=False)
+
+
+def pins(lines: list[str]) -> dict[str, str]:
+    """Versions by name, of lines that pin one."""
+    found = (re.fullmatch(r"([\w-]+)(?:\[\w+\])?==([\w.]+)", line) for line in lines)
+    return {each[1]: each[2] for each in found if each}
+
+
+def test_everything_is_pinned_and_all_say_the_same_versions() -> None:
+    tried = pins((ROOT / "packaging" / "ros_constraints.txt").read_text().splitlines())
+    document = tomllib.loads((PROJECT / "pyproject.toml").read_text())
+    ours = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]["ros"]
+    assert len(pins(ours)) == len(ours)
+    assert pins(ours).pop("throwcollect-ros-interfaces") == document["project"]["version"]
+    wanted = [*document["project"]["dependencies"], *document["tool"]["ros-interfaces"]["generators"], *ours]
+    of_ros = {name: version for name, version in pins(wanted).items() if name.startswith("ros-")}
+    assert len(of_ros) == len([name for name in wanted if name.startswith("ros-")])
+    assert of_ros == {name: tried[name] for name in of_ros}
+
+
+def test_what_is_built_is_what_throwcollect_defines_of_these_packages() -> None:
+    from builder.project import PROJECT as BUILT
+
+    names = [package.name for package in BUILT.packages]
+    assert names == ["control_msgs", "controller_manager_msgs", "simulation_interfaces", "tf2_msgs"]
+    for package in BUILT.packages:
+        on_disk = {path.relative_to(DEFINITIONS / package.name) for path in (DEFINITIONS / package.name).glob("*/*")}
+        assert set(package.files) == on_disk
+        readme = (PROJECT / "README.md").read_text()
+        assert re.search(rf"\[{package.name}\]\({package.source}\).*{package.license}", readme)
+
+
+def test_the_source_archive_carries_definitions_and_licences_and_is_the_same_twice(tmp_path: Path) -> None:
+    from builder import build_sdist
+
+    contents = []
+    for name in ("first", "second"):
+        (tmp_path / name).mkdir()
+        contents.append((tmp_path / name / build_sdist(str(tmp_path / name))).read_bytes())
+    assert contents[0] == contents[1]
+    with tarfile.open(tmp_path / "first" / "throwcollect_ros_interfaces-0.1.0.tar.gz") as archive:
+        names = {name.partition("/")[2] for name in archive.getnames()}
+    assert {"PKG-INFO", "pyproject.toml", "LICENSE", "LICENSE.BSD", "builder/__init__.py"} <= names
+    assert "definitions/tf2_msgs/msg/TFMessage.msg" in names
+    assert "definitions/std_srvs/srv/Trigger.srv" not in names
+
+
+def refusal(capsys: pytest.CaptureFixture[str]) -> str:
+    from builder import build_wheel, get_requires_for_build_wheel, prepare_metadata_for_build_wheel
+
+    said = set()
+    for hook in (get_requires_for_build_wheel, prepare_metadata_for_build_wheel, build_wheel):
+        with pytest.raises(SystemExit) as ended:
+            hook(*[] if hook is get_requires_for_build_wheel else ["/nowhere"])
+        said.add(str(ended.value.code))
+    (sentence,) = said
+    assert capsys.readouterr() == ("", "")
+    assert "\n" not in sentence
+    assert sentence.endswith(".")
+    return sentence
+
+
+@pytest.mark.parametrize(
+    ("where", "value", "sentence"),
+    [
+        ("platform.machine", lambda: "aarch64", "are for Linux on x86-64 alone, and this is Linux aarch64"),
+        ("platform.system", lambda: "Darwin", "and this is Darwin x86_64"),
+        ("platform.libc_ver", lambda: ("", ""), "need glibc 2.28 or later, and this machine has another C library"),
+        ("platform.libc_ver", lambda: ("glibc", "2.17"), "this machine has glibc 2.17"),
+        ("sys.version_info", (3, 12, 1), "make the virtual environment with python3.11"),
+        ("sys.implementation", SimpleNamespace(name="pypy"), "is for CPython 3.11 alone"),
+        ("shutil.which", lambda _: None, "there is no C compiler: install g++"),
+        ("sysconfig.get_path", lambda _: "/nowhere", "headers are missing (/nowhere/Python.h): install them"),
+    ],
+)
+def test_a_machine_that_cannot_build_is_told_so_in_one_sentence(
+    where: str, value: object, sentence: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    import builder
+
+    assert builder
+    if sys.version_info[:2] != (3, 11):
+        monkeypatch.setattr("sys.version_info", (3, 11, 2))
+    monkeypatch.setattr(where, value)
+    assert sentence in refusal(capsys)
+
+
+def test_a_compiler_that_is_named_and_not_there_is_named_back(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("CXX", "no-such-compiler -O3")
+    assert "CXX names no-such-compiler, which is not there" in refusal(capsys)
