@@ -2,11 +2,10 @@
 
 import itertools
 import json
-import time
 
 import pytest
+from tests.contract.rig import Rig
 
-from throwcollect.ros import Context, Node, SingleThreadedExecutor
 from throwcollect.ros.router import router
 from throwcollect.session_config import OVERRIDE_VARIABLE
 
@@ -32,48 +31,8 @@ def environment(endpoint, monkeypatch):
     return values
 
 
-class Rig:
-    """Nodes, each in a session of its own unless told otherwise, and a way to spin them all."""
-
-    def __init__(self):
-        self.contexts = []
-        self.executors = []
-
-    def context(self):
-        context = Context()
-        context.init()
-        self.contexts.append(context)
-        return context
-
-    def node(self, name, *, context=None, **options):
-        node = Node(name, context=context or self.context(), **options)
-        executor = SingleThreadedExecutor(context=node.context)
-        executor.add_node(node)
-        self.executors.append(executor)
-        return node
-
-    def spin(self, until, timeout=5.0):
-        """Spin until a condition is true; returns whether it became so."""
-        deadline = time.monotonic() + timeout
-        while not until():
-            if time.monotonic() > deadline:
-                return False
-            for executor in self.executors:
-                executor.spin_once(timeout_sec=0.001)
-        return True
-
-    def result(self, future, timeout=5.0):
-        assert self.spin(future.done, timeout), "no result"
-        return future.result()
-
-    def rest(self, seconds=0.1):
-        """Spin for a while, so that what should not happen had its chance."""
-        self.spin(lambda: False, seconds)
-
-
 @pytest.fixture
 def rig(environment):
     rig = Rig()
     yield rig
-    for context in rig.contexts:
-        context.try_shutdown()
+    rig.close()

@@ -2,16 +2,22 @@
 
 import ast
 import os
+import re
 import subprocess
 import sys
-from importlib.util import find_spec
+from importlib.machinery import PathFinder
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 import throwcollect.ros
 from throwcollect.errors import ConfigError
-from throwcollect.ros.backend import VARIABLE, uses_rclpy
+from throwcollect.interfaces.catalog import DEFINITIONS
+from throwcollect.ros.backend import RMW_VARIABLE, VARIABLE, uses_rclpy
+from throwcollect.ros_installation import PACKAGES, how_to_install, missing, module_name
+
+ROOT = Path(__file__).parents[3]
 
 
 @pytest.fixture(autouse=True)
@@ -26,29 +32,110 @@ def test_the_embedded_backend_can_be_asked_for(monkeypatch):
     assert not uses_rclpy()
 
 
-def test_rclpy_is_taken_where_it_can_be_imported(monkeypatch, tmp_path):
-    (tmp_path / "rclpy").mkdir()
-    (tmp_path / "rclpy" / "__init__.py").touch()
-    monkeypatch.syspath_prepend(tmp_path)
+@pytest.fixture
+def ros(monkeypatch, tmp_path):
+    """As much of an installation of ROS 2 as is looked at, with Fast DDS; nothing of it can be imported."""
+    for package in ("rclpy", *PACKAGES):
+        (tmp_path / package).mkdir()
+        (tmp_path / package / "__init__.py").write_text("raise AssertionError")
+        for definition in (DEFINITIONS / package).glob("*/*"):
+            module = tmp_path / package / definition.parent.name / f"_{module_name(definition.stem)}.py"
+            module.parent.mkdir(exist_ok=True)
+            module.touch()
+    index = tmp_path / "share" / "ament_index" / "resource_index" / "rmw_typesupport"
+    index.mkdir(parents=True)
+    for name in ("rmw_fastrtps_cpp", "rmw_implementation"):
+        (index / name).touch()
+    # Whatever ROS there is beside it.
+    monkeypatch.setattr(
+        "throwcollect.ros_installation.find_spec", lambda name: PathFinder.find_spec(name, [str(tmp_path)])
+    )
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path))
+    monkeypatch.setattr("sys.prefix", str(tmp_path))
     monkeypatch.delenv(VARIABLE, raising=False)
+    monkeypatch.delenv(RMW_VARIABLE, raising=False)
+    return tmp_path
+
+
+def test_rclpy_is_taken_where_it_and_all_interfaces_are_found(ros, monkeypatch):
     assert uses_rclpy()
     uses_rclpy.cache_clear()
     monkeypatch.setenv(VARIABLE, "embedded")
     assert not uses_rclpy()
 
 
-@pytest.mark.skipif(find_spec("rclpy") is not None, reason="rclpy is there")
-def test_without_rclpy_the_embedded_backend_is_taken_unless_rclpy_is_asked_for(monkeypatch):
-    monkeypatch.setenv(VARIABLE, "auto")
+@pytest.mark.parametrize(
+    ("package", "files", "lacking"),
+    [
+        ("control_msgs", "__init__.py", "control_msgs"),
+        ("simulation_interfaces", "srv/_spawn_entities.py", "simulation_interfaces/srv/SpawnEntities"),
+        ("rclpy", "__init__.py", "rclpy"),
+    ],
+)
+def test_an_rclpy_without_all_interfaces_is_taken_only_if_asked_for_and_then_says_what_is_missing(
+    package, files, lacking, ros, monkeypatch
+):
+    (ros / package / files).unlink()
+    assert missing() == [lacking]
     assert not uses_rclpy()
     uses_rclpy.cache_clear()
     monkeypatch.setenv(VARIABLE, "rclpy")
-    with pytest.raises(ConfigError, match="THROWCOLLECT_ROS is rclpy, but Python does not find it"):
+    with pytest.raises(ConfigError, match=f"THROWCOLLECT_ROS is rclpy, but Python does not find {lacking}\n  try: "):
         uses_rclpy()
 
 
+@pytest.mark.parametrize(
+    ("platform", "hint"),
+    [
+        (("cpython", (3, 11, 2), "x86_64"), f"pip install {ROOT}/packaging/ros_interfaces -e '{ROOT}[ros]', or source"),
+        (("cpython", (3, 12, 1), "x86_64"), "source the setup script of a ROS 2 Jazzy"),
+        (("cpython", (3, 11, 2), "aarch64"), "by pip it is for CPython 3.11 on Linux, x86-64, with glibc alone"),
+    ],
+)
+def test_the_way_to_rclpy_is_that_of_this_python_and_machine(platform, hint, ros, monkeypatch):
+    name, number, machine = platform
+    monkeypatch.setattr("sys.implementation", SimpleNamespace(name=name, cache_tag="cpython-311"))
+    monkeypatch.setattr("sys.version_info", number)
+    monkeypatch.setattr("platform.machine", lambda: machine)
+    assert hint in how_to_install()
+    assert ("pip install" in how_to_install()) == hint.startswith("pip")
+
+
+def test_an_rmw_that_is_not_installed_is_one_message(ros, monkeypatch):
+    monkeypatch.setenv(RMW_VARIABLE, "rmw_cyclonedds_cpp")
+    with pytest.raises(ConfigError, match="RMW_IMPLEMENTATION is rmw_cyclonedds_cpp, which is not installed") as told:
+        uses_rclpy()
+    assert told.value.expected == "rmw_fastrtps_cpp"
+    monkeypatch.setenv(RMW_VARIABLE, "rmw_fastrtps_cpp")
+    assert uses_rclpy()
+
+
+def test_where_ros_has_no_zenoh_the_embedded_backend_speaks_it(ros, monkeypatch):
+    monkeypatch.setenv(RMW_VARIABLE, "rmw_zenoh_cpp")
+    assert not uses_rclpy()
+    uses_rclpy.cache_clear()
+    monkeypatch.setenv(VARIABLE, "rclpy")
+    with pytest.raises(ConfigError, match="rmw_zenoh_cpp, which is not installed"):
+        uses_rclpy()
+
+
+def test_all_packages_whose_interfaces_nodes_use_are_looked_for():
+    source = ROOT / "src" / "throwcollect"
+    rooms = [path for room in ("coordinator", "runtime", "sim", "episode") for path in (source / room).rglob("*.py")]
+    named = re.compile(r"""["']([a-z0-9_]+)/(?:msg|srv|action)/""")
+    used = {package for path in rooms for package in named.findall(path.read_text(encoding="utf-8"))}
+    assert used <= {*PACKAGES, *OF_DATASETS}
+
+
+OF_DATASETS = {"diagnostic_msgs", "visualization_msgs"}
+"""Packages of messages that are written into recordings, and that no node sends."""
+
+
 def test_another_value_is_one_clear_message_and_exit_code_2(tmp_path):
-    command = [sys.executable, "-m", "throwcollect", "up", "--runtime", "local", "--output", str(tmp_path / "data")]
+    sweep = "sweep: {sampler: uniform, parameters: {task.duration_s: {min: 0.9, max: 1.3}}}"
+    (tmp_path / "throws.yaml").write_text(f"trials: 1\n{sweep}\n")
+    options = ["--runtime", "local", "--output", str(tmp_path / "data")]
+    command = [sys.executable, "-m", "throwcollect", "up", str(tmp_path / "throws.yaml"), *options]
     found = subprocess.run(command, env={**os.environ, VARIABLE: "ros2"}, capture_output=True, text=True, check=False)
     assert found.returncode == 2
     assert "THROWCOLLECT_ROS: got 'ros2'" in found.stderr

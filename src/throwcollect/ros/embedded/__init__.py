@@ -10,31 +10,33 @@ from throwcollect.ros.embedded.action import (
     get_action_names_and_types,
     get_action_server_names_and_types_by_node,
 )
-from throwcollect.ros.embedded.beyond import graph_changes, joins_protected, provide_time
-from throwcollect.ros.embedded.clock import Clock, ROSClock
-from throwcollect.ros.embedded.context import Context, get_default_context, init, ok, shutdown, try_shutdown
-from throwcollect.ros.embedded.duration import Duration
+from throwcollect.ros.embedded.beyond import graph_changes, joins_protected, pass_on_log, provide_time, spin_some
+from throwcollect.ros.embedded.context import Context, init, ok, shutdown, try_shutdown
 from throwcollect.ros.embedded.exceptions import ExternalShutdownException
 from throwcollect.ros.embedded.executors import Executor, SingleThreadedExecutor
 from throwcollect.ros.embedded.node import Node, create_node
-from throwcollect.ros.embedded.parameter import IntegerRange, Parameter, ParameterDescriptor, SetParametersResult
+from throwcollect.ros.embedded.parameter import (
+    FloatingPointRange,
+    IntegerRange,
+    Parameter,
+    ParameterDescriptor,
+    SetParametersResult,
+)
 from throwcollect.ros.embedded.publisher import Publisher
 from throwcollect.ros.embedded.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
-from throwcollect.ros.embedded.spinning import get_global_executor, spin, spin_once, spin_until_future_complete
-from throwcollect.ros.embedded.task import Future, Task
-from throwcollect.ros.embedded.time import ClockType, Time
+from throwcollect.ros.embedded.spinning import spin, spin_once, spin_until_future_complete
+from throwcollect.ros.embedded.task import Future
+from throwcollect.ros.embedded.time import Time
 
 __all__ = [
     "ActionClient",
     "ActionServer",
     "CancelResponse",
-    "Clock",
-    "ClockType",
     "Context",
     "DurabilityPolicy",
-    "Duration",
     "Executor",
     "ExternalShutdownException",
+    "FloatingPointRange",
     "Future",
     "GoalResponse",
     "HistoryPolicy",
@@ -44,29 +46,27 @@ __all__ = [
     "ParameterDescriptor",
     "Publisher",
     "QoSProfile",
-    "ROSClock",
     "ReliabilityPolicy",
     "SetParametersResult",
     "SingleThreadedExecutor",
-    "Task",
     "Time",
     "create_node",
     "get_action",
     "get_action_client_names_and_types_by_node",
     "get_action_names_and_types",
     "get_action_server_names_and_types_by_node",
-    "get_default_context",
-    "get_global_executor",
     "get_message",
     "get_service",
     "graph_changes",
     "init",
     "joins_protected",
     "ok",
+    "pass_on_log",
     "provide_time",
     "shutdown",
     "spin",
     "spin_once",
+    "spin_some",
     "spin_until_future_complete",
     "try_shutdown",
 ]

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import logging
+
+from throwcollect.ros.embedded.executors import Executor
+from throwcollect.ros.embedded.logging import LoggingSeverity
 from throwcollect.ros.embedded.node import Node
 from throwcollect.session_config import is_protected
 
@@ -20,6 +24,29 @@ def joins_protected() -> bool:
     return is_protected()
 
 
+def pass_on_log(node: Node, record: logging.LogRecord) -> None:
+    """Log what was logged by Python's own logging, under a node's name and with the place that it came from."""
+    place = (record.pathname, record.funcName or "", record.lineno)
+    node.get_logger().log_from(place, record.getMessage(), LoggingSeverity(record.levelno))
+
+
 def provide_time(node: Node) -> None:
     """Make a node the source of its own time: its clock shows what ``set_ros_time_override`` was last given."""
     node.get_clock().activate(True)
+
+
+def spin_some(executor: Executor, timeout_sec: float) -> None:
+    """Wait for an input, then call back with it and all others that have come by then, but none that come meanwhile.
+
+    Args:
+        executor: The executor.
+        timeout_sec: Longest time to wait [s].
+    """
+    executor.spin_once(timeout_sec)
+    last = executor.create_task(_nothing)
+    while not last.done():
+        executor.spin_once(timeout_sec=0.0)
+
+
+def _nothing() -> None:
+    """Work that marks a place among the inputs."""

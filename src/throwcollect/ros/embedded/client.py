@@ -119,12 +119,6 @@ class Client(Receiver):
             raise self._endpoint.invalid(error) from error
         return future
 
-    def remove_pending_request(self, future: Future) -> None:
-        """Forget a request, so that its future stays pending."""
-        for sequence, (pending, _) in list(self._pending.items()):
-            if pending is future:
-                self._pending.pop(sequence, None)
-
     def handle(self, item: zenoh.Reply | int, executor: Executor) -> None:
         """Decode a response and complete its future; a number says that no further response to that request comes."""
         if isinstance(item, int):

@@ -33,16 +33,8 @@ class ParameterAlreadyDeclaredException(ParameterException):
     """A parameter was declared twice."""
 
 
-class InvalidParameterTypeException(ParameterException):
-    """A parameter was declared with, or overridden by, a value of another type."""
-
-
 class InvalidParameterValueException(ParameterException):
     """The value of a parameter was refused by its range or by a callback."""
-
-
-class ParameterImmutableException(ParameterException):
-    """A read-only parameter was to be changed."""
 
 
 class ParameterUninitializedException(ParameterException):

@@ -59,10 +59,6 @@ class Executor:
             node.executor = None
             node.mailbox.detach()
 
-    def get_nodes(self) -> list[Node]:
-        """Nodes that were added."""
-        return list(self._nodes)
-
     def wake(self) -> None:
         """Let a waiting executor look around."""
         self._queue.put(None)
@@ -86,10 +82,6 @@ class Executor:
         self.submit(task)
         return task
 
-    def create_future(self) -> Future:
-        """A future whose done callbacks are called by the thread that spins."""
-        return Future(executor=self)
-
     def call(self, callback: Callable[..., Any], *args: Any) -> None:
         """Call a callback now; if it is a coroutine function, up to where it first awaits something."""
         result = callback(*args)
@@ -105,7 +97,7 @@ class Executor:
     def shutdown(self) -> None:
         """End spinning and let go of all nodes."""
         self._is_shutdown = True
-        for node in self.get_nodes():
+        for node in list(self._nodes):
             self.remove_node(node)
         self.wake()
 
@@ -183,7 +175,7 @@ class Executor:
         for node in self._nodes:
             for timer in node.timers:
                 left = timer.time_until_next_call()
-                if left is not None and (left <= 0 or not timer.clock.is_driven) and left / S_TO_NS < least:
+                if (left <= 0 or not timer.clock.is_driven) and left / S_TO_NS < least:
                     first, least = timer, left / S_TO_NS
         return first, least
 

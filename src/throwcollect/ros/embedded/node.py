@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any, TypeVar
 
 from throwcollect.interfaces import Message, get_message
 from throwcollect.interfaces import Service as ServiceType
 from throwcollect.ros.embedded.client import Client
-from throwcollect.ros.embedded.clock import Clock, ROSClock
+from throwcollect.ros.embedded.clock import ROSClock
 from throwcollect.ros.embedded.context import Context, get_default_context
 from throwcollect.ros.embedded.duration import S_TO_NS
 from throwcollect.ros.embedded.exceptions import InvalidHandle, NotInitializedException
@@ -19,7 +19,6 @@ from throwcollect.ros.embedded.mailbox import Mailbox
 from throwcollect.ros.embedded.names import absolute_namespace, check_node_name, join, resolve
 from throwcollect.ros.embedded.node_graph import NodeGraph
 from throwcollect.ros.embedded.node_parameters import NodeParameters
-from throwcollect.ros.embedded.parameter import Parameter
 from throwcollect.ros.embedded.parameter_service import ParameterService
 from throwcollect.ros.embedded.publisher import Publisher
 from throwcollect.ros.embedded.qos import (
@@ -30,10 +29,9 @@ from throwcollect.ros.embedded.qos import (
 )
 from throwcollect.ros.embedded.service import Service
 from throwcollect.ros.embedded.subscription import Subscription
-from throwcollect.ros.embedded.time import ClockType, Time
+from throwcollect.ros.embedded.time import Time
 from throwcollect.ros.embedded.time_source import TimeSource
 from throwcollect.ros.embedded.timer import Timer
-from throwcollect.ros.embedded.type_description_service import TypeDescriptionService
 
 _ParameterEvent = get_message("rcl_interfaces/msg/ParameterEvent")
 _Log = get_message("rcl_interfaces/msg/Log")
@@ -51,8 +49,6 @@ class Node(NodeParameters, NodeGraph):
         namespace: Namespace of the node and its relative names.
         enable_rosout: Whether what the node logs is published on ``/rosout``.
         start_parameter_services: Whether other nodes may read and change the parameters.
-        parameter_overrides: Values that win over the defaults of parameters that will be declared.
-        automatically_declare_parameters_from_overrides: Whether the overrides are declared at once.
 
     Raises:
         NotInitializedException: If the context is not initialised.
@@ -67,11 +63,9 @@ class Node(NodeParameters, NodeGraph):
         namespace: str | None = None,
         enable_rosout: bool = True,
         start_parameter_services: bool = True,
-        parameter_overrides: Sequence[Parameter] | None = None,
-        automatically_declare_parameters_from_overrides: bool = False,
     ) -> None:
         NodeGraph.__init__(self, context or get_default_context())
-        NodeParameters.__init__(self, parameter_overrides or (), self._publish_parameter_event)
+        NodeParameters.__init__(self, self._publish_parameter_event)
         if not self.context.ok():
             raise NotInitializedException(f"cannot create node {node_name!r}: init() has not been called")
         check_node_name(node_name)
@@ -90,13 +84,9 @@ class Node(NodeParameters, NodeGraph):
         self._parameter_events = self.create_publisher(
             _ParameterEvent, "/parameter_events", qos_profile_parameter_events
         )
-        if automatically_declare_parameters_from_overrides:
-            for parameter in parameter_overrides or ():
-                self.declare_parameter(parameter.name, parameter.value)
         self._time_source = TimeSource(self, self._clock)
         if start_parameter_services:
             ParameterService(self)
-        TypeDescriptionService(self)
         if is_taken:
             self._logger.warning(
                 f"there is another node {self.get_fully_qualified_name()}: both work, but whoever calls one by its "
@@ -151,8 +141,6 @@ class Node(NodeParameters, NodeGraph):
         """
         return resolve(topic, self._namespace, self._name)
 
-    resolve_service_name = resolve_topic_name
-
     def create_publisher(self, msg_type: type[Message], topic: str, qos_profile: QoSProfile | int) -> Publisher:
         """Publisher of a topic.
 
@@ -193,7 +181,7 @@ class Node(NodeParameters, NodeGraph):
 
         Raises:
             NameValidationException: If the name is invalid.
-            TypeError: If the callback takes neither one argument nor two.
+            RuntimeError: If the callback takes neither one argument nor two.
         """
         return self._keep(Subscription(self, msg_type, topic, callback, _profile(qos_profile), raw=raw))
 
@@ -247,23 +235,18 @@ class Node(NodeParameters, NodeGraph):
         self,
         timer_period_sec: float,
         callback: Callable[[], Any],
-        *,
-        clock: Clock | None = None,
-        autostart: bool = True,
     ) -> Timer:
         """Timer.
 
         Args:
-            timer_period_sec: Period [s].
+            timer_period_sec: Period [s] of the node's clock, so that simulated time counts.
             callback: Called without arguments; may be a coroutine function.
-            clock: Clock that the period is measured with; None for the node's, so that simulated time counts.
-            autostart: Whether the timer runs at once.
 
         Returns:
             The timer.
         """
         period_ns = int(timer_period_sec * S_TO_NS)
-        timer = Timer(callback, period_ns, clock or self._clock, autostart=autostart)
+        timer = Timer(callback, period_ns, self._clock)
         self.timers.append(timer)
         if self.executor is not None:
             self.executor.wake()
@@ -284,14 +267,6 @@ class Node(NodeParameters, NodeGraph):
     def destroy_client(self, client: Client) -> bool:
         """Withdraw a client; returns whether it was the node's."""
         return self._destroy(client)
-
-    def destroy_timer(self, timer: Timer) -> bool:
-        """Stop a timer for good; returns whether it was the node's."""
-        known = timer in self.timers
-        if known:
-            timer.cancel()
-            self.timers.remove(timer)
-        return known
 
     def destroy_node(self) -> None:
         """Withdraw the node and all that it has."""
@@ -324,7 +299,7 @@ class Node(NodeParameters, NodeGraph):
         if self._rosout is None:
             return
         message = _Log(
-            stamp=Time(nanoseconds=record.stamp_ns, clock_type=ClockType.SYSTEM_TIME).to_msg(),
+            stamp=Time(nanoseconds=record.stamp_ns).to_msg(),
             level=int(record.severity),
             name=record.name,
             msg=record.text,

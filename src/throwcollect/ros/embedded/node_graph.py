@@ -24,10 +24,6 @@ class NodeGraph:
         """Names and namespaces of all nodes."""
         return sorted((token.node, token.namespace) for token in self.context.graph.tokens(EntityKind.NODE))
 
-    def get_node_names(self) -> list[str]:
-        """Names of all nodes, without namespaces."""
-        return [name for name, _ in self.get_node_names_and_namespaces()]
-
     def get_topic_names_and_types(self) -> NamesAndTypes:
         """All topics."""
         return self.context.graph.names_and_types(EntityKind.PUBLISHER, EntityKind.SUBSCRIPTION)

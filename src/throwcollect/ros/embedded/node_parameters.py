@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from throwcollect.interfaces import Message, get_message, get_service
 from throwcollect.ros.embedded.exceptions import (
-    InvalidParameterTypeException,
     InvalidParameterValueException,
     ParameterAlreadyDeclaredException,
-    ParameterImmutableException,
     ParameterNotDeclaredException,
     ParameterUninitializedException,
 )
 from throwcollect.ros.embedded.parameter import Parameter, ParameterDescriptor, ParameterKind, SetParametersResult
-from throwcollect.ros.embedded.parameter_rules import WRONG_TYPE, check
+from throwcollect.ros.embedded.parameter_rules import check
 
 ListParametersResult = get_message("rcl_interfaces/msg/ListParametersResult")
 ParameterEvent = get_message("rcl_interfaces/msg/ParameterEvent")
@@ -32,35 +30,29 @@ class NodeParameters:
     """Parameters that were declared, and the rules for setting them.
 
     Args:
-        overrides: Values that win over the defaults of parameters that will be declared.
         announce: Gets the rcl_interfaces/msg/ParameterEvent of each change, without node and stamp.
     """
 
-    def __init__(self, overrides: Iterable[Parameter], announce: Callable[[Message], None]) -> None:
-        self._overrides = {parameter.name: parameter for parameter in overrides}
+    def __init__(self, announce: Callable[[Message], None]) -> None:
         self._announce = announce
         self._parameters: dict[str, Parameter] = {}
         self._descriptors: dict[str, Message] = {}
         self._on_set: list[OnSet] = []
         self._post_set: list[PostSet] = []
 
-    def declare_parameter(
-        self, name: str, value: Any = None, descriptor: Message | None = None, ignore_override: bool = False
-    ) -> Parameter:
+    def declare_parameter(self, name: str, value: Any = None, descriptor: Message | None = None) -> Parameter:
         """Declare a parameter.
 
         Args:
             name: Name of the parameter.
             value: Default value, or the type of a parameter without default.
             descriptor: rcl_interfaces/msg/ParameterDescriptor; None for one that fixes the type only.
-            ignore_override: Whether the default wins over an override.
 
         Returns:
             The parameter with its value.
 
         Raises:
             ParameterAlreadyDeclaredException: If it is declared already.
-            InvalidParameterTypeException: If the override is of another type.
             InvalidParameterValueException: If the value is out of range or refused by a callback.
             ValueError: If the parameter has neither type nor value, and not ``dynamic_typing``.
         """
@@ -74,49 +66,10 @@ class NodeParameters:
             described.type = ParameterKind.from_parameter_value(value).value
         if described.type == ParameterKind.NOT_SET.value and not described.dynamic_typing:
             raise ValueError(f"parameter {name!r}: give a default value, a type, or a descriptor with dynamic_typing")
-        parameter = Parameter(name, value=value)
-        if not ignore_override:
-            parameter = self._overrides.get(name, parameter)
-        result = self._set([parameter], {name: described})
+        result = self._set([Parameter(name, value=value)], {name: described})
         if not result.successful:
-            wrong_type = result.reason.startswith(WRONG_TYPE)
-            error = InvalidParameterTypeException if wrong_type else InvalidParameterValueException
-            raise error(f"parameter {name!r} cannot be {parameter.value!r}: {result.reason}")
+            raise InvalidParameterValueException(f"parameter {name!r} cannot be {value!r}: {result.reason}")
         return self._parameters[name]
-
-    def declare_parameters(
-        self, namespace: str, parameters: Sequence[tuple[Any, ...]], ignore_override: bool = False
-    ) -> list[Parameter]:
-        """Declare several parameters; see `declare_parameter`.
-
-        Args:
-            namespace: Put before the names, with a dot; may be empty.
-            parameters: Tuples of name, value and, optionally, descriptor.
-            ignore_override: Whether the defaults win over overrides.
-
-        Returns:
-            The parameters with their values.
-        """
-        prefix = f"{namespace}." if namespace else ""
-        declared = []
-        for name, value, *descriptor in parameters:
-            described = descriptor[0] if descriptor else None
-            declared.append(self.declare_parameter(prefix + name, value, described, ignore_override))
-        return declared
-
-    def undeclare_parameter(self, name: str) -> None:
-        """Take a declaration back.
-
-        Args:
-            name: Name of the parameter.
-
-        Raises:
-            ParameterNotDeclaredException: If it is not declared.
-            ParameterImmutableException: If it is read-only.
-        """
-        if self.describe_parameter(name).read_only:
-            raise ParameterImmutableException(f"parameter {name!r} is read-only")
-        del self._parameters[name], self._descriptors[name]
 
     def has_parameter(self, name: str) -> bool:
         """Whether a parameter is declared."""
@@ -141,21 +94,12 @@ class NodeParameters:
             raise ParameterUninitializedException(f"parameter {name!r} has no value yet")
         return parameter
 
-    def get_parameters(self, names: Sequence[str]) -> list[Parameter]:
-        """Several parameters; see `get_parameter`."""
-        return [self.get_parameter(name) for name in names]
-
     def get_parameter_or(self, name: str, alternative_value: Parameter | None = None) -> Parameter:
         """A parameter, or an alternative if it is not declared or has no value."""
         parameter = self._parameters.get(name)
         if parameter is not None and parameter.type_ is not ParameterKind.NOT_SET:
             return parameter
         return Parameter(name) if alternative_value is None else alternative_value
-
-    def get_parameters_by_prefix(self, prefix: str) -> dict[str, Parameter]:
-        """Parameters below a prefix, by the rest of their names."""
-        start = f"{prefix}." if prefix else ""
-        return {name[len(start) :]: value for name, value in self._parameters.items() if name.startswith(start)}
 
     def describe_parameter(self, name: str) -> Message:
         """Descriptor of a parameter.
@@ -208,17 +152,9 @@ class NodeParameters:
         """Ask a callback before parameters are set; the last one added is asked first."""
         self._on_set.insert(0, callback)
 
-    def remove_on_set_parameters_callback(self, callback: OnSet) -> None:
-        """Ask a callback no longer."""
-        self._on_set.remove(callback)
-
     def add_post_set_parameters_callback(self, callback: PostSet) -> None:
         """Tell a callback after parameters were set; the last one added is told first."""
         self._post_set.insert(0, callback)
-
-    def remove_post_set_parameters_callback(self, callback: PostSet) -> None:
-        """Tell a callback no longer."""
-        self._post_set.remove(callback)
 
     def list_parameters(self, prefixes: Sequence[str], depth: int) -> Message:
         """Names of parameters and their prefixes.

@@ -17,7 +17,6 @@ ParameterDescriptor = get_message("rcl_interfaces/msg/ParameterDescriptor")
 FloatingPointRange = get_message("rcl_interfaces/msg/FloatingPointRange")
 IntegerRange = get_message("rcl_interfaces/msg/IntegerRange")
 SetParametersResult = get_message("rcl_interfaces/msg/SetParametersResult")
-ParameterType = get_message("rcl_interfaces/msg/ParameterType")
 
 
 class ParameterKind(Enum):
@@ -133,11 +132,11 @@ class Parameter:
         return ParameterMessage(name=self.name, value=self.get_parameter_value())
 
     @classmethod
-    def from_parameter_msg(cls, message: Message) -> Parameter:
+    def from_parameter_msg(cls, param_msg: Message) -> Parameter:
         """Parameter that a rcl_interfaces/msg/Parameter holds.
 
         Args:
-            message: The message.
+            param_msg: The message.
 
         Returns:
             The parameter.
@@ -145,8 +144,8 @@ class Parameter:
         Raises:
             ValueError: If the message's type is none of `Type`.
         """
-        type_ = ParameterKind(message.value.type)
-        return cls(message.name, type_, parameter_value_to_python(message.value))
+        type_ = ParameterKind(param_msg.value.type)
+        return cls(param_msg.name, type_, parameter_value_to_python(param_msg.value))
 
 
 def parameter_value_to_python(message: Message) -> Any:

@@ -179,21 +179,9 @@ def _seconds(duration: Duration) -> str:
     return ",".join(map(str, divmod(duration.nanoseconds, S_TO_NS)))
 
 
-qos_profile_default = QoSProfile(depth=10)
-qos_profile_system_default = QoSProfile(
-    depth=0,
-    history=HistoryPolicy.SYSTEM_DEFAULT,
-    reliability=ReliabilityPolicy.SYSTEM_DEFAULT,
-    durability=DurabilityPolicy.SYSTEM_DEFAULT,
-)
-qos_profile_sensor_data = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
 qos_profile_services_default = QoSProfile(depth=10)
 qos_profile_parameters = QoSProfile(depth=1000)
 qos_profile_parameter_events = QoSProfile(depth=1000)
 qos_profile_action_status_default = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-qos_profile_rosout = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL, lifespan=Duration(seconds=10))
-
-QoSHistoryPolicy = HistoryPolicy
-QoSReliabilityPolicy = ReliabilityPolicy
-QoSDurabilityPolicy = DurabilityPolicy
-QoSLivelinessPolicy = LivelinessPolicy
+_ROSOUT_LIFESPAN = Duration(nanoseconds=10 * S_TO_NS)
+qos_profile_rosout = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL, lifespan=_ROSOUT_LIFESPAN)

@@ -42,7 +42,7 @@ class Subscription(Receiver):
         self.callback = callback
         self._wants_info = _takes(callback, 2) and not _takes(callback, 1)
         if not self._wants_info and not _takes(callback, 1):
-            raise TypeError(f"{topic}: the callback must take a message, or a message and its info")
+            raise RuntimeError(f"{topic}: the callback must take a message, or a message and its info")
         self._endpoint = Endpoint(node, EntityKind.SUBSCRIPTION, topic, msg_type.TYPE, qos_profile)
         # History may arrive before the declaring call returns: nothing below may matter to `handle`.
         self._endpoint.announce(self._declare())
@@ -65,11 +65,6 @@ class Subscription(Receiver):
     def topic_name(self) -> str:
         """Absolute name of the topic."""
         return self._endpoint.name
-
-    def get_publisher_count(self) -> int:
-        """Publishers of the topic in the whole graph."""
-        endpoint = self._endpoint
-        return endpoint.node.context.graph.count(EntityKind.PUBLISHER, endpoint.name, endpoint.type)
 
     def handle(self, item: zenoh.Sample, executor: Executor) -> None:
         """Decode a sample and call back."""

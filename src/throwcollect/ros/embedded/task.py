@@ -77,14 +77,6 @@ class Future:
                 return
         self._call(callback)
 
-    def remove_done_callback(self, callback: Callable[[Any], Any]) -> bool:
-        """Take a callback back; returns whether it was there."""
-        with self._lock:
-            known = callback in self._callbacks
-            if known:
-                self._callbacks.remove(callback)
-            return known
-
     def resume_when_done(self, task: Task) -> None:
         """Continue a task once the outcome is known."""
         with self._lock:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from throwcollect.ros.embedded.clock import Clock
+from throwcollect.ros.embedded.clock import ROSClock
 
 
 class Timer:
@@ -14,48 +14,24 @@ class Timer:
     Args:
         callback: Called without arguments; may be a coroutine function.
         timer_period_ns: Period [ns].
-        clock: Clock that the period is measured with.
-        autostart: Whether the timer runs from the beginning; otherwise from the first `reset`.
+        clock: ROSClock that the period is measured with.
     """
 
-    def __init__(
-        self, callback: Callable[[], Any], timer_period_ns: int, clock: Clock, *, autostart: bool = True
-    ) -> None:
+    def __init__(self, callback: Callable[[], Any], timer_period_ns: int, clock: ROSClock) -> None:
         if timer_period_ns < 0:
             raise ValueError(f"period must not be negative, got {timer_period_ns} ns")
         self.callback = callback
         self.timer_period_ns = timer_period_ns
         self.clock = clock
-        self._canceled = not autostart
         self._next = clock.timer_now_ns() + timer_period_ns
 
-    def is_canceled(self) -> bool:
-        """Whether the timer stands still."""
-        return self._canceled
-
-    def cancel(self) -> None:
-        """Stop the timer until it is reset."""
-        self._canceled = True
-
-    def reset(self) -> None:
-        """Start a new period now."""
-        self._canceled = False
-        self._next = self.clock.timer_now_ns() + self.timer_period_ns
-
-    def time_until_next_call(self) -> int | None:
-        """Time left [ns], not positive when due; None when canceled."""
-        if self._canceled:
-            return None
+    def time_until_next_call(self) -> int:
+        """Time left [ns], not positive when due."""
         now = self.clock.timer_now_ns()
         if self._next - now > self.timer_period_ns:
             # The clock jumped back, or changed between simulated and real time: its old stamps mean nothing.
             self._next = now + self.timer_period_ns
         return self._next - now
-
-    def is_ready(self) -> bool:
-        """Whether the timer is due."""
-        left = self.time_until_next_call()
-        return left is not None and left <= 0
 
     def advance(self) -> None:
         """Begin the next period; called before the callback."""

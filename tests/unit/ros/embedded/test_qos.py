@@ -14,14 +14,20 @@ from throwcollect.ros.embedded.qos import (
     encode,
 )
 
+_SYSTEM_DEFAULT = QoSProfile(
+    depth=0,
+    history=HistoryPolicy.SYSTEM_DEFAULT,
+    reliability=ReliabilityPolicy.SYSTEM_DEFAULT,
+    durability=DurabilityPolicy.SYSTEM_DEFAULT,
+)
+
 
 @pytest.mark.parametrize(
     ("profile", "text"),
     [
-        (qos.qos_profile_default, "::,10:,:,:,,"),
         (qos.qos_profile_services_default, "::,10:,:,:,,"),
-        (qos.qos_profile_sensor_data, "2::,5:,:,:,,"),
-        (qos.qos_profile_system_default, "::,:,:,:,,"),
+        (QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT), "2::,5:,:,:,,"),
+        (_SYSTEM_DEFAULT, "::,:,:,:,,"),
         (qos.qos_profile_action_status_default, ":1:,1:,:,:,,"),
         (qos.qos_profile_rosout, ":1:,1000:,:10,0:,,"),
         (qos.qos_profile_parameters, "::,1000:,:,:,,"),
@@ -30,13 +36,13 @@ from throwcollect.ros.embedded.qos import (
         (QoSProfile(depth=0, history=HistoryPolicy.KEEP_ALL), "::2,:,:,:,,"),
         (QoSProfile(depth=42), "::,:,:,:,,"),
         (QoSProfile(depth=1, deadline=Infinite, lifespan=Infinite), "::,1:,:,:,,"),
-        (QoSProfile(depth=1, deadline=Duration(seconds=1.5)), "::,1:1,500000000:,:,,"),
+        (QoSProfile(depth=1, deadline=Duration(nanoseconds=1_500_000_000)), "::,1:1,500000000:,:,,"),
         (
             QoSProfile(
                 depth=1,
                 durability=DurabilityPolicy.BEST_AVAILABLE,
                 liveliness=LivelinessPolicy.MANUAL_BY_TOPIC,
-                liveliness_lease_duration=Duration(seconds=2),
+                liveliness_lease_duration=Duration(nanoseconds=2_000_000_000),
             ),
             ":4:,1:,:,:3,2,0",
         ),
@@ -51,9 +57,9 @@ def test_a_profile_is_read_with_the_defaults_of_the_middleware():
     profile = decode(":1:,:,:10,0:3,2,5")
     assert (profile.reliability, profile.durability) == (ReliabilityPolicy.RELIABLE, DurabilityPolicy.TRANSIENT_LOCAL)
     assert (profile.history, profile.depth) == (HistoryPolicy.KEEP_LAST, 42)
-    assert (profile.deadline, profile.lifespan) == (Infinite, Duration(seconds=10))
+    assert (profile.deadline, profile.lifespan) == (Infinite, Duration(nanoseconds=10_000_000_000))
     assert profile.liveliness is LivelinessPolicy.MANUAL_BY_TOPIC
-    assert profile.liveliness_lease_duration == Duration(seconds=2, nanoseconds=5)
+    assert profile.liveliness_lease_duration == Duration(nanoseconds=2_000_000_005)
 
 
 @pytest.mark.parametrize(
@@ -89,7 +95,7 @@ def test_history_or_depth_is_required():
     ("profile", "length"),
     [
         (QoSProfile(depth=3), 3),
-        (qos.qos_profile_system_default, 42),
+        (_SYSTEM_DEFAULT, 42),
         (QoSProfile(history=HistoryPolicy.KEEP_ALL), None),
     ],
 )

@@ -5,9 +5,7 @@ import pytest
 import zenoh
 
 from throwcollect.interfaces import get_service, serialize, type_hash
-from throwcollect.ros import Future
 from throwcollect.ros.embedded.attachment import Attachment, unpack
-from throwcollect.ros.embedded.exceptions import InvalidHandle
 from throwcollect.ros.embedded.keys import data_key
 
 Trigger = get_service("std_srvs/srv/Trigger")
@@ -23,58 +21,6 @@ def answer(request, response):
 def pair(rig):
     server, client = rig.node("server"), rig.node("client")
     return server, client, client.create_client(SetBool, "/server/set")
-
-
-def test_a_request_is_answered(rig, pair):
-    server, _, client = pair
-    assert not client.wait_for_service(timeout_sec=0.05)
-    server.create_service(SetBool, "~/set", answer)
-    assert client.wait_for_service(timeout_sec=5)
-    assert rig.result(client.call_async(SetBool.Request(data=True))) == SetBool.Response(success=True, message="done")
-
-
-def test_many_requests_at_once_get_their_own_answers(rig, pair):
-    server, _, client = pair
-    server.create_service(SetBool, "~/set", answer)
-    client.wait_for_service(5)
-    # As many as the queue of the service holds.
-    futures = [client.call_async(SetBool.Request(data=bool(i % 3))) for i in range(10)]
-    assert [rig.result(future).success for future in futures] == [bool(i % 3) for i in range(10)]
-
-
-def test_a_coroutine_callback_does_not_hold_up_others(rig, pair):
-    server, _, client = pair
-    gate, order = Future(), []
-
-    async def wait(request, response):
-        if request.data:
-            await gate
-        order.append(request.data)
-        return response
-
-    server.create_service(SetBool, "~/set", wait)
-    client.wait_for_service(5)
-    slow, fast = (client.call_async(SetBool.Request(data=data)) for data in (True, False))
-    rig.result(fast)
-    assert not slow.done()
-    gate.set_result(None)
-    rig.result(slow)
-    assert order == [False, True]
-
-
-def test_a_service_may_call_another_service_in_a_coroutine(rig, pair):
-    server, other, client = pair
-    other.create_service(Trigger, "/inner", lambda _, response: response)
-    inner = server.create_client(Trigger, "/inner")
-
-    async def relay(_, response):
-        response.success = (await inner.call_async(Trigger.Request())) == Trigger.Response()
-        return response
-
-    server.create_service(SetBool, "~/set", relay)
-    assert client.wait_for_service(5)
-    assert inner.wait_for_service(5)
-    assert rig.result(client.call_async(SetBool.Request())).success
 
 
 def test_the_wire_is_that_of_rmw_zenoh(rig, pair):
@@ -141,42 +87,3 @@ def test_an_error_in_a_callback_ends_spinning_and_the_request(rig, pair):
     # Even while the traceback keeps everything alive.
     assert rig.spin(lambda: replies == [None])
     assert caught.value.args == ("callback failed",)
-
-
-def test_a_callback_that_returns_no_response_is_a_mistake(rig, pair):
-    server, _, client = pair
-    server.create_service(SetBool, "~/set", lambda _request, _response: None)
-    client.wait_for_service(5)
-    client.call_async(SetBool.Request())
-    with pytest.raises(TypeError, match=r"must return std_srvs/srv/SetBool.Response, got None"):
-        rig.rest(5)
-
-
-def test_a_request_of_another_type_is_not_sent(rig, pair):
-    with pytest.raises(TypeError, match=r"expected std_srvs/srv/SetBool.Request"):
-        pair[2].call_async(Trigger.Request())
-
-
-def test_a_destroyed_client_sends_nothing(rig, pair):
-    _, node, client = pair
-    node.destroy_client(client)
-    with pytest.raises(InvalidHandle, match="destroyed"):
-        client.call_async(SetBool.Request())
-
-
-def test_a_destroyed_service_is_not_offered_any_more(rig, pair):
-    server, _, client = pair
-    service = server.create_service(SetBool, "~/set", answer)
-    assert client.wait_for_service(5)
-    server.destroy_service(service)
-    assert rig.spin(lambda: not client.service_is_ready())
-
-
-def test_a_removed_request_stays_pending(rig, pair):
-    server, _, client = pair
-    server.create_service(SetBool, "~/set", answer)
-    client.wait_for_service(5)
-    future = client.call_async(SetBool.Request())
-    client.remove_pending_request(future)
-    rig.rest()
-    assert not future.done()

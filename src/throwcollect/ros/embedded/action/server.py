@@ -165,7 +165,7 @@ class ActionServer:
         self._goal_callback = goal_callback
         self._handle_accepted_callback = handle_accepted_callback
         self._cancel_callback = cancel_callback
-        self._logger = node.get_logger().get_child("action_server")
+        self._logger = node.get_logger()
         self._goals = GoalTable(int(result_timeout * S_TO_NS))
         self._handles: dict[bytes, ServerGoalHandle] = {}
         protocol, prefix = action_type.Impl, f"{action_name}/_action"

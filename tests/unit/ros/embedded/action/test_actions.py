@@ -1,24 +1,12 @@
-"""Action servers and clients, through a real router."""
+"""What action servers and clients of the embedded backend do beyond rclpy."""
 
 import pytest
 
-from throwcollect.interfaces import get_action, get_message, get_service
-from throwcollect.ros import DurabilityPolicy, Future, QoSProfile
-from throwcollect.ros.embedded.action import (
-    ActionClient,
-    ActionServer,
-    CancelResponse,
-    GoalResponse,
-    GoalStatus,
-    get_action_client_names_and_types_by_node,
-    get_action_names_and_types,
-    get_action_server_names_and_types_by_node,
-)
+from throwcollect.interfaces import get_action
+from throwcollect.ros import Future
+from throwcollect.ros.embedded.action import ActionClient, ActionServer, GoalStatus
 
 FJT = get_action("control_msgs/action/FollowJointTrajectory")
-CancelGoal = get_service("action_msgs/srv/CancelGoal")
-Uuid = get_message("unique_identifier_msgs/msg/UUID")
-StatusArray = get_message("action_msgs/msg/GoalStatusArray")
 
 
 def goal(*joints):
@@ -27,180 +15,19 @@ def goal(*joints):
     return goal
 
 
-class Controller:
-    """Server that accepts goals with joints and carries them out when told to."""
+def test_a_client_listens_to_what_it_uses_only(rig):
+    async def execute(_handle):
+        return await Future()
 
-    def __init__(self, node, **options):
-        self.handles, self.orders = [], {}
-        self.server = ActionServer(
-            node,
-            FJT,
-            "/arm/follow_joint_trajectory",
-            self.execute,
-            goal_callback=self.on_goal,
-            cancel_callback=self.on_cancel,
-            **options,
-        )
-
-    def on_goal(self, goal):
-        return GoalResponse.ACCEPT if goal.trajectory.joint_names else GoalResponse.REJECT
-
-    def on_cancel(self, handle):
-        return CancelResponse.REJECT if handle.request.trajectory.joint_names == ["stubborn"] else CancelResponse.ACCEPT
-
-    async def execute(self, handle):
-        self.handles.append(handle)
-        order = self.orders[bytes(handle.goal_id.uuid)] = Future()
-        end, result = await order
-        getattr(handle, end)()
-        return result
-
-    def end(self, handle, how, **result):
-        self.orders[bytes(handle.goal_id.uuid)].set_result((how, FJT.Result(**result)))
-
-
-@pytest.fixture
-def controller(rig):
-    return Controller(rig.node("server"))
-
-
-@pytest.fixture
-def client(rig, controller):
+    ActionServer(rig.node("server"), FJT, "/arm/follow_joint_trajectory", execute)
     client = ActionClient(rig.node("client"), FJT, "/arm/follow_joint_trajectory")
     assert client.wait_for_server(timeout_sec=5)
-    return client
-
-
-def send(rig, controller, client, *joints, **options):
-    """Send a goal and wait until it is being executed; returns both handles."""
-    known = len(controller.handles)
-    accepted = rig.result(client.send_goal_async(goal(*joints), **options))
-    assert accepted.accepted
-    assert rig.spin(lambda: len(controller.handles) == known + 1)
-    return accepted, controller.handles[-1]
-
-
-def test_a_goal_is_accepted_executed_and_reached_with_feedback(rig, controller, client):
-    feedback = []
-    theirs, ours = send(rig, controller, client, "a", feedback_callback=feedback.append)
-    assert ours.request.trajectory.joint_names == ["a"]
-    assert ours.goal_id == theirs.goal_id
-    assert theirs.stamp.sec > 1_600_000_000
-    result = theirs.get_result_async()
-    ours.publish_feedback(FJT.Feedback(joint_names=["a"]))
-    assert rig.spin(lambda: feedback and theirs.status == GoalStatus.STATUS_EXECUTING)
-    assert feedback[0].feedback.joint_names == ["a"]
-    assert not result.done()
-    controller.end(ours, "succeed", error_string="done")
-    response = rig.result(result)
-    assert (response.status, response.result.error_string) == (GoalStatus.STATUS_SUCCEEDED, "done")
-    assert rig.spin(lambda: theirs.status == GoalStatus.STATUS_SUCCEEDED)
-
-
-def test_a_result_is_given_as_often_as_it_is_asked_for(rig, controller, client):
-    theirs, ours = send(rig, controller, client, "a")
-    early = [theirs.get_result_async(), theirs.get_result_async()]
-    controller.end(ours, "abort", error_code=-4)
-    results = [rig.result(future) for future in (*early, theirs.get_result_async())]
-    assert [(r.status, r.result.error_code) for r in results] == [(GoalStatus.STATUS_ABORTED, -4)] * 3
-
-
-def test_a_goal_may_be_rejected(rig, controller, client):
-    handle = rig.result(client.send_goal_async(goal()))
-    assert not handle.accepted
-    assert rig.result(handle.get_result_async()).status == GoalStatus.STATUS_UNKNOWN
-
-
-def test_an_identifier_is_accepted_once(rig, controller, client):
-    identifier = Uuid(uuid=bytes(range(16)))
-    futures = [client.send_goal_async(goal("a"), goal_uuid=identifier) for _ in range(2)]
-    assert [rig.result(future).accepted for future in futures] == [True, False]
-
-
-def test_the_result_of_an_unknown_goal_is_unknown(rig, controller, client):
-    theirs, _ = send(rig, controller, client, "a")
-    theirs.goal_id = Uuid(uuid=b"x" * 16)
-    assert rig.result(theirs.get_result_async()).status == GoalStatus.STATUS_UNKNOWN
-
-
-def test_a_goal_is_cancelled(rig, controller, client):
-    theirs, ours = send(rig, controller, client, "a")
-    response = rig.result(theirs.cancel_goal_async())
-    assert response.return_code == CancelGoal.Response.ERROR_NONE
-    assert [info.goal_id for info in response.goals_canceling] == [theirs.goal_id]
-    assert ours.is_cancel_requested
-    controller.end(ours, "canceled")
-    assert rig.result(theirs.get_result_async()).status == GoalStatus.STATUS_CANCELED
-    assert rig.result(theirs.cancel_goal_async()).return_code == CancelGoal.Response.ERROR_GOAL_TERMINATED
-
-
-def test_a_goal_may_refuse_to_be_cancelled(rig, controller, client):
-    theirs, ours = send(rig, controller, client, "stubborn")
-    response = rig.result(theirs.cancel_goal_async())
-    assert (response.return_code, response.goals_canceling) == (CancelGoal.Response.ERROR_REJECTED, [])
-    assert ours.status == GoalStatus.STATUS_EXECUTING
-
-
-def test_all_goals_are_cancelled_and_an_unknown_one_is_not(rig, controller, client):
-    handles = [send(rig, controller, client, "a")[0] for _ in range(3)]
-    node = rig.node("canceler")
-    service = node.create_client(CancelGoal, "/arm/follow_joint_trajectory/_action/cancel_goal")
-    assert service.wait_for_service(5)
-    unknown = CancelGoal.Request()
-    unknown.goal_info.goal_id.uuid = b"x" * 16
-    assert rig.result(service.call_async(unknown)).return_code == CancelGoal.Response.ERROR_UNKNOWN_GOAL_ID
-    response = rig.result(service.call_async(CancelGoal.Request()))
-    assert [info.goal_id for info in response.goals_canceling] == [handle.goal_id for handle in handles]
-
-
-def test_results_are_forgotten_after_their_time(rig):
-    controller = Controller(rig.node("server"), result_timeout=0.05)
-    client = ActionClient(rig.node("client"), FJT, "/arm/follow_joint_trajectory")
-    assert client.wait_for_server(timeout_sec=5)
-    theirs, ours = send(rig, controller, client, "a")
-    controller.end(ours, "succeed")
-    assert rig.result(theirs.get_result_async()).status == GoalStatus.STATUS_SUCCEEDED
-    rig.rest(0.1)
-    assert rig.result(theirs.get_result_async()).status == GoalStatus.STATUS_UNKNOWN
-    assert ours.status == GoalStatus.STATUS_UNKNOWN
-
-
-def test_who_joins_late_gets_the_status_of_all_goals(rig, controller, client):
-    _, first = send(rig, controller, client, "a")
-    send(rig, controller, client, "b")
-    controller.end(first, "succeed")
-    assert rig.spin(lambda: first.status == GoalStatus.STATUS_SUCCEEDED)
-    heard = []
-    qos = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-    topic = "/arm/follow_joint_trajectory/_action/status"
-    rig.node("late").create_subscription(StatusArray, topic, heard.append, qos)
-    assert rig.spin(lambda: heard)
-    assert [status.status for status in heard[-1].status_list] == [4, 2]
-
-
-def test_an_execute_callback_that_forgets_the_end_aborts_the_goal(rig):
-    server = ActionServer(rig.node("server"), FJT, "/act", lambda _handle: FJT.Result(error_string="forgot"))
-    client = ActionClient(rig.node("client"), FJT, "/act")
-    assert client.wait_for_server(5)
-    handle = rig.result(client.send_goal_async(goal("a")))
-    response = rig.result(handle.get_result_async())
-    assert (response.status, response.result.error_string) == (GoalStatus.STATUS_ABORTED, "forgot")
-    server.destroy()
-    assert rig.spin(lambda: not client.server_is_ready())
-
-
-def test_an_execute_callback_that_fails_aborts_the_goal_and_ends_spinning(rig):
-    def fail(_handle):
-        raise LookupError("callback failed")
-
-    ActionServer(rig.node("server"), FJT, "/act", fail)
-    client = ActionClient(rig.node("client"), FJT, "/act")
-    assert client.wait_for_server(5)
-    future = client.send_goal_async(goal("a"))
-    with pytest.raises(LookupError, match="callback failed"):
-        rig.rest(5)
-    handle = rig.result(future)
-    assert rig.result(handle.get_result_async()).status == GoalStatus.STATUS_ABORTED
+    node = rig.node("observer")
+    feedback, status = ("/arm/follow_joint_trajectory/_action/" + topic for topic in ("feedback", "status"))
+    _, theirs = rig.result(client.send_goal_async(goal("a"))), rig.result(client.send_goal_async(goal("b")))
+    assert (node.count_subscribers(feedback), node.count_subscribers(status)) == (0, 0)
+    assert rig.spin(lambda: theirs.status != GoalStatus.STATUS_UNKNOWN)
+    assert (node.count_subscribers(feedback), node.count_subscribers(status)) == (0, 1)
 
 
 def test_a_handle_may_end_a_goal_without_an_execute_callback(rig):
@@ -229,30 +56,3 @@ def test_the_first_result_of_a_goal_counts(rig):
     assert client.wait_for_server(5)
     handle = rig.result(client.send_goal_async(goal("a")))
     assert [rig.result(handle.get_result_async()).result.error_string for _ in range(2)] == ["first", "first"]
-
-
-def test_wrong_types_are_refused(rig, controller, client):
-    _, ours = send(rig, controller, client, "a")
-    with pytest.raises(TypeError, match=r"expected .*FollowJointTrajectory.Goal, got .*Result"):
-        client.send_goal_async(FJT.Result())
-    with pytest.raises(TypeError, match=r"expected .*FollowJointTrajectory.Feedback"):
-        ours.publish_feedback(FJT.Goal())
-
-
-def test_actions_are_found_in_the_graph(rig, controller, client):
-    node = rig.node("observer")
-    expected = [("/arm/follow_joint_trajectory", [FJT.TYPE])]
-    assert get_action_names_and_types(node) == expected
-    assert get_action_server_names_and_types_by_node(node, "server", "/") == expected
-    assert get_action_server_names_and_types_by_node(node, "client", "/") == []
-    client.send_goal_async(goal("a"), feedback_callback=print)
-    assert rig.spin(lambda: get_action_client_names_and_types_by_node(node, "client", "/") == expected)
-
-
-def test_a_client_listens_to_what_it_uses_only(rig, controller, client):
-    node = rig.node("observer")
-    feedback, status = ("/arm/follow_joint_trajectory/_action/" + topic for topic in ("feedback", "status"))
-    _, theirs = rig.result(client.send_goal_async(goal("a"))), rig.result(client.send_goal_async(goal("b")))
-    assert (node.count_subscribers(feedback), node.count_subscribers(status)) == (0, 0)
-    assert rig.spin(lambda: theirs.status != GoalStatus.STATUS_UNKNOWN)
-    assert (node.count_subscribers(feedback), node.count_subscribers(status)) == (0, 1)

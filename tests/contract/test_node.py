@@ -1,19 +1,20 @@
+"""What a node is called, what it logs, and how it ends."""
+
+import re
 from pathlib import Path
 
 import pytest
 
-from throwcollect.interfaces import get_message
-from throwcollect.ros import Context, DurabilityPolicy, Node, QoSProfile
-from throwcollect.ros.embedded.exceptions import NameValidationException, NotInitializedException
-from throwcollect.ros.embedded.logging import LoggingSeverity, get_logger
+from tests.contract.rig import NotInitializedException, exceptions, get_logger, said
+from throwcollect.ros import Context, DurabilityPolicy, Node, QoSProfile, get_message
 
 Log = get_message("rcl_interfaces/msg/Log")
 
 
 def test_a_node_needs_an_initialised_context_and_a_valid_name(rig):
-    with pytest.raises(NotInitializedException, match="cannot create node 'a'"):
+    with pytest.raises(NotInitializedException, match="cannot create node"):
         Node("a", context=Context())
-    with pytest.raises(NameValidationException, match="invalid node name"):
+    with pytest.raises(exceptions.NameValidationException, match=r"(?i)invalid node name"):
         rig.node("a/b")
 
 
@@ -21,13 +22,12 @@ def test_a_node_knows_its_names(rig):
     node = rig.node("sim", namespace="talos")
     assert (node.get_name(), node.get_namespace()) == ("sim", "/talos")
     assert node.get_fully_qualified_name() == "/talos/sim"
-    assert node.resolve_service_name("~/x") == "/talos/sim/x"
+    assert node.resolve_topic_name("~/x") == "/talos/sim/x"
 
 
-def test_what_a_node_logs_goes_to_standard_error_and_rosout(rig, capsys):
+def test_what_a_node_logs_goes_to_standard_error_and_rosout(rig, capfd):
     node, heard = rig.node("sim", namespace="talos"), []
     node.get_logger().warning("careful")
-    node.get_logger().debug("not shown")
     qos = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     rig.node("console").create_subscription(Log, "/rosout", heard.append, qos)
     assert rig.spin(lambda: heard)
@@ -38,19 +38,23 @@ def test_what_a_node_logs_goes_to_standard_error_and_rosout(rig, capsys):
     )
     assert (heard[0].file, heard[0].function) == (__file__, "test_what_a_node_logs_goes_to_standard_error_and_rosout")
     assert "careful" in Path(__file__).read_text(encoding="utf-8").splitlines()[heard[0].line - 1]
-    lines = capsys.readouterr().err.splitlines()
+    lines = capfd.readouterr().err.splitlines()
     assert len(lines) == 1
     assert lines[0].startswith("[WARN] [")
     assert lines[0].endswith("[talos.sim]: careful")
 
 
+# rclpy knows of other nodes of its own process alone, and warns that what both log takes one way.
+WARNING = said(embedded="there is another node /ns/twin", rclpy="node name: 'twin'.*'ns.twin'")
+
+
 @pytest.mark.parametrize("same_session", [True, False])
-def test_a_second_node_of_one_name_works_and_warns(rig, capsys, same_session):
+def test_a_second_node_of_one_name_works_and_warns(rig, capfd, same_session):
     first = rig.node("twin", namespace="ns")
     rig.node("twin", namespace="other")
-    assert "twin" not in capsys.readouterr().err
+    assert "twin" not in capfd.readouterr().err
     second = rig.node("twin", namespace="ns", context=first.context if same_session else None)
-    assert "there is another node /ns/twin" in capsys.readouterr().err
+    assert re.search(WARNING, capfd.readouterr().err)
     heard = []
     for node in (first, second):
         node.create_subscription(Log, "t", lambda _, node=node: heard.append(node), 10)
@@ -60,28 +64,17 @@ def test_a_second_node_of_one_name_works_and_warns(rig, capsys, same_session):
     assert rig.spin(lambda: set(map(id, heard)) == {id(first), id(second)})
 
 
-def test_logging_goes_on_after_the_node_ended(rig, capsys):
+def test_logging_goes_on_after_the_node_ended(rig, capfd):
     node = rig.node("sim")
     node.destroy_node()
     node.get_logger().info("late")
-    assert "late" in capsys.readouterr().err
+    assert "late" in capfd.readouterr().err
 
 
-def test_levels_are_inherited_by_children(capsys):
-    logger = get_logger("some.node")
-    child = logger.get_child("part")
-    logger.set_level(LoggingSeverity.ERROR)
-    assert not child.warning("hidden")
-    child.set_level(LoggingSeverity.DEBUG)
-    assert child.debug("shown")
-    assert capsys.readouterr().err.count("\n") == 1
-
-
-def test_repeated_messages_can_be_limited(capsys):
+def test_repeated_messages_can_be_limited(capfd):
     logger = get_logger("limited")
-    assert [logger.info("once", once=True) for _ in range(3)] == [True, False, False]
     assert [logger.info("slow", throttle_duration_sec=100.0) for _ in range(3)] == [True, False, False]
-    assert capsys.readouterr().err.count("\n") == 2
+    assert capfd.readouterr().err.count("\n") == 1
 
 
 def test_destroying_a_node_twice_or_after_shutdown_is_harmless(rig):

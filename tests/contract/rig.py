@@ -1,0 +1,93 @@
+"""Nodes of the backend that this process is on, and what of rclpy has another place on each of the two."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+from throwcollect.ros import Context, Future, Node, SingleThreadedExecutor
+from throwcollect.ros.backend import uses_rclpy
+from throwcollect.ros.middleware import Middleware
+
+ON_RCLPY = uses_rclpy()
+ON_DDS = Middleware.of_process().is_fast_dds
+DISCOVERY_S = 5.0
+"""Genuine nodes find each other, and all that they have, within a second; the machine may be busy."""
+
+if ON_RCLPY:
+    from rclpy import exceptions as exceptions
+    from rclpy.exceptions import InvalidHandle as InvalidHandle
+    from rclpy.exceptions import NotInitializedException as NotInitializedException
+    from rclpy.logging import get_logger as get_logger
+    from rclpy.utilities import get_default_context as get_default_context
+else:
+    from throwcollect.ros.embedded import exceptions as exceptions
+    from throwcollect.ros.embedded.context import get_default_context as get_default_context
+    from throwcollect.ros.embedded.exceptions import InvalidHandle as InvalidHandle
+    from throwcollect.ros.embedded.exceptions import NotInitializedException as NotInitializedException
+    from throwcollect.ros.embedded.logging import Logger
+
+    get_logger = Logger
+
+
+def said(*, embedded: str, rclpy: str) -> str:
+    """What an error says, as a regular expression: its kind is the same on both backends, its words are not."""
+    return rclpy if ON_RCLPY else embedded
+
+
+def names_of(node: Node) -> list[str]:
+    """Names of the nodes that a node sees, sorted."""
+    return sorted(name for name, _ in node.get_node_names_and_namespaces())
+
+
+class Rig:
+    """Nodes, each in a session of its own unless told otherwise, and a way to spin them all."""
+
+    def __init__(self) -> None:
+        self.contexts: list[Context] = []
+        self.executors: list[tuple[SingleThreadedExecutor, Node]] = []
+
+    def context(self) -> Context:
+        context = Context()
+        context.init()
+        self.contexts.append(context)
+        return context
+
+    def node(self, name: str, *, context: Context | None = None, **options: Any) -> Node:
+        node = Node(name, context=context or self.context(), **options)
+        executor = SingleThreadedExecutor(context=node.context)
+        executor.add_node(node)
+        self.executors.append((executor, node))
+        return node
+
+    def spin(self, until: Callable[[], Any], timeout: float = 5.0) -> bool:
+        """Spin until a condition is true; returns whether it became so."""
+        deadline = time.monotonic() + timeout
+        while not until():
+            if time.monotonic() > deadline:
+                return False
+            for executor, _ in self.executors:
+                executor.spin_once(timeout_sec=0.001)
+        return True
+
+    def sees(self, condition: Callable[[], Any]) -> bool:
+        """Whether something of others that is there can be seen: at once, or on rclpy as soon as it is discovered."""
+        return self.spin(condition, DISCOVERY_S) if ON_RCLPY else bool(condition())
+
+    def result(self, future: Future, timeout: float = 5.0) -> Any:
+        assert self.spin(future.done, timeout), "no result"
+        return future.result()
+
+    def rest(self, seconds: float = 0.1) -> None:
+        """Spin for a while, so that what should not happen had its chance."""
+        self.spin(lambda: False, seconds)
+
+    def close(self) -> None:
+        # That of rclpy would wait for tasks.
+        options: Any = {"timeout_sec": 0} if ON_RCLPY else {}
+        for executor, node in self.executors:
+            executor.shutdown(**options)
+            node.destroy_node()
+        for context in self.contexts:
+            context.try_shutdown()

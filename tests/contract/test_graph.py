@@ -1,0 +1,85 @@
+"""What nodes see of each other."""
+
+from tests.contract.rig import ON_DDS, ON_RCLPY, names_of
+from throwcollect.interfaces import type_hash
+from throwcollect.ros import DurabilityPolicy, QoSProfile, ReliabilityPolicy, get_message, get_service
+
+STRING, INT32, TRIGGER = "std_msgs/msg/String", "std_msgs/msg/Int32", "std_srvs/srv/Trigger"
+String = get_message(STRING)
+Int32 = get_message(INT32)
+Trigger = get_service(TRIGGER)
+
+
+def test_nodes_see_what_others_have_as_soon_as_they_exist(rig):
+    node = rig.node("a", namespace="/ns")
+    node.create_publisher(String, "topic", 10)
+    node.create_subscription(Int32, "~/other", lambda _: None, 10)
+    node.create_service(Trigger, "service", lambda _, response: response)
+    node.create_client(Trigger, "/called")
+    seen = rig.node("b")
+    assert rig.sees(lambda: sorted(seen.get_node_names_and_namespaces()) == [("a", "/ns"), ("b", "/")])
+    assert names_of(seen) == ["a", "b"]
+    assert rig.sees(lambda: ("/called", [TRIGGER]) in seen.get_client_names_and_types_by_node("a", "/ns"))
+    assert rig.sees(lambda: ("/ns/topic", [STRING]) in seen.get_topic_names_and_types())
+    assert ("/ns/a/other", [INT32]) in seen.get_topic_names_and_types()
+    assert ("/ns/service", [TRIGGER]) in seen.get_service_names_and_types()
+    assert ("/ns/topic", [STRING]) in seen.get_publisher_names_and_types_by_node("a", "/ns")
+    assert seen.get_subscriber_names_and_types_by_node("a", "/ns") == [("/ns/a/other", [INT32])]
+    assert seen.get_client_names_and_types_by_node("a", "/ns") == [("/called", [TRIGGER])]
+    services = [name for name, _ in seen.get_service_names_and_types_by_node("a", "/ns")]
+    assert "/ns/a/set_parameters_atomically" in services
+    assert (seen.count_publishers("/ns/topic"), seen.count_subscribers("/ns/topic")) == (1, 0)
+    node.destroy_node()
+    assert rig.spin(lambda: names_of(seen) == ["b"])
+    assert seen.count_publishers("/ns/topic") == 0
+
+
+def test_each_endpoint_of_a_topic_is_known_as_a_genuine_node_shows_it(rig):
+    node = rig.node("a", namespace="/ns")
+    qos = QoSProfile(depth=3, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    publisher = node.create_publisher(String, "t", qos)
+    node.create_subscription(String, "t", print, QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT))
+    seen = rig.node("b", namespace="/ns")
+    # DDS tells whose an endpoint is after it has told of the endpoint.
+    assert rig.sees(lambda: [info.node_name for info in seen.get_publishers_info_by_topic("t")] == ["a"])
+    assert rig.sees(lambda: seen.count_subscribers("t") == 1)
+    (info,) = seen.get_publishers_info_by_topic("t")
+    gid = bytes(info.endpoint_gid)
+    # rclpy's publishers do not tell theirs.
+    assert ON_RCLPY or gid == publisher.gid
+    assert str(info).splitlines() == [
+        "Node name: a",
+        "Node namespace: /ns",
+        "Topic type: std_msgs/msg/String",
+        f"Topic type hash: {type_hash(STRING)}",
+        "Endpoint type: PUBLISHER",
+        f"GID: {gid.hex('.')}",
+        "QoS profile:",
+        "  Reliability: RELIABLE",
+        # DDS does not tell others of it.
+        f"  History (Depth): {'UNKNOWN' if ON_DDS else 'KEEP_LAST (3)'}",
+        "  Durability: TRANSIENT_LOCAL",
+        "  Lifespan: Infinite",
+        "  Deadline: Infinite",
+        "  Liveliness: AUTOMATIC",
+        "  Liveliness lease duration: Infinite",
+    ]
+    (info,) = seen.get_subscriptions_info_by_topic("/ns/t")
+    assert (info.endpoint_type.name, info.qos_profile.reliability.name) == ("SUBSCRIPTION", "BEST_EFFORT")
+
+
+def test_endpoints_match_by_name_and_type(rig):
+    node, other = rig.node("a"), rig.node("b")
+    publisher = node.create_publisher(String, "t", 10)
+    # Not of the same session: there, DDS has one type for each name.
+    other.create_subscription(Int32, "t", lambda _: None, 10)
+    assert rig.spin(lambda: node.count_subscribers("t") == 1)
+    assert publisher.get_subscription_count() == 0
+    node.create_subscription(String, "t", lambda _: None, 10)
+    assert rig.spin(lambda: publisher.get_subscription_count() == 1)
+
+
+def test_other_domains_are_invisible(rig, monkeypatch):
+    rig.node("a")
+    monkeypatch.setenv("ROS_DOMAIN_ID", "232")
+    assert names_of(rig.node("b")) == ["b"]

@@ -1,0 +1,138 @@
+"""Publishers and subscriptions."""
+
+import time
+
+import pytest
+
+from tests.contract.rig import ON_RCLPY, InvalidHandle, said
+from throwcollect.interfaces import message_class, serialize
+from throwcollect.ros import DurabilityPolicy, QoSProfile, ReliabilityPolicy, get_message
+
+String = get_message("std_msgs/msg/String")
+JointState = get_message("sensor_msgs/msg/JointState")
+LATCHED = QoSProfile(depth=2, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+def test_messages_arrive_in_order_at_a_node_in_another_session(rig):
+    talker, listener = rig.node("talker"), rig.node("listener")
+    heard = []
+    listener.create_subscription(JointState, "joints", lambda m: heard.append(list(m.position)), 100)
+    publisher = talker.create_publisher(JointState, "joints", 100)
+    assert rig.spin(lambda: publisher.get_subscription_count() == 1)
+    for i in range(50):
+        publisher.publish(JointState(position=[float(i), 0.0]))
+    assert rig.spin(lambda: len(heard) == 50)
+    assert heard == [[float(i), 0.0] for i in range(50)]
+
+
+def test_nodes_of_one_session_hear_each_other(rig):
+    context = rig.context()
+    talker, listener = rig.node("talker", context=context), rig.node("listener", context=context)
+    heard = []
+    listener.create_subscription(String, "/chatter", heard.append, 10)
+    talker.create_publisher(String, "/chatter", 10).publish(String(data="hello"))
+    assert rig.spin(lambda: heard)
+    assert heard == [String(data="hello")]
+
+
+def test_bytes_are_published_and_received_as_they_are(rig):
+    node = rig.node("node")
+    heard = []
+    node.create_subscription(String, "t", heard.append, 10, raw=True)
+    data = serialize(message_class("std_msgs/msg/String")(data="raw"))
+    node.create_publisher(String, "t", 10).publish(data)
+    assert rig.spin(lambda: heard)
+    assert heard == [data]
+
+
+def test_messages_of_another_type_are_not_published(rig):
+    publisher = rig.node("node").create_publisher(String, "t", 10)
+    with pytest.raises(
+        TypeError,
+        match=said(
+            embedded="expected std_msgs/msg/String or bytes, got JointState",
+            rclpy="Expected .*String.*, got .*JointState",
+        ),
+    ):
+        publisher.publish(JointState())
+
+
+# On DDS, only those get them that asked for reliable ones.
+@pytest.mark.parametrize(
+    "reliability", [ReliabilityPolicy.RELIABLE] + ([] if ON_RCLPY else [ReliabilityPolicy.BEST_EFFORT])
+)
+def test_who_joins_late_gets_the_last_messages_of_a_transient_local_topic(rig, reliability):
+    qos = QoSProfile(depth=2, durability=DurabilityPolicy.TRANSIENT_LOCAL, reliability=reliability)
+    talker, listener = rig.node("talker"), rig.node("listener")
+    publisher = talker.create_publisher(String, "t", qos)
+    for text in "abc":
+        publisher.publish(String(data=text))
+    rig.rest()  # What is still on its way would be heard as well.
+    heard = []
+    listener.create_subscription(String, "t", lambda m: heard.append(m.data), qos)
+    assert rig.spin(lambda: len(heard) == 2)
+    publisher.publish(String(data="d"))
+    assert rig.spin(lambda: len(heard) == 3)
+    assert heard == ["b", "c", "d"]
+
+
+def test_a_late_publisher_of_a_transient_local_topic_is_heard_once(rig):
+    listener = rig.node("listener")
+    heard = []
+    listener.create_subscription(String, "t", lambda m: heard.append(m.data), LATCHED)
+    publisher = rig.node("talker").create_publisher(String, "t", LATCHED)
+    publisher.publish(String(data="a"))
+    assert rig.spin(lambda: heard)
+    rig.rest()
+    assert heard == ["a"]
+
+
+def test_the_oldest_messages_make_room_when_nobody_spins(rig):
+    node, talker = rig.node("listener"), rig.node("talker")
+    heard, marks = [], []
+    node.create_subscription(String, "t", lambda m: heard.append(m.data), 3)
+    node.create_subscription(String, "end", marks.append, 1, raw=True)
+    publisher, end = talker.create_publisher(String, "t", 100), talker.create_publisher(String, "end", 1)
+    assert rig.spin(lambda: publisher.get_subscription_count() and end.get_subscription_count())
+    for i in range(20):
+        publisher.publish(String(data=str(i)))
+    end.publish(String())
+    time.sleep(0.2)
+    assert rig.spin(lambda: marks)
+    rig.rest(0.05)
+    assert heard == ["17", "18", "19"]
+
+
+def test_a_callback_with_two_arguments_learns_when_the_message_was_sent(rig):
+    node = rig.node("node")
+    infos = []
+    node.create_subscription(String, "t", lambda _message, info: infos.append(info), 10)
+    before = time.time_ns()
+    node.create_publisher(String, "t", 10).publish(String())
+    assert rig.spin(lambda: infos)
+    assert before <= infos[0]["source_timestamp"] <= infos[0]["received_timestamp"]
+    assert infos[0]["publication_sequence_number"] == 1
+
+
+def test_a_callback_must_take_a_message(rig):
+    with pytest.raises(
+        RuntimeError, match=said(embedded="the callback must take a message", rclpy="callable with one argument")
+    ):
+        rig.node("node").create_subscription(String, "t", lambda: None, 10)
+
+
+def test_destroyed_endpoints_leave_the_graph_and_are_silent(rig):
+    node, other = rig.node("node"), rig.node("other")
+    heard = []
+    subscription = node.create_subscription(String, "t", heard.append, 10)
+    publisher = other.create_publisher(String, "t", 10)
+    assert rig.spin(lambda: publisher.get_subscription_count() == 1)
+    assert node.destroy_subscription(subscription)
+    assert not node.destroy_subscription(subscription)
+    assert rig.spin(lambda: publisher.get_subscription_count() == 0)
+    publisher.publish(String())
+    rig.rest(0.05)
+    assert heard == []
+    other.destroy_publisher(publisher)
+    with pytest.raises(InvalidHandle, match=said(embedded="destroyed", rclpy="destruction was requested")):
+        publisher.publish(String())

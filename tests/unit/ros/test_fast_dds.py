@@ -1,0 +1,111 @@
+"""Profiles of Fast DDS for a run, and the discovery server that they lead to."""
+
+import re
+import stat
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+
+import pytest
+
+from throwcollect.errors import ConfigError, WorkerError
+from throwcollect.ros.discovery_server import discovery_server
+from throwcollect.ros.fast_dds import client_profile, server_profile, write_temporarily
+from throwcollect.ros.router import router
+
+ENDPOINT = "udp/127.0.0.1:7447"
+
+
+class Profile:
+    def __init__(self, text):
+        self._root = ET.fromstring(text)  # noqa: S314 - our own
+
+    def __call__(self, tag):
+        return [(each.text or "").strip() for each in self._root.iter() if each.tag.rpartition("}")[2] == tag]
+
+
+def test_nodes_know_of_one_server_and_learn_of_everybody_there():
+    profile = Profile(client_profile(ENDPOINT))
+    assert profile("discoveryProtocol") == ["SUPER_CLIENT"]
+    assert profile("port") == ["7447"]
+    assert profile("address") == ["127.0.0.1", "127.0.0.1"]
+    assert profile("type") == ["UDPv4"]
+    assert profile("useBuiltinTransports") == ["false"]
+
+
+def test_the_server_listens_where_it_is_told():
+    profile = Profile(server_profile(ENDPOINT))
+    assert profile("discoveryProtocol") == ["SERVER"]
+    assert profile("port") == ["7447"]
+    (remote,) = re.findall('RemoteServer prefix="(.*?)"', client_profile(ENDPOINT))
+    assert profile("prefix") == [remote]
+
+
+def test_nodes_that_other_machines_may_reach_listen_everywhere():
+    assert Profile(client_profile(ENDPOINT))("interfaceWhiteList")
+    assert not Profile(client_profile("udp/192.0.2.7:7447"))("interfaceWhiteList")
+
+
+@pytest.mark.parametrize("endpoint", ["udp/nowhere.invalid:1", "udp/127.0.0.1:x", "udp/" + 70 * "x" + ":1", "udp/"])
+def test_an_endpoint_without_an_address_is_refused(endpoint):
+    with pytest.raises(ConfigError, match="no address of a discovery server"):
+        client_profile(endpoint)
+
+
+def test_a_temporary_profile_is_for_its_owner_alone_and_goes_with_the_process():
+    program = (
+        "from throwcollect.ros.fast_dds import write_temporarily; import os, stat\n"
+        "path = write_temporarily('<ä/>')\n"
+        "print(path, oct(stat.S_IMODE(os.stat(path).st_mode)), path.read_text(encoding='utf-8'))"
+    )
+    said = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout
+    path, mode, content = said.split()
+    assert (mode, content) == ("0o600", "<ä/>")
+    assert not re.search(r"[^\w/.-]", path)
+    with pytest.raises(FileNotFoundError):
+        open(path).close()
+    assert stat.S_IMODE(write_temporarily("").stat().st_mode) == 0o600
+
+
+def test_without_the_program_of_fast_dds_there_is_one_message(monkeypatch, tmp_path):
+    monkeypatch.setattr("sys.prefix", str(tmp_path))
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with (
+        pytest.raises(ConfigError, match="there is no program fast-discovery-server") as caught,
+        discovery_server("udp/127.0.0.1:1"),
+    ):
+        pass
+    assert "run.ros to embedded" in caught.value.hint
+
+
+@pytest.fixture
+def program(monkeypatch, tmp_path):
+    """Puts a script in the place of the program of Fast DDS."""
+
+    def put(script):
+        path = tmp_path / "bin" / "fast-discovery-server"
+        path.parent.mkdir()
+        path.write_text(f"#!/bin/sh\n{script}\n")
+        path.chmod(0o755)
+        monkeypatch.setattr("sys.prefix", str(tmp_path))
+
+    return put
+
+
+def test_a_port_that_something_else_listens_on_is_refused(program):
+    program("exit 1")
+    with (
+        router("tcp/127.0.0.1:0") as taken,
+        pytest.raises(ConfigError, match=r"cannot listen on udp/.*: Address already in use"),
+        discovery_server(taken.replace("tcp", "udp")),
+    ):
+        pass
+
+
+def test_a_server_that_ends_at_once_says_why(program):
+    program("echo it cannot be; exit 1")
+    with (
+        pytest.raises(WorkerError, match=r"udp/127.0.0.1:1 has ended[\s\S]*it cannot be"),
+        discovery_server("udp/127.0.0.1:1"),
+    ):
+        pass
