@@ -1,4 +1,7 @@
-"""A router in this process and one simulation in another, for all tests of a session."""
+"""A router and one simulation in a process of its own, for all tests of a session.
+
+Nodes on Fast DDS meet as those of a run do: at a discovery server.
+"""
 
 import subprocess
 from collections.abc import Iterator
@@ -6,9 +9,18 @@ from pathlib import Path
 
 import pytest
 
-from tests.integration.robot import OWN, PLAYING, Robot, connected, running_simulation, start_simulation
+from tests.integration.robot import (
+    OWN,
+    PLAYING,
+    Robot,
+    connected,
+    discovery_server,
+    running_simulation,
+    start_simulation,
+)
 from throwcollect.ros import Context
 from throwcollect.ros.embedded.parameter import parameter_value_to_python
+from throwcollect.ros.middleware import Middleware
 from throwcollect.ros.router import router
 
 NAME = "sim_0"
@@ -16,7 +28,7 @@ NAME = "sim_0"
 
 @pytest.fixture(scope="session")
 def endpoint() -> Iterator[str]:
-    with router("tcp/127.0.0.1:0") as endpoint:
+    with discovery_server() if Middleware.of_process().is_fast_dds else router("tcp/127.0.0.1:0") as endpoint:
         yield endpoint
 
 

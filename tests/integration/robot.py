@@ -7,7 +7,7 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -30,8 +30,11 @@ from throwcollect.ros import (
     get_action,
     get_message,
     get_service,
+    init,
 )
 from throwcollect.ros.backend import VARIABLE, uses_rclpy
+from throwcollect.ros.middleware import Middleware
+from throwcollect.run_key import Signer
 from throwcollect.session_config import CONFIG_FILE_VARIABLE, OVERRIDE_VARIABLE
 
 CONFIG = Config.model_validate({"name": "integration", "tool": {"cup_floor_radius_m": 0.006}})
@@ -44,6 +47,8 @@ ELBOW = "arm_right_4_joint"
 STEP_NS = 10**9 // CONFIG.sim.physics_hz
 SAMPLE_NS = 10**9 // CONFIG.record.rate_hz
 PATIENCE_S = 20.0
+ON_DDS = Middleware.of_process().is_fast_dds
+FOUND_BY_OTHERS_S = 0.3
 
 ALL = QoSProfile(history=HistoryPolicy.KEEP_ALL)
 """Nothing is lost on the client's side, however late it looks."""
@@ -67,18 +72,32 @@ def environment(endpoint: str) -> dict[str, str]:
     return {OVERRIDE_VARIABLE: f'mode="client";connect/endpoints={json.dumps([endpoint])}', "ROS_DOMAIN_ID": "0"}
 
 
-def start_simulation(directory: Path, endpoint: str, name: str, config: Config = CONFIG) -> subprocess.Popen[str]:
+def start_simulation(
+    directory: Path, endpoint: str, name: str, config: Config = CONFIG, options: Sequence[str] = ()
+) -> subprocess.Popen[str]:
     path = directory / "integration.json"
     path.write_text(config.model_dump_json())
     # Simulation and client may be on different backends.
     backend = {VARIABLE: os.environ["SIMULATION_ROS"]} if "SIMULATION_ROS" in os.environ else {}
     return subprocess.Popen(
-        [sys.executable, "-m", "throwcollect", "sim", str(path), "--name", name],
+        [sys.executable, "-m", "throwcollect", "sim", str(path), "--name", name, *options],
         env={**os.environ, **environment(endpoint), **backend},
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
     )
+
+
+@contextmanager
+def discovery_server() -> Iterator[str]:
+    """The router of a run on Fast DDS, in a process of its own."""
+    command = [sys.executable, "-m", "throwcollect.ros.router", "--listen", "udp/127.0.0.1:0"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        listening, _, endpoint = process.stdout.readline().strip().rpartition(" ")
+        assert listening == "router listening on"
+        yield endpoint
+        process.terminate()
 
 
 @contextmanager
@@ -103,11 +122,16 @@ def connected(endpoint: str) -> Iterator[Context]:
         patch.delenv(CONFIG_FILE_VARIABLE, raising=False)
         for variable, value in environment(endpoint).items():
             patch.setenv(variable, value)
-        context.init()
+        init(context=context)
     try:
         yield context
     finally:
         context.try_shutdown()
+
+
+def signer() -> Signer:
+    """What leases and episodes are signed with: nothing, unless this process has a key."""
+    return Signer.of_environment()
 
 
 def stamp_ns(stamp: Any) -> int:
@@ -143,8 +167,9 @@ def swing(seconds: float = 1.0) -> Any:
 class Robot:
     """A client of one simulation, spinning whenever it waits."""
 
-    def __init__(self, context: Context, name: str) -> None:
+    def __init__(self, context: Context, name: str, namespace: str | None = None) -> None:
         self.name = name
+        self._prefix = (namespace or f"/{name}").removesuffix("/")
         self.node = Node(f"client_of_{name}", context=context)
         self._executor = SingleThreadedExecutor(context=context)
         self._executor.add_node(self.node)
@@ -152,7 +177,7 @@ class Robot:
         self._actions: dict[str, ActionClient] = {}
 
     def topic(self, name: str) -> str:
-        return f"/{self.name}/{name}"
+        return f"{self._prefix}/{name}"
 
     def wait_until(self, condition: Callable[[], bool], what: str = "") -> None:
         deadline = time.monotonic() + PATIENCE_S
@@ -193,9 +218,9 @@ class Robot:
         messages = [Parameter(name, value=value).to_parameter_msg() for name, value in values.items()]
         return self.parameters("set_parameters_atomically", node=node, parameters=messages).result
 
-    def publish(self, topic: str, message: Any) -> None:
+    def publish(self, topic: str, message: Any, qos: QoSProfile | int = 10) -> None:
         """Publish a message once the simulation listens, and let it have that."""
-        publisher = self.node.create_publisher(type(message), self.topic(topic), 10)
+        publisher = self.node.create_publisher(type(message), self.topic(topic), qos)
         self.wait_until(lambda: publisher.get_subscription_count() > 0, topic)
         publisher.publish(message)
         self.state()
@@ -237,6 +262,11 @@ class Robot:
         subscription = self.node.create_subscription(message_type, name, heard.append, qos, raw=raw)
         # The answer comes after the simulation has been told, as both take the same way.
         self.state()
+        if ON_DDS:
+            # They do not: each side finds the other, and cannot know when the other has found it.
+            self.wait_until(lambda: subscription.get_publisher_count() > 0, f"somebody publishes {name}")
+            found = time.monotonic()
+            self.wait_until(lambda: time.monotonic() > found + FOUND_BY_OTHERS_S)
         yield heard
         self.node.destroy_subscription(subscription)
 

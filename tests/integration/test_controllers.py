@@ -122,13 +122,9 @@ def test_partial_goals_can_be_allowed(robot: Robot) -> None:
 @pytest.mark.parametrize(
     ("parameter", "value", "reason"),
     [
-        (
-            "constraints__goal_time",
-            -1.0,
-            r"constraints\.goal_time: must be a finite number of at least 0\.0; got -1\.0",
-        ),
-        (f"constraints__{ELBOW}__goal", float("nan"), rf"constraints\.{ELBOW}\.goal: must be a finite number"),
-        ("cmd_timeout", float("inf"), r"cmd_timeout: must be a finite number of at least 0\.0; got inf"),
+        ("constraints__goal_time", -1.0, r"constraints\.goal_time out of range"),
+        (f"constraints__{ELBOW}__goal", float("nan"), rf"constraints\.{ELBOW}\.goal out of range"),
+        ("cmd_timeout", float("inf"), "cmd_timeout out of range"),
         ("constraints__goal_time", "soon", "Wrong parameter type"),
         ("interpolation_method", "none", "read-only"),
         ("state_interfaces", ["position", "velocity"], "read-only"),
@@ -229,9 +225,12 @@ def other(endpoint: str, session: Context, tmp_path_factory: pytest.TempPathFact
 
 
 def test_controllers_can_have_the_names_of_ros_1(other: Robot) -> None:
-    names = {name for name, namespace in other.node.get_node_names_and_namespaces() if namespace == "/sim_1"}
-    assert {graph_name(name, "ros1") for name in CONTROLLERS} <= names
-    assert not {ARM, "arm_left_controller"} & names
+    def names() -> set[str]:
+        return {name for name, namespace in other.node.get_node_names_and_namespaces() if namespace == "/sim_1"}
+
+    wanted = {graph_name(name, "ros1") for name in CONTROLLERS}
+    other.wait_until(lambda: wanted <= names(), "all controllers are discovered")
+    assert not {ARM, "arm_left_controller"} & names()
 
 
 def test_goals_that_are_refused_can_be_accepted_and_aborted_with_the_reason(other: Robot) -> None:

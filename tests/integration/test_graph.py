@@ -8,7 +8,6 @@ import pinocchio
 import pytest
 
 from tests.integration.robot import ARM, CONFIG, PAUSED, Robot
-from throwcollect.interfaces import get_service
 from throwcollect.robots.talos import CONTROLLERS, JOINTS
 from throwcollect.ros import DurabilityPolicy, QoSProfile, get_action_server_names_and_types_by_node
 from throwcollect.ros.backend import uses_rclpy
@@ -54,7 +53,6 @@ PARAMETERS = [
 ]
 TABLE = Path(__file__).parents[1] / "unit" / "interfaces" / "official_hashes.txt"
 HASHES = dict(line.split() for line in TABLE.read_text(encoding="utf-8").splitlines())
-GetTypeDescription: Any = get_service("type_description_interfaces/srv/GetTypeDescription")
 
 
 def snake(name: str) -> str:
@@ -62,8 +60,7 @@ def snake(name: str) -> str:
 
 
 def services_of_every_node(full_name: str) -> dict[str, str]:
-    offered = {f"{full_name}/{snake(name)}": f"rcl_interfaces/srv/{name}" for name in PARAMETERS}
-    return offered | {f"{full_name}/get_type_description": GetTypeDescription.TYPE}
+    return {f"{full_name}/{snake(name)}": f"rcl_interfaces/srv/{name}" for name in PARAMETERS}
 
 
 def tokens(robot: Robot, *kinds: EntityKind) -> list[Token]:
@@ -73,8 +70,9 @@ def tokens(robot: Robot, *kinds: EntityKind) -> list[Token]:
 
 
 def visible(names_and_types: list[tuple[str, list[str]]]) -> dict[str, str]:
-    """Without what makes up actions, which ROS hides."""
-    return {name: kind for name, (kind,) in names_and_types if "/_action/" not in name}
+    """Without what makes up actions, which ROS hides, and the descriptions of types that nodes of rclpy offer."""
+    hidden = ("/_action/", "/get_type_description")
+    return {name: kind for name, (kind,) in names_and_types if not any(part in name for part in hidden)}
 
 
 def latched(robot: Robot, kind: str, topic: str) -> Any:
@@ -138,7 +136,6 @@ def test_the_qualities_of_service_are_those_of_genuine_nodes(robot: Robot) -> No
         "/rosout": ":1:,1000:,:10,0:,,",
         "/parameter_events": "::,1000:,:,:,,",
         "/sim_0/sim_0/set_parameters": "::,1000:,:,:,,",
-        "/sim_0/sim_0/get_type_description": "::,10:,:,:,,",
         "/sim_0/reset_simulation": "::,10:,:,:,,",
         "/sim_0/robot_description": ":1:,1:,:,:,,",
         f"/sim_0/{ARM}/follow_joint_trajectory/_action/status": ":1:,1:,:,:,,",
@@ -147,21 +144,6 @@ def test_the_qualities_of_service_are_those_of_genuine_nodes(robot: Robot) -> No
     }
     found = {token.name: token.qos for token in tokens(robot, EntityKind.PUBLISHER, EntityKind.SERVICE)}
     assert {name: found[name] for name in expected} == expected
-
-
-def test_each_node_describes_every_type_that_it_uses(robot: Robot) -> None:
-    by_node: dict[str, set[tuple[str, str]]] = {}
-    for token in tokens(robot, *list(EntityKind)[1:]):
-        by_node.setdefault(token.node, set()).add((token.ros_type, token.type_hash))
-    assert len(by_node) == len(CONTROLLERS) + 2
-    for node, types in by_node.items():
-        for name, hashed in types:
-            response = robot.result(
-                robot.ask(GetTypeDescription.TYPE, f"{node}/get_type_description", type_hash=hashed)
-            )
-            assert response.successful, (node, name, response.failure_reason)
-            assert response.type_description.type_description.type_name == name
-            assert response.type_sources[0].type_name == name
 
 
 def test_a_late_listener_gets_a_description_with_the_spoon_and_32_movable_joints(description: str) -> None:

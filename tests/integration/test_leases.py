@@ -6,22 +6,23 @@ from typing import Any
 
 import pytest
 
-from tests.integration.robot import ARM, CONFIG, ELBOW, HEAD, POSTURE, TORSO, Robot, goal, swing, trajectory
+from tests.integration.robot import ARM, CONFIG, ELBOW, HEAD, POSTURE, TORSO, Robot, goal, signer, swing, trajectory
 from throwcollect.episode.message import Delivery, unpack
-from throwcollect.ros import get_message
+from throwcollect.ros import DurabilityPolicy, QoSProfile, get_message
 from throwcollect.run_key import Signer
 from throwcollect.trial.lease import Lease
 
-UNKEYED = Signer(b"")
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+"""As ros2_controllers have it; DDS connects no others."""
 LEASED = "the simulation is leased for trial 4, until its episode is handed over"
 SpeedScalingFactor: Any = get_message("control_msgs/msg/SpeedScalingFactor")
 Result: Any = get_message("simulation_interfaces/msg/Result")
 SimulationState: Any = get_message("simulation_interfaces/msg/SimulationState")
 
 
-def ask_for(robot: Robot, values: dict[str, float], *, signer: Signer = UNKEYED, trial: int = 4) -> Any:
+def ask_for(robot: Robot, values: dict[str, float], *, by: Signer | None = None, trial: int = 4) -> Any:
     lease = Lease(f"/{robot.name}", trial, (ARM, TORSO), values)
-    parameters = {"trial.number": trial, "trial.controllers": [ARM, TORSO], "trial.lease": lease.sign(signer)}
+    parameters = {"trial.number": trial, "trial.controllers": [ARM, TORSO], "trial.lease": lease.sign(by or signer())}
     return robot.set({**parameters, **values})
 
 
@@ -37,7 +38,7 @@ def finished(robot: Robot) -> Delivery:
         assert robot.send(swing()).accepted
         assert robot.send(goal(TORSO), TORSO).accepted
         robot.wait_until(lambda: bool(heard), "an episode")
-    return unpack(heard[0], UNKEYED)
+    return unpack(heard[0], signer())
 
 
 def test_a_lease_begins_its_trial_at_once(leased: Robot) -> None:
@@ -49,9 +50,9 @@ def test_a_lease_begins_its_trial_at_once(leased: Robot) -> None:
     assert sorted(conditions["inputs"]) == [ARM, TORSO]
 
 
-@pytest.mark.parametrize("signer", [Signer(b"another key")])
-def test_a_lease_that_is_not_signed_is_refused(robot: Robot, signer: Signer) -> None:
-    result = ask_for(robot, {}, signer=signer)
+@pytest.mark.parametrize("stranger", [Signer(b"another key")])
+def test_a_lease_that_is_not_signed_is_refused(robot: Robot, stranger: Signer) -> None:
+    result = ask_for(robot, {}, by=stranger)
     assert not result.successful
     assert result.reason == "trial.lease: is not signed with the key of this run"
     assert robot.now_ns() == 0
@@ -107,12 +108,12 @@ def test_nothing_else_moves_or_stops_a_leased_controller(leased: Robot) -> None:
     with leased.listening("std_msgs/msg/UInt8MultiArray", "episode", raw=True) as heard:
         arm = leased.send(swing())
         leased.publish(f"{ARM}/joint_trajectory", trajectory(ARM, 0.5))
-        leased.publish(f"{ARM}/speed_scaling_input", SpeedScalingFactor(factor=0.5))
+        leased.publish(f"{ARM}/speed_scaling_input", SpeedScalingFactor(factor=0.5), LATCHED)
         answer = leased.result(arm.cancel_goal_async())
         assert not answer.goals_canceling
         assert leased.send(goal(TORSO), TORSO).accepted
         leased.wait_until(lambda: bool(heard), "an episode")
-    touched = unpack(heard[0], UNKEYED).episode
+    touched = unpack(heard[0], signer()).episode
     assert ask_for(leased, {"ball.mass_kg": 0.05}).successful
     untouched = finished(leased).episode
     assert touched.digest == untouched.digest
@@ -121,7 +122,7 @@ def test_nothing_else_moves_or_stops_a_leased_controller(leased: Robot) -> None:
 def test_controllers_are_as_configured_in_every_leased_trial(leased: Robot) -> None:
     untouched = finished(leased).episode
     assert leased.set({f"constraints.{ELBOW}.trajectory": 1e-12}, node=ARM).successful
-    leased.publish(f"{ARM}/speed_scaling_input", SpeedScalingFactor(factor=0.5))
+    leased.publish(f"{ARM}/speed_scaling_input", SpeedScalingFactor(factor=0.5), LATCHED)
     assert ask_for(leased, {"ball.mass_kg": 0.05}).successful
     assert finished(leased).episode.digest == untouched.digest
 

@@ -1,19 +1,20 @@
 """Trial and physics as ROS parameters."""
 
 import re
+import sys
 from typing import Any
 
 import pytest
 
-from tests.integration.robot import ARM, CONFIG, ELBOW, PAUSED, POSTURE, STEP_NS, TORSO, Robot, goal, swing
+from tests.integration.robot import ARM, CONFIG, ELBOW, PAUSED, POSTURE, STEP_NS, TORSO, Robot, goal, signer, swing
 from throwcollect.config.values import is_physics, sweepable_keys
 from throwcollect.episode.message import unpack
 from throwcollect.interfaces import deserialize, message_class
 from throwcollect.ros import Parameter
-from throwcollect.run_key import Signer
 
 OWN = ["trial.number", "trial.controllers", "trial.lease", "sim.real_time_factor"]
-UNKEYED = Signer(b"")
+FOREIGN = ("use_sim_time", "start_type_description_service")
+"""Parameters that every node of ROS has."""
 INTEGER, DOUBLE, STRING, STRINGS = 2, 3, 4, 9
 
 
@@ -35,12 +36,53 @@ def test_parameters_are_described_with_their_types_and_have_the_values_of_the_co
     assert values[1].double_value == CONFIG.ball.mass_kg
 
 
+def range_of(descriptor: Any) -> tuple[float, float] | None:
+    for span in (*descriptor.floating_point_range, *descriptor.integer_range):
+        return span.from_value, span.to_value
+    return None
+
+
+def test_parameters_are_described_by_what_the_configuration_says_of_them(robot: Robot) -> None:
+    names = robot.parameters("list_parameters").result.names
+    described = {each.name: each for each in robot.parameters("describe_parameters", names=names).descriptors}
+    mine = {name: each for name, each in described.items() if name not in FOREIGN}
+    assert [name for name, each in mine.items() if not each.description] == []
+    mass = described["ball.mass_kg"]
+    assert (mass.description, mass.additional_constraints) == ("Mass.", "a number above 0 and up to 2 kg")
+    angle = described["task.start.arm_right_4_joint"]
+    assert angle.description.startswith("Joint angles at the start of each trial")
+    spans = {
+        "ball.mass_kg": (0.0, 2.0),
+        "task.start.arm_right_4_joint": (-6.3, 6.3),
+        "trial.number": (-1, 9_999_999),
+        "sim.real_time_factor": (0.0, sys.float_info.max),
+        "sim.physics_hz": (100, 10000),
+        "record.trials_per_shard": (1, 2**63 - 1),
+        "robot.name": None,
+        "controllers.topic_aborts_goal": None,
+    }
+    assert {name: range_of(described[name]) for name in spans} == spans
+
+
+def test_parameters_of_controllers_are_described(robot: Robot) -> None:
+    names = [name for name in robot.parameters("list_parameters", node=ARM).result.names if name not in FOREIGN]
+    described = robot.parameters("describe_parameters", node=ARM, names=names).descriptors
+    assert [each.name for each in described if not each.description] == []
+    doubles = {each.name: range_of(each) for each in described if each.type == DOUBLE}
+    assert doubles.pop("action_monitor_rate") == (0.1, sys.float_info.max)
+    assert set(doubles.values()) == {(0.0, sys.float_info.max)}
+    assert "constraints.arm_right_1_joint.goal" in doubles
+
+
 @pytest.mark.parametrize(
     ("values", "reason"),
     [
         ({"ball.mass_kg": 1}, "Wrong parameter type.*expected.*DOUBLE.*got.*INTEGER"),
         ({"trial.number": 1.0}, "Wrong parameter type.*expected.*INTEGER.*got.*DOUBLE"),
-        ({"ball.mass_kg": -1.0}, r"ball\.mass_kg: should be a number above 0 and up to 2 kg, got -1\.0"),
+        ({"ball.mass_kg": -1.0}, r"ball\.mass_kg out of range"),
+        ({"ball.mass_kg": 0.0}, r"ball\.mass_kg: should be a number above 0 and up to 2 kg, got 0\.0"),
+        ({"ball.mass_kg": 2.000001}, r"ball\.mass_kg: should be a number above 0 and up to 2 kg, got 2\.000001"),
+        ({"sim.real_time_factor": float("inf")}, "sim.real_time_factor"),
         ({"ball.mass_kg": float("nan")}, "ball.mass_kg"),
         ({"trial.controllers": [ARM, "arm_controller"]}, "no controller 'arm_controller'"),
         ({"sim.real_time_factor": -1.0}, "sim.real_time_factor"),
@@ -88,7 +130,7 @@ def test_a_trial_waits_for_all_its_controllers_and_then_hands_in_its_episode(rob
     (message,) = heard
     parts = [each.label for each in deserialize(message, message_class("std_msgs/msg/UInt8MultiArray")).layout.dim]
     assert parts == ["header", "conditions", "chunk", "signature"]
-    episode = unpack(message, UNKEYED).episode
+    episode = unpack(message, signer()).episode
     episode.check_records()
     header = episode.header
     assert (header.trial, header.start_ns, header.end_reason) == (5, start_ns, "landed")

@@ -1,5 +1,7 @@
 """Topics that come with every sample, while somebody listens."""
 
+import statistics
+from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -18,6 +20,7 @@ from tests.integration.robot import (
     swing,
 )
 from throwcollect.robots.talos import CONTROLLERS, JOINTS
+from throwcollect.ros import get_message
 
 KINDS = {
     "joint_states": "sensor_msgs/msg/JointState",
@@ -46,6 +49,23 @@ def test_a_listener_hears_every_sample_of_a_stretch_of_time(topic: str, robot: R
         times = [time for time in times if time % SAMPLE_NS == 0]
     assert times == list(range(times[0], 50 * STEP_NS + 1, SAMPLE_NS))
     assert times[0] in (0, SAMPLE_NS)
+
+
+def test_in_real_time_samples_leave_at_their_time(robot: Robot) -> None:
+    left: list[int] = []
+
+    def note(_message: Any, info: Any) -> None:
+        left.append(int(info["source_timestamp"]))
+
+    assert robot.set({"sim.real_time_factor": 1.0}).successful
+    kind = get_message(KINDS["joint_states"])
+    subscription = robot.node.create_subscription(kind, robot.topic("joint_states"), note, 10)
+    robot.state()
+    assert robot.outcome(robot.send(swing(1.0)))[1] == 0
+    robot.node.destroy_subscription(subscription)
+    gaps = [later - before for before, later in pairwise(left)]
+    # Most of them were less than 0.1 ms where the samples of a slice of 50 ms left together.
+    assert statistics.median(gaps) == pytest.approx(SAMPLE_NS, rel=0.5)
 
 
 def test_nobody_is_told_anything_twice_while_time_stands_still(robot: Robot) -> None:

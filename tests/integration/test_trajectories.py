@@ -13,6 +13,7 @@ from tests.integration.robot import (
     PAUSED,
     PLAYING,
     POSTURE,
+    SAMPLE_NS,
     STEP_NS,
     TORSO,
     FollowJointTrajectory,
@@ -73,15 +74,22 @@ def test_the_goals_of_all_eight_limbs_are_carried_out_at_once(robot: Robot) -> N
     assert [robot.outcome(handle) for handle in handles] == [REACHED] * 8
 
 
-@pytest.mark.parametrize("seconds", [0.52, 1.0])
-def test_feedback_comes_at_20_hz_of_simulated_time_from_the_start_on(seconds: float, robot: Robot) -> None:
+@pytest.mark.parametrize(("seconds", "factor"), [(0.52, 0.0), (1.0, 0.0), (0.52, 2.0)])
+def test_feedback_comes_at_20_hz_of_simulated_time_from_the_start_on(
+    seconds: float, factor: float, robot: Robot
+) -> None:
+    assert robot.set({"sim.real_time_factor": factor}).successful
     topic = f"{ARM}/follow_joint_trajectory/_action/feedback"
     with robot.listening(FollowJointTrajectory.Impl.FeedbackMessage, topic) as heard:
         handle = robot.send(goal(ARM, seconds, arm_right_4_joint=-1.7))
         assert robot.outcome(handle) == REACHED
+        # On DDS, the result takes another way, and may overtake the last feedback.
+        robot.wait_until(lambda: len(heard) >= math.ceil(seconds / 0.05) - 1, "the last feedback")
         assert {bytes(message.goal_id.uuid) for message in heard} == {bytes(handle.goal_id.uuid)}
     stamps = [stamp_ns(message.feedback.header.stamp) for message in heard]
-    assert stamps == [50_000_000 * number for number in range(1, math.ceil(seconds / 0.05))]
+    due = [50_000_000 * number for number in range(1, math.ceil(seconds / 0.05))]
+    slack = 2 * SAMPLE_NS if factor else 0
+    assert [stamp - time for stamp, time in zip(stamps, due, strict=True)] == pytest.approx([0] * len(due), abs=slack)
     middle = heard[len(heard) // 2].feedback
     assert tuple(middle.joint_names) == CONTROLLERS[ARM]
     column = CONTROLLERS[ARM].index(ELBOW)
@@ -163,7 +171,7 @@ def test_an_arm_that_cannot_follow_breaks_the_tolerance_of_the_path(robot: Robot
     assert (status, code) == (ABORTED, FollowJointTrajectory.Result.PATH_TOLERANCE_VIOLATED)
     assert code == -4
     assert text.startswith(f"Aborted due to path tolerance violation: joint {ELBOW} has position error 0.1")
-    assert text.endswith("tolerance 0.100000 rad")
+    assert text.endswith("tolerance 0.1 rad")
 
 
 def test_a_cancelled_goal_ends_as_cancelled_and_the_arm_stops_where_it_is(robot: Robot) -> None:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from throwcollect.control.decision import CANCELED, Decision, Judge
 from throwcollect.control.deviations import Deviations
 from throwcollect.control.goal import Trajectory, TrajectoryGoal
+from throwcollect.control.log import repeated
 from throwcollect.control.outcome import (
     ControllerState,
     ErrorCode,
@@ -31,8 +32,7 @@ from throwcollect.control.waypoints import Waypoints
 _FAR_AHEAD_NS = 3600 * 10**9
 """A trajectory that starts so much later was most likely stamped by another clock."""
 
-_MOST_SPEED = 1000.0
-"""Upstream has no limit; far above this one, a step of the trajectory's clock fits no number."""
+_MOST_SPEED = 1000.0  # Upstream has no limit; far above this one, a step of the trajectory's clock fits no number.
 
 
 class JointTrajectoryController:
@@ -111,14 +111,15 @@ class JointTrajectoryController:
             Whether it is taken over; the log says why not.
         """
         if len(self._parameters.command_interfaces) > 1:
-            self.logger.warning("%s: Speed scaling is only supported for position interfaces - Ignoring it!", self.name)
-            return False
-        if not 0 <= factor <= _MOST_SPEED:
+            problem = "Speed scaling is only supported for position interfaces - Ignoring it!"
+        elif not 0 <= factor <= _MOST_SPEED:
             rule = "Scaling factor has to be greater or equal to 0.0 - Ignoring input!"
-            self.logger.warning("%s: %s (got %g; at most %g)", self.name, rule, factor, _MOST_SPEED)
-            return False
-        self._tracker.scaling = factor
-        return True
+            problem = f"{rule} (got {factor:g}; expected 0 to {_MOST_SPEED:g})"
+        else:
+            self._tracker.scaling = factor
+            return True
+        self.logger.warning("%s: %s", self.name, problem, extra=repeated("speed"))
+        return False
 
     def activate(self, time_ns: int, measured: JointState, command: NDArray[np.float64] | None = None) -> None:
         """Start to command the joints, holding them where they are.
@@ -206,7 +207,7 @@ class JointTrajectoryController:
 
     def refuse(self, reason: Refusal) -> Refusal:
         """Log a refusal that was decided elsewhere, and name the controller in it."""
-        self.logger.error("%s: %s", self.name, reason.text)
+        self.logger.error("%s: %s", self.name, reason.text, stacklevel=2)
         return Refusal(reason.error_code, f"{self.name}: {reason.text}")
 
     def cancel(self, goal_id: Hashable) -> bool:
@@ -363,9 +364,8 @@ class JointTrajectoryController:
 
     def _finish(self, decision: Decision) -> None:
         if self._goal_id is not None:
-            stamp_ns = self._tracker.time_ns
-            result = GoalResult(self._goal_id, decision.status, decision.error_code, decision.text, stamp_ns)
-            self._results.append(result)
+            end = (decision.status, decision.error_code, decision.text, self._tracker.time_ns)
+            self._results.append(GoalResult(self._goal_id, *end))
             self._goal_id = None
 
     def _restart(self, time_ns: int, measured: JointState) -> None:
@@ -377,17 +377,16 @@ class JointTrajectoryController:
         velocities = self._tracker.velocities_count
         self._defaults = default_tolerances(parameters.constraints, parameters.joints, velocities=velocities)
         for warning in parameters.warnings():
-            self.logger.warning("%s: %s", self.name, warning)
+            self.logger.warning("%s: %s", self.name, warning, extra=repeated(warning.partition("(")[0]))
 
     def _judge_with(self, tolerances: Tolerances) -> Judge:
-        parameters, tracker = self._parameters, self._tracker
-        timeout_ns = round(parameters.timeout * 1e9)
-        return Judge(tolerances, timeout_ns, parameters.joints, tracker.velocities_count, tracker.continuous)
+        tracker, timeout_ns = self._tracker, round(self._parameters.timeout * 1e9)
+        return Judge(tolerances, timeout_ns, self._parameters.joints, tracker.velocities_count, tracker.continuous)
 
     def _refusal(self, trajectory: Trajectory, now_ns: int, what: str) -> Refusal | None:
         if not self._active:
             return self.refuse(Refusal(ErrorCode.INVALID_GOAL, f"Can't accept new {what}. Controller is not running."))
-        if (reason := refusal(trajectory, self._parameters, now_ns)) is not None:
+        if reason := refusal(trajectory, self._parameters, now_ns):
             return self.refuse(reason)
         ahead_ns = (trajectory.stamp_ns or now_ns) - now_ns
         if ahead_ns > _FAR_AHEAD_NS:

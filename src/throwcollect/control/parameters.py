@@ -20,6 +20,12 @@ _READ_ONLY = (
     "action_monitor_rate",
     "continuous_joints",
 )
+_LEAST = {"action_monitor_rate": 0.1}
+
+
+def least(key: str) -> float:
+    """The least value that a parameter with a number may have; it is 0 for almost all."""
+    return _LEAST.get(key, 0.0)
 
 
 @dataclass(frozen=True)
@@ -161,7 +167,7 @@ class ControllerParameters:
             needs = "measured velocities and a max_deceleration_on_cancel above 0 of each joint"
             warnings.append(f"cannot brake without {needs}. Falling back to hold position on cancel.")
         if self.cmd_timeout and not self.timeout:
-            values = f"({self.cmd_timeout:f} vs. {self.constraints.goal_time:f})"
+            values = f"({self.cmd_timeout:g} vs. {self.constraints.goal_time:g})"
             warnings.append(f"Command timeout must be higher than goal_time tolerance {values}; it is off.")
         return warnings
 
@@ -203,17 +209,17 @@ class ControllerParameters:
 
     def _wrong_numbers(self) -> list[tuple[str, str]]:
         numbers = [
-            ("action_monitor_rate", self.action_monitor_rate, 0.1),
-            ("cmd_timeout", self.cmd_timeout, 0.0),
-            ("speed_scaling.initial_scaling_factor", self.speed_scaling.initial_scaling_factor, 0.0),
-            ("constraints.goal_time", self.constraints.goal_time, 0.0),
-            ("constraints.stopped_velocity_tolerance", self.constraints.stopped_velocity_tolerance, 0.0),
+            ("action_monitor_rate", self.action_monitor_rate),
+            ("cmd_timeout", self.cmd_timeout),
+            ("speed_scaling.initial_scaling_factor", self.speed_scaling.initial_scaling_factor),
+            ("constraints.goal_time", self.constraints.goal_time),
+            ("constraints.stopped_velocity_tolerance", self.constraints.stopped_velocity_tolerance),
         ]
         for joint, limits in self.constraints.joints.items():
             for key, value in vars(limits).items():
-                numbers.append((f"constraints.{joint}.{key}", value, 0.0))
+                numbers.append((f"constraints.{joint}.{key}", value))
         return [
-            (key, f"must be a finite number of at least {lowest}; got {value}")
-            for key, value, lowest in numbers
-            if not (math.isfinite(value) and value >= lowest)
+            (key, f"must be a finite number of at least {least(key)}; got {value}")
+            for key, value in numbers
+            if not (math.isfinite(value) and value >= least(key))
         ]

@@ -129,9 +129,15 @@ def _violations(
 ) -> list[str]:
     broken = np.flatnonzero((tolerance > 0) & (np.abs(error) > tolerance))
     return [
-        f"joint {joints[index]} has {what} error {error[index]:f} {unit}, tolerance {tolerance[index]:f} {unit}"
+        f"joint {joints[index]} has {what} {_compared(error[index], tolerance[index], unit)}"
         for index in broken.tolist()
     ]
+
+
+def _compared(error: float, tolerance: float, unit: str) -> str:
+    """An error that is above its tolerance, both with as many digits as it takes to see that."""
+    digits = next((n for n in range(6, 17) if f"{abs(error):.{n}g}" != f"{tolerance:.{n}g}"), 17)
+    return f"error {error:.{digits}g} {unit}, tolerance {tolerance:.{digits}g} {unit}"
 
 
 class _IllegalToleranceError(Exception):
@@ -163,5 +169,5 @@ def _resolved(asked: float, default: float, what: str) -> float:
     if abs(asked - _ERASE) < _ERASE_WIDTH:
         return 0.0
     if asked < 0:
-        raise _IllegalToleranceError(f"{what}: {asked:f} (expected 0, -1 or more than 0).")
+        raise _IllegalToleranceError(f"{what}: {asked:g} (expected 0, -1 or more than 0).")
     return default

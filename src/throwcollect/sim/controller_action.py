@@ -67,11 +67,17 @@ class ControllerAction:
         """Whether somebody listens to feedback that there is."""
         return bool(self._results) and self.heard
 
+    @property
+    def owes_feedback(self) -> bool:
+        """Whether somebody listens to feedback, and some time has passed since the last one."""
+        passed_ns = self._simulation.now_ns - self._told_ns
+        return passed_ns != 0 and not 0 < passed_ns < self._simulation.feedback_ns and self.watched
+
     def publish_feedback(self, state: ControllerState) -> None:
-        """Tell how far the goals have come, unless no time has passed since the last time."""
-        if self._simulation.now_ns == self._told_ns:
-            return
-        self._told_ns = self._simulation.now_ns
+        """Tell how far the goals have come."""
+        passed_ns = self._simulation.now_ns - self._told_ns
+        # By a clock of its own, as slices of time need not end when feedback is due.
+        self._told_ns += passed_ns - passed_ns % (self._simulation.feedback_ns or 1)
         feedback = feedback_message(state)
         for handle in self._handles.values():
             handle.publish_feedback(feedback)

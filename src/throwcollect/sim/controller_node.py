@@ -3,10 +3,22 @@
 from __future__ import annotations
 
 import logging
+import math
+import time
 from typing import Any
 
 from throwcollect.control import GoalResult
-from throwcollect.ros import DurabilityPolicy, Node, QoSProfile, Time, get_message, get_service, provide_time
+from throwcollect.control.log import REPEATED
+from throwcollect.ros import (
+    DurabilityPolicy,
+    Node,
+    QoSProfile,
+    Time,
+    get_message,
+    get_service,
+    pass_on_log,
+    provide_time,
+)
 from throwcollect.sim.controller_action import ControllerAction
 from throwcollect.sim.controller_messages import (
     JointTrajectory,
@@ -24,6 +36,7 @@ SpeedScalingFactor: Any = get_message("control_msgs/msg/SpeedScalingFactor")
 _SPEED = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _STATES = QoSProfile(depth=100)
 """The states of one slice of time leave together."""
+_REPEATED_S = 1.0
 
 
 class ControllerNode(Node):
@@ -82,7 +95,7 @@ class ControllerNode(Node):
             states = [self._simulation.controller_state(self.controller)]
         for state in states:
             self._states.publish(state_message(state))
-        if self._action.watched:
+        if self._action.owes_feedback:
             self._action.publish_feedback(self._simulation.controller_state(self.controller))
 
     def set_time(self, time: Time) -> None:
@@ -99,7 +112,8 @@ class ControllerNode(Node):
 
     def _scale_speed(self, message: Any) -> None:
         if self._simulation.trial.leased:
-            self.get_logger().warning(f"the speed is not scaled: {self._simulation.trial.lease_in_words}")
+            refusal = f"the speed is not scaled: {self._simulation.trial.lease_in_words}"
+            self.get_logger().warning(refusal, throttle_duration_sec=_REPEATED_S)
             return
         self._limb.controller.scale_speed(message.factor)
 
@@ -114,14 +128,17 @@ class ControllerNode(Node):
 
 
 class _LogHandler(logging.Handler):
-    """Passes on what a controller logs to the log of its node."""
+    """Passes on what a controller logs to the log of its node; what is repeated once a second at most."""
 
     def __init__(self, node: Node) -> None:
         super().__init__()
-        self._logger = node.get_logger()
+        self._node = node
+        self._told_s: dict[str, float] = {}
 
     def emit(self, record: logging.LogRecord) -> None:
-        if record.levelno >= logging.ERROR:
-            self._logger.error(record.getMessage())
-        else:
-            self._logger.warning(record.getMessage())
+        if (about := getattr(record, REPEATED, None)) is not None:
+            now_s = time.monotonic()
+            if now_s < self._told_s.get(about, -math.inf) + _REPEATED_S:
+                return
+            self._told_s[about] = now_s
+        pass_on_log(self._node, record)

@@ -7,8 +7,10 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from throwcollect.control import ControllerParameters
+from throwcollect.control.parameters import least
 from throwcollect.errors import ConfigError
 from throwcollect.ros import Node, Parameter, ParameterDescriptor, SetParametersResult
+from throwcollect.sim.descriptors import floating_range
 from throwcollect.sim.limb import Limb
 from throwcollect.sim.present_trial import PresentTrial
 
@@ -45,7 +47,10 @@ class ParameterFace:
         self._limb = limb
         self._trial = trial
         for name, value, description, read_only in _declared(limb.controller.parameters):
-            node.declare_parameter(name, value, ParameterDescriptor(description=description, read_only=read_only))
+            descriptor = ParameterDescriptor(description=description, read_only=read_only)
+            if isinstance(value, float):
+                descriptor.floating_point_range = [floating_range(least(name), None)]
+            node.declare_parameter(name, value, descriptor)
         node.add_on_set_parameters_callback(self._check)
         node.add_post_set_parameters_callback(self._apply)
 

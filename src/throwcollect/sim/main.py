@@ -9,60 +9,56 @@ from types import FrameType
 
 from throwcollect import ros
 from throwcollect.config.loader import load
+from throwcollect.heartbeat import Heartbeat
 from throwcollect.interruption import stop_signals
+from throwcollect.ros.self_check import check_answers
 from throwcollect.sim.node import SimulationNode
 from throwcollect.sim.simulation import Simulation
 
 
-def _nothing() -> None:
-    """Work that marks a place among the inputs."""
-
-
-def _take_inputs(executor: ros.Executor) -> None:
-    """Handle the inputs that have come by now, but none that come meanwhile."""
-    last = executor.create_task(_nothing)
-    while not last.done():
-        executor.spin_once(timeout_sec=0.0)
-
-
-def run(config: Path, *, name: str) -> None:
+def run(config: Path, *, name: str, namespace: str | None = None) -> None:
     """Serve one simulation until SIGTERM, SIGINT or SIGHUP, or until a client sets its state to quitting.
 
     Inputs are looked at between slices of a running trial; otherwise the process sleeps until one arrives.
 
     Args:
         config: YAML file of the collection.
-        name: Name of the node and of its namespace.
+        name: Name of the node.
+        namespace: Its namespace; None for the root where `run.root_namespace` says so, otherwise ``/<name>``.
 
     Raises:
-        ConfigError: If the configuration cannot be used.
-        WorkerError: If the physics engine does not start.
+        ConfigError: If the configuration or the namespace cannot be used.
+        WorkerError: If the physics engine does not start, or the ROS 2 backend does not answer.
     """
     simulation = Simulation(load(config))
+    if namespace is None and simulation.config.run.root_namespace:
+        namespace = "/"
     ros.init()
-    node = SimulationNode(name, simulation)
+    node = SimulationNode(name, simulation, namespace=namespace)
     executor = ros.SingleThreadedExecutor()
     for each in (node, *node.companions):
         executor.add_node(each)
-    stopped = False
+    stopped = 0
 
-    def stop(_number: int, _frame: FrameType | None) -> None:
+    def stop(number: int, _frame: FrameType | None) -> None:
         nonlocal stopped
-        stopped = True
+        stopped = number
 
     for number in stop_signals():
         signal.signal(number, stop)
+    check_answers(node, executor)
     # What is here now stays until the end; the garbage collector need not go through it again and again.
     gc.freeze()
+    heartbeat = Heartbeat()
     print(f"{name} is ready", flush=True)
     try:
         while not stopped and not node.quitting:
-            if not simulation.running:
-                executor.spin_once(timeout_sec=node.patience_s)
-            _take_inputs(executor)
+            heartbeat.beat()
+            ros.spin_some(executor, timeout_sec=0.0 if simulation.running else node.patience_s)
             if simulation.running:
                 simulation.advance(watched=node.watched)
             node.follow_up()
+        node.get_logger().info(f"ends: {signal.Signals(stopped).name if stopped else 'a client asked for it'}")
     finally:
         for each in (*node.companions, node):
             each.destroy_node()

@@ -30,6 +30,7 @@ from throwcollect.ros import (
     provide_time,
 )
 from throwcollect.run_key import Signer
+from throwcollect.sim import descriptors
 from throwcollect.sim.controller_manager import ControllerManager
 from throwcollect.sim.controller_node import ControllerNode
 from throwcollect.sim.present_trial import TrialSetup
@@ -42,6 +43,7 @@ _CLOCK = "rosgraph_msgs/msg/Clock"
 Clock: Any = get_message(_CLOCK)
 UInt8MultiArray: Any = get_message("std_msgs/msg/UInt8MultiArray")
 
+_EPISODE = "episode"
 _LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _SAMPLED = QoSProfile(depth=100)
 _WHOLE = QoSProfile(history=HistoryPolicy.KEEP_ALL)
@@ -63,15 +65,20 @@ _MOST_TRIALS = 10_000_000
 
 
 class SimulationNode(Node):
-    """Serves one simulation under ``/<name>``.
+    """Serves one simulation.
 
     Args:
-        name: Name of the node and of its namespace.
+        name: Name of the node.
         simulation: What it serves.
+        namespace: Namespace of the node and of all names; None for ``/<name>``.
+
+    Raises:
+        ConfigError: If the namespace is that of another simulation.
     """
 
-    def __init__(self, name: str, simulation: Simulation) -> None:
-        super().__init__(name, namespace=f"/{name}")
+    def __init__(self, name: str, simulation: Simulation, *, namespace: str | None = None) -> None:
+        super().__init__(name, namespace=namespace or f"/{name}")
+        self._require_own_namespace()
         self._simulation = simulation
         config = simulation.config
         # The simulation is the source of its time, so the clock is set and not subscribed to.
@@ -95,7 +102,7 @@ class SimulationNode(Node):
         self._restoring = False
         self._control = SimulationControl(self, simulation)
         # Last, as coordinators take its presence for that of the whole simulation.
-        self._episodes = self.create_publisher(UInt8MultiArray, "episode", _WHOLE)
+        self._episodes = self.create_publisher(UInt8MultiArray, _EPISODE, _WHOLE)
 
     @property
     def companions(self) -> tuple[Node, ...]:
@@ -136,6 +143,21 @@ class SimulationNode(Node):
             whole = Episode(header, self._encoder.encode(samples, states))
             self._episodes.publish(pack(whole, simulation.trial.conditions().to_json(), self._signer))
         self._control.follow_up()
+
+    def _require_own_namespace(self) -> None:
+        """Refuse to live where another simulation lives: clients could not tell them apart, and each goal moved both.
+
+        Raises:
+            ConfigError: If there is another one.
+        """
+        others = {info.node_name for info in self.get_publishers_info_by_topic(_EPISODE)} - {self.get_name()}
+        if others:
+            namespace = self.get_namespace()
+            self.destroy_node()
+            raise ConfigError(
+                f"namespace {namespace}: the simulation {min(others)} lives there",
+                expected=f"one simulation in a namespace, such as --namespace /{self.get_name()}, the default",
+            )
 
     def _publish_samples(self) -> None:
         if not self._listened:
@@ -193,16 +215,25 @@ class SimulationNode(Node):
     def _declare_parameters(self, config: Config) -> None:
         values = dict(leaves(config))
         self._physics = {key: float(values[key]) for key in sweepable_keys(config) if is_physics(key)}
-        self.declare_parameter(NUMBER, self._simulation.trial.setup.number)
-        self.declare_parameter(CONTROLLERS, [""])
-        self.declare_parameter(LEASE, "")
-        self.declare_parameter(_FACTOR, config.sim.real_time_factor or _NO_LIMIT)
+        setup = self._simulation.trial.setup
+        numbers = [descriptors.integer_range(-1, _MOST_TRIALS - 1)]
+        about_number = "Number of the trial that the next reset begins, from 0; -1 for none, which also ends a lease."
+        self.declare_parameter(
+            NUMBER, setup.number, ParameterDescriptor(description=about_number, integer_range=numbers)
+        )
+        about_controllers = "Controllers that must have a goal before the clock of a trial runs; with none, any goal."
+        self.declare_parameter(CONTROLLERS, [""], ParameterDescriptor(description=about_controllers))
+        about_lease = "Signature of a coordinator over all that is set with it; begins the trial at once."
+        self.declare_parameter(LEASE, "", ParameterDescriptor(description=about_lease))
+        factor = config.sim.real_time_factor or _NO_LIMIT
+        about_factor = descriptors.of_key(_FACTOR, factor)
+        about_factor.additional_constraints = "a number; 0 stands for none"
+        self.declare_parameter(_FACTOR, factor, about_factor)
         for key, value in self._physics.items():
-            self.declare_parameter(key, value)
-        fixed = ParameterDescriptor(read_only=True, description="of the configuration")
+            self.declare_parameter(key, value, descriptors.of_key(key, value))
         for key, value in values.items():
             if isinstance(value, str | int | float) and key.startswith(_SHOWN) and not self.has_parameter(key):
-                self.declare_parameter(key, value, fixed)
+                self.declare_parameter(key, value, descriptors.of_key(key, value, read_only=True))
         self.add_on_set_parameters_callback(self._set_up)
         self.add_post_set_parameters_callback(self._restore_physics)
 

@@ -27,6 +27,7 @@ from throwcollect.robots.description import start_posture
 from throwcollect.robots.talos import CONTROLLERS
 from throwcollect.sim.entities import Entities
 from throwcollect.sim.limb import Limb
+from throwcollect.sim.pace import Pace, longest_steps, slice_steps
 from throwcollect.sim.present_trial import PresentTrial, TrialSetup
 from throwcollect.sim.step_request import StepRequest
 from throwcollect.sim.world import World
@@ -83,6 +84,7 @@ class Simulation:
         self._measures_velocity = any(limb.measures_velocity for limb in self.limbs.values())
         self._watched: list[Limb] = []
         self._keeps_states = "controller_state" in config.record.topics
+        self._pace = Pace()
         self.real_time_factor = config.sim.real_time_factor
         self._results: list[tuple[str, GoalResult]] = []
         self.reset()
@@ -210,29 +212,33 @@ class Simulation:
         return refusal
 
     def advance(self, *, watched: bool) -> None:
-        """Run for a slice of time, or until the run ends; slept through where a real-time factor asks for it.
+        """Run for a slice of time, or until the run ends; it ends on time where a real-time factor asks for it.
 
         Args:
             watched: Whether somebody wants to see it happen: slices are short then.
         """
-        began, stamp = time.monotonic(), self.now_ns
-        # In slow motion slices are shorter still, so that the node answers while it waits.
-        slice_s = _WATCHED_SLICE_S * min(1.0, self.real_time_factor or 1.0)
-        busy = self._in_trial or self._steps is not None
-        if busy and not watched and self.real_time_factor is None:
-            slice_s = _SLICE_S
+        began_s, since_ns, factor = time.monotonic(), self.now_ns, self.real_time_factor
+        slice_s = _SLICE_S if (self._in_trial or self._steps) and not (watched or factor) else _WATCHED_SLICE_S
         steps = max(1, round(slice_s * self.config.sim.physics_hz))
         if self._steps is not None:
             self._take_steps(self._steps, steps)
             return
+        if factor:
+            steps = slice_steps(factor, self.config.sim.physics_hz, self._stride, self.world.steps % self._stride)
         self.step(steps)
         if self._in_trial and self.world.end_reason is not None:
             self._running = False
         elif not self._in_trial and not any(limb.moves for limb in self.limbs.values()):
             self._running = self.world.end_reason is None
-        if self.real_time_factor:
-            due = began + (self.now_ns - stamp) / 1e9 / self.real_time_factor
-            time.sleep(max(0.0, due - time.monotonic()))
+        if factor:
+            self._pace.wait(factor, began_s=began_s, since_ns=since_ns, until_ns=self.now_ns)
+
+    @property
+    def feedback_ns(self) -> int:
+        """Simulated time that passes between two messages of feedback where slices are shorter than that [ns]."""
+        if not self.real_time_factor or self.state != State.PLAYING:
+            return 0
+        return longest_steps(self.real_time_factor, self.config.sim.physics_hz) * self._period_ns
 
     def request_steps(self, steps: int) -> StepRequest:
         """Have `advance` take physics steps while the clock stands still; trials may end on the way.

@@ -86,16 +86,22 @@ def test_velocity_tolerances_count_where_there_is_a_velocity_error() -> None:
 def test_an_error_equal_to_the_tolerance_is_within_it() -> None:
     error = np.array((0.5, -0.5000001, 7.0))
     assert violations(error, None, Limits(np.array((0.5, 0.5, 0.0)), STILL), JOINTS) == (
-        "joint j2 has position error -0.500000 rad, tolerance 0.500000 rad"
+        "joint j2 has position error -0.5000001 rad, tolerance 0.5 rad"
     )
     assert violations(error, STILL, Limits(np.full(3, 8.0), np.ones(3)), JOINTS) == ""
+
+
+def test_tiny_tolerances_can_be_read() -> None:
+    limits = Limits(np.array((1e-9, 0.0, 0.0)), STILL)
+    text = violations(np.array((2.5e-7, 0.0, 0.0)), None, limits, JOINTS)
+    assert text == "joint j1 has position error 2.5e-07 rad, tolerance 1e-09 rad"
 
 
 def test_all_joints_outside_are_named() -> None:
     limits = Limits(np.full(3, 0.25), np.array((0.0, 0.125, 0.0)))
     text = violations(np.array((1.0, 0.0, -2.0)), np.ones(3), limits, JOINTS)
     assert text == (
-        "joint j1 has position error 1.000000 rad, tolerance 0.250000 rad; "
-        "joint j3 has position error -2.000000 rad, tolerance 0.250000 rad; "
-        "joint j2 has velocity error 1.000000 rad/s, tolerance 0.125000 rad/s"
+        "joint j1 has position error 1 rad, tolerance 0.25 rad; "
+        "joint j3 has position error -2 rad, tolerance 0.25 rad; "
+        "joint j2 has velocity error 1 rad/s, tolerance 0.125 rad/s"
     )

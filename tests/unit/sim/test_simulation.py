@@ -309,7 +309,26 @@ def test_the_last_look_of_a_trial_tells_the_results_that_it_brings() -> None:
 def test_a_real_time_factor_holds_the_clock_back(simulation: Simulation) -> None:
     trial(simulation)
     simulation.real_time_factor = 1.0
+    simulation.fresh_samples()
     began = time.monotonic()
+    told = []
+    for _ in range(20):
+        simulation.advance(watched=True)
+        told.append(len(simulation.fresh_samples()))
+    simulation.real_time_factor = None
+    assert time.monotonic() - began >= 20 / CONFIG.record.rate_hz
+    assert told == [1] * 20, "a sample waits for those after it"
+
+
+def test_samples_are_told_one_by_one_also_after_steps_that_ended_between_them(simulation: Simulation) -> None:
+    simulation.state = State.PAUSED
+    simulation.request_steps(3)
+    simulation.advance(watched=True)
+    simulation.state = State.PLAYING
+    assert simulation.submit(ARM, 1, swing()) is None
+    simulation.real_time_factor = 1.0
+    simulation.fresh_samples()
     simulation.advance(watched=True)
     simulation.real_time_factor = None
-    assert time.monotonic() - began >= 0.05
+    assert simulation.now_ns == 4 * 10**9 // CONFIG.sim.physics_hz
+    assert len(simulation.fresh_samples()) == 1

@@ -1,0 +1,59 @@
+"""Keeping pace with real time, in slices so short that everything is told when it happens."""
+
+from __future__ import annotations
+
+import math
+import time
+
+_SHORTEST_S = 0.004
+"""Real time of a slice, at least: what is done between two slices takes about a millisecond of it."""
+_LONGEST_S = 0.05
+"""Real time of a slice, at most: inputs wait for its end."""
+_LATE_S = 0.05
+"""Real time that is caught up with; beyond, as after a rest, pace is kept from the present on."""
+
+
+def longest_steps(factor: float, hz: int) -> int:
+    """Physics steps of the longest slice, at a factor [-] and a number of steps per simulated second."""
+    return max(1, round(_LONGEST_S * min(1.0, factor) * hz))
+
+
+def slice_steps(factor: float, hz: int, period: int, phase: int) -> int:
+    """Physics steps of one slice.
+
+    Args:
+        factor: Simulated over real time [-].
+        hz: Physics steps per simulated second.
+        period: Physics steps after which there is something to tell.
+        phase: Physics steps since there was.
+
+    Returns:
+        What is left of the period, or a multiple of it where it is shorter than a slice can be; in slow motion less.
+    """
+    periods = math.ceil(_SHORTEST_S * factor * hz / period)
+    steps = min(periods * period, longest_steps(factor, hz))
+    return steps if steps <= phase else steps - phase
+
+
+class Pace:
+    """Ends each slice when it is due by a schedule that goes on from slice to slice, so that nothing adds up."""
+
+    def __init__(self) -> None:
+        self._factor = 0.0
+        self._until_ns = -1
+        self._due_s = 0.0
+
+    def wait(self, factor: float, *, began_s: float, since_ns: int, until_ns: int) -> None:
+        """Wait until a slice that has been simulated is due to end.
+
+        Args:
+            factor: Simulated over real time [-].
+            began_s: Monotonic time at which the slice began [s].
+            since_ns: Simulated time at its beginning [ns].
+            until_ns: Simulated time at its end [ns].
+        """
+        if factor != self._factor or since_ns != self._until_ns or began_s > self._due_s + _LATE_S:
+            self._due_s = began_s
+        self._factor, self._until_ns = factor, until_ns
+        self._due_s += (until_ns - since_ns) / 1e9 / factor
+        time.sleep(max(0.0, self._due_s - time.monotonic()))

@@ -1,0 +1,84 @@
+"""What a simulation says on /rosout: from where, and how often."""
+
+import signal
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.integration.robot import ALL, ARM, OWN, QUITTING, Robot, goal
+from throwcollect.ros import DurabilityPolicy, Parameter, QoSProfile, get_message
+
+Log = "rcl_interfaces/msg/Log"
+SpeedScalingFactor: Any = get_message("control_msgs/msg/SpeedScalingFactor")
+
+LATCHED = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+"""As the simulation subscribes to speeds; on DDS it would not hear others."""
+
+
+def said(heard: list[Any], words: str) -> list[Any]:
+    return [each for each in heard if words in each.msg]
+
+
+def settle(robot: Robot) -> None:
+    """What was logged before an answer has been heard after a few more."""
+    for _ in range(5):
+        robot.state()
+
+
+def test_a_refused_goal_is_one_line_that_names_where_it_was_refused(robot: Robot) -> None:
+    with robot.listening(Log, "/rosout") as heard:
+        for _ in range(3):
+            assert not robot.send(goal(ARM, 0.0)).accepted
+        settle(robot)
+    lines = said(heard, "not strictly increasing")
+    assert len(lines) == 3
+    assert (Path(lines[0].file).name, lines[0].function) == ("controller.py", "_refusal")
+    assert lines[0].line > 0
+
+
+def test_speeds_that_are_refused_do_not_flood_the_log(robot: Robot) -> None:
+    with robot.listening(Log, "/rosout") as heard:
+        publisher = robot.node.create_publisher(SpeedScalingFactor, robot.topic(f"{ARM}/speed_scaling_input"), LATCHED)
+        robot.wait_until(lambda: publisher.get_subscription_count() > 0)
+        for number in range(50):
+            publisher.publish(SpeedScalingFactor(factor=-1.0 - number))
+        settle(robot)
+        robot.node.destroy_publisher(publisher)
+    lines = said(heard, "Scaling factor has to be")
+    assert 1 <= len(lines) <= 2
+    assert "0 to 1000" in lines[0].msg
+    assert (Path(lines[0].file).name, lines[0].function) == ("controller.py", "scale_speed")
+
+
+def test_what_cannot_take_effect_is_said_once_for_one_request(robot: Robot) -> None:
+    wanted = [Parameter("cmd_timeout", value=0.1)]
+    wanted += [Parameter(f"constraints.arm_right_{number}_joint.goal", value=0.03) for number in range(1, 8)]
+    with robot.listening(Log, "/rosout") as heard:
+        messages = [each.to_parameter_msg() for each in wanted]
+        results = robot.parameters("set_parameters", node=ARM, parameters=messages).results
+        assert all(each.successful for each in results)
+        settle(robot)
+    assert len(said(heard, "Command timeout must be higher than goal_time tolerance (0.1 vs. 0.6)")) == 1
+    undone = [Parameter("cmd_timeout", value=0.0), *(Parameter(each.name, value=0.02) for each in wanted[1:])]
+    robot.parameters("set_parameters", node=ARM, parameters=[each.to_parameter_msg() for each in undone])
+
+
+@pytest.mark.parametrize("way", ["a client", "SIGTERM"])
+def test_a_simulation_says_why_it_ends(way: str, running: tuple[subprocess.Popen[str], Robot]) -> None:
+    process, robot = running
+    heard: list[Any] = []
+    robot.node.create_subscription(get_message(Log), "/rosout", heard.append, ALL)
+    robot.state()
+    if way == "SIGTERM":
+        process.send_signal(signal.SIGTERM)
+    else:
+        robot.put_into(QUITTING)
+    robot.wait_until(lambda: bool(said(heard, "ends: ")), "a last word")
+    output, _ = process.communicate(timeout=10)
+    robot.wait_until(lambda: robot.node.count_publishers(robot.topic("episode")) == 0)
+    (line,) = said(heard, "ends: ")
+    assert way in line.msg
+    assert line.name.endswith(f"{OWN}.{OWN}")
+    assert output.count("ends: ") == 1
