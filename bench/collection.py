@@ -13,6 +13,7 @@ import psutil
 
 from throwcollect.coordinator.progress import Progress
 from throwcollect.dataset.writer import create
+from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
 from throwcollect.runtime.docker import DockerRuntime
 from throwcollect.runtime.listening import Listening
@@ -116,13 +117,18 @@ def _key(directory: Path) -> RunKey:
 
 def local_runtime(plan: Plan, directory: Path) -> LocalRuntime:
     """Nodes as processes."""
-    return LocalRuntime(directory, directory / "logs", plan.config.run, _key(directory))
+    return LocalRuntime(directory, directory / "logs", plan.config.run, _key(directory), Middleware.of_process())
 
 
 def docker_runtime(plan: Plan, directory: Path) -> DockerRuntime:
     """Nodes as containers of the default image."""
     runtime = DockerRuntime(
-        f"bench-{os.getpid()}", plan.config, directory=directory, logs=directory / "logs", key=_key(directory)
+        f"bench-{os.getpid()}",
+        plan.config,
+        directory=directory,
+        logs=directory / "logs",
+        key=_key(directory),
+        middleware=Middleware.of_process(),
     )
     runtime.open()
     return runtime
@@ -147,7 +153,10 @@ def measure(
     runtime = make_runtime(plan, directory)
     with Supervisor(runtime, run, simulations=simulations) as supervisor:
         supervisor.start()
-        with Listening(reports.append, domain_id=run.domain_id, key=_key(directory)) as listening:
+        listening = Listening(
+            reports.append, domain_id=run.domain_id, key=_key(directory), middleware=Middleware.of_process()
+        )
+        with listening:
             first = _until(supervisor, listening, reports, 1)
             watch = _Watch(supervisor, listening, reports)
             start, stop = watch.until(trials // 10), watch.until(trials * 9 // 10)

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import os
 import re
+import socket
 import struct
 import sys
 import time
@@ -19,7 +20,9 @@ import time
 import zenoh
 
 from throwcollect.errors import ConfigError, ThrowcollectError
-from throwcollect.session_config import client_config
+from throwcollect.heartbeat import is_beating
+from throwcollect.ros.middleware import Middleware
+from throwcollect.session_config import OPEN, client_config, connect_endpoint
 
 NODE_VARIABLE = "THROWCOLLECT_NODE"
 """Names the node of a container."""
@@ -51,6 +54,14 @@ def check(node: str | None = None) -> None:
             f"health: got {name!r} as node" if name else "health: no node is named",
             expected=f"router, coordinator, or the name of a simulation; by default what {NODE_VARIABLE} says",
         )
+    if Middleware.of_process().is_fast_dds:
+        if name != _ROUTER:
+            _check_heartbeat(name)
+            return
+        endpoint = connect_endpoint()
+        if endpoint is not None and not endpoint.startswith(OPEN):
+            _check_discovery_server(endpoint)
+            return
     config = client_config()
     config.insert_json5("transport/unicast/open_timeout", str(round(TIMEOUT_S * 1000)))
     try:
@@ -64,6 +75,31 @@ def check(node: str | None = None) -> None:
             raise ThrowcollectError(f"{name}: does not answer")
     finally:
         session.close()  # type: ignore[no-untyped-call]
+
+
+def _check_heartbeat(name: str) -> None:
+    """Whether the loop of the node in this container goes on.
+
+    Raises:
+        ThrowcollectError: If it does not.
+    """
+    if not is_beating():
+        raise ThrowcollectError(f"{name}: does not answer")
+
+
+def _check_discovery_server(endpoint: str) -> None:
+    """Whether the router of a private run on Fast DDS takes a connection.
+
+    Raises:
+        ThrowcollectError: If it does not.
+    """
+    host, _, port = endpoint.partition("/")[2].rpartition(":")
+    try:
+        with socket.create_connection((host, int(port)), TIMEOUT_S) as connection:
+            # It hangs up at once; one that is stuck does not.
+            connection.recv(1)
+    except OSError as error:
+        raise ThrowcollectError(f"{_ROUTER}: no session with the router at {endpoint}: {error}") from error
 
 
 def attachment() -> bytes:

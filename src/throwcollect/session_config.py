@@ -23,6 +23,8 @@ DEFAULT_ENDPOINT = "tcp/localhost:7447"
 
 CONFIG_FILE_VARIABLE = "ZENOH_SESSION_CONFIG_URI"
 OVERRIDE_VARIABLE = "ZENOH_CONFIG_OVERRIDE"
+OPEN = "tcp/"
+"""What endpoints begin with whose router lets anybody in."""
 PROTECTED = "tls/"
 """What endpoints begin with whose router lets nobody in without the key of the run."""
 
@@ -74,6 +76,18 @@ def is_protected() -> bool:
     """
     endpoints = json.loads(client_config().get_json("connect/endpoints"))
     return all(endpoint.startswith(PROTECTED) for endpoint in endpoints)
+
+
+def connect_endpoint() -> str | None:
+    """Where the environment says that the router of a run is; None if it says nothing of it.
+
+    Raises:
+        ConfigError: If an environment variable does not hold what it should.
+    """
+    if not (os.environ.get(OVERRIDE_VARIABLE) or os.environ.get(CONFIG_FILE_VARIABLE)):
+        return None
+    endpoints: list[str] = json.loads(client_config().get_json("connect/endpoints"))
+    return endpoints[0] if endpoints else None
 
 
 def client_override(endpoint: str, key: RunKey) -> str:

@@ -3,13 +3,27 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Sequence
 
 _LONGEST_LINE = 1000
+_MOST_NAMES = 6
 
 
 def counted(number: int, noun: str) -> str:
     """A number and what it counts, such as ``1 trial`` and ``0 trials``."""
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
+def listed(names: Sequence[str], word: str = "and") -> str:
+    """Names in a sentence, such as ``a, b and c``; of more than six, the others are counted.
+
+    Args:
+        names: The names.
+        word: What stands before the last one.
+    """
+    if len(names) > _MOST_NAMES:
+        names = [*names[: _MOST_NAMES - 1], f"{len(names) - _MOST_NAMES + 1} more"]
+    return f" {word} ".join(filter(None, [", ".join(names[:-1]), *names[-1:]]))
 
 
 def command(*words: object) -> str:

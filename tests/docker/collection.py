@@ -16,6 +16,7 @@ from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.prepare import prepare
 from throwcollect.dataset.inspect import info
+from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
 from throwcollect.runtime.docker import DockerRuntime
 from throwcollect.runtime.docker_runs import remove
@@ -99,7 +100,15 @@ def collecting(
     dataset = directory / "dataset"
     if not dataset.exists():
         prepare(config, dataset, sweep_directory=directory)
-    runtime = DockerRuntime(run, config, directory=dataset, logs=dataset / "logs", key=key_in(directory), client=client)
+    runtime = DockerRuntime(
+        run,
+        config,
+        directory=dataset,
+        logs=dataset / "logs",
+        key=key_in(directory),
+        middleware=Middleware(),
+        client=client,
+    )
     try:
         with Supervisor(runtime, config.run, simulations=config.run.simulations) as supervisor:
             runtime.open()

@@ -23,6 +23,7 @@ from tests.docker.cut_line import CutLine
 from throwcollect.coordinator.prepare import prepare
 from throwcollect.dataset.inspect import info
 from throwcollect.errors import ConfigError, WorkerError
+from throwcollect.ros.middleware import Middleware
 from throwcollect.runtime import docker_watch
 from throwcollect.runtime.docker import DockerRuntime
 from throwcollect.runtime.docker_engine import connect
@@ -49,7 +50,7 @@ def digest(tmp_path_factory: pytest.TempPathFactory) -> str:
     directory = tmp_path_factory.mktemp("local")
     config = config_for(directory)
     prepare(config, directory / "dataset", sweep_directory=directory)
-    runtime = LocalRuntime(directory / "dataset", directory / "logs", config.run, key_in(directory))
+    runtime = LocalRuntime(directory / "dataset", directory / "logs", config.run, key_in(directory), Middleware())
     with Supervisor(runtime, config.run, simulations=2) as supervisor:
         supervisor.start()
         until(lambda: supervisor.poll()[0] is not None)
@@ -169,7 +170,9 @@ def test_runs_side_by_side_do_not_disturb_one_another(client: DockerClient, tmp_
     config = config_for(tmp_path / "other", f"containers.volume={volume}", "run.simulations=1")
     prepare(config, tmp_path / "other" / "dataset", sweep_directory=tmp_path)
     key = key_in(tmp_path / "other")
-    runtime = DockerRuntime(run, config, directory=None, logs=tmp_path / "other" / "logs", key=key, client=client)
+    runtime = DockerRuntime(
+        run, config, directory=None, logs=tmp_path / "other" / "logs", key=key, middleware=Middleware(), client=client
+    )
     assert runtime.data == f"/data/{run}"
     try:
         with (
@@ -193,13 +196,14 @@ LAUNCHER = """
 import sys, time
 from pathlib import Path
 from throwcollect.config.loader import load
+from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
 from throwcollect.runtime.docker import DockerRuntime
 from throwcollect.runtime.supervisor import Supervisor
 run, directory = sys.argv[1], Path(sys.argv[2])
 config = load(directory / "config.yaml")
 key = RunKey(directory.parent / "key")
-runtime = DockerRuntime(run, config, directory=directory, logs=directory / "logs", key=key)
+runtime = DockerRuntime(run, config, directory=directory, logs=directory / "logs", key=key, middleware=Middleware())
 runtime.open()
 supervisor = Supervisor(runtime, config.run, simulations=2)
 supervisor.start()
@@ -242,6 +246,7 @@ def bare(client: DockerClient, tmp_path: Path) -> Any:
             directory=tmp_path,
             logs=tmp_path / "logs",
             key=key_in(tmp_path),
+            middleware=Middleware(),
             client=through,
         )
         made.append((runtime, run))

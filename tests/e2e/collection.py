@@ -66,6 +66,7 @@ class Running:
         deadline = time.monotonic() + seconds
         while not condition():
             if self.process.poll() is not None or time.monotonic() > deadline:
+                self.process.kill()
                 raise AssertionError(f"did not happen; the command says: {self.process.communicate()}")
             time.sleep(0.01)
 

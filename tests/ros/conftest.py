@@ -1,12 +1,19 @@
 """Everything here needs genuine rclpy and runs wherever Python finds it."""
 
 import os
+import shutil
 from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
 
+from throwcollect.ros.backend import EMBEDDED_RMW, RMW_VARIABLE
+
 HERE = Path(__file__).parent
+
+# The wheels of rclpy come without the command `ros2`, which meets an embedded simulation over Zenoh alone.
+_MEETS = shutil.which("ros2") is not None and os.environ.get(RMW_VARIABLE) == EMBEDDED_RMW
+collect_ignore = [] if _MEETS else ["test_ros2cli.py"]
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -16,10 +23,3 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(pytest.mark.ros)
             if find_spec("rclpy") is None:
                 item.add_marker(missing)
-
-
-@pytest.fixture(scope="session")
-def zenoh_rmw() -> None:
-    """Genuine and embedded nodes meet over Zenoh alone."""
-    if os.environ.get("RMW_IMPLEMENTATION") != "rmw_zenoh_cpp":
-        pytest.skip("RMW_IMPLEMENTATION is not rmw_zenoh_cpp")

@@ -1,7 +1,6 @@
 """The genuine ros2 command line tools with a simulation on the embedded backend."""
 
 import os
-import shutil
 import subprocess
 from collections.abc import Callable, Iterator
 
@@ -11,8 +10,6 @@ from tests.integration.robot import POSTURE, environment, start_simulation
 from throwcollect.robots.talos import CONTROLLERS
 from throwcollect.ros.router import router
 
-pytestmark = pytest.mark.skipif(shutil.which("ros2") is None, reason="there is no ros2 command")
-
 Ros2 = Callable[..., str]
 ALONE = ("--no-daemon", "--spin-time", "2")
 ACTION = "control_msgs/action/FollowJointTrajectory"
@@ -20,7 +17,7 @@ TORSO = "/sim_0/torso_controller/follow_joint_trajectory"
 
 
 @pytest.fixture(scope="module")
-def ros2(zenoh_rmw: None, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ros2]:
+def ros2(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ros2]:
     """Calls ``ros2`` in the graph of one simulation, and gives what it prints."""
     with router("tcp/127.0.0.1:0") as endpoint, pytest.MonkeyPatch.context() as patch:
         patch.setenv("SIMULATION_ROS", "embedded")

@@ -3,12 +3,20 @@ from pathlib import Path
 
 import pytest
 
-from throwcollect.wording import command, counted, is_text, printable
+from throwcollect.wording import command, counted, is_text, listed, printable
 
 
 @pytest.mark.parametrize(("number", "said"), [(0, "0 trials"), (1, "1 trial"), (2, "2 trials")])
 def test_one_alone_is_singular(number: int, said: str) -> None:
     assert counted(number, "trial") == said
+
+
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [("", ""), ("a", "a"), ("ab", "a and b"), ("abc", "a, b and c"), ("abcdefgh", "a, b, c, d, e and 3 more")],
+)
+def test_names_stand_in_a_sentence_unless_they_are_many(names: str, said: str) -> None:
+    assert listed(names) == said
 
 
 def test_a_recommended_command_can_be_typed_as_it_is() -> None:

@@ -9,7 +9,6 @@ from throwcollect.errors import Interrupted
 from throwcollect.runtime.control import down, stop
 from throwcollect.runtime.records import Records
 from throwcollect.runtime.runs import died, failure, living, to_change
-from throwcollect.runtime.scaling import scale
 from throwcollect.wording import counted
 
 
@@ -21,6 +20,9 @@ def change_scale(named: str | None, simulations: int) -> None:
         WorkerError: If its launcher does not answer.
     """
     run = to_change(Records(), named, command=f"scale {simulations}")
+    run.record.middleware.joining.settle()
+    from throwcollect.runtime.scaling import scale
+
     scale(run, simulations)
     typer.echo(f"{run.record.run}: {run.record.simulations} -> {counted(simulations, 'simulation')}")
 

@@ -303,7 +303,10 @@ def router(
 def sim(
     config: ConfigArgument = DEFAULT_CONFIG,
     name: Annotated[
-        str | None, typer.Option("--name", help="Name of the node and of its namespace; sim_<host name> by default.")
+        str | None, typer.Option("--name", help="Name of the node, and of its namespace; sim_<host name> by default.")
+    ] = None,
+    namespace: Annotated[
+        str | None, typer.Option("--namespace", help="Namespace: / where nodes look that know of no other; /<name>.")
     ] = None,
 ) -> None:
     """Run one simulation."""
@@ -313,7 +316,7 @@ def sim(
     from throwcollect.sim.main import run
 
     only_log()
-    run(config, name=name or simulation_name_of(gethostname()))
+    run(config, name=name or simulation_name_of(gethostname()), namespace=namespace)
 
 
 @app.command(rich_help_panel="Nodes, as `up` starts them")

@@ -20,11 +20,19 @@ ros_app.add_typer(service_app, name="service")
 ros_app.add_typer(action_app, name="action")
 ros_app.add_typer(param_app, name="param")
 
+
+def _settle(run: str | None) -> str | None:
+    from throwcollect.cli.ros_env import settle
+
+    return settle(run)
+
+
 RunOption = Annotated[
     str | None,
     typer.Option(
         "--run",
         metavar="RUN",
+        callback=_settle,
         help="Join this run: its id, the beginning of that, or the dataset's directory. By default, the router that "
         "ZENOH_CONFIG_OVERRIDE names, or the one at tcp/localhost:7447.",
     ),

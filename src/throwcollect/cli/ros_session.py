@@ -5,15 +5,13 @@ from __future__ import annotations
 import difflib
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
 from throwcollect import ros
+from throwcollect.cli.ros_env import joining_environment, named
 from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError, WorkerError
-from throwcollect.runtime.nodes import joining_environment
-from throwcollect.runtime.records import Records
-from throwcollect.runtime.runs import living, to_change
 
 _SLICE_S = 0.2
 """rclpy looks at signals between two waits only."""
@@ -79,7 +77,7 @@ def joined(run: str | None) -> Iterator[Session]:
         Interrupted: If the user leaves; the message is empty, as that is how one leaves.
     """
     if run is not None:
-        os.environ.update(way_into(run))
+        os.environ.update(joining_environment(named(run)))
     try:
         _init()
         session = Session()
@@ -89,23 +87,6 @@ def joined(run: str | None) -> Iterator[Session]:
             session.close()
     except KeyboardInterrupt:
         raise Interrupted("") from None
-
-
-def way_into(named: str | None) -> Mapping[str, str]:
-    """Environment variables by which a process joins a run.
-
-    Args:
-        named: Id of a run, unique beginning of one, or directory of the dataset; None for the only one that lives.
-
-    Raises:
-        ConfigError: If there is no such run, or it has ended.
-        WorkerError: If the run has no router (any more).
-    """
-    run = to_change(Records(), named, command="ros env")
-    record = living(run)
-    if record.endpoint is None:
-        raise WorkerError(f"run {record.run} has no router yet", hint="try once more")
-    return joining_environment(record.endpoint, record.domain_id, run.key)
 
 
 def _init() -> None:
@@ -179,7 +160,7 @@ def interface(kind: str, get: Callable[[str], Any], name: str) -> Any:
     """
     try:
         return get(full_name(kind, name))
-    except (ValueError, AttributeError, ModuleNotFoundError) as error:
+    except ValueError as error:
         raise ConfigError(f"{name}: {error}") from error
 
 

@@ -24,9 +24,9 @@ from throwcollect.dataset.directory import CONFIG, PLAN, TRIALS, config_path
 from throwcollect.dataset.inspect import info
 from throwcollect.dataset.lock import held_together
 from throwcollect.errors import ConfigError, Problem
+from throwcollect.ros.middleware import Middleware
 from throwcollect.runtime.choice import choose
 from throwcollect.runtime.detached import start_launcher, wait_for_nodes
-from throwcollect.runtime.launcher import launch, place_of
 from throwcollect.runtime.ports import reserved_port
 from throwcollect.runtime.records import OpenRun, Record, Records, Run
 from throwcollect.runtime.runs import busy, left_in
@@ -123,6 +123,8 @@ def _collect(request: _Request, *, detach: bool, json: bool) -> None:
         with display(quiet=json, bar=not detach) as shown:
             ready = _ready(records, request, shown, held)
             if ready is not None and not detach:
+                from throwcollect.runtime.launcher import launch
+
                 with Interruptions() as interruptions:
                     run, config = ready
                     summary, lost = launch(run, config, onlooker=shown, interruptions=lambda: interruptions.count)
@@ -142,6 +144,7 @@ def _ready(records: Records, request: _Request, shown: Display, held: ExitStack)
     left = left_in(records, directory)
     if left is not None:
         run, config = _taken_over(records, left, config)
+        run.record.middleware.joining.settle()
         fate = "died" if left.status == "died" else "given up"
         shown.say(f"run {run.run}: its launcher had {fate}; it goes on where its containers are")
         return run, config
@@ -169,6 +172,9 @@ def serve(run: str, lock: int) -> None:
     """
     with display(quiet=True) as shown, Interruptions() as interruptions:
         inherited = Records().inherited(run, lock)
+        inherited.record.middleware.joining.settle()
+        from throwcollect.runtime.launcher import launch
+
         config = load(config_path(Path(inherited.record.directory)))
         launch(inherited, config, onlooker=shown, interruptions=lambda: interruptions.count)
 
@@ -186,8 +192,8 @@ def _prepared(records: Records, request: _Request, plan: Plan | None, shown: Dis
         # Getting an image may take minutes, so all that may be wrong is found before; but where there is a volume, it
         # is the runtime that decides where the dataset is.
         volume = config.containers.volume
-        runtime = choose(config, say=shown.say, warn=shown.warn) if volume else None
-        if runtime == "local":
+        choice = choose(config, say=shown.say, warn=shown.warn) if volume else None
+        if choice is not None and choice.runtime == "local":
             volume = None
         if volume and plan is not None:
             raise ConfigError(
@@ -203,11 +209,12 @@ def _prepared(records: Records, request: _Request, plan: Plan | None, shown: Dis
         held.enter_context(held_together(directory))
         if not request.resumed:
             undo.callback(_remove_plan, directory, made=made)
-        runtime = runtime or choose(config, say=shown.say, warn=shown.warn)
+        choice = choice or choose(config, say=shown.say, warn=shown.warn)
+        choice.middleware.joining.settle()
         record = Record(
             run=run.run,
             name=config.name,
-            runtime=runtime,
+            runtime=choice.runtime,
             directory=str(directory.absolute()),
             volume=volume,
             logs=str((run.directory if volume else directory).absolute() / "logs"),
@@ -216,18 +223,30 @@ def _prepared(records: Records, request: _Request, plan: Plan | None, shown: Dis
             launcher=os.getpid(),
             simulations=config.run.simulations,
             begun_in=os.getcwd(),
+            middleware=choice.middleware,
         )
+        from throwcollect.runtime.launcher import place_of
+
         # Finds what cannot be had of what the configuration asks for.
         place_of(record, config, run.key, warn=shown.warn).close()
         run.write(record)
         undo.pop_all()
     refused = sum(trial.refused is not None for trial in plan.trials)
     note = f", {refused} refused by calculation (see `throwcollect plan`)" if refused else ""
-    if config.run.open:
-        shown.warn("run.open: anybody who reaches the router may join, read and disturb this run")
+    _warn_of_company(config, choice.middleware, shown)
     where = f"volume {volume}" if volume else directory
     shown.say(f"plan: {counted(len(plan.trials), 'trial')}{note}{more_trials(plan)}; dataset: {where}")
     return run
+
+
+def _warn_of_company(config: Config, middleware: Middleware, shown: Display) -> None:
+    """Say in one line that others may join a run, if they may."""
+    if config.run.open:
+        shown.warn("run.open: anybody who reaches the router may join, read and disturb this run")
+    elif middleware.is_fast_dds:
+        shown.warn("on Fast DDS, whoever finds the router's port may join and disturb this run; episodes are signed")
+    elif not middleware.keeps_others_out:
+        shown.warn(f"{middleware.rmw}: anybody on its network may join and disturb this run; episodes are signed")
 
 
 def _remove_plan(directory: Path, *, made: bool) -> None:

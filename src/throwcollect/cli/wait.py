@@ -12,7 +12,6 @@ from throwcollect.cli.summary import print_summary
 from throwcollect.cli.terminal import display
 from throwcollect.errors import Interrupted
 from throwcollect.runtime.events import EVENTS, parse
-from throwcollect.runtime.listening import follow
 from throwcollect.runtime.logs import Tail
 from throwcollect.runtime.records import Records
 from throwcollect.runtime.runs import died, failure, to_watch
@@ -31,6 +30,9 @@ def wait_for(named: str | None, *, json: bool) -> None:
     """
     records = Records()
     run = to_watch(records, named, say=partial(typer.echo, err=True))
+    run.record.middleware.joining.settle()
+    from throwcollect.runtime.listening import follow
+
     events = Tail(Path(run.record.logs) / EVENTS)
     events.skip()
     with display(quiet=json) as shown, Interruptions() as interruptions:

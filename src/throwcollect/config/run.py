@@ -22,6 +22,11 @@ class RunConfig(Section):
     0 takes a free one, and publishes none of a container."""
     open: bool = False
     """Anybody who reaches the router may join, read and disturb the run; episodes are still signed."""
+    ros: Literal["auto", "rclpy", "embedded"] = "auto"
+    """What nodes run on: genuine ROS 2 (`rclpy`) or the embedded client; `auto` takes rclpy where it is installed."""
+    root_namespace: bool = False
+    """The one simulation lives in the root namespace, where nodes look for the real robot (`/clock`, `/tf`,
+    `/arm_left_controller/...`), and not in `/sim_0`."""
     domain_id: Annotated[int, Field(ge=0, le=232)] = 0
     """ROS domain."""
     trial_timeout_s: PositiveFloat = 60.0

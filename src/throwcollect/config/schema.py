@@ -302,6 +302,10 @@ class Config(Section):
             wrong["containers.sim.ports"] = (
                 f"should be left out, as {self.run.simulations} simulations cannot share a port of this machine"
             )
+        if self.run.root_namespace and self.run.simulations > 1:
+            wrong["run.root_namespace"] = (
+                f"should be left out, as {self.run.simulations} simulations (-n) cannot share a namespace"
+            )
         if wrong:
             raise ContradictionError(wrong)
         return self

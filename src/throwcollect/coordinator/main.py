@@ -15,7 +15,9 @@ from throwcollect.dataset.directory import known_directory
 from throwcollect.dataset.inspect import info, loss
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.errors import Interrupted, WorkerError
+from throwcollect.heartbeat import Heartbeat
 from throwcollect.interruption import stop_signals
+from throwcollect.ros.self_check import check_answers
 from throwcollect.tasks.throw import ThrowResult
 from throwcollect.wording import command, counted
 
@@ -37,7 +39,7 @@ def run(directory: Path) -> None:
     Raises:
         DatasetError: If the directory holds no plan, or cannot be written, or a trial came out otherwise when it was
             simulated again.
-        WorkerError: If every simulation refuses every trial, or trials cannot be simulated again.
+        WorkerError: If every simulation refuses every trial, trials cannot be simulated again, or ROS 2 is silent.
         LossError: If the dataset is finished, and trials of it are lost.
         Interrupted: If a signal ended the collection before its last trial.
     """
@@ -60,6 +62,7 @@ def run(directory: Path) -> None:
         signal.signal(number, drain)
     executor = ros.SingleThreadedExecutor()
     executor.add_node(node)
+    check_answers(node, executor)
     # What is here now stays until the end; the garbage collector need not go through it again and again.
     gc.freeze()
     try:
@@ -90,10 +93,12 @@ def _collect(node: Coordinator, writer: DatasetWriter, executor: ros.Executor) -
         DatasetError: If the dataset cannot be written.
     """
     told = synced = time.monotonic()
+    heartbeat = Heartbeat()
     while not node.finished:
+        heartbeat.beat()
         # Simulations come first: what can wait is done when no message is there.
         waiting = node.backlog or node.prepare_one()
-        executor.spin_once(timeout_sec=0.0 if waiting else _IDLE_S)
+        ros.spin_some(executor, timeout_sec=0.0 if waiting else _IDLE_S)
         if node.backlog:
             node.write_one()
         if (reason := node.hopeless) is not None:
@@ -116,12 +121,18 @@ def _check(directory: Path, writer: DatasetWriter, executor: ros.Executor) -> No
         WorkerError: If trials cannot be simulated again.
     """
     config = writer.plan.config
+    heartbeat = Heartbeat()
+
+    def go_on() -> None:
+        heartbeat.beat()
+        executor.spin_once(timeout_sec=_IDLE_S)
+
     said = check_by_replay(
         directory,
         writer.digests(),
         count=config.run.replay,
         seed=config.seed,
-        meanwhile=lambda: executor.spin_once(timeout_sec=_IDLE_S),
+        meanwhile=go_on,
     )
     if said is not None:
         print(said, flush=True)

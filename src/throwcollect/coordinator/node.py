@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 import time
-from collections import Counter, deque
+from collections import Counter, defaultdict, deque
+from collections.abc import Iterator
 
 from throwcollect.coordinator.acceptance import Acceptance, Assignment
 from throwcollect.coordinator.goals import FollowJointTrajectory
 from throwcollect.coordinator.growth import Growth
 from throwcollect.coordinator.leases import Leases
-from throwcollect.coordinator.progress import PROGRESS_QOS, PROGRESS_TOPIC, Progress, String
+from throwcollect.coordinator.progress import Progress
+from throwcollect.coordinator.progress_topic import PROGRESS_QOS, PROGRESS_TOPIC, String
 from throwcollect.coordinator.simulation_client import EPISODE_TOPIC, SimulationClient
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.episode.message import Episode, unpack
@@ -26,6 +28,12 @@ _DISCOVERY_PERIOD_S = 0.1
 _REPORT_PERIOD_S = 0.2
 _UNREADABLE_PERIOD_S = 10.0
 """Whoever publishes garbage may do so often."""
+_SHARED_PERIOD_S = 10.0
+"""Time between two warnings of simulations that share a namespace."""
+_UNKNOWN = "_NODE_NAME_UNKNOWN_"
+"""What an RMW calls a node that it has not heard of yet, unlike its publisher."""
+_REACH_S = 6.0
+"""Nodes that see each other are connected within a second, also on a busy machine."""
 _RATE_WINDOW_S = 10.0
 """Throws per second are averaged over this time."""
 
@@ -49,6 +57,8 @@ class Coordinator(Node):
         self._limits = joint_limits()
         self._simulations: dict[str, SimulationClient] = {}
         self._discovered_changes = -1
+        self._visible: set[str] = set()
+        self._unreached: dict[str, float] = {}
         self._signer = Signer.of_environment()
         self._acceptance = Acceptance(plan.config)
         self._assignments: dict[int, Assignment] = {}
@@ -195,11 +205,13 @@ class Coordinator(Node):
             outcomes=dict(self._outcomes),
             simulations=len(self._simulations),
             throws_per_s=(ended - before) / (now - since) if now > since else 0.0,
-            hung=[name.strip("/") for name, simulation in self._simulations.items() if simulation.hung],
+            hung=sorted(
+                {simulation.name for simulation in self._simulations.values() if simulation.hung} | self._unreachable
+            ),
             wanted=self._config.until.landed if self._config.until else None,
-            set_aside={name.strip("/"): reason for name, reason in self._set_aside.items()},
+            set_aside={self._name_in(namespace): reason for namespace, reason in self._set_aside.items()},
         )
-        self._progress.publish(progress.message())
+        self._progress.publish(String(data=progress.to_json()))
         return progress
 
     def _discover(self) -> None:
@@ -211,29 +223,81 @@ class Coordinator(Node):
         for namespace, simulation in list(self._simulations.items()):
             if now > simulation.deadline:
                 simulation.hung = True
-                self._take_back(namespace, f"no episode within {self._patience_s:g} s")
+                besides = f", and no answer to {simulation.unanswered[0]}" if simulation.unanswered else ""
+                self._take_back(namespace, f"no episode within {self._patience_s:g} s{besides}")
+            elif (missing := simulation.remind()) is not None:
+                trial = self._leases.held_by(namespace)
+                self.get_logger().warning(f"{namespace}: no answer to {missing} of trial {trial}, which is sent again")
             self._lease(namespace)
+        self._notice_unreached(now)
+
+    def _notice_unreached(self, now: float) -> None:
+        """Notice simulations that are in the graph and cannot be asked: the connection to them was never made whole."""
+        reached = {namespace for namespace, simulation in self._simulations.items() if simulation.ready()}
+        self._unreached = {
+            namespace: self._unreached.get(namespace, now) for namespace in self._visible if namespace not in reached
+        }
+
+    @property
+    def _unreachable(self) -> set[str]:
+        """Names of simulations that have been out of reach for too long; a new connection is a matter of luck."""
+        latest = time.monotonic() - _REACH_S
+        return {self._name_in(namespace) for namespace, since in self._unreached.items() if since < latest}
 
     def _find_simulations(self) -> None:
-        offered = {
-            topic.removesuffix(f"/{EPISODE_TOPIC}")
-            for topic, types in self.get_topic_names_and_types()
-            if topic.endswith(f"/{EPISODE_TOPIC}") and "std_msgs/msg/UInt8MultiArray" in types
-            if self.count_publishers(topic)
-        }
-        for namespace in offered - self._simulations.keys():
+        self._visible.clear()
+        offered = {namespace: (name, publishers) for namespace, name, publishers in self._offered()}
+        for namespace, simulation in list(self._simulations.items()):
+            name, publishers = offered.get(namespace, ("", frozenset()))
+            if name != simulation.name:
+                self._lose(namespace, "left the ROS graph")
+            elif publishers - simulation.publishers:
+                # Where nodes are silent for a while before they count as gone, its successor is there first.
+                self._lose(namespace, "was started again")
+        for namespace in offered.keys() - self._simulations.keys():
             self._simulations[namespace] = SimulationClient(
                 self,
                 namespace,
+                *offered[namespace],
                 controllers=self._controllers,
                 action_type=FollowJointTrajectory,
                 on_episode=self._receive,
                 on_refusal=lambda name, reason: self._take_back(name, reason, refused=True),
             )
-        for namespace in self._simulations.keys() - offered:
-            self._take_back(namespace, "left the ROS graph")
-            self._leases.forget(namespace)
-            self._simulations.pop(namespace).destroy()
+
+    def _lose(self, namespace: str, reason: str) -> None:
+        self._take_back(namespace, reason)
+        self._leases.forget(namespace)
+        self._simulations.pop(namespace).destroy()
+
+    def _offered(self) -> Iterator[tuple[str, str, frozenset[bytes]]]:
+        """Each simulation in the graph, which is a node that publishes episodes: namespace, name, its publishers."""
+        for topic, types in self.get_topic_names_and_types():
+            above, _, last = topic.rpartition("/")
+            if last != EPISODE_TOPIC or "std_msgs/msg/UInt8MultiArray" not in types:
+                continue
+            publishers: defaultdict[str, set[bytes]] = defaultdict(set)
+            for info in self.get_publishers_info_by_topic(topic):
+                publishers[info.node_name].add(bytes(info.endpoint_gid))
+            if publishers:
+                self._visible.add(above or "/")
+            names = publishers.keys() - {_UNKNOWN}
+            # Whoever else publishes there, the simulation sim_0 is the node sim_0 in the namespace /sim_0.
+            names = names & {above.removeprefix("/")} or names
+            if len(names) > 1:
+                self.get_logger().warning(
+                    f"namespace {above or '/'}: gets no trials, as it is that of {len(names)} simulations: "
+                    f"{', '.join(sorted(names))}",
+                    throttle_duration_sec=_SHARED_PERIOD_S,
+                )
+            elif names:
+                (name,) = names
+                yield above or "/", name, frozenset(publishers[name])
+
+    def _name_in(self, namespace: str) -> str:
+        """Name of the simulation in a namespace, also when it has left."""
+        simulation = self._simulations.get(namespace)
+        return namespace.strip("/") if simulation is None else simulation.name
 
     def _lease(self, namespace: str) -> None:
         simulation = self._simulations.get(namespace)
@@ -247,7 +311,7 @@ class Coordinator(Node):
         assignment = self._assignments.get(trial) or self._assign(trial)
         self._assignments[trial] = assignment
         simulation.deadline = time.monotonic() + self._patience_s
-        self._writer.note("lease", trial=trial, simulation=namespace.strip("/"))
+        self._writer.note("lease", trial=trial, simulation=simulation.name)
         lease = assignment.lease(namespace, trial)
         simulation.begin(lease, lease.sign(self._signer), assignment.messages)
 
@@ -297,7 +361,7 @@ class Coordinator(Node):
     def _give_back(self, namespace: str, trial: int, reason: str, given_up: list[str] | None) -> None:
         """Tell of a trial that goes to another simulation, or write that it is lost, with the reasons."""
         self.get_logger().warning(f"{namespace}: trial {trial} is given to another simulation: {reason}")
-        self._writer.note("fail", trial=trial, simulation=namespace.strip("/"), reason=reason)
+        self._writer.note("fail", trial=trial, simulation=self._name_in(namespace), reason=reason)
         if given_up is not None:
             del self._assignments[trial]
             self._writer.append_lost(trial, "; ".join(given_up))

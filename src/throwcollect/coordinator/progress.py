@@ -1,24 +1,14 @@
-"""What the coordinator tells about its progress, and how to listen to it from another process."""
+"""What the coordinator tells about its progress; `progress_topic` carries it."""
 
 from __future__ import annotations
 
 import json
-import os
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from types import TracebackType
-from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from throwcollect import ros
-from throwcollect.ros import DurabilityPolicy, get_message
 from throwcollect.wording import counted
-
-String: Any = get_message("std_msgs/msg/String")
-
-PROGRESS_TOPIC = "/coordinator/progress"
-PROGRESS_QOS = ros.QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 @dataclass(frozen=True)
@@ -86,13 +76,13 @@ class Progress:
         simulations = counted(self.simulations, "simulation")
         return [f"{self.failed} failed", *lost, simulations, f"{self.throws_per_s:.1f} throws/s"]
 
-    def message(self) -> Any:
-        """The message that carries it: a std_msgs/String of JSON."""
-        return String(data=json.dumps(asdict(self)))
+    def to_json(self) -> str:
+        """All of it as JSON, as `read` takes it."""
+        return json.dumps(asdict(self))
 
     @classmethod
     def read(cls, text: str) -> Progress | None:
-        """Progress from the text of its message; None if somebody else has published something else there."""
+        """Progress from its JSON; None if somebody else has published something else there."""
         try:
             return _PROGRESS.validate_json(text, strict=True)
         except ValidationError:
@@ -100,43 +90,3 @@ class Progress:
 
 
 _PROGRESS = TypeAdapter(Progress)
-
-
-class ProgressListener:
-    """A node of its own that hears the coordinator's progress; use it as a context manager.
-
-    Attributes:
-        node: The node.
-
-    Args:
-        on_progress: Called with every report, within `spin`.
-        name: Name of the node; one of this process alone, and hidden, by default.
-
-    Raises:
-        ThrowcollectError: If there is no router.
-    """
-
-    def __init__(self, on_progress: Callable[[Progress], None], *, name: str | None = None) -> None:
-        ros.init()
-        self.node = ros.Node(name or f"_throwcollect_{os.getpid()}")
-        self._executor = ros.SingleThreadedExecutor()
-        self._executor.add_node(self.node)
-        self._on_progress = on_progress
-        self.node.create_subscription(String, PROGRESS_TOPIC, self._hear, PROGRESS_QOS)
-
-    def __enter__(self) -> ProgressListener:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.node.destroy_node()
-        ros.shutdown()
-
-    def spin(self, seconds: float) -> None:
-        """Wait for a report, at most so long [s]."""
-        self._executor.spin_once(timeout_sec=seconds)
-
-    def _hear(self, message: Any) -> None:
-        if (progress := Progress.read(message.data)) is not None:
-            self._on_progress(progress)

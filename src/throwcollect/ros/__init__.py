@@ -1,8 +1,13 @@
 """The ROS 2 edge: what a node needs of rclpy's API, and the classes of its messages.
 
 Nodes import from here and from nowhere below, so that they run unchanged on both backends: genuine rclpy, and the
-embedded one. See `backend`.
+embedded one. The first name that is taken from here settles which one it is; see `backend`.
 """
 
-from throwcollect.ros.chosen import *  # noqa: F403
-from throwcollect.ros.chosen import __all__ as __all__
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from throwcollect.ros.embedded import *  # noqa: F403
+    from throwcollect.ros.embedded import __all__ as __all__
+else:
+    from throwcollect.ros.chosen import __getattr__ as __getattr__

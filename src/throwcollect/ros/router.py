@@ -1,4 +1,4 @@
-"""A Zenoh router, as ``ros2 run rmw_zenoh_cpp rmw_zenohd`` is one.
+"""The router of a run: one of Zenoh, as ``ros2 run rmw_zenoh_cpp rmw_zenohd`` is, or a discovery server of Fast DDS.
 
 ``python -m throwcollect.ros.router --listen tcp/127.0.0.1:7447`` runs until it is told to stop by SIGTERM or SIGINT.
 """
@@ -18,8 +18,10 @@ import zenoh
 
 from throwcollect.errors import ConfigError, ThrowcollectError
 from throwcollect.interruption import stop_signals
+from throwcollect.ros.discovery_server import discovery_server
+from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
-from throwcollect.session_config import PROTECTED, in_words, router_config
+from throwcollect.session_config import OPEN, PROTECTED, in_words, router_config
 
 DEFAULT_LISTEN = "tcp/127.0.0.1:7447"
 """Reachable from this host alone, at the port that nodes connect to by default."""
@@ -48,6 +50,26 @@ def router(listen: str = DEFAULT_LISTEN, key: RunKey | None = None) -> Iterator[
         yield endpoint
     finally:
         session.close()  # type: ignore[no-untyped-call]
+
+
+@contextmanager
+def _discovery_server(listen: str) -> Iterator[str]:
+    """Run a discovery server of Fast DDS.
+
+    Args:
+        listen: Endpoint to listen on; port 0 takes a free one.
+
+    Yields:
+        The endpoint that nodes look for.
+
+    Raises:
+        ConfigError: If it cannot listen there, or there is no such program.
+        WorkerError: If it ends at once.
+    """
+    address, _, port = listen.rpartition(":")
+    endpoint = f"{address}:{_free_port(address)}" if port == "0" else listen
+    with discovery_server(endpoint):
+        yield endpoint
 
 
 def _open(listen: str, key: RunKey | None) -> tuple[zenoh.Session, str]:
@@ -104,7 +126,9 @@ def serve(listen: str = DEFAULT_LISTEN, key_directory: Path | None = None) -> No
     stop: SimpleQueue[int] = SimpleQueue()
     for number in stop_signals():
         signal.signal(number, lambda received, _frame: stop.put(received))
-    with router(listen, key) as endpoint:
+    # In an open run, nodes on Fast DDS find each other as DDS does it, and the router only shows that the run lives.
+    by_server = Middleware.of_process().is_fast_dds and not listen.startswith(OPEN)
+    with _discovery_server(listen) if by_server else router(listen, key) as endpoint:
         print(f"router listening on {endpoint}", flush=True)
         # In slices: a signal just before the wait would have its handler run only when the wait ends.
         while True:

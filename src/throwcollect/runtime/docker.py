@@ -8,14 +8,17 @@ import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, suppress
+from ipaddress import ip_network
 from pathlib import Path
 from typing import Any
 
 from docker.client import DockerClient
 from docker.errors import NotFound
+from docker.types import IPAMConfig, IPAMPool
 
 from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError, Interrupted, Problem, WorkerError
+from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
 from throwcollect.runtime.docker_checks import check
 from throwcollect.runtime.docker_clock import EngineClock
@@ -48,6 +51,8 @@ _LOG_S = 2.0
 _BEGIN_S = 30.0
 """Nobody but the end of the run waits longer for a container that is being started."""
 _POLL_S = 0.2
+_ROUTER_HOST = -2
+"""Last address of a range that is not that of a broadcast."""
 _AT_ONCE = 8
 _SIGNALLED = 128
 """Exit codes above this are those of a signal."""
@@ -85,18 +90,20 @@ class DockerRuntime:
         directory: Path | None,
         logs: Path,
         key: RunKey,
+        middleware: Middleware,
         warn: Callable[[str], None] = lambda _line: None,
         client: DockerClient | None = None,
     ) -> None:
         source = config.containers.volume if directory is None else str(directory.resolve())
         if source is None:
             raise ConfigError([Problem("missing, as the dataset has no directory either", "containers.volume")])
-        self.listen = router_endpoint(config)
+        self.listen = router_endpoint(config, middleware)
         self.cleared = False
         self._place = RunPlace(run_id, source)
         self.data = self._place.data
         self._config = config
         self._key = key
+        self._middleware = middleware
         self._logs = NodeLogs(logs)
         self._watch: EngineWatch | None = None
         self._nodes: dict[str, NodeContainer] = {}
@@ -129,11 +136,33 @@ class DockerRuntime:
             if not self._client.networks.list(filters={"label": f"{RUN_LABEL}={place.run_id}"}):
                 with ThreadPoolExecutor(1) as beside:
                     placed = beside.submit(place_key, self._client, place, self._config, self._key)
-                    self._client.networks.create(
-                        place.network, driver="bridge", internal=not published(self._config), labels=place.labels()
-                    )
+                    self._create_network()
                     placed.result()
         self._watch = EngineWatch(self._client, place, self._clock)
+
+    def _create_network(self) -> None:
+        """Make the run's network; on Fast DDS one in which the router can always have the same address.
+
+        Nodes on Fast DDS look up the address of their discovery server once. The engine gives containers addresses that
+        they may choose only in a network whose range was named, so it is asked for a free range first.
+        """
+        place = self._place
+        options = {"driver": "bridge", "internal": not published(self._config), "labels": place.labels()}
+        network = self._client.networks.create(place.network, **options)
+        if self._middleware.is_fast_dds:
+            network.reload()
+            pool = IPAMPool(subnet=network.attrs["IPAM"]["Config"][0]["Subnet"])
+            network.remove()
+            self._client.networks.create(place.network, ipam=IPAMConfig(pool_configs=[pool]), **options)
+
+    def _address_of(self, name: str) -> str | None:
+        """The address that a node is to have in the run's network; None if it may be any."""
+        if name != ROUTER or not self._middleware.is_fast_dds:
+            return None
+        with engine_errors("the engine does not say which addresses the run's network has"):
+            network = self._client.networks.get(self._place.network)
+        # The engine gives addresses from the beginning of the range.
+        return str(ip_network(network.attrs["IPAM"]["Config"][0]["Subnet"])[_ROUTER_HOST])
 
     def found(self) -> tuple[str, ...]:
         """Names of the nodes whose containers exist already, of a launcher that died; they become nodes of this one.
@@ -188,7 +217,15 @@ class DockerRuntime:
             arguments: Arguments of the `throwcollect` command.
             core: Processor core that it is bound to unless the configuration binds it; None for any.
         """
-        options = node_options(name, arguments, place=self._place, config=self._config, core=core)
+        options = node_options(
+            name,
+            arguments,
+            place=self._place,
+            config=self._config,
+            middleware=self._middleware,
+            core=core,
+            address=self._address_of(name),
+        )
         node = self._nodes[name] = self._node(name)
         node.start(options, networks=section_of(self._config, name).networks)
 

@@ -32,6 +32,11 @@ def engine_address() -> str:
     return os.environ.get("DOCKER_HOST") or _DEFAULT_HOST
 
 
+def is_local() -> bool:
+    """Whether the engine is that of this machine, so that its containers can be reached from here."""
+    return engine_address().startswith("unix:")
+
+
 def connect(*, timeout_s: float | None = None) -> DockerClient:
     """A client of the engine that ``DOCKER_HOST`` names.
 

@@ -16,6 +16,7 @@ from throwcollect.config.containers import NodeContainerConfig
 from throwcollect.config.schema import Config
 from throwcollect.dataset.card import HOST_VARIABLE
 from throwcollect.dataset.directory import DIRECTORY_VARIABLE
+from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
 from throwcollect.runtime.image import default_tag
 from throwcollect.runtime.nodes import COORDINATOR, ROUTER, node_environment, protocol_of
@@ -97,9 +98,9 @@ class RunPlace:
         return Mount(target=str(KEY.directory), source=self.key_volume, type="volume", read_only=read_only)
 
 
-def router_endpoint(config: Config) -> str:
+def router_endpoint(config: Config, middleware: Middleware) -> str:
     """Zenoh endpoint of the router: in the router itself, its name means its address in the run's network alone."""
-    return f"{protocol_of(config.run)}/{ROUTER}:{ROUTER_PORT}"
+    return f"{protocol_of(config.run, middleware)}/{ROUTER}:{ROUTER_PORT}"
 
 
 def image(config: Config) -> str:
@@ -137,7 +138,14 @@ def confined(place: RunPlace, config: Config) -> dict[str, Any]:
 
 
 def node_options(
-    name: str, arguments: Sequence[str], *, place: RunPlace, config: Config, core: int | None
+    name: str,
+    arguments: Sequence[str],
+    *,
+    place: RunPlace,
+    config: Config,
+    middleware: Middleware,
+    core: int | None,
+    address: str | None = None,
 ) -> dict[str, Any]:
     """Keywords for `containers.create` that make the container of a node.
 
@@ -146,13 +154,15 @@ def node_options(
         arguments: Arguments of the `throwcollect` command.
         place: The run.
         config: Its configuration.
+        middleware: What carries the messages of its nodes.
         core: Processor core that it is bound to unless the configuration binds it; None for any.
+        address: Its address in the run's network; None for any.
     """
     node = section_of(config, name)
     options: dict[str, Any] = dict(node.options)
     general = confined(place, config)
     own = {
-        **node_environment(router_endpoint(config), config.run.domain_id, KEY),
+        **node_environment(router_endpoint(config, middleware), config.run.domain_id, KEY, middleware),
         # What nodes would say otherwise, a random id and /data, means nothing outside of the container.
         HOST_VARIABLE: socket.gethostname(),
         DIRECTORY_VARIABLE: "" if place.in_volume else place.source,
@@ -175,7 +185,7 @@ def node_options(
         "ulimits": [Ulimit(name=key, soft=value, hard=value) for key, value in options.get("ulimits", {}).items()],
         "mounts": [*mounts, *map(_bind, node.mounts)],
         "network": place.network,
-        "networking_config": {place.network: EndpointConfig(_API_VERSION, aliases=[name])},
+        "networking_config": {place.network: EndpointConfig(_API_VERSION, aliases=[name], ipv4_address=address)},
         "ports": ports,
         "nano_cpus": None if node.cpus is None else round(node.cpus * 10**9),
         "mem_limit": node.memory,

@@ -16,11 +16,12 @@ from typing import Literal
 
 from docker.errors import ImageNotFound
 
+from throwcollect import ros_installation
 from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.robots.model import half_sitting, joint_limits, urdf_path
 from throwcollect.runtime.docker_engine import connect, engine_address, engine_errors
 from throwcollect.runtime.image import default_tag, is_outdated
-from throwcollect.wording import counted
+from throwcollect.wording import counted, listed
 
 _GIB = 1024**3
 _SIMULATION_MEMORY_GIB = 0.3
@@ -118,6 +119,32 @@ def _port() -> Check:
     return Check("ports", "ok", f"{_ROS_ROUTER_PORT}, where ROS nodes look for a router, is free")
 
 
+def _rclpy() -> Check:
+    lacking = ros_installation.missing()
+    if "rclpy" in lacking:
+        return Check("rclpy", "note", f"not installed; to have it: {ros_installation.how_to_install()}")
+    rmws = listed(ros_installation.rmws()) or "no RMW"
+    found = f"{ros_installation.rclpy_version() or 'of unknown version'} with {rmws}"
+    if lacking:
+        return Check("rclpy", "note", f"{found}, without {listed(lacking)}; try: {ros_installation.how_to_install()}")
+    return Check("rclpy", "ok", f"{found} and all interfaces")
+
+
+def _embedded() -> Check:
+    found = f"Zenoh {version('eclipse-zenoh')}"
+    try:
+        # Its package loads the backend that is chosen.
+        from throwcollect.ros.backend import VARIABLE, uses_rclpy
+
+        chosen = "rclpy" if uses_rclpy() else "the embedded backend"
+    except ConfigError as error:
+        return Check("embedded", "problem", f"{found}; {'; try: '.join(filter(None, [error.message, error.hint]))}")
+    except ImportError as error:
+        return Check("embedded", "problem", f"{found}, but rclpy is chosen and cannot be imported: {error}")
+    value = os.environ.get(VARIABLE)
+    return Check("embedded", "ok", f"{found}; nodes run on {chosen}, as {VARIABLE} is {value or 'not set'}")
+
+
 def _disk(directory: Path) -> Check:
     free = shutil.disk_usage(directory).free / _GIB
     status: Literal["ok", "problem"] = "ok" if free >= _LEAST_DISK_GIB else "problem"
@@ -133,5 +160,5 @@ def examine(directory: Path) -> list[Check]:
     Returns:
         The findings, in a fixed order.
     """
-    checks: list[Callable[[], Check]] = [_python, _cores, _memory, _pybullet, _robot, _docker, _port]
+    checks: list[Callable[[], Check]] = [_python, _cores, _memory, _pybullet, _robot, _rclpy, _embedded, _docker, _port]
     return [*(check() for check in checks), _disk(directory)]

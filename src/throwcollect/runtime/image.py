@@ -25,13 +25,17 @@ DEFAULT_BASE = "python:3.11-slim-bookworm"
 """Base image, as in the Dockerfile."""
 
 _DOCKERFILE = "docker/Dockerfile"
-_TARGET = "embedded"
+_TARGET = "throwcollect"
 _SOURCES = ("pyproject.toml", "README.md", "configs/quickstart.yaml", "src")
+_INTERFACES = ("packaging/ros_interfaces", "packaging/ros_constraints.txt")
+"""What the wheel with interfaces of ROS 2 is made from, besides sources."""
 _LEFT_OUT = re.compile(r"__pycache__|.*\.egg-info")
 SOURCES_LABEL = "throwcollect.sources"
 """Label that tells which sources are installed in an image."""
 SOURCE_LABEL = "org.opencontainers.image.source"
 """Label that tells where the sources come from; an image of a clone from nowhere else than this machine has none."""
+RMW_LABEL = "throwcollect.rmw"
+"""Label that tells which middleware genuine rclpy has in an image; an image without rclpy has none."""
 _SCHEMES = ("https", "http", "ssh", "git")
 _SSH_ADDRESS = re.compile(r"(?:[^@:/]+@)?([^@:/]{2,}):(?!//)/?(.+)")
 """The short form of ssh: ``git@host:path``."""
@@ -148,6 +152,21 @@ def is_outdated(client: DockerClient, tag: str) -> bool:
     return label not in (_UNKNOWN, _digest_of(root))
 
 
+def rmw_of(client: DockerClient, tag: str) -> str | None:
+    """Middleware of the genuine rclpy in an image; None if it has no rclpy.
+
+    Args:
+        client: Client of the engine.
+        tag: Name of the image, which the engine has.
+
+    Raises:
+        WorkerError: If the engine does not answer.
+    """
+    with engine_errors(f"the engine does not say what the image {tag} holds"):
+        label = client.images.get(tag).labels.get(RMW_LABEL)
+    return label if isinstance(label, str) else None
+
+
 def source_root() -> Path:
     """Directory of the clone that this package runs from.
 
@@ -192,7 +211,7 @@ def _write_context(archive: IO[bytes], root: Path, wheelhouse: Path | None) -> N
         return None if _LEFT_OUT.fullmatch(Path(info.name).name) else info
 
     with tarfile.open(fileobj=archive, mode="w") as context:
-        for name in _SOURCES:
+        for name in (*_SOURCES, *_INTERFACES):
             context.add(root / name, name, filter=entry)
         for path in sorted((root / "docker").iterdir()):
             if path.is_file():

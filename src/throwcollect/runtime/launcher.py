@@ -5,6 +5,7 @@ It is the node ``/launcher``; setting its integer parameter ``simulations`` scal
 
 from __future__ import annotations
 
+import math
 import os
 import time
 from collections.abc import Callable, Mapping
@@ -22,10 +23,10 @@ from throwcollect.run_key import RunKey
 from throwcollect.runtime.events import EventLog, RunEvent
 from throwcollect.runtime.listening import Listening
 from throwcollect.runtime.local import LocalRuntime
-from throwcollect.runtime.nodes import LAUNCHER, NodeExit, endpoint_of
+from throwcollect.runtime.nodes import COORDINATOR, LAUNCHER, ROUTER, NodeExit, endpoint_of
 from throwcollect.runtime.records import OpenRun, Record
 from throwcollect.runtime.runs import goes_on
-from throwcollect.runtime.scaling import offer_scaling
+from throwcollect.runtime.scaling import MOST_SIMULATIONS, offer_scaling
 from throwcollect.runtime.supervisor import NodeState, Supervisor
 from throwcollect.wording import command
 
@@ -37,6 +38,8 @@ Place = Union[LocalRuntime, "DockerRuntime"]
 
 _POLL_S = 0.05
 _WRITE_PROGRESS_S = 1.0
+_MEET_S = 20.0
+"""Nodes that are ready see each other within a second."""
 
 
 class Onlooker(Protocol):
@@ -66,11 +69,19 @@ def place_of(record: Record, config: Config, key: RunKey, *, warn: Callable[[str
         WorkerError: If there is no such place on this machine.
     """
     if record.runtime == "local":
-        return LocalRuntime(Path(record.directory), Path(record.logs), config.run, key)
+        return LocalRuntime(Path(record.directory), Path(record.logs), config.run, key, record.middleware)
     from throwcollect.runtime.docker import DockerRuntime
 
     directory = None if record.volume else Path(record.directory)
-    return DockerRuntime(record.run, config, directory=directory, logs=Path(record.logs), key=key, warn=warn)
+    return DockerRuntime(
+        record.run,
+        config,
+        directory=directory,
+        logs=Path(record.logs),
+        key=key,
+        middleware=record.middleware,
+        warn=warn,
+    )
 
 
 def launch(
@@ -203,14 +214,17 @@ class _Launcher:
         self._onlooker = onlooker
         self._interruptions = interruptions
         self._is_open = config.run.open
+        self._most = 1 if config.run.root_namespace else MOST_SIMULATIONS
         self._simulations = self._wanted = run.record.simulations
         self._set_aside: set[str] = set()
+        self._apart_since = math.inf
         self._place = place
         self._supervisor = Supervisor(self._place, config.run, simulations=self._simulations)
         self._listening = Listening(
             self._report,
             domain_id=run.record.domain_id,
             key=run.key,
+            middleware=run.record.middleware,
             name=LAUNCHER,
             on_connect=self._offer_scaling,
         )
@@ -279,6 +293,7 @@ class _Launcher:
 
     def _report(self, progress: Progress) -> None:
         self._notes.progress(progress)
+        self._check_that_nodes_meet(progress)
         self._onlooker.update(progress)
         self._supervisor.replace(progress.hung)
         for name in progress.set_aside.keys() - self._set_aside:
@@ -287,8 +302,27 @@ class _Launcher:
                 f"{name} gets no more trials, as others could do what it refused: {progress.set_aside[name]}"
             )
 
+    def _check_that_nodes_meet(self, progress: Progress) -> None:
+        """End a run that would go on for ever with nothing done, as its nodes do not see each other.
+
+        Raises:
+            WorkerError: If simulations have been ready for a while, and the coordinator has never seen one.
+        """
+        states = self._supervisor.states()
+        ready = any(state.status == "running" for state in states if state.name not in (ROUTER, COORDINATOR))
+        if progress.simulations or progress.ended or not ready:
+            self._apart_since = math.inf
+            return
+        self._apart_since = min(self._apart_since, time.monotonic())
+        if time.monotonic() - self._apart_since > _MEET_S:
+            raise WorkerError(
+                f"simulations have been ready for {_MEET_S:g} s, but the coordinator does not see them",
+                evidence=f"they use {self._run.record.middleware.rmw}, and the router at {endpoint_of(self._place)}",
+                hint="a firewall may keep nodes apart; throwcollect doctor shows what is installed",
+            )
+
     def _offer_scaling(self, node: ros.Node) -> None:
-        offer_scaling(node, self._simulations, self._want)
+        offer_scaling(node, self._simulations, self._want, most=self._most)
 
     def _want(self, simulations: int) -> None:
         # Not done here: whoever asks shall not have to wait for nodes that are slow to end.

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import os
-import socket
 import time
 from collections.abc import Callable, Iterator
 from types import TracebackType
 
 from throwcollect import ros
-from throwcollect.coordinator.progress import Progress, ProgressListener
+from throwcollect.coordinator.progress import Progress
+from throwcollect.coordinator.progress_topic import ProgressListener
 from throwcollect.errors import ConfigError, ThrowcollectError
+from throwcollect.ros.endpoint import answers
+from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
 from throwcollect.runtime.nodes import node_environment
 from throwcollect.runtime.records import Records, Run
 
-_CONNECT_S = 0.5
 _POLL_S = 0.05
+_SILENT_S = 8.0
+"""Reports come several times a second; after a silence like this the connection is made anew, should it be broken."""
 
 
 class Listening:
@@ -26,6 +29,7 @@ class Listening:
         on_progress: Called with every report, within `spin`.
         domain_id: ROS domain of the run.
         key: Key of the run.
+        middleware: What carries the run's messages; that of this process.
         name: Name of the node; one of this process alone, and hidden, by default.
         on_connect: Called with the node whenever it is made anew.
     """
@@ -36,16 +40,19 @@ class Listening:
         *,
         domain_id: int,
         key: RunKey,
+        middleware: Middleware,
         name: str | None = None,
         on_connect: Callable[[ros.Node], None] = lambda _: None,
     ) -> None:
         self._on_progress = on_progress
         self._domain_id = domain_id
         self._key = key
+        self._middleware = middleware
         self._name = name
         self._on_connect = on_connect
         self._listener: ProgressListener | None = None
         self._endpoint: str | None = None
+        self._heard_at = 0.0
 
     def __enter__(self) -> Listening:
         return self
@@ -67,7 +74,8 @@ class Listening:
         Raises:
             ConfigError: If a variable of the environment does not hold what it should.
         """
-        if endpoint is not None and endpoint != self._endpoint and answers(endpoint):
+        elsewhere = endpoint != self._endpoint or time.monotonic() > self._heard_at + _SILENT_S
+        if endpoint is not None and elsewhere and answers(endpoint):
             self.__exit__(None, None, None)
             self._connect(endpoint)
         if self._listener is not None:
@@ -76,9 +84,10 @@ class Listening:
             time.sleep(seconds)
 
     def _connect(self, endpoint: str) -> None:
-        os.environ.update(node_environment(endpoint, self._domain_id, self._key))
+        os.environ.update(node_environment(endpoint, self._domain_id, self._key, self._middleware))
+        self._heard_at = time.monotonic()
         try:
-            listener = ProgressListener(self._on_progress, name=self._name)
+            listener = ProgressListener(self._hear, name=self._name)
         except ConfigError:
             raise
         except ThrowcollectError:
@@ -87,15 +96,9 @@ class Listening:
         self._listener, self._endpoint = listener, endpoint
         self._on_connect(listener.node)
 
-
-def answers(endpoint: str) -> bool:
-    """Whether something listens at a Zenoh endpoint of TCP or TLS, such as ``tls/127.0.0.1:7447``."""
-    host, _, port = endpoint.partition("/")[2].rpartition(":")
-    try:
-        socket.create_connection((host, int(port)), _CONNECT_S).close()
-    except OSError:
-        return False
-    return True
+    def _hear(self, progress: Progress) -> None:
+        self._heard_at = time.monotonic()
+        self._on_progress(progress)
 
 
 def follow(
@@ -116,7 +119,9 @@ def follow(
         ConfigError: If its record vanishes or cannot be read.
     """
     found = records.get(run)
-    with Listening(on_progress, domain_id=found.record.domain_id, key=found.key) as listening:
+    record = found.record
+    listening = Listening(on_progress, domain_id=record.domain_id, key=found.key, middleware=record.middleware)
+    with listening:
         yield found
         while found.status == "running" and keep_on():
             listening.spin(found.record.endpoint, _POLL_S)

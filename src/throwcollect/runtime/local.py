@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import os
 import signal
 import subprocess
@@ -15,21 +14,18 @@ from pathlib import Path
 from throwcollect.config.run import RunConfig
 from throwcollect.errors import WorkerError
 from throwcollect.files import open_log
+from throwcollect.interruption import die_with_parent
+from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
 from throwcollect.runtime.node_logs import NodeLogs
 from throwcollect.runtime.nodes import ROUTER, NodeExit, node_environment, protocol_of
 from throwcollect.runtime.ports import reserved_port
 
-_PR_SET_PDEATHSIG = 1
-"""prctl(2): the signal a process gets when its parent dies."""
-
-_LIBC = ctypes.CDLL(None)
-
 
 def _enter(core: int | None) -> None:
     """What a child does before it becomes the node: it asks to die with its parent, and takes its core."""
     # By force: without router and simulations there is nothing that a coordinator could wait for.
-    _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    die_with_parent()
     if core is not None:
         os.sched_setaffinity(0, {core})
 
@@ -50,19 +46,20 @@ class LocalRuntime:
         logs: Directory for the log files.
         run: How to run.
         key: Key of the run.
+        middleware: What carries the messages of the nodes.
 
     Raises:
         ConfigError: If the router's port is taken.
     """
 
-    def __init__(self, data: Path, logs: Path, run: RunConfig, key: RunKey) -> None:
+    def __init__(self, data: Path, logs: Path, run: RunConfig, key: RunKey, middleware: Middleware) -> None:
         self.data = str(data)
         self.cleared = True
         self._logs = NodeLogs(logs)
         self._reserved = reserved_port(run.router_port)
         self._address: tuple[str, int] = self._reserved.getsockname()
-        self.listen = "{}/{}:{}".format(protocol_of(run), *self._address)
-        self._environment = {**os.environ, **node_environment(self.listen, run.domain_id, key)}
+        self.listen = "{}/{}:{}".format(protocol_of(run, middleware), *self._address)
+        self._environment = {**os.environ, **node_environment(self.listen, run.domain_id, key, middleware)}
         self._processes: dict[str, subprocess.Popen[bytes]] = {}
 
     def router_address(self) -> tuple[str, int]:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from throwcollect.config.run import RunConfig
+from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import KEY_VARIABLE, RunKey
 from throwcollect.session_config import OVERRIDE_VARIABLE, client_override
 
@@ -114,36 +115,34 @@ def endpoint_of(runtime: Runtime) -> str | None:
     return "{}/{}:{}".format(protocol, *address)
 
 
-def protocol_of(run: RunConfig) -> str:
-    """What the router of a run speaks: TLS, which nobody else has the key to, unless the run is open."""
-    return "tcp" if run.open else "tls"
+def protocol_of(run: RunConfig, middleware: Middleware) -> str:
+    """What the router of a run speaks: TLS, which nobody else has the key to, unless the run is open or on Fast DDS."""
+    if run.open:
+        return "tcp"
+    return "udp" if middleware.is_fast_dds else "tls"
 
 
-def joining_environment(endpoint: str, domain_id: int, key: RunKey) -> Mapping[str, str]:
-    """Environment variables by which any process joins a run; they name the key's files and hold no secret.
+def joining_environment(endpoint: str, domain_id: int, key: RunKey, middleware: Middleware) -> Mapping[str, str]:
+    """Environment variables by which a process of ours joins a run; they name the key's files and hold no secret.
 
     Args:
-        endpoint: Zenoh endpoint of the router.
+        endpoint: Endpoint of the router.
         domain_id: ROS domain.
         key: Key of the run.
+        middleware: What carries the run's messages.
     """
     return {
+        **middleware.environment(),
         OVERRIDE_VARIABLE: client_override(endpoint, key),
         "ROS_DOMAIN_ID": str(domain_id),
         KEY_VARIABLE: str(key.directory),
     }
 
 
-def node_environment(endpoint: str, domain_id: int, key: RunKey) -> Mapping[str, str]:
-    """Environment variables of a node of a run.
-
-    Args:
-        endpoint: Zenoh endpoint of the router.
-        domain_id: ROS domain.
-        key: Key of the run.
-    """
+def node_environment(endpoint: str, domain_id: int, key: RunKey, middleware: Middleware) -> Mapping[str, str]:
+    """Environment variables of a node of a run; arguments as `joining_environment`."""
     return {
-        **joining_environment(endpoint, domain_id, key),
+        **joining_environment(endpoint, domain_id, key, middleware),
         # One process per core is the parallelism here; threads of numerical libraries would only fight it.
         "OMP_NUM_THREADS": "1",
         "OPENBLAS_NUM_THREADS": "1",

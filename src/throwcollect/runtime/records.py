@@ -30,6 +30,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from throwcollect.errors import ConfigError
 from throwcollect.files import beside, write_all
+from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
 from throwcollect.runtime.supervisor import NodeState
 from throwcollect.wording import command
@@ -40,6 +41,7 @@ STATE_VARIABLE = "THROWCOLLECT_STATE"
 _VERSION: Literal[1] = 1
 _REMEMBERED_S = 7 * 24 * 3600.0
 """Ended runs are remembered for this long."""
+_EMBEDDED = Middleware()
 _LOCK_PATIENCE_S = 1.0
 """Whoever asks whether a launcher lives holds its lock for a moment."""
 
@@ -69,6 +71,7 @@ class Record:
         message: The error that it ended with, as it was printed; empty if there was none.
         summary: What its dataset holds, as `dataset info` says it; None if it is not finished.
         begun_in: Absolute path of the directory in which it was begun; empty if an older version did not note it.
+        middleware: What carries the messages of its nodes.
         version: Version of this layout.
     """
 
@@ -92,6 +95,7 @@ class Record:
     message: str = ""
     summary: dict[str, Any] | None = None
     begun_in: str = ""
+    middleware: Middleware = _EMBEDDED
     version: Literal[1] = _VERSION
 
     @property

@@ -10,8 +10,8 @@ from typing import Any
 from throwcollect import ros
 from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.ros import IntegerRange, get_service
+from throwcollect.ros.endpoint import answers
 from throwcollect.run_key import RunKey
-from throwcollect.runtime.listening import answers
 from throwcollect.runtime.nodes import LAUNCHER, node_environment
 from throwcollect.runtime.records import Record, Run
 from throwcollect.runtime.runs import living
@@ -26,13 +26,16 @@ _ANSWER_S = 10.0
 """Time in which a launcher answers; it may be busy ending simulations."""
 
 
-def offer_scaling(node: ros.Node, simulations: int, on_wanted: Callable[[int], None]) -> None:
+def offer_scaling(
+    node: ros.Node, simulations: int, on_wanted: Callable[[int], None], *, most: int = MOST_SIMULATIONS
+) -> None:
     """Declare the parameter.
 
     Args:
         node: Node of the launcher.
         simulations: Its value.
         on_wanted: Called with another value when somebody sets one.
+        most: Largest value that can be set.
     """
 
     def tell(parameters: list[ros.Parameter]) -> None:
@@ -40,7 +43,7 @@ def offer_scaling(node: ros.Node, simulations: int, on_wanted: Callable[[int], N
             if parameter.name == SIMULATIONS:
                 on_wanted(int(parameter.value))
 
-    span = IntegerRange(from_value=0, to_value=MOST_SIMULATIONS, step=1)
+    span = IntegerRange(from_value=0, to_value=most, step=1)
     described = ros.ParameterDescriptor(description="Number of simulations.", integer_range=[span])
     node.declare_parameter(SIMULATIONS, simulations, described)
     node.add_post_set_parameters_callback(tell)
@@ -74,7 +77,7 @@ def scale(run: Run, simulations: int) -> None:
 def _graph_of(record: Record, key: RunKey) -> Iterator[None]:
     if record.endpoint is None or not answers(record.endpoint):
         raise _silent(record)
-    os.environ.update(node_environment(record.endpoint, record.domain_id, key))
+    os.environ.update(node_environment(record.endpoint, record.domain_id, key, record.middleware))
     ros.init()
     try:
         yield

@@ -32,6 +32,7 @@ from throwcollect.ros.embedded import (
     QoSProfile,
     SingleThreadedExecutor,
 )
+from throwcollect.ros.middleware import Middleware
 from throwcollect.ros.router import router
 from throwcollect.run_key import RunKey
 from throwcollect.runtime.nodes import joining_environment
@@ -208,7 +209,7 @@ def test_a_service_is_called_with_values_in_yaml(say: Callable[..., Said]) -> No
 
 
 def test_parameters_are_listed_read_and_set(say: Callable[..., Said]) -> None:
-    own = ["  limit", "  names", "  start_type_description_service", "  use_sim_time"]
+    own = ["  limit", "  names", "  use_sim_time"]
     assert say("param", "list", "/robot/driver").out.splitlines() == own
     assert say("param", "list").out.splitlines() == ["/robot/driver:", *own]
     assert say("param", "get", "robot/driver", "names").out == "String values are: ['a', 'b']\n"
@@ -300,7 +301,7 @@ def test_a_run_is_joined_by_its_name_or_directory(
     endpoint: str, say: Callable[..., Said], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setenv("THROWCOLLECT_STATE", str(tmp_path))
-    for variable in joining_environment(endpoint, 0, RunKey(tmp_path)):
+    for variable in joining_environment(endpoint, 0, RunKey(tmp_path), Middleware()):
         monkeypatch.setenv(variable, "nonsense")
     run = Records().new("throws")
     record = Record(
@@ -320,8 +321,8 @@ def test_a_run_is_joined_by_its_name_or_directory(
     run.write(record)
     override = f'mode="client";connect/endpoints=["{endpoint}"]'
     line = (
-        f"export RMW_IMPLEMENTATION=rmw_zenoh_cpp ZENOH_CONFIG_OVERRIDE='{override}' ROS_DOMAIN_ID=0 "
-        f"THROWCOLLECT_KEY={run.key.directory}\n"
+        f"export THROWCOLLECT_ROS=embedded ZENOH_CONFIG_OVERRIDE='{override}' ROS_DOMAIN_ID=0 "
+        f"THROWCOLLECT_KEY={run.key.directory} RMW_IMPLEMENTATION=rmw_zenoh_cpp\n"
     )
     assert say("env") == (0, line, "")
     for named in (run.run, "thr", str(tmp_path / "data")):
@@ -332,6 +333,43 @@ def test_a_run_is_joined_by_its_name_or_directory(
         assert say(*command, "--run", run.run).code == 3
     run.close()
     assert "its launcher died" in say("node", "list", "--run", run.run).err
+
+
+def test_a_run_on_fast_dds_is_joined_by_a_profile_that_its_owner_alone_can_read(
+    say: Callable[..., Said], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("THROWCOLLECT_STATE", str(tmp_path))
+    run = Records().new("throws")
+    run.key.create()
+    record = Record(
+        run=run.run,
+        name="throws",
+        runtime="local",
+        directory=str(tmp_path / "data"),
+        volume=None,
+        logs=str(tmp_path),
+        domain_id=5,
+        started=datetime.now(timezone.utc),
+        launcher=os.getpid(),
+        simulations=1,
+        endpoint="udp/127.0.0.1:9",
+        begun_in=os.getcwd(),
+        middleware=Middleware("rclpy", "rmw_fastrtps_cpp"),
+    )
+    run.write(record)
+    for _ in range(2):
+        said = say("env")
+        assert (said.code, said.err) == (0, "")
+    script = f"{said.out}\nprintenv THROWCOLLECT_ROS RMW_IMPLEMENTATION ROS_DOMAIN_ID ROS_AUTOMATIC_DISCOVERY_RANGE"
+    script += "\nprintenv FASTRTPS_DEFAULT_PROFILES_FILE"
+    told = subprocess.run(["sh", "-c", script], capture_output=True, text=True, check=True).stdout.splitlines()
+    assert told[:4] == ["rclpy", "rmw_fastrtps_cpp", "5", "SYSTEM_DEFAULT"]
+    profile = Path(told[4])
+    assert profile.parent == run.key.directory.parent
+    assert profile.stat().st_mode & 0o777 == 0o600
+    assert "<udpv4><address>127.0.0.1</address><port>9</port></udpv4>" in profile.read_text(encoding="utf-8")
+    assert run.key.private_key.read_text().splitlines()[1] not in said.out + profile.read_text(encoding="utf-8")
+    run.close()
 
 
 def test_leaving_an_echo_by_ctrl_c_is_quiet(endpoint: str) -> None:

@@ -21,8 +21,8 @@ from throwcollect.errors import ConfigError, PlanError, Problem
 
 CONFIGS = Path(__file__).parents[3] / "configs"
 KNOWN_IN_RUN = (
-    "simulations, runtime, router_port, open, domain_id, trial_timeout_s, start_timeout_s, grace_s, retries, replay, "
-    "restarts"
+    "simulations, runtime, router_port, open, ros, root_namespace, domain_id, trial_timeout_s, start_timeout_s, "
+    "grace_s, retries, replay, restarts"
 )
 JOINT_LIST = "joint names, each with a number from -6.3 to 6.3 rad"
 

@@ -11,9 +11,9 @@ PROGRESS = Progress(10, 4, {"landed": 2, "recaught": 1, "lost": 1}, 2, 7.5, hung
 
 
 def test_progress_survives_its_message() -> None:
-    assert Progress.read(PROGRESS.message().data) == PROGRESS
+    assert Progress.read(PROGRESS.to_json()) == PROGRESS
     idle = replace(PROGRESS, throws_per_s=0.0, hung=[])
-    assert Progress.read(idle.message().data) == idle
+    assert Progress.read(idle.to_json()) == idle
 
 
 @pytest.mark.parametrize("text", ["", "landed", "{}", "[]", "null", '{"total": "ten"}', "{" * 5000, "\0"])
@@ -34,4 +34,4 @@ def test_the_line_counts_trials_or_throws_that_should_land() -> None:
     assert until.line == "4 throws: 2/5 landed, 1 failed, 1 lost, 2 simulations, 7.5 throws/s"
     assert until.steps == (2, 5)
     assert replace(until, outcomes={"landed": 7}).steps == (5, 5)
-    assert Progress.read(until.message().data) == until
+    assert Progress.read(until.to_json()) == until

@@ -33,39 +33,39 @@ def lease(trial: int, **values: float) -> Lease:
 class Bench:
     """A coordinator's client, and a node that stands in for the simulation."""
 
-    def __init__(self) -> None:
+    def __init__(self, namespace: str = "/sim_0") -> None:
         self.refusals: list[tuple[str, str]] = []
         self.requests: list[str] = []
         self.accepts = True
         self.executor = ros.SingleThreadedExecutor()
-        self.simulation = ros.Node("sim_0", namespace="/sim_0")
+        self.simulation = ros.Node("sim_0", namespace=namespace)
         self.simulation.declare_parameter("trial.number", -1)
         self.simulation.declare_parameter("trial.controllers", [""])
         self.simulation.declare_parameter("ball.mass_kg", 0.045)
         self.simulation.declare_parameter("trial.lease", "")
-        self.servers = [
-            ActionServer(
-                self.simulation,
-                FollowJointTrajectory,
-                f"{graph_name(controller, NAMING)}/follow_joint_trajectory",
-                self._execute,
-                goal_callback=self._consider,
-            )
-            for controller in GOALS
-        ]
+        self.servers: list[ActionServer] = []
+        for controller in GOALS:
+            self.offer(controller)
         self.node = ros.Node("coordinator")
         self.client = SimulationClient(
             self.node,
-            "/sim_0",
+            namespace,
+            "sim_0",
+            set(),
             controllers={name: graph_name(name, NAMING) for name in GOALS},
             action_type=FollowJointTrajectory,
             on_episode=lambda *_: None,
             on_refusal=lambda namespace, reason: self.refusals.append((namespace, reason)),
         )
-        self.asking = self.node.create_client(GetParameters, "/sim_0/sim_0/get_parameters")
+        self.asking = self.node.create_client(GetParameters, f"{namespace.rstrip('/')}/sim_0/get_parameters")
         self.executor.add_node(self.node)
         self.executor.add_node(self.simulation)
         assert self.spin(self.client.ready)
+
+    def offer(self, controller: str) -> None:
+        name = f"{graph_name(controller, NAMING)}/follow_joint_trajectory"
+        server = ActionServer(self.simulation, FollowJointTrajectory, name, self._execute, goal_callback=self._consider)
+        self.servers.append(server)
 
     def _consider(self, _goal):
         self.requests.append("goal")
@@ -88,14 +88,19 @@ class Bench:
 
 
 @pytest.fixture
-def bench(monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
+def joined(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     with router("tcp/127.0.0.1:0") as endpoint:
         monkeypatch.setenv("ZENOH_CONFIG_OVERRIDE", f'mode="client";connect/endpoints=["{endpoint}"]')
         ros.init()
         try:
-            yield Bench()
+            yield
         finally:
             ros.shutdown()
+
+
+@pytest.fixture
+def bench(joined: None) -> Bench:
+    return Bench()
 
 
 def test_a_trial_is_a_lease_and_then_goals(bench: Bench) -> None:
@@ -107,6 +112,14 @@ def test_a_trial_is_a_lease_and_then_goals(bench: Bench) -> None:
     assert tuple(bench.simulation.get_parameter("trial.controllers").value) == tuple(GOALS)
     assert bench.simulation.get_parameter("ball.mass_kg").value == 0.05
     assert bench.refusals == []
+
+
+@pytest.mark.usefixtures("joined")
+def test_a_simulation_may_live_in_the_root_namespace() -> None:
+    bench = Bench("/")
+    bench.client.begin(lease(5), "token", GOALS)
+    assert bench.spin(lambda: len(bench.requests) == 2)
+    assert bench.simulation.get_parameter("trial.number").value == 5
 
 
 def test_refused_goals_are_reported(bench: Bench) -> None:
@@ -148,3 +161,35 @@ def test_an_abandoned_trial_goes_no_further(bench: Bench) -> None:
     bench.settle()
     bench.settle()
     assert "goal" not in bench.requests
+
+
+def test_what_has_no_answer_is_sent_again(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    bench.client.begin(lease(5), "token", GOALS)
+    assert bench.client.remind() is None
+    monkeypatch.setattr(bench.client, "_patience_s", 0.0)
+    # The simulation has not had a chance to answer yet; the goals of the first attempt must not follow those of this.
+    assert bench.client.remind() == "the lease"
+    assert bench.spin(lambda: not bench.client.unanswered)
+    assert bench.requests == ["goal", "goal"]
+    assert bench.client.remind() is None
+    assert bench.refusals == []
+
+
+def test_a_goal_that_got_lost_has_its_trial_begun_again(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    lost = bench.servers.pop()
+    lost.destroy()
+    bench.client.begin(lease(5), "token", GOALS)
+    *_, last = GOALS
+    assert bench.spin(lambda: bench.client.unanswered == [last])
+    monkeypatch.setattr(bench.client, "_patience_s", 0.0)
+    bench.offer(last)
+    assert bench.client.remind() == last
+    assert bench.spin(lambda: not bench.client.unanswered)
+    assert bench.requests == ["goal"] * 3
+
+
+def test_nothing_is_missing_of_an_abandoned_trial(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    bench.client.begin(lease(0), "token", GOALS)
+    monkeypatch.setattr(bench.client, "_patience_s", 0.0)
+    bench.client.abandon()
+    assert bench.client.remind() is None

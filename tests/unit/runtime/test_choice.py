@@ -7,7 +7,8 @@ import pytest
 from throwcollect.config.containers import ContainersConfig
 from throwcollect.config.run import RunConfig
 from throwcollect.config.schema import Config
-from throwcollect.errors import WorkerError
+from throwcollect.errors import ConfigError, WorkerError
+from throwcollect.ros.middleware import Middleware
 from throwcollect.runtime import choice
 from throwcollect.runtime.image import default_tag
 
@@ -19,7 +20,9 @@ def choose() -> Callable[..., tuple[str, list[str]]]:
     def choose(runtime: str, image: str | None = None) -> tuple[str, list[str]]:
         said: list[str] = []
         config = Config(run=RunConfig(runtime=runtime), containers=ContainersConfig(image=image))
-        return choice.choose(config, say=said.append, warn=lambda line: said.append(f"! {line}")), said
+        chosen = choice.choose(config, say=said.append, warn=lambda line: said.append(f"! {line}"))
+        assert chosen.middleware == Middleware()
+        return chosen.runtime, said
 
     return choose
 
@@ -33,6 +36,7 @@ def no_engine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def engine(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(choice, "connect", lambda **_: Mock())
     monkeypatch.setattr(choice, "is_outdated", lambda *_: False)
+    monkeypatch.setattr(choice, "rmw_of", lambda *_: None)
 
 
 @pytest.fixture
@@ -40,6 +44,7 @@ def outdated(engine, monkeypatch: pytest.MonkeyPatch) -> Mock:
     """An engine whose images are all there, and of other sources; what it is told to build."""
     monkeypatch.setattr(choice, "ensure", lambda *_, **__: None)
     monkeypatch.setattr(choice, "is_outdated", lambda *_: True)
+    monkeypatch.setattr(choice, "rmw_of", lambda *_: None)
     build = Mock()
     monkeypatch.setattr(choice, "build", build)
     return build
@@ -123,3 +128,51 @@ def test_an_image_that_the_user_names_is_used_with_a_warning(choose, outdated, r
         f"! the image {image} was made from other sources than these; it is used, as containers.image names it"
     )
     outdated.assert_not_called()
+
+
+FAST_DDS = Middleware("rclpy", "rmw_fastrtps_cpp")
+ZENOH = Middleware("rclpy", "rmw_zenoh_cpp")
+
+
+@pytest.mark.parametrize(
+    ("launcher", "rmw", "ros", "expected"),
+    [
+        (Middleware(), None, "auto", Middleware()),
+        (FAST_DDS, None, "auto", Middleware()),
+        (FAST_DDS, "rmw_fastrtps_cpp", "auto", FAST_DDS),
+        # A launcher without rclpy cannot join nodes on Fast DDS, but those on Zenoh.
+        (Middleware(), "rmw_fastrtps_cpp", "auto", Middleware()),
+        (Middleware(), "rmw_zenoh_cpp", "auto", ZENOH),
+        (Middleware(), "rmw_zenoh_cpp", "embedded", Middleware()),
+    ],
+)
+def test_containers_get_what_their_image_has_and_the_launcher_can_join(
+    engine, monkeypatch: pytest.MonkeyPatch, launcher: Middleware, rmw: str | None, ros: str, expected: Middleware
+) -> None:
+    monkeypatch.setattr(choice, "ensure", lambda *_, **__: None)
+    monkeypatch.setattr(choice, "rmw_of", lambda *_: rmw)
+    monkeypatch.setattr(choice, "wanted_middleware", lambda _: launcher)
+    said: list[str] = []
+    found = choice.choose(Config(run=RunConfig(runtime="docker", ros=ros)), say=said.append, warn=said.append)
+    assert found.middleware == expected
+    assert ("on genuine rclpy" in said[0]) == (expected.backend == "rclpy")
+
+
+@pytest.mark.parametrize(
+    ("rmw", "host", "problem"),
+    [
+        (None, None, "has no rclpy"),
+        ("rmw_fastrtps_cpp", "tcp://192.0.2.7:2375", "those at tcp://192.0.2.7:2375 cannot"),
+    ],
+)
+def test_rclpy_that_is_asked_for_and_cannot_be_had_in_containers_is_an_error(
+    engine, monkeypatch: pytest.MonkeyPatch, rmw: str | None, host: str | None, problem: str
+) -> None:
+    monkeypatch.setattr(choice, "ensure", lambda *_, **__: None)
+    monkeypatch.setattr(choice, "rmw_of", lambda *_: rmw)
+    monkeypatch.setattr(choice, "wanted_middleware", lambda _: FAST_DDS)
+    if host is not None:
+        monkeypatch.setenv("DOCKER_HOST", host)
+    with pytest.raises(ConfigError, match=problem) as caught:
+        choice.choose(Config(run=RunConfig(runtime="docker", ros="rclpy")), say=print, warn=print)
+    assert "run.ros" in str(caught.value)

@@ -7,6 +7,7 @@ import pytest
 
 import throwcollect
 from throwcollect.config.schema import Config
+from throwcollect.ros.middleware import Middleware
 from throwcollect.runtime.docker_options import RunPlace, image, mount_source, node_options, published
 from throwcollect.runtime.image import default_tag
 
@@ -18,7 +19,7 @@ def options(
     name: str, place: RunPlace = DIRECTORY, *, core: int | None = None, run: Any = None, **containers: Any
 ) -> dict[str, Any]:
     config = Config.model_validate({"run": run or {}, "containers": containers}, strict=True)
-    return node_options(name, ["command", "--option"], place=place, config=config, core=core)
+    return node_options(name, ["command", "--option"], place=place, config=config, middleware=Middleware(), core=core)
 
 
 @pytest.mark.parametrize("name", ["router", "sim_0", "coordinator"])

@@ -12,6 +12,7 @@ from tests.unit.runtime.engine import Engine, engine_at
 
 from throwcollect.config.schema import Config
 from throwcollect.errors import WorkerError
+from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
 from throwcollect.runtime import docker as module
 from throwcollect.runtime import docker_clock, docker_engine, docker_watch
@@ -49,7 +50,13 @@ def make(engine: Engine, tmp_path: Path, warnings: list[str]) -> Iterator[Callab
         key.create()
         made.append(
             DockerRuntime(
-                "run-1a2b", CONFIG, directory=directory, logs=tmp_path / "logs", key=key, warn=warnings.append
+                "run-1a2b",
+                CONFIG,
+                directory=directory,
+                logs=tmp_path / "logs",
+                key=key,
+                middleware=Middleware(),
+                warn=warnings.append,
             )
         )
         made[-1].open()

@@ -2,19 +2,65 @@ import json
 import socketserver
 import threading
 from http.server import BaseHTTPRequestHandler
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
 
+from throwcollect.ros.backend import VARIABLE, uses_rclpy
 from throwcollect.runtime.doctor import examine
 from throwcollect.runtime.image import SOURCES_LABEL, default_tag
 
 
 def test_a_machine_that_runs_the_tests_has_no_problem(tmp_path: Path) -> None:
     checks = {check.name: check for check in examine(tmp_path)}
-    assert list(checks) == ["python", "cores", "memory", "pybullet", "robot", "docker", "ports", "disk"]
+    assert list(checks) == [
+        "python",
+        "cores",
+        "memory",
+        "pybullet",
+        "robot",
+        "rclpy",
+        "embedded",
+        "docker",
+        "ports",
+        "disk",
+    ]
     assert [check for check in checks.values() if check.status == "problem"] == []
     assert str(tmp_path) in checks["disk"].finding
+
+
+def backends(directory: Path) -> dict[str, tuple[str, str]]:
+    uses_rclpy.cache_clear()
+    found = {check.name: (check.status, check.finding) for check in examine(directory)}
+    uses_rclpy.cache_clear()
+    return {name: found[name] for name in ("rclpy", "embedded")}
+
+
+def test_both_backends_and_what_is_missing_of_one_are_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    zenoh = f"Zenoh {version('eclipse-zenoh')}"
+    monkeypatch.delenv(VARIABLE, raising=False)
+    monkeypatch.setattr("throwcollect.ros_installation.rmws", lambda: ["rmw_fastrtps_cpp"])
+    monkeypatch.setattr("throwcollect.ros_installation.rclpy_version", lambda: "7.1.6")
+    monkeypatch.setattr("throwcollect.ros_installation.how_to_install", lambda: "pip install it")
+    monkeypatch.setattr("throwcollect.ros_installation.missing", lambda: ["rclpy"])
+    assert backends(tmp_path)["rclpy"] == ("note", "not installed; to have it: pip install it")
+    monkeypatch.setattr("throwcollect.ros_installation.missing", lambda: ["tf2_msgs"])
+    finding = "7.1.6 with rmw_fastrtps_cpp, without tf2_msgs; try: pip install it"
+    assert backends(tmp_path)["rclpy"] == ("note", finding)
+    monkeypatch.setattr("throwcollect.ros_installation.missing", list)
+    assert backends(tmp_path)["rclpy"] == ("ok", "7.1.6 with rmw_fastrtps_cpp and all interfaces")
+    monkeypatch.setenv(VARIABLE, "embedded")
+    finding = f"{zenoh}; nodes run on the embedded backend, as THROWCOLLECT_ROS is embedded"
+    assert backends(tmp_path)["embedded"] == ("ok", finding)
+
+
+def test_a_backend_that_nodes_cannot_run_on_is_a_problem(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(VARIABLE, "rclpy")
+    monkeypatch.setattr("throwcollect.ros.backend.missing", lambda: ["tf2_msgs"])
+    status, finding = backends(tmp_path)["embedded"]
+    assert status == "problem"
+    assert "; THROWCOLLECT_ROS is rclpy, but Python does not find tf2_msgs; try: " in finding
 
 
 class Engine(BaseHTTPRequestHandler):

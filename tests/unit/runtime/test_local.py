@@ -9,6 +9,7 @@ import pytest
 
 from throwcollect.config.run import RunConfig
 from throwcollect.errors import ConfigError, WorkerError
+from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
 from throwcollect.runtime.local import LocalRuntime
 from throwcollect.runtime.nodes import NodeExit
@@ -23,7 +24,7 @@ def runtime(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[LocalRu
     (package / "__main__.py").write_text("import sys\nexec(sys.argv[1])\n")
     monkeypatch.chdir(tmp_path / "fake")
     monkeypatch.setenv("ANSWER", "42")
-    local = LocalRuntime(tmp_path, tmp_path / "logs", RunConfig(domain_id=7), RunKey(tmp_path / "key"))
+    local = LocalRuntime(tmp_path, tmp_path / "logs", RunConfig(domain_id=7), RunKey(tmp_path / "key"), Middleware())
     yield local
     local.stop(local.running(), grace_s=0.0)
     local.close()
@@ -93,14 +94,14 @@ def test_a_node_that_ignores_requests_is_ended_by_force(runtime: LocalRuntime) -
 def test_a_log_that_cannot_be_written_is_an_error(tmp_path: Path) -> None:
     (tmp_path / "logs").write_text("a file")
     with pytest.raises(WorkerError, match=r"node: cannot be started: .*File exists"):
-        LocalRuntime(tmp_path, tmp_path / "logs", RunConfig(), RunKey(tmp_path)).start("node", [""])
+        LocalRuntime(tmp_path, tmp_path / "logs", RunConfig(), RunKey(tmp_path), Middleware()).start("node", [""])
 
 
 def test_a_busy_port_is_refused_with_a_way_out(tmp_path: Path) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         with pytest.raises(ConfigError, match=f"run.router_port: port {port} of 127.0.0.1 cannot be used") as caught:
-            LocalRuntime(tmp_path, tmp_path / "logs", RunConfig(router_port=port), RunKey(tmp_path))
+            LocalRuntime(tmp_path, tmp_path / "logs", RunConfig(router_port=port), RunKey(tmp_path), Middleware())
     assert caught.value.hint == "--set run.router_port=0 takes a free one"
 
 

@@ -12,7 +12,7 @@ from throwcollect.run_key import KEY_VARIABLE, RunKey
 from throwcollect.runtime import scaling
 from throwcollect.runtime.nodes import LAUNCHER
 from throwcollect.runtime.records import Record, Run
-from throwcollect.runtime.scaling import offer_scaling, scale
+from throwcollect.runtime.scaling import MOST_SIMULATIONS, offer_scaling, scale
 from throwcollect.session_config import CONFIG_FILE_VARIABLE, OVERRIDE_VARIABLE
 
 
@@ -32,14 +32,19 @@ def endpoint(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
 
 
 @pytest.fixture
-def wanted(endpoint: str, monkeypatch: pytest.MonkeyPatch) -> Iterator[list[int]]:
+def most() -> int:
+    return MOST_SIMULATIONS
+
+
+@pytest.fixture
+def wanted(endpoint: str, most: int, monkeypatch: pytest.MonkeyPatch) -> Iterator[list[int]]:
     """What a launcher that offers scaling is asked for."""
     asked: list[int] = []
     monkeypatch.setenv(OVERRIDE_VARIABLE, f'connect/endpoints=["{endpoint}"]')
     context = Context()
     context.init()
     node = Node(LAUNCHER, context=context)
-    offer_scaling(node, 2, asked.append)
+    offer_scaling(node, 1, asked.append, most=most)
     executor = SingleThreadedExecutor(context=context)
     executor.add_node(node)
     done = threading.Event()
@@ -67,6 +72,14 @@ def test_the_launcher_refuses_what_is_out_of_range(simulations: int, endpoint: s
     with pytest.raises(ConfigError, match=f"run a-0123: .* out of range. Min: 0, max: 256, value: {simulations}"):
         scale(living(endpoint), simulations)
     assert wanted == []
+
+
+@pytest.mark.parametrize("most", [1])
+def test_the_launcher_refuses_a_second_simulation_where_there_is_room_for_one(endpoint: str, wanted: list[int]) -> None:
+    with pytest.raises(ConfigError, match=r"out of range. Min: 0, max: 1, value: 2"):
+        scale(living(endpoint), 2)
+    scale(living(endpoint), 0)
+    assert wanted == [0]
 
 
 def test_a_launcher_that_is_not_there_is_one_message(endpoint: str, monkeypatch: pytest.MonkeyPatch) -> None:

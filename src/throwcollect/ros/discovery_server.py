@@ -1,0 +1,103 @@
+"""A discovery server of Fast DDS, by which the nodes of a run on genuine rclpy find each other."""
+
+from __future__ import annotations
+
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from throwcollect.errors import ConfigError, WorkerError
+from throwcollect.interruption import die_with_parent
+from throwcollect.ros.fast_dds import server_profile, write_temporarily
+
+_PROGRAM = "fast-discovery-server"
+_RUNNING = b"Server is running"
+_STOP_S = 3.0
+
+
+@contextmanager
+def discovery_server(endpoint: str) -> Iterator[None]:
+    """Run a discovery server as a child process.
+
+    Args:
+        endpoint: Where it listens, such as ``udp/127.0.0.1:7447``; at the same port of TCP, whoever asks learns that it
+            is there.
+
+    Yields:
+        Nothing; by then it runs.
+
+    Raises:
+        ConfigError: If there is no such program, or it cannot listen there.
+        WorkerError: If it ends at once.
+    """
+    command = [_program(), "-i", "0", "-x", str(write_temporarily(server_profile(endpoint)))]
+    with (
+        _showing_that_it_is_there(endpoint),
+        subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            preexec_fn=die_with_parent,  # noqa: PLW1509 - it calls nothing that takes a lock
+        ) as process,
+    ):
+        try:
+            _wait_until_it_runs(process, endpoint)
+            yield
+        finally:
+            process.send_signal(signal.SIGINT)
+            try:
+                process.wait(_STOP_S)
+            except subprocess.TimeoutExpired:
+                process.kill()
+
+
+@contextmanager
+def _showing_that_it_is_there(endpoint: str) -> Iterator[None]:
+    """Accept connections and close them: a port of UDP alone does not tell whether somebody listens."""
+    host, _, port = endpoint.partition("/")[2].rpartition(":")
+    try:
+        server = socket.create_server((host, int(port)))
+    except OSError as error:
+        raise ConfigError(
+            f"the discovery server cannot listen on {endpoint}: {error.strerror}",
+            expected="an address of this machine with a free port, such as udp/127.0.0.1:0, which takes any",
+        ) from error
+
+    def accept() -> None:
+        with suppress(OSError):
+            while True:
+                server.accept()[0].close()
+
+    threading.Thread(target=accept, daemon=True).start()
+    try:
+        yield
+    finally:
+        server.shutdown(socket.SHUT_RDWR)
+        server.close()
+
+
+def _wait_until_it_runs(process: subprocess.Popen[bytes], endpoint: str) -> None:
+    said = []
+    for line in process.stdout or ():
+        if _RUNNING in line:
+            return
+        said.append(line.decode(errors="replace"))
+    raise WorkerError(f"the discovery server at {endpoint} has ended", evidence="".join(said).strip() or None)
+
+
+def _program() -> str:
+    beside_python = Path(sys.prefix, "bin", _PROGRAM)
+    found = str(beside_python) if beside_python.is_file() else shutil.which(_PROGRAM)
+    if found is None:
+        raise ConfigError(
+            f"there is no program {_PROGRAM}, by which nodes on Fast DDS find each other",
+            hint="it comes with Fast DDS: pip install 'throwcollect[ros]'; or set run.ros to embedded",
+        )
+    return found

@@ -1,0 +1,53 @@
+"""Whether a node that is about to say that it is ready can be reached at all."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from throwcollect import ros
+from throwcollect.errors import WorkerError
+from throwcollect.ros.middleware import Middleware
+
+_ANSWER_S = 10.0
+_AGAIN_S = 1.0
+_SLICE_S = 0.05
+
+
+def check_answers(node: ros.Node, executor: ros.Executor) -> None:
+    """Ask a node of this process for something, on the way by which others ask it.
+
+    A backend that does not answer would otherwise show as a collection that does not begin.
+
+    Args:
+        node: The node, in the executor.
+        executor: The executor, which is spun as the process will spin it.
+
+    Raises:
+        WorkerError: If no answer comes within ten seconds.
+    """
+    service: Any = ros.get_service("rcl_interfaces/srv/GetParameters")
+    client = node.create_client(service, f"{node.get_fully_qualified_name()}/get_parameters")
+    deadline = time.monotonic() + _ANSWER_S
+    answers: list[ros.Future] = []
+    asked_at = 0.0
+    try:
+        while not any(answer.done() for answer in answers):
+            now = time.monotonic()
+            if now > deadline:
+                raise _silent(node)
+            if now >= asked_at + _AGAIN_S:
+                asked_at = now
+                answers.append(client.call_async(service.Request()))
+            ros.spin_some(executor, timeout_sec=_SLICE_S)
+    finally:
+        node.destroy_client(client)
+
+
+def _silent(node: ros.Node) -> WorkerError:
+    middleware = Middleware.of_process()
+    backend = "the embedded backend" if middleware.backend == "embedded" else f"rclpy with {middleware.rmw}"
+    return WorkerError(
+        f"{node.get_fully_qualified_name()} does not answer itself within {_ANSWER_S:g} s, over {backend}",
+        hint="throwcollect doctor shows what is installed; --set run.ros=embedded needs none of it",
+    )

@@ -1,0 +1,193 @@
+"""Collections on genuine rclpy: what comes of them, and who sees them."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.e2e.collection import Running, collect, fingerprints, start, write_config
+from throwcollect.dataset.journal import read_journal
+from throwcollect.errors import WorkerError
+from throwcollect.runtime.records import STATE_VARIABLE, Records
+
+TRIALS = 12
+DOMAIN = "83"
+UNTIL_STOPPED = ("--trials", "400", "--set", "sim.real_time_factor=1", "--set", f"run.domain_id={DOMAIN}")
+
+LOOK = """
+import json, time, rclpy
+
+rclpy.init()
+node = rclpy.create_node("stranger")
+seen = set()
+deadline = time.monotonic() + 4
+while time.monotonic() < deadline:
+    rclpy.spin_once(node, timeout_sec=0.1)
+    seen |= set(node.get_node_names()) | {name for name, _ in node.get_topic_names_and_types() if "sim_" in name}
+print(json.dumps(sorted(seen - {"stranger"})))
+"""
+"""A genuine node that knows nothing of us, and looks around."""
+
+JOIN = """
+import rclpy
+from rcl_interfaces.srv import GetParameters
+from sensor_msgs.msg import JointState
+
+rclpy.init()
+node = rclpy.create_node("guest")
+heard = []
+node.create_subscription(JointState, "/sim_0/joint_states", heard.append, 10)
+client = node.create_client(GetParameters, "/sim_0/sim_0/get_parameters")
+assert client.wait_for_service(20)
+answer = client.call_async(GetParameters.Request(names=["ball.mass_kg"]))
+rclpy.spin_until_future_complete(node, answer, timeout_sec=10)
+assert answer.result().values[0].double_value > 0
+for _ in range(200):
+    if heard:
+        break
+    rclpy.spin_once(node, timeout_sec=0.1)
+print(len(heard[0].name))
+"""
+"""A genuine node that knows nothing of us, and takes part."""
+
+
+@pytest.fixture
+def records(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Records:
+    monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "state"))
+    monkeypatch.setenv("THROWCOLLECT_ROS", "rclpy")
+    return Records()
+
+
+Begin = Callable[..., Running]
+
+
+@pytest.fixture
+def begin(records: Records, tmp_path: Path) -> Iterator[Begin]:
+    """Begins a run that goes on until it is stopped, and waits until its first trials have ended."""
+    begun: list[Running] = []
+
+    def begin(name: str, simulations: int) -> Running:
+        running = start(write_config(tmp_path, trials=TRIALS), tmp_path / name, simulations, *UNTIL_STOPPED)
+        begun.append(running)
+        deadline = time.monotonic() + 45
+        while len(simulations_of(running)) < simulations:
+            assert running.process.poll() is None, running.finish()
+            assert time.monotonic() < deadline, [path.read_text() for path in running.directory.glob("logs/*.log")]
+            time.sleep(0.05)
+        return running
+
+    yield begin
+    for running in begun:
+        if running.process.poll() is None:
+            running.process.send_signal(signal.SIGINT)
+            running.process.send_signal(signal.SIGINT)
+        running.finish()
+
+
+def entries(running: Running, event: str) -> list[dict[str, Any]]:
+    path = running.directory / "logs" / "journal.jsonl"
+    return [entry for entry in read_journal(path) if entry["event"] == event] if path.exists() else []
+
+
+def simulations_of(running: Running) -> set[str]:
+    """Those that have had a trial."""
+    return {entry["simulation"] for entry in entries(running, "lease")}
+
+
+@pytest.fixture(scope="module")
+def reference(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    directory = tmp_path_factory.mktemp("reference")
+    collect(write_config(directory, trials=TRIALS), directory / "data", 2, THROWCOLLECT_ROS="embedded")
+    return fingerprints(directory / "data")
+
+
+def test_the_dataset_does_not_depend_on_the_backend(
+    reference: dict[str, str], records: Records, tmp_path: Path
+) -> None:
+    collect(write_config(tmp_path, trials=TRIALS), tmp_path / "data", 2)
+    assert fingerprints(tmp_path / "data") == reference
+
+
+def test_the_trial_of_a_simulation_that_was_killed_is_given_to_another(
+    reference: dict[str, str], records: Records, tmp_path: Path
+) -> None:
+    config = write_config(tmp_path, trials=TRIALS)
+    running = start(config, tmp_path / "data", 2, "--set", "sim.real_time_factor=1")
+
+    def under_way() -> set[int]:
+        """Trials that one of the simulations has been given and not handed in."""
+        ended = {entry["trial"] for entry in entries(running, "commit")}
+        return {entry["trial"] for entry in entries(running, "lease") if entry["simulation"].endswith("sim_0")} - ended
+
+    running.wait_until(lambda: len(entries(running, "commit")) >= 2 and bool(under_way()))
+    (trial,) = under_way()
+    running.node("--name", "sim_0").kill()
+    killed = time.time()
+    code, _, err = running.finish()
+    assert code == 0, err
+    assert "sim_0 was lost (ended by SIGKILL)" in err
+    again = [entry for entry in entries(running, "lease") if entry["trial"] == trial and entry["time"] > killed]
+    assert len(again) == 1
+    assert again[0]["time"] < killed + 15
+    collected = fingerprints(tmp_path / "data")
+    for name in ("small_00000.mcap", "throws.parquet"):
+        assert collected[name] == reference[name]
+
+
+def test_who_does_not_know_the_port_sees_nothing_and_whoever_evaluates_one_line_takes_part(begin: Begin) -> None:
+    running = begin("data", 1)
+    plain = {name: value for name, value in os.environ.items() if not name.startswith(("THROWCOLLECT", "FASTRTPS"))}
+    for way in ({}, {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}):
+        assert json.loads(python(LOOK, {**plain, "ROS_DOMAIN_ID": DOMAIN, **way})) == [], way
+    # As docs/ros.md says it.
+    script = f'eval "$({sys.executable} -m throwcollect ros env)"; exec {sys.executable} -c "$PROGRAM"'
+    said = subprocess.run(
+        ["bash", "-c", script],
+        env={**os.environ, "PROGRAM": JOIN},
+        capture_output=True,
+        text=True,
+        timeout=90,
+        check=False,
+    )
+    assert said.returncode == 0, said.stderr
+    assert said.stdout.splitlines()[-1] == "32"
+    assert running.process.poll() is None
+
+
+def test_a_coordinator_that_sees_no_simulation_is_told_of_after_a_while(
+    records: Records, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As behind a firewall: every simulation lives in another domain than the rest of its run.
+
+    On the embedded backend: to a discovery server of Fast DDS, domains make no difference.
+    """
+    apart = "import os, sys\nif '--name' in sys.orig_argv:\n    os.environ['ROS_DOMAIN_ID'] = '84'\n"
+    (tmp_path / "site").mkdir()
+    (tmp_path / "site" / "sitecustomize.py").write_text(apart)
+    path = os.pathsep.join([str(tmp_path / "site"), os.environ.get("PYTHONPATH", "")])
+    running = start(
+        write_config(tmp_path, trials=TRIALS), tmp_path / "data", 1, PYTHONPATH=path, THROWCOLLECT_ROS="embedded"
+    )
+    code, _, err = running.finish()
+    assert code == WorkerError.exit_code == 3
+    assert "simulations have been ready for 20 s, but the coordinator does not see them" in err
+    assert "they use rmw_" in err
+    assert "a firewall may keep nodes apart" in err
+
+
+def python(program: str, environment: dict[str, str]) -> str:
+    found = subprocess.run(
+        [sys.executable, "-c", program], env=environment, capture_output=True, text=True, timeout=60, check=False
+    )
+    assert found.returncode == 0, found.stderr
+    # Fast DDS prints what it cannot do, too.
+    return found.stdout.splitlines()[-1]

@@ -1,0 +1,81 @@
+"""Containers whose nodes run on genuine rclpy: the same files as on the embedded backend, whatever is killed."""
+
+from __future__ import annotations
+
+import os
+import time
+from pathlib import Path
+
+import docker
+import psutil
+import pytest
+
+from tests.docker.conftest import client
+from tests.docker.test_up import containers_of, engine
+from tests.e2e.collection import collect, fingerprints, start, write_config
+from throwcollect.heartbeat import SILENT_S
+from throwcollect.runtime.image import RMW_LABEL, default_tag
+
+pytestmark = [pytest.mark.docker, pytest.mark.usefixtures("client")]
+__all__ = ["client", "engine"]
+
+
+def test_nodes_that_are_killed_come_back_and_find_each_other(engine: docker.DockerClient, tmp_path: Path) -> None:
+    config, directory = write_config(tmp_path, trials=90), tmp_path / "data"
+    collect(config, tmp_path / "undisturbed", 2, "--set", "run.ros=embedded")
+    rclpy = ("--runtime", "docker", "--set", "run.ros=rclpy", "--set", "run.trial_timeout_s=20")
+    running = start(config, directory, 2, *rclpy)
+    running.wait_until(lambda: running.written() > 0)
+    for name in ("router", "sim_0", "coordinator"):
+        size = running.written()
+        before = containers_of(engine, directory)[name]
+        before.kill()
+        running.wait_until(lambda name=name, old=before.id: is_another(engine, directory, name, old))
+        if name == "router":
+            assert address_of(containers_of(engine, directory)[name]) == address_of(before)
+        running.wait_until(lambda size=size: running.written() > size)
+    code, _, err = running.finish()
+    assert code == 0, err
+    assert f"Docker containers of {default_tag()} on genuine rclpy with rmw_fastrtps_cpp" in err
+    assert fingerprints(directory) == fingerprints(tmp_path / "undisturbed")
+
+
+def test_health_is_that_of_the_loop(engine: docker.DockerClient, tmp_path: Path) -> None:
+    directory = tmp_path / "data"
+    slow = ("--runtime", "docker", "--set", "run.ros=rclpy", "--set", "sim.real_time_factor=1", "--trials", "300")
+    running = start(write_config(tmp_path, trials=8), directory, 1, *slow)
+    running.wait_until(lambda: running.written() > 0)
+    nodes = containers_of(engine, directory)
+    assert nodes.keys() == {"router", "sim_0", "coordinator"}
+    for node in nodes.values():
+        assert asked(node) == (0, ""), node.name
+    # Its process is stopped, and not the container, so that the launcher takes it for well.
+    (stuck,) = psutil.Process(nodes["sim_0"].attrs["State"]["Pid"]).children()
+    stuck.suspend()
+    try:
+        time.sleep(SILENT_S + 1)
+        assert asked(nodes["sim_0"]) == (1, "sim_0: does not answer\n")
+    finally:
+        stuck.resume()
+    running.process.terminate()
+    running.finish()
+
+
+def test_the_image_says_which_rclpy_it_has(client: docker.DockerClient) -> None:
+    assert client.images.get(default_tag()).labels[RMW_LABEL] == "rmw_fastrtps_cpp"
+    assert os.environ.get("THROWCOLLECT_ROS") is None
+
+
+def asked(container: docker.models.containers.Container) -> tuple[int, str]:
+    code, said = container.exec_run(["python", "-m", "throwcollect.health"])
+    return code, said.decode()
+
+
+def is_another(engine: docker.DockerClient, directory: Path, name: str, old: str) -> bool:
+    node = containers_of(engine, directory).get(name)
+    return node is not None and node.id != old and node.status == "running"
+
+
+def address_of(container: docker.models.containers.Container) -> str:
+    (network,) = container.attrs["NetworkSettings"]["Networks"].values()
+    return network["IPAddress"]

@@ -1,0 +1,93 @@
+"""Interfaces that genuine rclpy loads, against those of the embedded backend."""
+
+import json
+import re
+import sys
+from importlib import import_module
+from importlib.metadata import PackageNotFoundError, distribution
+from pathlib import Path
+
+import pytest
+
+from throwcollect import interfaces
+from throwcollect.interfaces import type_hash
+from throwcollect.interfaces.catalog import DEFINITIONS
+
+ROOT = Path(__file__).parents[2]
+BUILT = ("control_msgs", "controller_manager_msgs", "simulation_interfaces", "tf2_msgs")
+NAME = re.compile(r"""["']([a-z0-9_]+/(?:msg|srv|action)/[A-Z]\w+)["']""")
+
+
+def used() -> set[str]:
+    """Every interface that is named in the sources."""
+    sources = (ROOT / "src" / "throwcollect").rglob("*.py")
+    return {name for path in sources for name in NAME.findall(path.read_text(encoding="utf-8"))}
+
+
+def defined() -> set[str]:
+    """Every interface that the wheel is built from."""
+    paths = (path for package in BUILT for path in (DEFINITIONS / package).glob("*/*"))
+    return {path.relative_to(DEFINITIONS).with_suffix("").as_posix() for path in paths}
+
+
+def genuine_hash(name: str) -> str:
+    """Hash that the generators of ROS 2 have computed, as it is installed with the interface."""
+    text = Path(sys.prefix, "share", f"{name}.json").read_text(encoding="utf-8")
+    return {each["type_name"]: each["hash_string"] for each in json.loads(text)["type_hashes"]}[name]
+
+
+@pytest.fixture(scope="session")
+def _wheels() -> None:
+    try:
+        distribution("throwcollect-ros-interfaces")
+    except PackageNotFoundError:
+        pytest.skip("interfaces are not those of the wheel")
+
+
+@pytest.mark.usefixtures("_wheels")
+@pytest.mark.parametrize("name", sorted(used() | defined()))
+def test_type_hashes_of_both_backends_are_equal(name):
+    assert type_hash(name) == genuine_hash(name)
+
+
+@pytest.mark.usefixtures("_wheels")
+def test_the_wheel_holds_what_is_defined_and_nothing_else():
+    files = [file.as_posix() for file in distribution("throwcollect-ros-interfaces").files or ()]
+    found = [file for file in files if file.endswith((".msg", ".srv", ".action"))]
+    assert {file.partition("share/")[2].rpartition(".")[0] for file in found} == defined()
+
+
+@pytest.mark.parametrize("name", sorted(used() | defined()))
+def test_an_interface_that_is_used_is_loaded_with_its_type_support(name):
+    package, kind, short = name.split("/")
+    interface = getattr(import_module(f"{package}.{kind}"), short)
+    type(interface).__import_type_support__()
+    assert type(interface)._TYPE_SUPPORT is not None
+
+
+@pytest.mark.parametrize(
+    ("get", "wrong"),
+    [
+        ("get_message", "std_msgs/msg/Strin"),
+        ("get_message", "no_such_msgs/msg/String"),
+        ("get_service", "std_msgs/srv/String"),
+        ("get_message", "std_srvs/srv/Trigger"),
+        ("get_action", "FollowJointTrajectory"),
+    ],
+)
+def test_a_name_of_no_interface_is_refused_by_both_backends(get, wrong):
+    from throwcollect.ros import genuine
+
+    with pytest.raises(ValueError, match=re.escape(repr(wrong))):
+        getattr(genuine, get)(wrong)
+    with pytest.raises(ValueError, match=re.escape(repr(wrong))):
+        getattr(interfaces, get)(wrong)
+
+
+def test_classes_are_those_that_ros_has():
+    from throwcollect.ros import genuine
+
+    follow = import_module("control_msgs.action").FollowJointTrajectory
+    assert genuine.get_action("control_msgs/action/FollowJointTrajectory") is follow
+    assert genuine.get_message("std_msgs/msg/String") is import_module("std_msgs.msg").String
+    assert genuine.get_service("std_srvs/srv/Trigger") is import_module("std_srvs.srv").Trigger

@@ -1,0 +1,84 @@
+"""Native libraries of rclpy, pybullet, Pinocchio and Zenoh in one process, whichever is loaded first."""
+
+import itertools
+import os
+import subprocess
+import sys
+
+import pytest
+
+IMPORTS = {
+    "rclpy": "import rclpy, rclpy.action, control_msgs.action, trajectory_msgs.msg",
+    "pybullet": "import pybullet",
+    "pinocchio": "import pinocchio",
+    "zenoh": "import zenoh",
+}
+WORK = """
+import os, numpy, pyarrow, scipy.linalg
+
+assert pybullet.connect(pybullet.DIRECT) == 0
+pybullet.setGravity(0, 0, -10)
+shape = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=0.1)
+ball = pybullet.createMultiBody(1, shape, basePosition=[0, 0, 1])
+for _ in range(240):
+    pybullet.stepSimulation()
+assert pybullet.getBasePositionAndOrientation(ball)[0][2] < -3
+
+from throwcollect.robots.model import urdf_path
+model = pinocchio.buildModelFromUrdf(str(urdf_path()))
+data = model.createData()
+pinocchio.forwardKinematics(model, data, pinocchio.neutral(model))
+assert numpy.isfinite(data.oMi[model.njoints - 1].translation).all()
+assert numpy.allclose(scipy.linalg.inv(numpy.eye(300) * 2), numpy.eye(300) / 2)
+
+with zenoh.open(zenoh.Config()) as session:
+    heard = []
+    listener = session.declare_subscriber("here", lambda sample: heard.append(sample.payload.to_bytes()))
+    session.put("here", b"hello")
+    import time
+    for _ in range(100):
+        if heard:
+            break
+        time.sleep(0.05)
+    assert heard == [b"hello"]
+
+rclpy.init()
+node = rclpy.create_node("one_process", namespace=f"/process_{os.getpid()}")
+Follow = control_msgs.action.FollowJointTrajectory
+points = []
+
+def execute(handle):
+    points.extend(handle.request.trajectory.points)
+    handle.succeed()
+    return Follow.Result(error_string="reached")
+
+server = rclpy.action.ActionServer(node, Follow, "follow", execute)
+client = rclpy.action.ActionClient(node, Follow, "follow")
+assert client.wait_for_server(10)
+goal = Follow.Goal()
+goal.trajectory.points = [trajectory_msgs.msg.JointTrajectoryPoint(positions=[1.0, 2.0])]
+sent = client.send_goal_async(goal)
+rclpy.spin_until_future_complete(node, sent, timeout_sec=10)
+result = sent.result().get_result_async()
+rclpy.spin_until_future_complete(node, result, timeout_sec=10)
+assert result.result().result.error_string == "reached"
+assert list(points[0].positions) == [1.0, 2.0]
+rclpy.shutdown()
+print("all of it works")
+"""
+
+
+@pytest.mark.parametrize("order", list(itertools.permutations(IMPORTS, 2)), ids="-".join)
+def test_all_libraries_work_in_one_process(order):
+    # The rest in its own order: what matters is which two are first.
+    names = [*order, *(name for name in IMPORTS if name not in order)]
+    program = "\n".join([*(IMPORTS[name] for name in names), WORK])
+    found = subprocess.run(
+        [sys.executable, "-c", program],
+        env={**os.environ, "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert (found.returncode, found.stdout.splitlines()[-1:]) == (0, ["all of it works"]), found.stderr

@@ -1,0 +1,98 @@
+"""Simulations that are in the ROS graph, whether they can be asked or not, over a real router."""
+
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from throwcollect import ros
+from throwcollect.config.loader import load
+from throwcollect.coordinator import node as coordinator_node
+from throwcollect.coordinator.goals import FollowJointTrajectory
+from throwcollect.coordinator.node import Coordinator
+from throwcollect.dataset.writer import DatasetWriter, create
+from throwcollect.ros import ActionServer, get_message
+from throwcollect.ros.router import router
+from throwcollect.sweep.plan import make_plan
+
+UInt8MultiArray: Any = get_message("std_msgs/msg/UInt8MultiArray")
+YAML = """\
+name: reach
+trials: 2
+sweep: {sampler: uniform, parameters: {task.duration_s: {min: 1.0, max: 1.2}}}
+"""
+
+
+class Bench:
+    """A coordinator, and nodes that look like simulations."""
+
+    def __init__(self, directory: Path) -> None:
+        (directory / "reach.yaml").write_text(YAML)
+        plan = make_plan(load(directory / "reach.yaml"))
+        create(directory / "data", plan)
+        self.writer = DatasetWriter.open(directory / "data")
+        self.coordinator = Coordinator(self.writer.plan, self.writer)
+        self.executor = ros.SingleThreadedExecutor()
+        self.executor.add_node(self.coordinator)
+
+    def simulation(self, *, whole: bool) -> ros.Node:
+        node = ros.Node("sim_0", namespace="/sim_0")
+        self.executor.add_node(node)
+        if whole:
+            for limb in ("arm_right", "torso"):
+                ActionServer(node, FollowJointTrajectory, f"{limb}_controller/follow_joint_trajectory", lambda _: None)
+        node.create_publisher(UInt8MultiArray, "episode", 10)
+        return node
+
+    def until(self, condition: Callable[[], bool], seconds: float = 5.0) -> bool:
+        deadline = time.monotonic() + seconds
+        while not condition() and time.monotonic() < deadline:
+            self.executor.spin_once(timeout_sec=0.02)
+        return condition()
+
+    @property
+    def hung(self) -> list[str]:
+        return self.coordinator.report().hung
+
+
+@pytest.fixture
+def bench(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Bench]:
+    monkeypatch.setattr(coordinator_node, "_REACH_S", 0.5)
+    with router("tcp/127.0.0.1:0") as endpoint:
+        monkeypatch.setenv("ZENOH_CONFIG_OVERRIDE", f'mode="client";connect/endpoints=["{endpoint}"]')
+        ros.init()
+        bench = Bench(tmp_path)
+        try:
+            yield bench
+        finally:
+            bench.writer.close()
+            ros.shutdown()
+
+
+def test_a_simulation_that_cannot_be_asked_is_named_after_a_while(bench: Bench) -> None:
+    node = bench.simulation(whole=False)
+    assert bench.until(lambda: bench.coordinator.report().simulations == 1)
+    assert bench.hung == []
+    assert bench.until(lambda: bench.hung == ["sim_0"])
+    node.destroy_node()
+    assert bench.until(lambda: bench.hung == [])
+
+
+def test_one_that_can_be_asked_is_not(bench: Bench) -> None:
+    bench.simulation(whole=True)
+    assert bench.until(lambda: bench.coordinator.report().simulations == 1)
+    assert not bench.until(lambda: bench.hung != [], seconds=1.5)
+
+
+def test_a_simulation_that_was_started_again_is_another_one(bench: Bench) -> None:
+    first = bench.simulation(whole=True)
+    assert bench.until(lambda: bench.coordinator.report().simulations == 1)
+    (before,) = bench.coordinator._simulations.values()
+    # Its successor is there before it has gone.
+    second = ros.Node("sim_0", namespace="/sim_0")
+    second.create_publisher(UInt8MultiArray, "episode", 10)
+    assert bench.until(lambda: list(bench.coordinator._simulations.values()) != [before])
+    first.destroy_node()
+    second.destroy_node()
