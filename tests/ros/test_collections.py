@@ -8,20 +8,19 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from tests.e2e.collection import Running, collect, fingerprints, start, write_config
+from tests.e2e.collection import Running, call, collect, fingerprints, start, write_config
 from throwcollect.dataset.journal import read_journal
 from throwcollect.errors import WorkerError
 from throwcollect.runtime.records import STATE_VARIABLE, Records
 
 TRIALS = 12
 DOMAIN = "83"
-UNTIL_STOPPED = ("--trials", "400", "--set", "sim.real_time_factor=1", "--set", f"run.domain_id={DOMAIN}")
 
 LOOK = """
 import json, time, rclpy
@@ -67,40 +66,24 @@ def records(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Records:
     return Records()
 
 
-Begin = Callable[..., Running]
-
-
-@pytest.fixture
-def begin(records: Records, tmp_path: Path) -> Iterator[Begin]:
-    """Begins a run that goes on until it is stopped, and waits until its first trials have ended."""
-    begun: list[Running] = []
-
-    def begin(name: str, simulations: int) -> Running:
-        running = start(write_config(tmp_path, trials=TRIALS), tmp_path / name, simulations, *UNTIL_STOPPED)
-        begun.append(running)
-        deadline = time.monotonic() + 45
-        while len(simulations_of(running)) < simulations:
-            assert running.process.poll() is None, running.finish()
-            assert time.monotonic() < deadline, [path.read_text() for path in running.directory.glob("logs/*.log")]
-            time.sleep(0.05)
-        return running
-
-    yield begin
-    for running in begun:
-        if running.process.poll() is None:
-            running.process.send_signal(signal.SIGINT)
-            running.process.send_signal(signal.SIGINT)
-        running.finish()
+@pytest.fixture(scope="module")
+def going_on(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Running]:
+    """A run that goes on while tests look at it; its first trials have begun."""
+    directory = tmp_path_factory.mktemp("going_on")
+    options = ("--set", "sim.real_time_factor=1", "--set", f"run.domain_id={DOMAIN}")
+    environment = {STATE_VARIABLE: str(directory / "state"), "THROWCOLLECT_ROS": "rclpy"}
+    running = start(write_config(directory, trials=400), directory / "data", 1, *options, **environment)
+    running.wait_until(lambda: bool(entries(running, "lease")))
+    yield running
+    if running.process.poll() is None:
+        running.process.send_signal(signal.SIGINT)
+        running.process.send_signal(signal.SIGINT)
+    running.finish()
 
 
 def entries(running: Running, event: str) -> list[dict[str, Any]]:
     path = running.directory / "logs" / "journal.jsonl"
     return [entry for entry in read_journal(path) if entry["event"] == event] if path.exists() else []
-
-
-def simulations_of(running: Running) -> set[str]:
-    """Those that have had a trial."""
-    return {entry["simulation"] for entry in entries(running, "lease")}
 
 
 @pytest.fixture(scope="module")
@@ -143,8 +126,10 @@ def test_the_trial_of_a_simulation_that_was_killed_is_given_to_another(
         assert collected[name] == reference[name]
 
 
-def test_who_does_not_know_the_port_sees_nothing_and_whoever_evaluates_one_line_takes_part(begin: Begin) -> None:
-    running = begin("data", 1)
+def test_who_does_not_know_the_port_sees_nothing_and_whoever_evaluates_one_line_takes_part(
+    going_on: Running, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(STATE_VARIABLE, str(going_on.directory.parent / "state"))
     plain = {name: value for name, value in os.environ.items() if not name.startswith(("THROWCOLLECT", "FASTRTPS"))}
     for way in ({}, {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}):
         assert json.loads(python(LOOK, {**plain, "ROS_DOMAIN_ID": DOMAIN, **way})) == [], way
@@ -160,7 +145,19 @@ def test_who_does_not_know_the_port_sees_nothing_and_whoever_evaluates_one_line_
     )
     assert said.returncode == 0, said.stderr
     assert said.stdout.splitlines()[-1] == "32"
-    assert running.process.poll() is None
+    named = call("ros", "node", "list", "--run", going_on.directory).stdout.splitlines()
+    assert {"/coordinator", "/sim_0/sim_0", "/sim_0/arm_right_controller"} <= set(named)
+    assert going_on.process.poll() is None
+
+
+def test_two_runs_at_once_do_not_see_each_other(
+    reference: dict[str, str], records: Records, going_on: Running, tmp_path: Path
+) -> None:
+    """In one domain and with the same names, so that nothing but their discovery servers keeps them apart."""
+    collect(write_config(tmp_path, trials=TRIALS), tmp_path / "data", 2, "--set", f"run.domain_id={DOMAIN}")
+    assert fingerprints(tmp_path / "data") == reference
+    assert going_on.process.poll() is None
+    assert not entries(going_on, "fail")
 
 
 def test_a_coordinator_that_sees_no_simulation_is_told_of_after_a_while(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import os
 import re
+import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -12,9 +13,13 @@ from typing import Any
 from throwcollect import ros
 from throwcollect.cli.ros_env import joining_environment, named
 from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError, WorkerError
+from throwcollect.ros.middleware import Middleware
 
 _SLICE_S = 0.2
 """rclpy looks at signals between two waits only."""
+_QUIET_S = 0.5
+_LOOKING_S = 3.0
+"""Nodes on DDS find each other within a second; the machine may be busy."""
 _MOST_NAMES = 8
 _ABSOLUTE = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
 
@@ -35,6 +40,19 @@ class Session:
         """Call back until something is true."""
         while not done():
             self._executor.spin_once(timeout_sec=_SLICE_S)
+
+    def look_around(self) -> None:
+        """Wait until others are seen and nothing new comes: DDS tells of one thing after another, not of the last."""
+        seen: set[object] = set()
+        start = changed = time.monotonic()
+        while (now := time.monotonic()) < start + _LOOKING_S:
+            self._executor.spin_once(timeout_sec=_SLICE_S)
+            nodes = set(self.node.get_node_names_and_namespaces())
+            sees: set[object] = {*nodes, *(name for name, _ in self.node.get_topic_names_and_types())}
+            if sees != seen:
+                seen, changed = sees, now
+            elif len(nodes) > 1 and now > changed + _QUIET_S:
+                return
 
     def answer(self, future: ros.Future, *, alive: Callable[[], bool], who: str) -> Any:
         """Wait for an answer.
@@ -82,6 +100,8 @@ def joined(run: str | None) -> Iterator[Session]:
         _init()
         session = Session()
         try:
+            if Middleware.of_process().is_fast_dds:
+                session.look_around()
             yield session
         finally:
             session.close()
