@@ -43,12 +43,14 @@ $(READY_ROS): $(ROS_WHEELS)/made-from.sha256 | $(READY_DEV)
 	mv $@.pth "$$($(ROS_VENV)/bin/python -c "import sysconfig; print(sysconfig.get_path('purelib'))")/development.pth"
 	touch $@
 
-# Tests that wait for processes run two files at a time; those with an engine look at all that is on it, so one by one.
-test: check ros
-	$(ROS_VENV)/bin/python -m pytest -n 2 --dist loadfile tests/contract tests/ros
+# Continuous integration makes the image meanwhile, and names the process that does. Tests that wait for processes, and
+# those with an engine, which run one by one, leave the processors to others most of the time.
+test: check
 	$(BIN)/python -m pytest -n logical tests/architecture tests/unit tests/contract tests/physics
-	$(BIN)/python -m pytest -n 2 --dist loadfile tests/e2e tests/integration
-	$(BIN)/python -m pytest tests/docker
+	@while [ -n "$(MAKES_IMAGE)" ] && kill -0 $(MAKES_IMAGE) 2> /dev/null; do sleep 1; done
+	$(MAKE) --no-print-directory ros
+	$(ROS_VENV)/bin/python -m pytest -n 2 --dist loadgroup tests/contract tests/ros
+	$(BIN)/python -m pytest -n 3 --dist loadgroup --no-loadscope-reorder tests/docker tests/e2e tests/integration
 
 # Format, lint, types and the direction of imports.
 check: $(READY_DEV)

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import psutil
 import pytest
 
 from tests.e2e.collection import Running, call, collect, fingerprints, start, write_config
@@ -100,9 +101,10 @@ def test_the_dataset_does_not_depend_on_the_backend(
     assert fingerprints(tmp_path / "data") == reference
 
 
-def test_the_trial_of_a_simulation_that_was_killed_is_given_to_another(
+def test_the_trial_of_a_simulation_that_was_killed_is_given_to_another_though_the_router_is_killed_too(
     reference: dict[str, str], records: Records, tmp_path: Path
 ) -> None:
+    """A discovery server that comes back too soon is never told of the nodes that are there."""
     config = write_config(tmp_path, trials=TRIALS)
     running = start(config, tmp_path / "data", 2, "--set", "sim.real_time_factor=1")
 
@@ -115,6 +117,9 @@ def test_the_trial_of_a_simulation_that_was_killed_is_given_to_another(
     (trial,) = under_way()
     running.node("--name", "sim_0").kill()
     killed = time.time()
+    time.sleep(1.0)
+    (router,) = [each for each in psutil.Process(running.process.pid).children() if "router" in each.cmdline()]
+    router.kill()
     code, _, err = running.finish()
     assert code == 0, err
     assert "sim_0 was lost (ended by SIGKILL)" in err

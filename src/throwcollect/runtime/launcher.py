@@ -19,6 +19,7 @@ from throwcollect.coordinator.progress import Progress
 from throwcollect.dataset.inspect import info, loss
 from throwcollect.dataset.lock import held_together
 from throwcollect.errors import ConfigError, DatasetError, Interrupted, LossError, ThrowcollectError, WorkerError
+from throwcollect.ros.fast_dds import SERVER_REST_S
 from throwcollect.run_key import RunKey
 from throwcollect.runtime.events import EventLog, RunEvent
 from throwcollect.runtime.listening import Listening
@@ -219,7 +220,8 @@ class _Launcher:
         self._set_aside: set[str] = set()
         self._apart_since = math.inf
         self._place = place
-        self._supervisor = Supervisor(self._place, config.run, simulations=self._simulations)
+        rest_s = SERVER_REST_S if run.record.middleware.is_fast_dds else 0.0
+        self._supervisor = Supervisor(self._place, config.run, simulations=self._simulations, router_rest_s=rest_s)
         self._listening = Listening(
             self._report,
             domain_id=run.record.domain_id,

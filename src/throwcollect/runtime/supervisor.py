@@ -54,11 +54,13 @@ class Supervisor:
         runtime: Where the nodes live; closed at the end.
         run: How to run.
         simulations: Number of simulations.
+        router_rest_s: Shortest time after which a router that ended is started again [s].
     """
 
-    def __init__(self, runtime: Runtime, run: RunConfig, *, simulations: int) -> None:
+    def __init__(self, runtime: Runtime, run: RunConfig, *, simulations: int, router_rest_s: float = 0.0) -> None:
         self.runtime = runtime
         self._run = run
+        self._router_rest_s = router_rest_s
         self._simulations: tuple[str, ...] = tuple(map(simulation_name, range(simulations)))
         self._restarts: dict[str, int] = {}
         self._last_end: dict[str, str] = {}
@@ -226,7 +228,8 @@ class Supervisor:
             self._given_up[node.name] = node
             return False
         self._restarts[node.name] = count + 1
-        self._due[node.name] = time.monotonic() + min(_FIRST_BACKOFF_S * 2**count, _LONGEST_BACKOFF_S)
+        rest = min(_FIRST_BACKOFF_S * 2**count, _LONGEST_BACKOFF_S)
+        self._due[node.name] = time.monotonic() + (max(rest, self._router_rest_s) if node.name == ROUTER else rest)
         return True
 
     def _check_hope(self) -> None:

@@ -212,6 +212,19 @@ def test_without_the_router_the_run_ends(runtime: FakeRuntime, clock: Clock) -> 
         supervisor.poll()
 
 
+def test_a_router_rests_for_as_long_as_its_nodes_need_to_miss_it(runtime: FakeRuntime, clock: Clock) -> None:
+    supervisor = Supervisor(runtime, RunConfig(), simulations=2, router_rest_s=4.0)
+    supervisor.start()
+    runtime.die(ROUTER)
+    supervisor.poll()
+    clock.now += 3.9
+    supervisor.poll()
+    assert state(supervisor, ROUTER).status == "restarting"
+    clock.now += 0.2
+    supervisor.poll()
+    assert state(supervisor, ROUTER).status == "running"
+
+
 def test_the_end_of_the_coordinator_is_handed_out_whatever_else_is_lost(runtime: FakeRuntime, clock: Clock) -> None:
     supervisor = supervise(runtime, restarts=0)
     for name in SIMULATIONS:
