@@ -12,7 +12,7 @@ READY_ROS := $(ROS_VENV)/.ready
 # starts twice as fast when its libraries are compiled once.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: up ros test check bench bench-full clean
+.PHONY: up ros test test-containers test-processes check bench bench-full clean
 
 up: $(READY)
 	$(BIN)/throwcollect up -n 2 configs/quickstart.yaml
@@ -43,14 +43,21 @@ $(READY_ROS): $(ROS_WHEELS)/made-from.sha256 | $(READY_DEV)
 	mv $@.pth "$$($(ROS_VENV)/bin/python -c "import sysconfig; print(sysconfig.get_path('purelib'))")/development.pth"
 	touch $@
 
-# Continuous integration makes the image meanwhile, and names the process that does. Tests that wait for processes, and
-# those with an engine, which run one by one, leave the processors to others most of the time.
+# Continuous integration makes the image meanwhile, and names the process that does.
 test: check
 	$(BIN)/python -m pytest -n logical tests/architecture tests/unit tests/contract tests/physics
 	@while [ -n "$(MAKES_IMAGE)" ] && kill -0 $(MAKES_IMAGE) 2> /dev/null; do sleep 1; done
 	$(MAKE) --no-print-directory ros
-	$(ROS_VENV)/bin/python -m pytest -n 2 --dist loadgroup tests/contract tests/ros
-	$(BIN)/python -m pytest -n 3 --dist loadgroup --no-loadscope-reorder tests/docker tests/e2e tests/integration
+	$(ROS_VENV)/bin/python -m pytest -n 2 --dist loadfile tests/contract tests/ros
+	$(MAKE) --no-print-directory -j 2 --output-sync=target test-containers test-processes
+
+# Both wait most of the time, so they run side by side. Tests with an engine look at all that is on it, so one by one.
+test-containers:
+	$(BIN)/python -m pytest tests/docker
+
+# Two files at a time.
+test-processes:
+	$(BIN)/python -m pytest -n 2 --dist loadfile tests/e2e tests/integration
 
 # Format, lint, types and the direction of imports.
 check: $(READY_DEV)
