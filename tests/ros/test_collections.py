@@ -149,7 +149,8 @@ def test_who_does_not_know_the_port_sees_nothing_and_whoever_evaluates_one_line_
         check=False,
     )
     assert said.returncode == 0, said.stderr
-    assert said.stdout.splitlines()[-1] == "32"
+    # RMWs print there, too, and Zenoh does when it is closed.
+    assert "32" in said.stdout.splitlines()
     named = call("ros", "node", "list", "--run", going_on.directory).stdout.splitlines()
     assert {"/coordinator", "/sim_0/sim_0", "/sim_0/arm_right_controller"} <= set(named)
     assert going_on.process.poll() is None
