@@ -152,11 +152,12 @@ class SimulationNode(Node):
         """
         others = {info.node_name for info in self.get_publishers_info_by_topic(_EPISODE)} - {self.get_name()}
         if others:
-            namespace = self.get_namespace()
+            # Before it is destroyed: rclpy tells nothing of a node afterwards.
+            name, namespace = self.get_name(), self.get_namespace()
             self.destroy_node()
             raise ConfigError(
                 f"namespace {namespace}: the simulation {min(others)} lives there",
-                expected=f"one simulation in a namespace, such as --namespace /{self.get_name()}, the default",
+                expected=f"one simulation in a namespace, such as --namespace /{name}, the default",
             )
 
     def _publish_samples(self) -> None:
