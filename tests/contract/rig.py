@@ -12,8 +12,8 @@ from throwcollect.ros.middleware import Middleware
 
 ON_RCLPY = uses_rclpy()
 ON_DDS = Middleware.of_process().is_fast_dds
-DISCOVERY_S = 5.0
-"""Genuine nodes find each other, and all that they have, within a second; the machine may be busy."""
+PATIENCE_S = 30.0
+"""Genuine nodes find each other, and all that they have, within a second; the machine may be very busy."""
 
 if ON_RCLPY:
     from rclpy import exceptions as exceptions
@@ -61,7 +61,7 @@ class Rig:
         self.executors.append((executor, node))
         return node
 
-    def spin(self, until: Callable[[], Any], timeout: float = 5.0) -> bool:
+    def spin(self, until: Callable[[], Any], timeout: float = PATIENCE_S) -> bool:
         """Spin until a condition is true; returns whether it became so."""
         deadline = time.monotonic() + timeout
         while not until():
@@ -73,9 +73,9 @@ class Rig:
 
     def sees(self, condition: Callable[[], Any]) -> bool:
         """Whether something of others that is there can be seen: at once, or on rclpy as soon as it is discovered."""
-        return self.spin(condition, DISCOVERY_S) if ON_RCLPY else bool(condition())
+        return self.spin(condition) if ON_RCLPY else bool(condition())
 
-    def result(self, future: Future, timeout: float = 5.0) -> Any:
+    def result(self, future: Future, timeout: float = PATIENCE_S) -> Any:
         assert self.spin(future.done, timeout), "no result"
         return future.result()
 

@@ -125,7 +125,7 @@ def test_the_trial_of_a_simulation_that_was_killed_is_given_to_another_though_th
     assert "sim_0 was lost (ended by SIGKILL)" in err
     again = [entry for entry in entries(running, "lease") if entry["trial"] == trial and entry["time"] > killed]
     assert len(again) == 1
-    assert again[0]["time"] < killed + 15
+    assert again[0]["time"] < killed + 30
     collected = fingerprints(tmp_path / "data")
     for name in ("small_00000.mcap", "throws.parquet"):
         assert collected[name] == reference[name]
@@ -162,8 +162,8 @@ def test_two_runs_at_once_do_not_see_each_other(
     """In one domain and with the same names, so that nothing but their discovery servers keeps them apart."""
     collect(write_config(tmp_path, trials=TRIALS), tmp_path / "data", 2, "--set", f"run.domain_id={DOMAIN}")
     assert fingerprints(tmp_path / "data") == reference
-    assert going_on.process.poll() is None
-    assert not entries(going_on, "fail")
+    before = len(entries(going_on, "commit"))
+    going_on.wait_until(lambda: len(entries(going_on, "commit")) > before)
 
 
 def test_a_coordinator_that_sees_no_simulation_is_told_of_after_a_while(
@@ -182,7 +182,8 @@ def test_a_coordinator_that_sees_no_simulation_is_told_of_after_a_while(
     )
     code, _, err = running.finish()
     assert code == WorkerError.exit_code == 3
-    assert "simulations have been ready for 20 s, but the coordinator does not see them" in err
+    assert "the coordinator does not see the simulations; all of them are started again" in err
+    assert "simulations have been ready for 12 s, twice, but the coordinator does not see them" in err
     assert "they use rmw_" in err
     assert "a firewall may keep nodes apart" in err
 

@@ -27,10 +27,10 @@ PLAIN_DISCOVERY = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "SYSTEM_DEFAULT"}
 
 _SERVER = "44.53.00.5f.45.50.52.4f.53.49.4d.41"
 """Identifier of a discovery server, by which its clients know it; that which Fast DDS's own tools take."""
-_NODE_LEASE_S, _NODE_ANNOUNCED_S = 10.0, 2.0
-"""A node that is not heard of for so long is gone; nodes are silent for a while on a busy machine."""
-_SERVER_LEASE_S, _SERVER_ANNOUNCED_S = 3.0, 0.5
-SERVER_REST_S = 4.0
+_LEASE_S, _ANNOUNCED_S = 10, 1
+"""A node or server that is not heard of for so long is gone. On a busy machine they are silent for a while; whoever is
+taken for gone by mistake is often not found again."""
+SERVER_REST_S = 11.0
 """A server that ended is started again after this time. Nodes take one that comes back sooner, before they have missed
 the last one, for that one: they do not tell it of themselves, and are never told of any node that comes later."""
 
@@ -52,15 +52,14 @@ def client_profile(endpoint: str) -> str:
           <discoveryServersList><RemoteServer prefix="{_SERVER}"><metatrafficUnicastLocatorList>
             {_locator(address, port)}
           </metatrafficUnicastLocatorList></RemoteServer></discoveryServersList>"""
-    return _profile(address, discovery + _lease(_NODE_LEASE_S, _NODE_ANNOUNCED_S))
+    return _profile(address, discovery)
 
 
 def server_profile(endpoint: str) -> str:
     """The profile of a discovery server that listens there; argument, result and errors as `client_profile`."""
     address, port = _place(endpoint)
     locators = f"<metatrafficUnicastLocatorList>{_locator(address, port)}</metatrafficUnicastLocatorList>"
-    discovery = "<discoveryProtocol>SERVER</discoveryProtocol>" + _lease(_SERVER_LEASE_S, _SERVER_ANNOUNCED_S)
-    return _profile(address, discovery, locators, f"<prefix>{_SERVER}</prefix>")
+    return _profile(address, "<discoveryProtocol>SERVER</discoveryProtocol>", locators, f"<prefix>{_SERVER}</prefix>")
 
 
 def write_temporarily(profile: str) -> Path:
@@ -86,15 +85,6 @@ def _locator(address: str, port: int) -> str:
     return f"<locator><udpv4><address>{address}</address><port>{port}</port></udpv4></locator>"
 
 
-def _lease(lease_s: float, announced_s: float) -> str:
-    def duration(seconds: float) -> str:
-        return f"<sec>{int(seconds)}</sec><nanosec>{int(seconds % 1 * 1e9)}</nanosec>"
-
-    return f"""
-          <leaseDuration>{duration(lease_s)}</leaseDuration>
-          <leaseAnnouncement>{duration(announced_s)}</leaseAnnouncement>"""
-
-
 def _profile(address: str, discovery: str, locators: str = "", prefix: str = "") -> str:
     # Nodes of one machine are not to be reached from others.
     loopback = f"<interfaceWhiteList><address>{address}</address></interfaceWhiteList>"
@@ -112,6 +102,8 @@ def _profile(address: str, discovery: str, locators: str = "", prefix: str = "")
       <userTransports><transport_id>run</transport_id></userTransports>
       <builtin>
         <discovery_config>{discovery}
+          <leaseDuration><sec>{_LEASE_S}</sec></leaseDuration>
+          <leaseAnnouncement><sec>{_ANNOUNCED_S}</sec></leaseAnnouncement>
         </discovery_config>
         {locators}
       </builtin>

@@ -39,7 +39,7 @@ Place = Union[LocalRuntime, "DockerRuntime"]
 
 _POLL_S = 0.05
 _WRITE_PROGRESS_S = 1.0
-_MEET_S = 20.0
+_MEET_S = 12.0
 """Nodes that are ready see each other within a second."""
 
 
@@ -219,6 +219,7 @@ class _Launcher:
         self._simulations = self._wanted = run.record.simulations
         self._set_aside: set[str] = set()
         self._apart_since = math.inf
+        self._started_again = False
         self._place = place
         rest_s = SERVER_REST_S if run.record.middleware.is_fast_dds else 0.0
         self._supervisor = Supervisor(self._place, config.run, simulations=self._simulations, router_rest_s=rest_s)
@@ -305,10 +306,10 @@ class _Launcher:
             )
 
     def _check_that_nodes_meet(self, progress: Progress) -> None:
-        """End a run that would go on for ever with nothing done, as its nodes do not see each other.
+        """Start nodes again that do not see each other: on DDS that happens, and they do at the next try.
 
         Raises:
-            WorkerError: If simulations have been ready for a while, and the coordinator has never seen one.
+            WorkerError: If that did not help; the run would go on for ever with nothing done.
         """
         states = self._supervisor.states()
         ready = any(state.status == "running" for state in states if state.name not in (ROUTER, COORDINATOR))
@@ -316,9 +317,15 @@ class _Launcher:
             self._apart_since = math.inf
             return
         self._apart_since = min(self._apart_since, time.monotonic())
-        if time.monotonic() - self._apart_since > _MEET_S:
+        if time.monotonic() - self._apart_since <= _MEET_S:
+            return
+        if not self._started_again:
+            self._started_again = True
+            self._onlooker.warn("the coordinator does not see the simulations; all of them are started again")
+            self._supervisor.replace([state.name for state in states if state.name != ROUTER])
+        else:
             raise WorkerError(
-                f"simulations have been ready for {_MEET_S:g} s, but the coordinator does not see them",
+                f"simulations have been ready for {_MEET_S:g} s, twice, but the coordinator does not see them",
                 evidence=f"they use {self._run.record.middleware.rmw}, and the router at {endpoint_of(self._place)}",
                 hint="a firewall may keep nodes apart; throwcollect doctor shows what is installed",
             )
