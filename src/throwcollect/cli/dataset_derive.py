@@ -9,10 +9,10 @@ from typing import Any
 
 import typer
 
-from throwcollect.dataset.derive.choice import filtered, merge, sample
-from throwcollect.dataset.derive.derivation import Derived
-from throwcollect.dataset.derive.split import SQUARES, split
-from throwcollect.dataset.derive.statistics import Statistics, statistics
+from throwcollect.derive.choice import filtered, merge, sample
+from throwcollect.derive.derivation import Derived
+from throwcollect.derive.split import SQUARES, split
+from throwcollect.derive.statistics import Statistics, statistics
 from throwcollect.wording import counted
 
 _COLUMNS = ("count", "nulls", "min", "q05", "q50", "q95", "max", "mean", "std")

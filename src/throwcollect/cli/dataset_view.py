@@ -8,8 +8,8 @@ from pathlib import Path
 
 import typer
 
-from throwcollect.dataset.viewer.view import view
 from throwcollect.errors import ConfigError
+from throwcollect.view.view import view
 
 
 def write_view(directory: Path, output: Path, *, trials: str | None, json: bool) -> None:

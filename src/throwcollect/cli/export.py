@@ -8,7 +8,7 @@ from pathlib import Path
 
 import typer
 
-from throwcollect.dataset.export.formats import export
+from throwcollect.export.formats import export
 from throwcollect.wording import counted
 
 

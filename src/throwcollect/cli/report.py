@@ -7,7 +7,7 @@ from pathlib import Path
 
 import typer
 
-from throwcollect.dataset.report.write import write_report
+from throwcollect.report.write import write_report
 
 
 def report_dataset(directory: Path, output: Path | None, *, pictures: Path | None, json: bool) -> None:

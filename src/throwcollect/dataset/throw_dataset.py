@@ -15,6 +15,7 @@ import pyarrow.compute as pc
 from throwcollect.config.schema import Config
 from throwcollect.dataset.card import count_outcomes
 from throwcollect.dataset.columns import COLUMNS, Place
+from throwcollect.dataset.expression import Expression
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.throw import Throw
 from throwcollect.dataset.trajectories import Trajectories, read_trajectories
@@ -92,8 +93,6 @@ class ThrowDataset(Sequence[Throw]):
             DatasetError: If a trial is not among the throws.
         """
         if isinstance(which, str):
-            from throwcollect.dataset.derive.where import Expression
-
             return self._taken(Expression(which, place="select").rows(self.throws))
         if isinstance(which, pc.Expression):
             try:

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
-from throwcollect.dataset.derive.row_result import row_result
 from throwcollect.dataset.directory import PLAN
 from throwcollect.dataset.findings import Finding
+from throwcollect.dataset.row_result import row_result
 from throwcollect.dataset.throws import REFUSED
 from throwcollect.errors import ConfigError
 from throwcollect.sweep.plan import Check, Plan, make_trials, refusal

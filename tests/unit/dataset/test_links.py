@@ -13,11 +13,11 @@ from tests.unit.dataset.conftest import Collection
 from tests.unit.dataset.mutations import SETTINGS, no_plan
 
 from throwcollect.coordinator.resume import resume
-from throwcollect.dataset.derive.choice import filtered
 from throwcollect.dataset.rebuild import rebuild
 from throwcollect.dataset.repair import repair
 from throwcollect.dataset.verify import verify
 from throwcollect.dataset.writer import DatasetWriter
+from throwcollect.derive.choice import filtered
 from throwcollect.errors import DatasetError, ThrowcollectError
 
 BEGUN = "quick_00001.mcap.part"

@@ -16,13 +16,13 @@ from mcap.opcode import Opcode
 from tests.unit.dataset.conftest import Collection
 from tests.unit.dataset.mutations import SETTINGS, no_plan
 
-from throwcollect.dataset.derive.choice import filtered
 from throwcollect.dataset.manifest import RunningHash, changed_sizes, entry_of_file, promised_names, read_manifest
 from throwcollect.dataset.mcap_reader import opened
 from throwcollect.dataset.rebuild import rebuild
 from throwcollect.dataset.repair import repair
 from throwcollect.dataset.verify import verify
 from throwcollect.dataset.verify_manifest import manifest_findings
+from throwcollect.derive.choice import filtered
 from throwcollect.errors import DatasetError
 
 MANIFEST = "datapackage.json"

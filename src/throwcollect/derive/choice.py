@@ -1,0 +1,73 @@
+"""Datasets made of some trials of one dataset, or of all trials of several."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from throwcollect.dataset.expression import Expression
+from throwcollect.dataset.reader import Dataset
+from throwcollect.derive.derivation import Derived, derive
+from throwcollect.derive.source import source
+from throwcollect.errors import ConfigError, Problem
+
+
+def merge(directories: Sequence[Path], output: Path) -> Derived:
+    """Put the trials of several datasets one after the other.
+
+    Args:
+        directories: Directories of the datasets, at least one, in this order.
+        output: Directory of the new dataset, which must not exist or be empty.
+
+    Raises:
+        ConfigError: If the datasets differ in keys that cannot be swept, or the directory cannot be used.
+        DatasetError: If a dataset is damaged, or the new one cannot be written.
+    """
+    return derive([source(Dataset.open(directory)) for directory in directories], output)
+
+
+def filtered(directory: Path, output: Path, *, where: str) -> Derived:
+    """Take the trials that fulfil a condition.
+
+    Args:
+        directory: Directory of the dataset.
+        output: Directory of the new dataset, which must not exist or be empty.
+        where: Condition on columns of the table of throws; see `dataset.expression`.
+
+    Raises:
+        ConfigError: If the condition cannot be evaluated or no trial fulfils it, or the directory cannot be used.
+        DatasetError: If the dataset is damaged, or the new one cannot be written.
+    """
+    condition = Expression(where, place="--where")
+    dataset = Dataset.open(directory)
+    chosen = source(dataset, condition.rows(dataset.throws))
+    if not chosen.trials:
+        problem = f"no trial of {directory} that has an episode fulfils {where!r}"
+        raise ConfigError([Problem(problem, "--where")])
+    return derive([chosen], output)
+
+
+def sample(directory: Path, output: Path, *, count: int, seed: int = 0) -> Derived:
+    """Take trials at random, all equally likely and none twice; they stay in their order.
+
+    With the same seed, fewer trials are some of more.
+
+    Args:
+        directory: Directory of the dataset.
+        output: Directory of the new dataset, which must not exist or be empty.
+        count: Number of trials.
+        seed: Seed of the choice, not negative.
+
+    Raises:
+        ConfigError: If the dataset has fewer episodes, or the directory cannot be used.
+        DatasetError: If the dataset is damaged, or the new one cannot be written.
+    """
+    dataset = Dataset.open(directory)
+    candidates = source(dataset).trials
+    if not 1 <= count <= len(candidates):
+        problem = f"should be from 1 to {len(candidates)}, the number of episodes of {directory}, got {count}"
+        raise ConfigError([Problem(problem, "--count")])
+    order = np.random.default_rng(seed).permutation(len(candidates))
+    return derive([source(dataset, [candidates[place] for place in order[:count]])], output)

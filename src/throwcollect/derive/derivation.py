@@ -1,0 +1,151 @@
+"""Writes a derived dataset: the one that a collection of its list of trials would have given."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections import Counter, deque
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import closing
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from throwcollect.config.schema import Config
+from throwcollect.dataset.directory import CARD, SOURCES
+from throwcollect.dataset.inspect import info
+from throwcollect.dataset.new_directory import new_directory
+from throwcollect.dataset.reader import Dataset
+from throwcollect.dataset.row_result import row_result
+from throwcollect.dataset.writer import DatasetWriter
+from throwcollect.derive.records import encode_sources, sources_section
+from throwcollect.derive.source import Source
+from throwcollect.derive.union import list_of_trials
+from throwcollect.episode.channels import Channels
+from throwcollect.episode.message import Episode
+from throwcollect.episode.restamp import Restamper
+from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.files import write_file
+from throwcollect.robots.description import full_description
+from throwcollect.sweep.plan import Plan, make_trials
+from throwcollect.wording import command
+
+_ROWS_AT_ONCE = 256
+_MOST_WORKERS = 4
+"""Compressing and hashing run side by side; what stays with the interpreter keeps more of them from being of use."""
+
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Derived:
+    """A dataset that was made from others.
+
+    Attributes:
+        trials: Number of its trials, each of which has an episode.
+        offered: Number of trials of its sources.
+        without_episode: Number of trials that were asked for but have no episode, by outcome; they are left out.
+        digest: Its digest.
+    """
+
+    trials: int
+    offered: int
+    without_episode: Mapping[str, int]
+    digest: str
+
+    def as_dict(self) -> dict[str, Any]:
+        """The same for JSON."""
+        return asdict(self)
+
+
+def derive(sources: Sequence[Source], output: Path) -> Derived:
+    """Make the dataset that consists of the trials of some others, renumbered from 0, under the name of the first.
+
+    Args:
+        sources: At least one; its trials come in the order of the sources.
+        output: Its directory, which must not exist or be empty; nothing is left there after an error.
+
+    Raises:
+        ConfigError: If there is no trial, the sources do not go together, or the directory cannot be used.
+        DatasetError: If an episode of a source is damaged, or the dataset cannot be written.
+    """
+    with new_directory(output) as directory:
+        return write(sources, directory)
+
+
+def write(sources: Sequence[Source], directory: Path, *, name: str | None = None) -> Derived:
+    """Write such a dataset to a directory that is removed if that fails.
+
+    Args:
+        sources: As for `derive`.
+        directory: New or empty.
+        name: Name of the dataset; None for that of the first source.
+
+    Raises:
+        ConfigError: If there is no trial, or the sources do not go together.
+        DatasetError: If an episode of a source is damaged, or the dataset cannot be written.
+    """
+    began = time.monotonic()
+    config, points = list_of_trials(sources)
+    if not len(points.values):
+        raise ConfigError("no trial with an episode is left", expected="at least one")
+    if name is not None:
+        config = config.model_copy(update={"name": name})
+    # Every trial has been run before, so none is to be checked.
+    plan = Plan(config, tuple(make_trials(config, points)))
+    with closing(DatasetWriter.create(directory, plan, listed=points)) as writer:
+        write_file(directory / SOURCES, encode_sources(sources))
+        joints = tuple(config.task.end)
+        for episode, row in _episodes(sources, config):
+            writer.append(episode, row_result(row, joints))
+        writer.finish(wall_s=time.monotonic() - began)
+    card = (directory / CARD).read_text(encoding="utf-8")
+    write_file(directory / CARD, (card + sources_section(sources)).encode())
+    without = sum((Counter(each.without_episode) for each in sources), Counter[str]())
+    return Derived(
+        trials=len(plan.trials),
+        offered=sum(len(each.dataset.throws) for each in sources),
+        without_episode=dict(sorted(without.items())),
+        digest=info(directory).digest,
+    )
+
+
+def _episodes(sources: Sequence[Source], config: Config) -> Iterator[tuple[Episode, Row]]:
+    """Episodes under their new numbers, in order, each with its row in the table of its source."""
+    restamper = Restamper(config, Channels(config, full_description(config)))
+    workers = min(_MOST_WORKERS, os.cpu_count() or 1)
+    pending: deque[tuple[Future[Episode], Row]] = deque()
+    with ThreadPoolExecutor(workers) as pool:
+        for number, (dataset, row) in enumerate(_rows(sources)):
+            pending.append((pool.submit(_restamped, restamper, dataset, row, number), row))
+            if len(pending) > 2 * workers:
+                yield _result(pending)
+        while pending:
+            yield _result(pending)
+
+
+def _result(pending: deque[tuple[Future[Episode], Row]]) -> tuple[Episode, Row]:
+    future, row = pending.popleft()
+    return future.result(), row
+
+
+def _rows(sources: Sequence[Source]) -> Iterator[tuple[Dataset, Row]]:
+    for each in sources:
+        for start in range(0, len(each.trials), _ROWS_AT_ONCE):
+            numbers = each.trials[start : start + _ROWS_AT_ONCE]
+            for row in each.dataset.throws.take(numbers).to_pylist():
+                yield each.dataset, row
+
+
+def _restamped(restamper: Restamper, dataset: Dataset, row: Row, number: int) -> Episode:
+    trial = row["trial"]
+    episode = dataset.episode(trial)
+    try:
+        if episode.digest != row["digest"]:
+            raise DatasetError(f"digest {episode.digest}", expected=f"{row['digest']} as throws.parquet says")
+        return restamper.restamped(episode, number)
+    except DatasetError as error:
+        raise DatasetError(
+            f"{dataset.directory}: trial {trial}: {error}", hint=command("dataset", "verify", dataset.directory)
+        ) from error

@@ -1,0 +1,67 @@
+"""What a derived dataset says of where its trials come from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import pyarrow as pa
+
+from throwcollect.dataset.throws import encode_table
+from throwcollect.derive.source import Source
+
+
+def encode_sources(sources: Sequence[Source]) -> bytes:
+    """Parquet bytes of a table with one row a trial: the dataset, trial and episode that it was."""
+    rows: list[dict[str, object]] = []
+    for source in sources:
+        dataset = source.dataset
+        digests = dataset.throws["digest"].take(source.trials).to_pylist()
+        for number, digest in zip(source.trials, digests, strict=True):
+            rows.append(
+                {
+                    "trial": len(rows),
+                    "source_name": dataset.config.name,
+                    "source_directory": str(dataset.directory),
+                    "source_digest": source.digest,
+                    "source_trial": number,
+                    "source_trial_digest": dataset.plan.trials[number].digest,
+                    "source_episode_digest": digest,
+                }
+            )
+    return encode_table(pa.Table.from_pylist(rows, schema=_SOURCES))
+
+
+def sources_section(sources: Sequence[Source]) -> str:
+    """The part of the data card that names the datasets that the trials come from."""
+    lines = [
+        "",
+        "## Sources",
+        "",
+        "Derived from other datasets, in whose data cards the provenance of the simulations is; `sources.parquet` says "
+        "which trial and episode of them each trial is, `trials.parquet` has the points of all trials.",
+        "",
+        "| dataset | directory | trials taken | of | digest |",
+        "|---|---|---|---|---|",
+    ]
+    for source in sources:
+        dataset = source.dataset
+        cells = (dataset.config.name, dataset.directory, len(source.trials), len(dataset.throws), source.digest)
+        lines.append(f"| {' | '.join(str(cell).replace('|', chr(92) + '|') for cell in cells)} |")
+    return "\n".join([*lines, ""])
+
+
+def _field(name: str, kind: pa.DataType, description: str) -> pa.Field:
+    return pa.field(name, kind, metadata={"description": description})
+
+
+_SOURCES = pa.schema(
+    [
+        _field("trial", pa.int64(), "Number of the trial here."),
+        _field("source_name", pa.string(), "Name of the dataset that the trial comes from."),
+        _field("source_directory", pa.string(), "Directory of that dataset, as it was given."),
+        _field("source_digest", pa.string(), "Digest of that dataset."),
+        _field("source_trial", pa.int64(), "Number of the trial there."),
+        _field("source_trial_digest", pa.string(), "Digest of the trial in the plan there."),
+        _field("source_episode_digest", pa.string(), "Digest of the episode there."),
+    ]
+)

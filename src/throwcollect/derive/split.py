@@ -1,0 +1,209 @@
+"""Splits a dataset into parts so that throws to the same place go to the same part.
+
+Space is cut into cells, such as squares of the ground. The hash of a cell and a seed decides on its part, so a cell
+stays in its part whatever other trials there are. A trial that is in no cell, because it did not land, is decided on by
+a hash over all that determines it but for its number.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from fractions import Fraction
+from itertools import accumulate
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+from pydantic import TypeAdapter, ValidationError
+
+from throwcollect.config.kinds import Name
+from throwcollect.dataset.expression import Expression
+from throwcollect.dataset.new_directory import new_directory
+from throwcollect.dataset.reader import Dataset
+from throwcollect.derive.derivation import Derived, write
+from throwcollect.derive.source import Source, source
+from throwcollect.derive.union import list_of_trials
+from throwcollect.errors import ConfigError, Problem
+from throwcollect.sweep.digest import trial_digests
+
+SQUARES = ("landing_x_m=0.05", "landing_y_m=0.05")
+"""Squares of 5 cm on the ground."""
+_NUMBER = re.compile(r"\s*(\d*\.?\d+|\d+/\d+)\s*")
+_NAME = TypeAdapter[str](Name)
+_LONGEST_NAME = 64
+_HASHES = 2**64
+
+Cell = tuple[int, ...]
+"""Number of the cell along each axis."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """One part of a split.
+
+    Attributes:
+        dataset: The dataset.
+        cells: Number of cells whose trials it has.
+        uncelled: Number of its trials that are in no cell.
+    """
+
+    dataset: Derived
+    cells: int
+    uncelled: int
+
+
+@dataclass(frozen=True)
+class Split:
+    """A dataset in parts.
+
+    Attributes:
+        parts: The parts by name, each in the directory of that name.
+        without_episode: Number of trials that have no episode, by outcome; they are in no part.
+    """
+
+    parts: Mapping[str, Part]
+    without_episode: Mapping[str, int]
+
+    def as_dict(self) -> dict[str, Any]:
+        """The same for JSON."""
+        return asdict(self)
+
+
+def split(directory: Path, output: Path, *, fractions: str, cells: Sequence[str] = SQUARES, seed: int = 0) -> Split:
+    """Split a dataset into parts, each a dataset of its own.
+
+    Args:
+        directory: Directory of the dataset.
+        output: Directory that gets one directory a part; it must not exist or be empty.
+        fractions: Names of the parts and their shares of the cells: ``train=0.8,test=0.2``.
+        cells: Axes of the space that is cut into cells: an expression on columns of the table of throws (see
+            `dataset.expression`) and the width of the cells along it, each: ``landing_x_m=0.05``.
+        seed: Seed of the choice.
+
+    Raises:
+        ConfigError: If fractions or cells are wrong, a part gets no trial, or the directory cannot be used.
+        DatasetError: If the dataset is damaged, or a part cannot be written.
+    """
+    dataset = Dataset.open(directory)
+    everything = source(dataset)
+    members = assign(everything, fractions=fractions, cells=cells, seed=seed)
+    parts = {}
+    with new_directory(output) as beside:
+        for name, places in members.items():
+            derived = write([source(dataset, places)], beside / name, name=_part_name(dataset.config.name, name))
+            held = list(places.values())
+            parts[name] = Part(derived, len({cell for cell in held if cell is not None}), held.count(None))
+    return Split(parts, everything.without_episode)
+
+
+def assign(
+    everything: Source, *, fractions: str, cells: Sequence[str] = SQUARES, seed: int = 0
+) -> dict[str, dict[int, Cell | None]]:
+    """Decide which trials each part of a split gets.
+
+    Args:
+        everything: All trials.
+        fractions: As for `split`.
+        cells: As for `split`.
+        seed: Seed of the choice.
+
+    Returns:
+        The trials of each part and the cell that each is in; None for a trial that is in none.
+
+    Raises:
+        ConfigError: If fractions or cells are wrong, or a part gets no trial.
+    """
+    shares = _shares(fractions)
+    grid = _Grid(cells)
+    config, points = list_of_trials([everything])
+    contents = trial_digests(config, points, [0] * len(points.values))
+    places = grid.cells(everything.dataset.throws.take(everything.trials))
+    members: dict[str, dict[int, Cell | None]] = {name: {} for name in shares}
+    for trial, cell, digest in zip(everything.trials, places, contents, strict=True):
+        owner = _owner(f"trial {digest}" if cell is None else f"cell {list(cell)}", shares, seed)
+        members[owner][trial] = cell
+    if empty := [name for name, trials in members.items() if not trials]:
+        raise ConfigError(
+            [Problem(f"{', '.join(empty)} would get none of the {len(places)} trials", "--fractions")],
+            hint="larger fractions, smaller cells, or another seed",
+        )
+    return members
+
+
+class _Grid:
+    """Cells of the space that some expressions span.
+
+    Args:
+        axes: Expressions and widths: ``landing_x_m=0.05``.
+
+    Raises:
+        ConfigError: If one of them is anything else.
+    """
+
+    def __init__(self, axes: Sequence[str]) -> None:
+        self._axes = []
+        for text in axes:
+            name, width = _pair(text, "--cells")
+            if not float(width) > 0:
+                raise ConfigError([Problem(f"the width of cells should be above 0, got {text!r}", "--cells")])
+            self._axes.append((Expression(name, place="--cells"), float(width)))
+
+    def cells(self, throws: pa.Table) -> list[Cell | None]:
+        """The cell of each row; None where an expression has no finite value.
+
+        Raises:
+            ConfigError: If an expression cannot be evaluated.
+        """
+        columns = [[_slot(value, width) for value in axis.numbers(throws)] for axis, width in self._axes]
+        return [None if None in cell else cell for cell in zip(*columns, strict=True)]
+
+
+def _slot(value: float | None, width: float) -> int | None:
+    place = math.nan if value is None else value / width
+    return math.floor(place) if math.isfinite(place) else None
+
+
+def _owner(thing: str, shares: Mapping[str, Fraction], seed: int) -> str:
+    place = Fraction(int.from_bytes(hashlib.sha256(f"{seed} {thing}".encode()).digest()[:8], "big"), _HASHES)
+    return next(name for name, end in zip(shares, accumulate(shares.values()), strict=True) if place < end)
+
+
+def _shares(text: str) -> dict[str, Fraction]:
+    pairs = [_pair(item, "--fractions") for item in text.split(",")]
+    shares = dict(pairs)
+    problem = None
+    if len(shares) < len(pairs):
+        problem = "names a part twice"
+    elif len(shares) < 2:
+        problem = "should name two parts or more"
+    elif any(share <= 0 for share in shares.values()):
+        problem = "should be above 0"
+    elif sum(shares.values()) != 1:
+        problem = f"should add up to 1, add up to {float(sum(shares.values())):g}"
+    for name in shares:
+        try:
+            _NAME.validate_python(name)
+        except ValidationError:
+            problem = f"{name!r} should be lower-case letters, digits, - and _, first a letter or digit"
+    if problem:
+        raise ConfigError([Problem(f"{problem}, got {text!r}", "--fractions")])
+    return shares
+
+
+def _pair(text: str, option: str) -> tuple[str, Fraction]:
+    name, _, number = text.rpartition("=")
+    try:
+        value = Fraction(number) if _NUMBER.fullmatch(number) else None
+    except ZeroDivisionError:
+        value = None
+    if value is None or not name.strip():
+        raise ConfigError([Problem(f"should be a name, an equals sign and a number such as 0.5, got {text!r}", option)])
+    return name.strip(), value
+
+
+def _part_name(name: str, part: str) -> str:
+    return f"{name[: _LONGEST_NAME - len(part) - 1]}-{part}"

@@ -1,0 +1,73 @@
+"""What several datasets have in common, and what varies between their trials."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from throwcollect.config.loader import value_as_yaml
+from throwcollect.config.schema import Config, SweepConfig
+from throwcollect.config.values import leaves, reason_not_sweepable
+from throwcollect.dataset.directory import TRIALS
+from throwcollect.dataset.reader import Dataset
+from throwcollect.derive.source import Source
+from throwcollect.errors import ConfigError, Problem
+from throwcollect.sweep.digest import determines_samples
+from throwcollect.sweep.points import Points
+
+_ABSENT = object()
+
+
+def list_of_trials(sources: Sequence[Source]) -> tuple[Config, Points]:
+    """A configuration whose trials are those of all sources, one after the other.
+
+    Args:
+        sources: At least one.
+
+    Returns:
+        The configuration of the first source, which takes its points from a file; and the points. Swept are the keys
+        that any source sweeps, and those that the sources have fixed at different values.
+
+    Raises:
+        ConfigError: If the sources differ in keys that cannot be swept; it shows all of them.
+    """
+    first, *others = [source.dataset for source in sources]
+    keys = list(dict.fromkeys(key for source in sources for key in source.dataset.plan.keys))
+    fixed = [_fixed_values(dataset) for dataset in (first, *others)]
+    problems = []
+    for key in dict.fromkeys(key for values in fixed for key in values):
+        values = [each.get(key, _ABSENT) for each in fixed]
+        if _ABSENT in values:
+            obstacle: str | None = "not all have this key"
+        elif key in keys or all(value == values[0] for value in values):
+            continue
+        else:
+            obstacle = reason_not_sweepable(first.config, key)
+        if obstacle is None:
+            keys.append(key)
+        else:
+            problems.append(Problem(f"{_differences(sources, values)}; {obstacle}", key))
+    if problems:
+        raise ConfigError(problems, expected="datasets that differ only in what a sweep may vary")
+    rows = [
+        [source.dataset.plan.trials[number].values.get(key, values[key]) for key in keys]
+        for source, values in zip(sources, fixed, strict=True)
+        for number in source.trials
+    ]
+    sweep = SweepConfig(sampler="list", file=TRIALS)
+    config = first.config.without_run().model_copy(update={"sweep": sweep, "trials": None, "until": None})
+    return config, Points(tuple(keys), np.array(rows, np.float64))
+
+
+def _fixed_values(dataset: Dataset) -> dict[str, Any]:
+    return {key: value for key, value in leaves(dataset.config) if key != "seed" and determines_samples(key)}
+
+
+def _differences(sources: Sequence[Source], values: Sequence[Any]) -> str:
+    said: dict[str, list[str]] = {}
+    for source, value in zip(sources, values, strict=True):
+        text = "absent" if value is _ABSENT else value_as_yaml(value)
+        said.setdefault(text, []).append(str(source.dataset.directory))
+    return ", ".join(f"{text} in {' and '.join(where)}" for text, where in said.items())

@@ -1,0 +1,142 @@
+"""The data card of an export: what its files hold, in which units, and from which dataset it was made."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import pyarrow as pa
+
+import throwcollect
+from throwcollect.dataset.bag import to_yaml
+from throwcollect.dataset.card import outcome_lines
+from throwcollect.dataset.directory import CONFIG
+from throwcollect.export.source import Source
+from throwcollect.robots.talos import JOINTS
+
+_TAGS = ("robotics", "throwing", "talos", "simulation")
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How a format lays its data out, in words.
+
+    Attributes:
+        files: What each file or directory holds.
+        loading: Code that loads it.
+        over_time: Lines of the section on time series.
+        notes: What else whoever uses it should know; one paragraph each.
+        hub: Tags and configurations of a dataset on a hub; None if the format is not one that hubs show.
+        language: Language of `loading`.
+    """
+
+    files: Mapping[str, str]
+    loading: str
+    over_time: Sequence[str]
+    notes: Sequence[str] = ()
+    hub: Mapping[str, Any] | None = None
+    language: str = "python"
+
+
+def card(source: Source, layout: Layout) -> str:
+    """README.md of an export.
+
+    Args:
+        source: What was exported.
+        layout: How.
+    """
+    config = source.dataset.config
+    lines = [
+        *(_front_matter(config.name, layout.hub) if layout.hub else []),
+        f"# {config.name}",
+        "",
+        f"{len(source.table)} simulated throws of a ball by the humanoid robot Talos; {len(source.entries)} of them "
+        f"have time series, at {source.rate_hz} Hz. Exported by throwcollect {throwcollect.__version__} from the "
+        f"dataset with the digest `{source.digest}`.",
+        "",
+        *outcome_lines(source.table),
+        "",
+        "## Files",
+        "",
+        *(f"- `{name}`: {text}" for name, text in layout.files.items()),
+        f"- `{CONFIG}`: the configuration of the collection; collecting with it again yields the same data.",
+        "",
+        f"```{layout.language}",
+        layout.loading,
+        "```",
+        "",
+        *(line for note in (*layout.notes, _rate(source)) for line in (note, "")),
+        "The world frame has x forward, y left, z up; its origin is on the ground below the robot's base.",
+        "",
+        "## Over time",
+        "",
+        *layout.over_time,
+        "",
+        "## One row a trial",
+        "",
+        *_columns(source.table),
+    ]
+    return "\n".join(lines)
+
+
+def _front_matter(name: str, hub: Mapping[str, Any]) -> list[str]:
+    header = {
+        "license": "apache-2.0",
+        "pretty_name": name,
+        "task_categories": ["robotics"],
+        "tags": [*hub["tags"], *_TAGS],
+        "configs": hub["configs"],
+    }
+    return ["---", to_yaml(header) + "---", ""]
+
+
+def _rate(source: Source) -> str:
+    recorded_hz = source.dataset.config.record.rate_hz
+    if source.rate_hz == recorded_hz:
+        return f"The samples are those that were recorded, at {recorded_hz} Hz."
+    if recorded_hz % source.rate_hz == 0:
+        how = f"Each is one of the {recorded_hz} Hz record, unchanged: every {recorded_hz // source.rate_hz}th."
+    else:
+        how = (
+            f"They lie between those of the {recorded_hz} Hz record: positions of joints and ball on the cubic through "
+            "positions and velocities of both neighbours, all else linear, orientations normalised."
+        )
+    return (
+        f"The samples are at {source.rate_hz} Hz. {how} Nothing is filtered: what is faster than "
+        f"{source.rate_hz / 2:g} Hz is aliased. Commanded values are computed at the very instants."
+    )
+
+
+def signal_lines(source: Source, *, columns: bool = False) -> list[str]:
+    """Lines on the signals of a source: a table by the names of their arrays, or else of their columns."""
+    return [
+        f"| {'columns' if columns else 'array'} | unit | of | |",
+        "|---|---|---|---|",
+        *(
+            f"| {_code(signal.pattern.split(', ') if columns else [signal.name])} | {signal.unit} | {signal.each} "
+            f"| {signal.description} |"
+            for signal in source.signals
+        ),
+        "",
+        *joint_lines(source, everything=True),
+    ]
+
+
+def joint_lines(source: Source, *, everything: bool = False) -> list[str]:
+    """A line that names the joints, in the order in which they come."""
+    said = f"The joints that move are {_code(source.moving)}, in this order"
+    return [f"{said}; all joints are {_code(JOINTS)}." if everything else f"{said}."]
+
+
+def _code(names: Sequence[str]) -> str:
+    return ", ".join(f"`{name}`" for name in names)
+
+
+def _columns(table: pa.Table) -> list[str]:
+    rows = []
+    for field in table.schema:
+        metadata = field.metadata or {}
+        unit, description = (metadata.get(key, b"").decode() for key in (b"unit", b"description"))
+        rows.append(f"| `{field.name}` | {unit} | {description} |")
+    return ["| column | unit | |", "|---|---|---|", *rows, ""]

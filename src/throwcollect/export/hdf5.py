@@ -1,0 +1,151 @@
+"""HDF5 in the layout of robomimic: one group a throw, with observations, actions, rewards and dones."""
+
+from __future__ import annotations
+
+import io
+import json
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+
+from throwcollect.errors import ConfigError
+from throwcollect.export.card import Layout, signal_lines
+from throwcollect.export.npz import as_array
+from throwcollect.export.signals import Signal
+from throwcollect.export.source import Source, Throw
+from throwcollect.files import write_all
+
+ACTION = "command_position_rad"
+_BESIDE = ("time_s", "command_velocity_radps", "command_acceleration_radps2")
+"""Signals that are neither observed nor acted on."""
+_COMPRESSION = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
+_GYM = 2
+"""robomimic's number for environments that are not of robosuite."""
+
+
+def layout(source: Source) -> Layout:
+    """How `write` lays a source out."""
+    return Layout(
+        files={
+            "throws.hdf5": "the throw of trial N is the group `data/demo_N`; `mask/landed` lists those that landed; "
+            "`throws/` is the table of all trials, one dataset a column, with NaN, -1 or an empty string where there "
+            "is nothing.",
+        },
+        loading=f"""\
+import h5py
+
+file = h5py.File("throws.hdf5")
+ball_position_m = file["data/demo_{source.entries[0].trial}/obs/ball_position_m"][:]
+landing_x_m = file["throws/landing_x_m"][:]""",
+        notes=(
+            "The layout is that of robomimic. Each group of a throw has `obs/` with what is measured, `actions`, the "
+            "commanded positions of the moving joints, `rewards`, 1 in the last sample of a throw that landed, and "
+            "`dones`, 1 in the last sample; and beside them `time_s` and the commanded velocities and accelerations. "
+            "Every dataset has the attributes `unit` and `description`, and `components` where it has several columns.",
+            "In robomimic, set `train.hdf5_load_next_obs` to false, as next observations are not stored twice. "
+            "`env_args` names no environment that robomimic could make.",
+        ),
+        over_time=signal_lines(source),
+    )
+
+
+def write(source: Source, directory: Path) -> None:
+    """Write a dataset as one HDF5 file; see `formats.Format`."""
+    h5py = _h5py()
+    config = source.dataset.config
+    with _Output(directory / "throws.hdf5") as output, h5py.File(output, "w") as file:
+        file.attrs["digest_of_dataset"] = source.digest
+        file.attrs["rate_hz"] = source.rate_hz
+        data = file.create_group("data")
+        data.attrs["total"] = sum(entry.samples for entry in source.entries)
+        data.attrs["env_args"] = json.dumps({"env_name": config.name, "type": _GYM, "env_kwargs": {}})
+        file.attrs["config"] = config.model_dump_json()
+        for throw in source.throws(source.entries):
+            _add_throw(data.create_group(f"demo_{throw.trial}"), throw, source)
+            output.check()
+        landed = [f"demo_{entry.trial}" for entry in source.entries if entry.landed]
+        file["mask/landed"] = np.array(landed, dtype="S")
+        _add_table(file.create_group("throws"), source.table, h5py.string_dtype())
+
+
+class _Output(io.FileIO):
+    """A file whose write errors wait until they are asked for: in the middle of a write HDF5 does not survive them."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path, "w+")
+        self._error: OSError | None = None
+
+    def write(self, data: Any) -> int:
+        try:
+            write_all(self.fileno(), data)
+        except OSError as error:
+            self._error = self._error or error
+        return len(data)
+
+    def truncate(self, size: int | None = None) -> int:
+        try:
+            return super().truncate(size)
+        except OSError as error:
+            self._error = self._error or error
+            return size or 0
+
+    def flush(self) -> None:
+        """Nothing is held back."""
+
+    def check(self) -> None:
+        """Raise what has gone wrong so far.
+
+        Raises:
+            OSError: If something could not be written.
+        """
+        if self._error is not None:
+            raise self._error
+
+    def __exit__(self, kind: type[BaseException] | None, *rest: Any) -> None:
+        super().__exit__(kind, *rest)
+        # Whatever HDF5 said on the way out, this is why.
+        self.check()
+
+
+def _h5py() -> ModuleType:
+    try:
+        import h5py
+    except ImportError as error:
+        raise ConfigError("--to hdf5: h5py is not installed", hint="pip install 'throwcollect[export]'") from error
+    module: ModuleType = h5py
+    return module
+
+
+def _add_throw(group: Any, throw: Throw, source: Source) -> None:
+    group.attrs["num_samples"] = len(throw)
+    group.attrs["trial"] = throw.trial
+    group.attrs["landed"] = throw.landed
+    last = np.zeros(len(throw))
+    last[-1] = 1
+    group["dones"] = last.astype(np.int64)
+    group["rewards"] = last * throw.landed
+    for signal in source.signals:
+        name = signal.name if signal.name in _BESIDE else "actions" if signal.name == ACTION else f"obs/{signal.name}"
+        stored = group.create_dataset(name, data=throw.signals[signal.name], **_COMPRESSION)
+        _describe(stored, signal)
+
+
+def _describe(stored: Any, signal: Signal) -> None:
+    stored.attrs["unit"] = signal.unit
+    stored.attrs["description"] = signal.description
+    if signal.components:
+        stored.attrs["components"] = list(signal.components)
+
+
+def _add_table(group: Any, table: pa.Table, text: Any) -> None:
+    for field in table.schema:
+        values = as_array(table[field.name])
+        stored = group.create_dataset(
+            field.name, data=values.astype(object) if values.dtype.kind == "U" else values,
+            dtype=text if values.dtype.kind == "U" else None,
+        )  # fmt: skip
+        for key, value in (field.metadata or {}).items():
+            stored.attrs[key.decode()] = value.decode()

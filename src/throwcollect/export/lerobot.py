@@ -1,0 +1,272 @@
+"""LeRobot datasets, version 3.0 of their format, written without that library."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from throwcollect.dataset.directory import THROWS
+from throwcollect.dataset.throws import encode_table
+from throwcollect.export.card import Layout, joint_lines
+from throwcollect.export.parquet_series import FILES_PER_CHUNK, MEGABYTES_PER_FILE, PATH, ParquetSeries
+from throwcollect.export.source import Source, Throw
+from throwcollect.export.statistics import Frames, Moments, Statistics, of_all, of_episode
+from throwcollect.robots.talos import JOINTS
+
+_VERSION = "v3.0"
+_TASK = "Throw the ball."
+_VIDEO_MEGABYTES = 200
+_EPISODES_PER_GROUP = 100
+
+
+@dataclass(frozen=True)
+class Feature:
+    """One feature of each frame.
+
+    Attributes:
+        dtype: Type of its numbers, as both NumPy and Arrow call it.
+        names: Names of its components; None for a scalar.
+    """
+
+    dtype: str
+    names: tuple[str, ...] | None = None
+
+    @property
+    def arrow_type(self) -> pa.DataType:
+        """Type of its column."""
+        kind = pa.type_for_alias(self.dtype)
+        return kind if self.names is None else pa.list_(kind, len(self.names))
+
+    def as_dict(self) -> dict[str, object]:
+        """Its entry in ``meta/info.json``."""
+        names = None if self.names is None else list(self.names)
+        return {"dtype": self.dtype, "shape": [len(self.names or ("",))], "names": names}
+
+
+def features_of(moving: Sequence[str]) -> dict[str, Feature]:
+    """Features by name, in the order of their columns.
+
+    Args:
+        moving: Joints that the task moves.
+    """
+    positions = tuple(f"{joint}.pos" for joint in moving)
+    return {
+        "observation.state": Feature("float32", (*positions, *(f"{joint}.vel" for joint in moving))),
+        "observation.effort": Feature("float32", tuple(f"{joint}.effort" for joint in moving)),
+        "observation.environment_state": Feature(
+            "float32", ("ball.x", "ball.y", "ball.z", "ball.vx", "ball.vy", "ball.vz")
+        ),
+        "action": Feature("float32", positions),
+        "next.reward": Feature("float32"),
+        "next.success": Feature("bool"),
+        "next.done": Feature("bool"),
+        "timestamp": Feature("float32"),
+        "frame_index": Feature("int64"),
+        "episode_index": Feature("int64"),
+        "index": Feature("int64"),
+        "task_index": Feature("int64"),
+    }
+
+
+def layout(source: Source) -> Layout:
+    """How `write` lays a source out."""
+    return Layout(
+        files={
+            "data/": "one row a frame.",
+            "meta/": "features, statistics, tasks, episodes; `meta/episodes/` has the columns of the table below, too.",
+            THROWS: "one row a trial, also of those without episode; `episode_index` says which frames are its own.",
+        },
+        loading="""\
+from lerobot.datasets.lerobot_dataset import LeRobotDataset
+
+dataset = LeRobotDataset("me/throws", root=".")
+landed = LeRobotDataset("me/throws", root=".", episode_filter=lambda episode: episode["outcome"] == "landed")""",
+        notes=(
+            f"A LeRobot dataset of version {_VERSION.removeprefix('v')}; each episode is a throw. Frames are float32, "
+            "as usual there. Joints that do not move, orientation and spin of the ball, and commanded velocities are "
+            "left out.",
+        ),
+        over_time=[
+            "| feature | unit | |",
+            "|---|---|---|",
+            "| `observation.state` | rad, rad/s | positions (`.pos`), velocities (`.vel`) of moving joints, measured |",
+            "| `observation.effort` | N m | torques of their motors |",
+            "| `observation.environment_state` | m, m/s | position and velocity of the ball's centre, in world |",
+            "| `action` | rad | their commanded positions, on the trajectory that controllers were sent |",
+            "| `next.reward` | 1 | 1 in the last frame of a throw that landed, 0 in all others |",
+            "| `next.success` | | true in the last frame of a throw that landed |",
+            "| `next.done` | | true in the last frame of a throw |",
+            "",
+            *joint_lines(source),
+        ],
+        hub={
+            "tags": ["LeRobot"],
+            "configs": [
+                {"config_name": "default", "data_files": "data/*/*.parquet", "default": True},
+                {"config_name": "throws", "data_files": THROWS},
+            ],
+        },
+    )
+
+
+def write(source: Source, directory: Path) -> None:
+    """Write a dataset in LeRobot's format; see `formats.Format`."""
+    features = features_of(source.moving)
+    table = _with_episode_index(source)
+    (directory / THROWS).write_bytes(encode_table(table))
+    moments: dict[str, Moments] = {}
+    with ParquetSeries(directory / "data") as data, ParquetSeries(directory / "meta" / "episodes") as meta:
+        throws = source.throws(source.entries)
+        episodes = table.filter(table["episode_index"].is_valid())
+        first = 0
+        for start in range(0, len(episodes), _EPISODES_PER_GROUP):
+            rows = []
+            for number, throw in enumerate(islice(throws, _EPISODES_PER_GROUP), start=start):
+                frames = _frames(throw, source, episode=number, first=first)
+                chunk, file = data.place()
+                data.append(_frames_table(frames, features, source))
+                rows.append(_episode_row(frames, number=number, first=first, chunk=chunk, file=file))
+                _add(moments, frames)
+                first += len(throw)
+            _append_episodes(meta, rows, episodes.slice(start, len(rows)))
+    _write_json(directory / "meta" / "info.json", _info(source, features, frames=first))
+    statistics = {name: _as_lists(of_all(moments[name], _read(data.paths, name))) for name in features}
+    _write_json(directory / "meta" / "stats.json", statistics)
+    pq.write_table(_tasks(), directory / "meta" / "tasks.parquet")
+
+
+def _with_episode_index(source: Source) -> pa.Table:
+    """The table of throws with the number of each trial's episode behind its own."""
+    numbers = {entry.trial: number for number, entry in enumerate(source.entries)}
+    field = pa.field(
+        "episode_index", pa.int64(), metadata={"description": "Number of its episode; null if it has none."}
+    )
+    column = pa.array([numbers.get(trial) for trial in source.table["trial"].to_pylist()], pa.int64())
+    table = source.table.add_column(1, field, column)
+    return table.replace_schema_metadata({"throwcollect.digest": source.digest})
+
+
+def _frames(throw: Throw, source: Source, *, episode: int, first: int) -> dict[str, Frames]:
+    """Values of each feature, in the types of the file, as numbers of shape ``(n_frames, n_components)``."""
+    count = len(throw)
+    moving = [JOINTS.index(joint) for joint in source.moving]
+    signals = throw.signals
+    done = np.zeros(count)
+    done[-1] = 1
+    index = np.arange(count)
+    values = {
+        "observation.state": np.hstack(
+            [signals[f"joint_{name}"][:, moving] for name in ("position_rad", "velocity_radps")]
+        ),
+        "observation.effort": signals["joint_effort_nm"][:, moving],
+        "observation.environment_state": np.hstack([signals["ball_position_m"], signals["ball_velocity_mps"]]),
+        "action": signals["command_position_rad"],
+        "next.reward": done * throw.landed,
+        "next.success": done * throw.landed,
+        "next.done": done,
+        "timestamp": index / source.rate_hz,
+        "frame_index": index,
+        "episode_index": np.full(count, episode),
+        "index": first + index,
+        "task_index": np.zeros(count),
+    }
+    features = features_of(source.moving)
+    # Statistics are those of the numbers as they are stored.
+    return {
+        name: array.astype(features[name].dtype).astype(np.float64).reshape(count, -1) for name, array in values.items()
+    }
+
+
+def _frames_table(frames: dict[str, Frames], features: dict[str, Feature], source: Source) -> pa.Table:
+    columns = []
+    for name, feature in features.items():
+        flat = pa.array(frames[name].astype(feature.dtype).ravel())
+        columns.append(flat if feature.names is None else pa.FixedSizeListArray.from_arrays(flat, len(feature.names)))
+    schema = pa.schema([pa.field(name, feature.arrow_type) for name, feature in features.items()])
+    return pa.table(columns, schema.with_metadata({"throwcollect.digest": source.digest}))
+
+
+def _episode_row(frames: dict[str, Frames], *, number: int, first: int, chunk: int, file: int) -> dict[str, Any]:
+    length = len(frames["index"])
+    row = {
+        "episode_index": number,
+        "tasks": [_TASK],
+        "length": length,
+        "data/chunk_index": chunk,
+        "data/file_index": file,
+        "dataset_from_index": first,
+        "dataset_to_index": first + length,
+    }
+    for name, array in frames.items():
+        row |= {f"stats/{name}/{key}": values for key, values in _as_lists(of_episode(array)).items()}
+    return row
+
+
+def _append_episodes(meta: ParquetSeries, rows: list[dict[str, Any]], throws: pa.Table) -> None:
+    chunk, file = meta.place()
+    places = {"meta/episodes/chunk_index": chunk, "meta/episodes/file_index": file}
+    table = pa.Table.from_pylist([{**row, **places} for row in rows])
+    for field in throws.drop_columns(["episode_index"]).schema:
+        table = table.append_column(field, throws[field.name])
+    meta.append(table)
+
+
+def _add(moments: dict[str, Moments], frames: dict[str, Frames]) -> None:
+    for name, array in frames.items():
+        more = Moments.of(array)
+        moments[name] = moments[name].with_more(more) if name in moments else more
+
+
+def _read(paths: Sequence[Path], name: str) -> Iterator[Frames]:
+    for path in paths:
+        with pq.ParquetFile(path) as file:
+            for batch in file.iter_batches(columns=[name]):
+                column = batch.column(0)
+                if pa.types.is_fixed_size_list(column.type):
+                    column = column.flatten()
+                yield column.cast(pa.float64()).to_numpy(zero_copy_only=False).reshape(len(batch), -1)
+
+
+def _as_lists(statistics: Statistics) -> dict[str, list[float] | list[int]]:
+    return {key: values.tolist() for key, values in statistics.items()}
+
+
+def _info(source: Source, features: dict[str, Feature], *, frames: int) -> dict[str, object]:
+    episodes = len(source.entries)
+    return {
+        "codebase_version": _VERSION,
+        "fps": source.rate_hz,
+        "features": {name: feature.as_dict() for name, feature in features.items()},
+        "total_episodes": episodes,
+        "total_frames": frames,
+        "total_tasks": 1,
+        "chunks_size": FILES_PER_CHUNK,
+        "data_files_size_in_mb": MEGABYTES_PER_FILE,
+        "video_files_size_in_mb": _VIDEO_MEGABYTES,
+        "data_path": f"data/{PATH}",
+        "video_path": None,
+        "robot_type": source.dataset.config.robot.name,
+        "splits": {"train": f"0:{episodes}"},
+    }
+
+
+def _tasks() -> pa.Table:
+    """One row for the one task; its text is the index of the table, as pandas stores it."""
+    columns = [
+        {"name": name, "field_name": name, "pandas_type": kind, "numpy_type": stored, "metadata": None}
+        for name, kind, stored in (("task_index", "int64", "int64"), ("task", "unicode", "object"))
+    ]
+    pandas = {"index_columns": ["task"], "column_indexes": [], "columns": columns}
+    return pa.table({"task_index": [0], "task": [_TASK]}).replace_schema_metadata({"pandas": json.dumps(pandas)})
+
+
+def _write_json(path: Path, value: object) -> None:
+    path.write_text(json.dumps(value, indent=4) + "\n", encoding="utf-8")

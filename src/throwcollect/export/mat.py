@@ -1,0 +1,207 @@
+"""MATLAB files in the structure of the throwing database of the Jožef Stefan Institute.
+
+That is ``robot_throws`` of github.com/abr-ijs/Throwing-trajectories-dataset: cells ``qPath`` and ``DMP``, the matrix
+``targets`` and the structure ``robot_data``, whose fields bear the same names here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+from scipy.io import savemat
+
+from throwcollect.config.schema import Config, DynamicMovementPrimitive
+from throwcollect.errors import DatasetError
+from throwcollect.export.card import Layout, joint_lines
+from throwcollect.export.npz import as_array
+from throwcollect.export.source import Entry, Source, Throw
+from throwcollect.robots.interpolation import sample_quintic
+from throwcollect.robots.talos import JOINTS
+from throwcollect.robots.trajectory import JointTrajectory
+from throwcollect.tasks.dmp import fit_dmp, kernels, roll_out
+
+BASIS_FUNCTIONS = 25
+"""Of a DMP that is fitted, to each joint."""
+_FIT_POINTS = 501
+_LARGEST = 2**31 - 1
+"""Size that a variable may have in a file of version 5 [bytes]."""
+
+
+def layout(source: Source) -> Layout:
+    """How `write` lays a source out."""
+    return Layout(
+        files={
+            "throws.mat": "`throws` has one field a column of the table of all trials, with NaN, -1 or an empty string "
+            "where there is nothing; dots in names are underscores. `units` has the unit of each of these fields.",
+            "trajectories/": "one file a recording, with the structure `robot_throws`; its k-th throw is trial "
+            "`robot_throws.trial(k)`.",
+        },
+        loading=f"""\
+load('trajectories/{next(iter(source.shards))}.mat');
+k = 1;
+path = robot_throws.qPath{{k}};
+dmp = robot_throws.DMP{{k}};
+target = robot_throws.targets(k, :);  % d, h, alpha""",
+        over_time=[*_FIELDS, "", *joint_lines(source)],
+        language="matlab",
+    )
+
+
+_FIELDS = (
+    "Fields of `robot_throws`, with n for the number of joints that move. `qPath`, `targets`, `DMP` and `robot_data` "
+    "are those of the throwing database of the Jožef Stefan Institute.",
+    "",
+    "- `robot_data`: `joints`; `base`, position of the robot's base in world [m]; `dt`, time step [s]. There are no "
+    "link lengths, as Talos is no planar arm.",
+    "- `qPath{k}`: commanded motion, a row each `dt`: time [s], n positions [rad], n velocities [rad/s], n "
+    "accelerations [rad/s²].",
+    "- `targets(k, :)`: what the throw achieved. `d`: distance of the ball's centre at its landing from the vertical "
+    "axis through the world's origin [m]; `h`: height of the landing plane [m]; `alpha`: direction of flight at the "
+    "landing below the horizontal [rad]. `d` and `alpha` are NaN if the ball did not land.",
+    "- `DMP{k}`: `N`, `dt`, `a_z`, `a_x`, `c`, `sigma_2`, `w` (N × n), `tau`, `goal`, `y0`, with which each joint y "
+    "follows `tau z' = a_z (a_z / 4 (goal - y) - z) + f(x)`, `tau y' = z`, `tau x' = -a_x x`, "
+    "`f(x) = sum(psi_i w_i) / sum(psi_i) x`, `psi_i = exp(-(x - c_i)² / (2 sigma_2_i))`, x(0) = 1. `fitted` is 0 if "
+    f"the throw was made from these parameters, and 1 if they were fitted to `qPath` by linear regression over "
+    f"{BASIS_FUNCTIONS} basis functions. `error`: largest distance of each joint from `qPath` when it follows them "
+    "[rad].",
+    "- `trial(k)`: number of the trial.",
+    "- `measured{k}`: time [s], n positions [rad], n velocities [rad/s] and n torques [N m] of the joints that move.",
+    "- `ball{k}`: time [s], x, y, z [m] and vx, vy, vz [m/s] of the ball's centre in world.",
+)
+
+
+def write(source: Source, directory: Path) -> None:
+    """Write a dataset as MATLAB files of version 5; see `formats.Format`."""
+    columns = {_field(field.name): _column(source.table[field.name]) for field in source.table.schema}
+    units = {_field(field.name): (field.metadata or {}).get(b"unit", b"").decode() for field in source.table.schema}
+    _save(directory / "throws.mat", {"throws": columns, "units": units, "digest_of_dataset": source.digest})
+    (directory / "trajectories").mkdir()
+    landings = {
+        row["trial"]: (row["landing_x_m"], row["landing_y_m"], row["hit_angle_rad"])
+        for row in source.table.select(["trial", "landing_x_m", "landing_y_m", "hit_angle_rad"]).to_pylist()
+    }
+    for shard, entries in source.shards.items():
+        path = directory / "trajectories" / f"{shard}.mat"
+        _save(path, {"robot_throws": _robot_throws(source, entries, landings), "digest_of_dataset": source.digest})
+
+
+def _save(path: Path, variables: Mapping[str, Any]) -> None:
+    for name, value in variables.items():
+        if (size := _size(value)) > _LARGEST:
+            raise DatasetError(
+                f"{path.name}: {name} would have {size / 2**30:.1f} GiB",
+                expected="less than 2 GiB, which is what MATLAB files of version 5 can hold",
+                hint="export at a lower --rate, or another format",
+            )
+    savemat(path, variables, do_compression=True, long_field_names=True)
+
+
+def _size(value: Any) -> int:
+    """Bytes of all numbers in nested structures."""
+    if isinstance(value, dict):
+        return sum(map(_size, value.values()))
+    if isinstance(value, np.ndarray):
+        return sum(map(_size, value.flat)) if value.dtype == object else value.nbytes
+    return 0
+
+
+def _field(column: str) -> str:
+    return column.replace(".", "_")
+
+
+def _column(values: pa.ChunkedArray) -> NDArray[Any]:
+    array = as_array(values)
+    return (array.astype(object) if array.dtype.kind == "U" else array)[:, np.newaxis]
+
+
+def _cell(values: Sequence[Any]) -> NDArray[np.object_]:
+    cell = np.empty((1, len(values)), dtype=object)
+    for index, value in enumerate(values):
+        cell[0, index] = value
+    return cell
+
+
+def _robot_throws(
+    source: Source, entries: Sequence[Entry], landings: Mapping[int, tuple[float | None, ...]]
+) -> dict[str, Any]:
+    plan = source.dataset.plan
+    moving = [JOINTS.index(joint) for joint in source.moving]
+    paths, primitives, targets, measured, balls = [], [], [], [], []
+    for throw in source.throws(entries):
+        config = plan.config_of(plan.trials[throw.trial])
+        paths.append(_path(throw.trajectory, source.rate_hz))
+        primitives.append(_primitive(throw.trajectory, config, source.rate_hz))
+        targets.append(_target(landings[throw.trial], config))
+        measured.append(_columns(throw, "joint_position_rad", "joint_velocity_radps", "joint_effort_nm", of=moving))
+        balls.append(_columns(throw, "ball_position_m", "ball_velocity_mps", of=[0, 1, 2]))
+    return {
+        "robot_data": {
+            "joints": _cell(source.moving),
+            "base": np.array([[0.0, 0.0, source.dataset.config.robot.base_height_m]]),
+            "dt": 1 / source.rate_hz,
+        },
+        "qPath": _cell(paths),
+        "targets": np.array(targets),
+        "DMP": _cell(primitives),
+        "trial": np.array([[float(entry.trial)] for entry in entries]),
+        "measured": _cell(measured),
+        "ball": _cell(balls),
+    }
+
+
+def _path(trajectory: JointTrajectory, rate_hz: int) -> NDArray[np.float64]:
+    # The last time is the first one at which the motion is over.
+    times = np.arange(int(np.ceil(trajectory.times[-1] * rate_hz - 1e-9)) + 1) / rate_hz
+    return np.column_stack([times, *sample_quintic(trajectory, times)])
+
+
+def _columns(throw: Throw, *names: str, of: Sequence[int]) -> NDArray[np.float64]:
+    return np.column_stack([throw.signals["time_s"], *(throw.signals[name][:, of] for name in names)])
+
+
+def _target(landing: tuple[float | None, ...], config: Config) -> tuple[float, ...]:
+    x, y, angle = (np.nan if value is None else value for value in landing)
+    return float(np.hypot(x, y)), config.scene.landing_height_m, angle
+
+
+def _primitive(trajectory: JointTrajectory, config: Config, rate_hz: int) -> dict[str, Any]:
+    """Fields of the DMP of a throw: that of its configuration, or else one fitted to the commanded motion."""
+    times = np.linspace(0, trajectory.times[-1], _FIT_POINTS)
+    positions, velocities, accelerations = sample_quintic(trajectory, times)
+    family, tau = config.task.trajectory, config.task.duration_s
+    fitted = not isinstance(family, DynamicMovementPrimitive)
+    if not isinstance(family, DynamicMovementPrimitive):
+        tau = float(trajectory.times[-1])
+        family = fit_dmp(
+            trajectory.joints,
+            times,
+            positions,
+            velocities=velocities,
+            accelerations=accelerations,
+            basis_functions=BASIS_FUNCTIONS,
+        )
+    weights = np.array(
+        [family.weights.get(joint, [0.0] * family.basis_functions) for joint in trajectory.joints], dtype=np.float64
+    )
+    start, goal = trajectory.positions[0], trajectory.positions[-1]
+    motion = roll_out(times, start=start, goal=goal, weights=weights, tau=tau, family=family)[0]
+    centres, variances = kernels(count=family.basis_functions, alpha_x=family.alpha_x)
+    return {
+        "N": float(family.basis_functions),
+        "dt": 1 / rate_hz,
+        "a_z": family.alpha_z,
+        "a_x": family.alpha_x,
+        "c": centres[np.newaxis],
+        "sigma_2": variances[np.newaxis],
+        "w": weights.T,
+        "tau": tau,
+        "goal": goal[np.newaxis],
+        "y0": start[np.newaxis],
+        "fitted": float(fitted),
+        "error": np.abs(motion - positions).max(axis=0)[np.newaxis],
+    }

@@ -1,0 +1,107 @@
+"""NumPy archives: arrays of all samples of a recording, with the offsets of its throws."""
+
+from __future__ import annotations
+
+import shutil
+import zipfile
+from collections.abc import Mapping
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from throwcollect.export.card import Layout, signal_lines
+from throwcollect.export.source import Entry, Source
+from throwcollect.robots.talos import JOINTS
+
+_EPOCH = (1980, 1, 1, 0, 0, 0)
+"""A fixed date for the members of archives: the same data are the same bytes."""
+
+
+def layout(source: Source) -> Layout:
+    """How `write` lays a source out."""
+    shard, trial = next(iter(source.shards)), source.entries[0].trial
+    return Layout(
+        files={
+            "throws.npz": "one array a column, one element a trial; NaN, -1 or an empty string where there is nothing.",
+            "trajectories/": "one archive a recording. The samples of its k-th throw, which is trial `trial[k]`, are "
+            "rows `offsets[k]` to `offsets[k + 1]` of each array.",
+        },
+        loading=f"""\
+import numpy as np
+
+throws = np.load("throws.npz")
+archive = np.load("trajectories/{shard}.npz")
+k = list(archive["trial"]).index({trial})
+rows = slice(*archive["offsets"][k : k + 2])
+time_s, ball_position_m = archive["time_s"][rows], archive["ball_position_m"][rows]""",
+        notes=("`joints` and `moving_joints` name the joints; no array needs `allow_pickle`.",),
+        over_time=signal_lines(source),
+    )
+
+
+def write(source: Source, directory: Path) -> None:
+    """Write a dataset as NumPy archives; see `formats.Format`."""
+    columns = {field.name: as_array(source.table[field.name]) for field in source.table.schema}
+    with _archive(directory / "throws.npz") as archive:
+        for name, values in {**columns, "digest_of_dataset": np.array(source.digest)}.items():
+            _add(archive, name, values)
+    (directory / "trajectories").mkdir()
+    for shard, entries in source.shards.items():
+        _write_shard(source, entries, directory / "trajectories" / f"{shard}.npz")
+
+
+def as_array(column: pa.ChunkedArray) -> NDArray[Any]:
+    """A column of the table of throws; what is null is NaN, -1 or an empty string."""
+    if pa.types.is_string(column.type):
+        return np.array(column.fill_null("").to_pylist(), dtype=np.str_)
+    missing = -1 if pa.types.is_integer(column.type) else np.nan
+    array: NDArray[Any] = column.fill_null(missing).to_numpy()
+    return array
+
+
+def _write_shard(source: Source, entries: tuple[Entry, ...], path: Path) -> None:
+    offsets = np.concatenate([[0], np.cumsum([entry.samples for entry in entries])])
+    names: Mapping[str, NDArray[Any]] = {
+        "trial": np.array([entry.trial for entry in entries]),
+        "offsets": offsets,
+        "joints": np.array(JOINTS),
+        "moving_joints": np.array(source.moving),
+        "digest_of_dataset": np.array(source.digest),
+    }
+    # Signals are written side by side on disk before they are packed one after the other.
+    beside = {signal.name: path.with_name(f"{path.stem}.{signal.name}.npy") for signal in source.signals}
+    with ExitStack() as stack:
+        files = {name: stack.enter_context(file.open("wb")) for name, file in beside.items()}
+        for signal in source.signals:
+            shape = (int(offsets[-1]), *signal.shape)
+            header = {"descr": "<f8", "fortran_order": False, "shape": shape}
+            np.lib.format.write_array_header_1_0(files[signal.name], header)
+        for throw in source.throws(entries):
+            for name, file in files.items():
+                file.write(throw.signals[name].astype("<f8").tobytes())
+    with _archive(path) as archive:
+        for name, values in names.items():
+            _add(archive, name, values)
+        for name, unpacked in beside.items():
+            with unpacked.open("rb") as array, archive.open(_member(name), "w", force_zip64=True) as packed:
+                shutil.copyfileobj(array, packed)
+            unpacked.unlink()
+
+
+def _archive(path: Path) -> zipfile.ZipFile:
+    return zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED)
+
+
+def _add(archive: zipfile.ZipFile, name: str, values: NDArray[Any]) -> None:
+    with archive.open(_member(name), "w") as file:
+        np.lib.format.write_array(file, values, allow_pickle=False)
+
+
+def _member(name: str) -> zipfile.ZipInfo:
+    member = zipfile.ZipInfo(f"{name}.npy", _EPOCH)
+    member.compress_type = zipfile.ZIP_DEFLATED
+    return member

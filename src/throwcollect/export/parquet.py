@@ -1,0 +1,82 @@
+"""Parquet: a table of throws and tables of samples, for pandas, Polars, DuckDB and dataset hubs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from throwcollect.dataset.directory import THROWS
+from throwcollect.dataset.throws import encode_table
+from throwcollect.export.card import Layout, signal_lines
+from throwcollect.export.source import Source, Throw
+
+_TRAJECTORIES = "trajectories"
+_ROWS_PER_GROUP = 30_000
+"""Large enough for columns to compress, small enough to read a single throw and to hold in memory."""
+
+
+def layout(source: Source) -> Layout:
+    """How `write` lays a source out."""
+    return Layout(
+        files={
+            THROWS: "one row a trial: swept values, outcome, release, apex, landing.",
+            f"{_TRAJECTORIES}/": "one row a sample, throw after throw; `trial` says of which. No throw is divided "
+            "between files or row groups.",
+        },
+        loading=f"""\
+import pandas as pd
+
+throws = pd.read_parquet("{THROWS}")
+samples = pd.read_parquet("{_TRAJECTORIES}", filters=[("trial", "==", {source.entries[0].trial})])""",
+        notes=(
+            "Without `filters` these are the samples of all throws. Units and descriptions are also in the metadata of "
+            "the fields.",
+        ),
+        over_time=signal_lines(source, columns=True),
+        hub={
+            "tags": [],
+            "configs": [
+                {"config_name": "throws", "data_files": THROWS, "default": True},
+                {"config_name": _TRAJECTORIES, "data_files": f"{_TRAJECTORIES}/*.parquet"},
+            ],
+        },
+    )
+
+
+def write(source: Source, directory: Path) -> None:
+    """Write a dataset as Parquet; see `formats.Format`."""
+    facts = {"throwcollect.digest": source.digest}
+    table = source.table.replace_schema_metadata(facts)
+    (directory / THROWS).write_bytes(encode_table(table))
+    schema = _schema(source).with_metadata(facts)
+    (directory / _TRAJECTORIES).mkdir()
+    for shard, entries in source.shards.items():
+        path = directory / _TRAJECTORIES / f"{shard}.parquet"
+        with pq.ParquetWriter(path, schema, compression="zstd", write_page_checksum=True) as writer:
+            group: list[pa.RecordBatch] = []
+            for throw in source.throws(entries):
+                group.append(_batch(throw, source, schema))
+                if sum(map(len, group)) >= _ROWS_PER_GROUP:
+                    writer.write_table(pa.Table.from_batches(group))
+                    group = []
+            if group:
+                writer.write_table(pa.Table.from_batches(group))
+
+
+def _schema(source: Source) -> pa.Schema:
+    fields = [pa.field("trial", pa.int64(), nullable=False, metadata={"description": "Number of the trial."})]
+    for signal in source.signals:
+        metadata = {"description": signal.description, "unit": signal.unit}
+        fields += [pa.field(column, pa.float64(), nullable=False, metadata=metadata) for column in signal.columns]
+    return pa.schema(fields)
+
+
+def _batch(throw: Throw, source: Source, schema: pa.Schema) -> pa.RecordBatch:
+    columns = [np.full(len(throw), throw.trial)]
+    for signal in source.signals:
+        # A transposed copy at once, as columns of the recorded messages lie far apart.
+        columns += list(np.ascontiguousarray(throw.signals[signal.name].T.reshape(-1, len(throw))))
+    return pa.record_batch(columns, schema)

@@ -1,0 +1,189 @@
+"""A dataset as exporters see it: throws one by one, each with its row and its signals."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from throwcollect.dataset.directory import METADATA
+from throwcollect.dataset.reader import Dataset
+from throwcollect.episode.record import Samples
+from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.export.resampling import resample, resampled_count
+from throwcollect.export.signals import Signal, signals_of, unit_of
+from throwcollect.robots.interpolation import sample_quintic
+from throwcollect.robots.talos import JOINTS
+from throwcollect.robots.trajectory import JointTrajectory
+from throwcollect.tasks.outcome import Outcome
+from throwcollect.tasks.trajectory import throw_trajectory
+
+_NS_PER_S = 1_000_000_000
+_PLACES = ("shard", "chunk_offset")
+
+Signals = Mapping[str, NDArray[np.float64]]
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A throw that is there to be exported.
+
+    Attributes:
+        trial: Number of its trial.
+        samples: Number of samples to give.
+        landed: Whether its outcome is ``landed``.
+    """
+
+    trial: int
+    samples: int
+    landed: bool
+
+
+@dataclass(frozen=True)
+class Throw:
+    """One throw with its time series.
+
+    Attributes:
+        trial: Number of its trial.
+        landed: Whether its outcome is ``landed``.
+        signals: Each signal of the source by name, ``(n_samples, ...)``.
+        trajectory: What the controllers were sent.
+    """
+
+    trial: int
+    landed: bool
+    signals: Signals
+    trajectory: JointTrajectory
+
+    def __len__(self) -> int:
+        return len(self.signals["time_s"])
+
+
+@dataclass(frozen=True)
+class Source:
+    """What is exported.
+
+    Attributes:
+        dataset: The dataset.
+        digest: Its digest.
+        rate_hz: Samples per second to give.
+        moving: Joints that the task moves, in the order of the trajectories.
+        signals: What is known of each throw over time.
+        shards: Throws of each recording, by its name without ending; all in order of trials.
+        table: One row a trial, with ``description`` and ``unit`` in the metadata of each column.
+    """
+
+    dataset: Dataset
+    digest: str
+    rate_hz: int
+    moving: tuple[str, ...]
+    signals: tuple[Signal, ...]
+    shards: Mapping[str, tuple[Entry, ...]]
+    table: pa.Table
+
+    @classmethod
+    def open(cls, directory: Path, *, rate_hz: int | None = None) -> Source:
+        """Open a dataset to export it.
+
+        Args:
+            directory: Its directory.
+            rate_hz: Samples per second to give; the recorded ones when None.
+
+        Raises:
+            DatasetError: If the directory holds no finished dataset, or one without episodes.
+            ConfigError: If the rate is not one to give.
+        """
+        dataset = Dataset.open(directory)
+        recorded_hz = dataset.config.record.rate_hz
+        if rate_hz is not None and not 1 <= rate_hz <= recorded_hz:
+            raise ConfigError(
+                f"--rate: {rate_hz} samples per second",
+                expected=f"1 to {recorded_hz}, at which {directory} was recorded",
+            )
+        if not len(dataset):
+            raise DatasetError(f"{directory}: none of its {len(dataset.throws)} trials has an episode to export")
+        try:
+            digest = str(dataset.bag["custom_data"]["throwcollect.digest"])
+        except (KeyError, TypeError) as error:
+            raise DatasetError(f"{directory / METADATA}: {error} is missing") from error
+        rate_hz = rate_hz or recorded_hz
+        moving = tuple(joint for joint in JOINTS if joint in dataset.config.task.end)
+        return cls(
+            dataset,
+            digest,
+            rate_hz,
+            moving,
+            signals_of(moving),
+            _entries(dataset, rate_hz),
+            with_units(dataset.throws),
+        )
+
+    @property
+    def entries(self) -> tuple[Entry, ...]:
+        """All throws."""
+        return tuple(entry for entries in self.shards.values() for entry in entries)
+
+    def throws(self, entries: Iterable[Entry]) -> Iterator[Throw]:
+        """Throws with their time series; one at a time is in memory.
+
+        Raises:
+            DatasetError: If an episode is damaged, or not where the table says.
+        """
+        for entry in entries:
+            yield self._throw(entry.trial, landed=entry.landed)
+
+    def _throw(self, trial: int, *, landed: bool) -> Throw:
+        dataset = self.dataset
+        episode = dataset.episode(trial)
+        try:
+            recorded = episode.samples()
+        except DatasetError as error:
+            raise DatasetError(f"{dataset.directory}: trial {trial}: {error}") from error
+        samples = resample(recorded, recorded_hz=dataset.config.record.rate_hz, rate_hz=self.rate_hz)
+        trajectory = throw_trajectory(dataset.plan.config_of(dataset.plan.trials[trial]))
+        return Throw(trial, landed, _signals(samples, trajectory, episode.header.start_ns), trajectory)
+
+
+def _entries(dataset: Dataset, rate_hz: int) -> dict[str, tuple[Entry, ...]]:
+    found: dict[str, list[Entry]] = {}
+    for row in dataset.throws.select(["trial", "outcome", "shard", "samples"]).to_pylist():
+        if row["shard"] is not None:
+            count = resampled_count(row["samples"], recorded_hz=dataset.config.record.rate_hz, rate_hz=rate_hz)
+            entry = Entry(row["trial"], count, row["outcome"] == Outcome.LANDED.value)
+            found.setdefault(Path(row["shard"]).stem, []).append(entry)
+    return {shard: tuple(entries) for shard, entries in found.items()}
+
+
+def _signals(samples: Samples, trajectory: JointTrajectory, start_ns: int) -> Signals:
+    time_s = (samples.stamps_ns - start_ns) / _NS_PER_S
+    position, velocity, acceleration = sample_quintic(trajectory, time_s)
+    return {
+        "time_s": time_s,
+        "joint_position_rad": samples.position,
+        "joint_velocity_radps": samples.velocity,
+        "joint_effort_nm": samples.effort,
+        "command_position_rad": position,
+        "command_velocity_radps": velocity,
+        "command_acceleration_radps2": acceleration,
+        "ball_position_m": samples.ball_position,
+        "ball_orientation_xyzw": samples.ball_orientation_xyzw,
+        "ball_velocity_mps": samples.ball_linear_velocity,
+        "ball_angular_velocity_radps": samples.ball_angular_velocity,
+    }
+
+
+def with_units(throws: pa.Table) -> pa.Table:
+    """The table of throws without the places of the recordings, and with the unit of each number."""
+    table = throws.drop_columns(list(_PLACES))
+    fields = [
+        field if pa.types.is_string(field.type) else field.with_metadata(_with_unit(field)) for field in table.schema
+    ]
+    return table.cast(pa.schema(fields))
+
+
+def _with_unit(field: pa.Field) -> dict[bytes, bytes]:
+    return {**(field.metadata or {}), b"unit": unit_of(field.name).encode()}

@@ -1,0 +1,112 @@
+"""How many throws each target has: cells over distance, hit angle and height."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from throwcollect.config.sweep import LANDING_HEIGHT, TargetConfig
+from throwcollect.report.landing import Landings, numbers
+
+_BINS = 14
+_LABELS = {
+    "distance_m": "landing distance [m]",
+    "hit_angle_rad": "hit angle below the horizontal [rad]",
+    "height_m": "landing height [m]",
+}
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One dimension of the cells.
+
+    Attributes:
+        label: What is along it, with its unit.
+        edges: Of its bins, shape ``(n_bins + 1,)``.
+    """
+
+    label: str
+    edges: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """Throws that landed as planned, in cells of targets.
+
+    Attributes:
+        axes: One to three dimensions.
+        counts: Throws in each cell, of one dimension for each axis.
+        throws: Number of throws that landed as planned, in a cell or not.
+        asked: Whether the configuration names the cells; else they are those between the lowest and highest values.
+    """
+
+    axes: tuple[Axis, ...]
+    counts: NDArray[np.intp]
+    throws: int
+    asked: bool
+
+    @property
+    def hit(self) -> int:
+        """Number of cells with at least one throw."""
+        return int((self.counts > 0).sum())
+
+    @property
+    def pairs(self) -> tuple[tuple[Axis, Axis, NDArray[np.intp]], ...]:
+        """Each two axes, and the throws over both, shape ``(n_first, n_second)``, whatever the third is."""
+        count = len(self.axes)
+        return tuple(
+            (
+                self.axes[first],
+                self.axes[second],
+                self.counts.sum(axis=tuple(other for other in range(count) if other not in (first, second))),
+            )
+            for first in range(count)
+            for second in range(first + 1, count)
+        )
+
+
+def coverage(landings: Landings, throws: pa.Table, *, target: TargetConfig | None) -> Coverage | None:
+    """Coverage of the targets of a configuration, or of what was reached if it has none.
+
+    Args:
+        landings: Throws that landed as planned.
+        throws: Table of all throws.
+        target: Targets of the configuration.
+
+    Returns:
+        None if nothing landed.
+    """
+    if not len(landings):
+        return None
+    values = {"distance_m": landings.distance_m, "hit_angle_rad": landings.hit_angle_rad}
+    if target is None:
+        edges = {name: _edges(column) for name, column in values.items()}
+    else:
+        if target.height_m is not None:
+            values["height_m"] = numbers(throws, LANDING_HEIGHT)[landings.trial]
+        bins = target.dimensions
+        values = {name: column for name, column in values.items() if name in bins}
+        edges = {name: np.linspace(bins[name].min, bins[name].max, bins[name].bins + 1) for name in values}
+    counts, _ = np.histogramdd(np.column_stack(list(values.values())), list(edges.values()))
+    axes = tuple(Axis(_LABELS[name], edges[name]) for name in values)
+    return Coverage(axes, counts.astype(np.intp), len(landings), target is not None)
+
+
+def _edges(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Edges of cells; cells of a round number, so that they can be quoted."""
+    low, high = float(values.min()), float(values.max())
+    width = _round_up((high - low) / _BINS) or 0.1
+    first, last = np.floor(low / width), np.floor(high / width) + 1
+    edges: NDArray[np.float64] = np.arange(first, last + 1) * width
+    return edges
+
+
+def _round_up(width: float) -> float:
+    """The next of 1, 2 and 5 times a power of ten; 0 for what is too small to tell values apart."""
+    if width < 1e-9:
+        return 0.0
+    power = 10.0 ** np.floor(np.log10(width))
+    return float(next(step * power for step in (1, 2, 5, 10) if step * power >= width * (1 - 1e-9)))

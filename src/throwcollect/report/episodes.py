@@ -1,0 +1,170 @@
+"""What a report takes from recordings: how ballistic the flights are, and a few throws to look at."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from throwcollect.dataset.reader import Dataset
+from throwcollect.report.landing import Landings
+from throwcollect.report.outcomes import LANDED, Outcomes
+from throwcollect.robots.interpolation import sample_positions
+from throwcollect.robots.talos import JOINTS
+from throwcollect.tasks.flight import NS_PER_S, flight_residual, release_of
+from throwcollect.tasks.trajectory import throw_trajectory
+
+MOST_RESIDUALS = 2000
+"""Episodes whose flight is computed again, some 15 s of work; `verify` computes them all."""
+_MOST_LANDED = 6
+_MOST_OTHERS = 3
+
+
+@dataclass(frozen=True)
+class Residuals:
+    """How far recorded flights depart from ballistic motion.
+
+    Attributes:
+        episodes: Number of episodes in the dataset.
+        checked: Number of those that were looked at, chosen at random if not all.
+        distance_m: Largest distance of each flight that could be compared [m], shape ``(n,)``; nan where a sample is
+            not a number.
+    """
+
+    episodes: int
+    checked: int
+    distance_m: NDArray[np.float64]
+
+    @property
+    def finite_m(self) -> NDArray[np.float64]:
+        """Those distances that are numbers [m]."""
+        return self.distance_m[np.isfinite(self.distance_m)]
+
+
+@dataclass(frozen=True)
+class BallPath:
+    """The ball of one throw.
+
+    Attributes:
+        trial: Number of the trial.
+        outcome: How it ended.
+        positions: Ball centre in world [m], shape ``(n_samples, 3)``.
+        release: Index of the first sample after the release; None if it was not released.
+    """
+
+    trial: int
+    outcome: str
+    positions: NDArray[np.float64]
+    release: int | None
+
+
+@dataclass(frozen=True)
+class JointMotion:
+    """The moving joints of one throw.
+
+    Attributes:
+        trial: Number of the trial.
+        joints: Their names.
+        times_s: Since the start of the trial [s], shape ``(n_samples,)``.
+        commanded: What the controllers were sent [rad], shape ``(n_samples, n_joints)``.
+        measured: What the joints did [rad], shape ``(n_samples, n_joints)``.
+        release_s: Since the start of the trial [s]; None if the ball was not released.
+    """
+
+    trial: int
+    joints: tuple[str, ...]
+    times_s: NDArray[np.float64]
+    commanded: NDArray[np.float64]
+    measured: NDArray[np.float64]
+    release_s: float | None
+
+    def span(self, column: int) -> tuple[float, float]:
+        """Range of positions to show of a joint [rad]; joints at rest should look it."""
+        both = np.concatenate([self.commanded[:, column], self.measured[:, column]])
+        both = both[np.isfinite(both)]
+        low, high = (float(both.min()), float(both.max())) if len(both) else (0.0, 0.0)
+        room = max(0.05 * (high - low), 0.05 - (high - low) / 2)
+        return low - room, high + room
+
+
+def residuals(dataset: Dataset) -> Residuals:
+    """Flights computed again, at most `MOST_RESIDUALS`.
+
+    Raises:
+        DatasetError: If an episode is not where the table says, or is damaged.
+    """
+    trials = _with_episode(dataset)
+    # A regular choice would be a lattice in the parameters of a Sobol sequence or a grid.
+    chosen = np.sort(np.random.default_rng(0).permutation(trials)[:MOST_RESIDUALS])
+    found = []
+    for trial in chosen.tolist():
+        episode = dataset.episode(trial)
+        config = dataset.plan.config_of(dataset.plan.trials[trial])
+        distance = flight_residual(episode.samples(), episode.header, config=config)
+        if distance is not None:
+            found.append(distance)
+    return Residuals(len(trials), len(chosen), np.array(found))
+
+
+def example_trials(dataset: Dataset, landed: Landings, outcomes: Outcomes) -> tuple[int, ...]:
+    """Trials to look at: some that landed, from the nearest to the farthest, and the first of some other outcomes.
+
+    Args:
+        dataset: The dataset.
+        landed: Throws that landed as planned.
+        outcomes: Outcomes of all its trials.
+    """
+    recorded = set(_with_episode(dataset).tolist())
+    by_distance = landed.trial[np.argsort(landed.distance_m, kind="stable")].tolist()
+    usable = [trial for trial in by_distance if trial in recorded]
+    picks = np.linspace(0, len(usable) - 1, min(len(usable), _MOST_LANDED)).round().astype(int)
+    others = (
+        next((trial for trial in np.flatnonzero(outcomes.are(name)).tolist() if trial in recorded), None)
+        for name in outcomes.names
+        if name != LANDED
+    )
+    return (*(usable[pick] for pick in picks), *[trial for trial in others if trial is not None][:_MOST_OTHERS])
+
+
+def ball_paths(dataset: Dataset, trials: Sequence[int]) -> Iterator[BallPath]:
+    """Paths of the ball in some throws.
+
+    Raises:
+        DatasetError: If an episode is not where the table says, or is damaged.
+    """
+    outcomes = dataset.throws["outcome"]
+    for trial in trials:
+        episode = dataset.episode(trial)
+        samples = episode.samples()
+        release_ns = release_of(episode.header.contacts, gap_s=dataset.config.task.recatch_gap_s)
+        release = None if release_ns is None else int(np.searchsorted(samples.stamps_ns, release_ns))
+        yield BallPath(trial, outcomes[trial].as_py(), samples.ball_position, release)
+
+
+def joint_motion(dataset: Dataset, trial: int) -> JointMotion:
+    """Commanded and measured motion of one throw.
+
+    Raises:
+        DatasetError: If the episode is not where the table says, or is damaged.
+    """
+    episode = dataset.episode(trial)
+    samples = episode.samples()
+    config = dataset.plan.config_of(dataset.plan.trials[trial])
+    trajectory = throw_trajectory(config)
+    times = (samples.stamps_ns - episode.header.start_ns) / NS_PER_S
+    columns = [JOINTS.index(joint) for joint in trajectory.joints]
+    release_ns = release_of(episode.header.contacts, gap_s=config.task.recatch_gap_s)
+    return JointMotion(
+        trial=trial,
+        joints=trajectory.joints,
+        times_s=times,
+        commanded=sample_positions(trajectory, times),
+        measured=samples.position[:, columns],
+        release_s=None if release_ns is None else (release_ns - episode.header.start_ns) / NS_PER_S,
+    )
+
+
+def _with_episode(dataset: Dataset) -> NDArray[np.int64]:
+    return np.flatnonzero(dataset.throws["shard"].is_valid().to_numpy())

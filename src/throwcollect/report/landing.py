@@ -1,0 +1,63 @@
+"""Where balls landed, from where they came, and which targets they cover."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from throwcollect.report.outcomes import Outcomes
+
+
+def numbers(throws: pa.Table, name: str) -> NDArray[np.float64]:
+    """A column of numbers, nan where there is none."""
+    return np.asarray(throws[name].to_numpy(), dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class Landings:
+    """All throws whose ball crossed the landing plane, whatever their outcome; each array of shape ``(n,)``.
+
+    Attributes:
+        trial: Number of the trial.
+        x_m: Ball centre in world [m], forward of the robot.
+        y_m: Ball centre in world [m], left of the robot.
+        distance_m: Horizontal distance from the robot's base [m].
+        hit_angle_rad: Direction of flight below the horizontal [rad].
+        speed_mps: Speed at release [m/s].
+        elevation_rad: Direction of flight at release above the horizontal [rad].
+        code: Outcome, as index into `Outcomes.names`.
+    """
+
+    trial: NDArray[np.int64]
+    x_m: NDArray[np.float64]
+    y_m: NDArray[np.float64]
+    distance_m: NDArray[np.float64]
+    hit_angle_rad: NDArray[np.float64]
+    speed_mps: NDArray[np.float64]
+    elevation_rad: NDArray[np.float64]
+    code: NDArray[np.intp]
+
+    def __len__(self) -> int:
+        return len(self.trial)
+
+    def __getitem__(self, rows: NDArray[np.intp] | NDArray[np.bool_]) -> Landings:
+        return Landings(**{name: column[rows] for name, column in vars(self).items()})
+
+
+def landings(throws: pa.Table, outcomes: Outcomes) -> Landings:
+    """The landings of a table of throws."""
+    x, y = numbers(throws, "landing_x_m"), numbers(throws, "landing_y_m")
+    everything = Landings(
+        trial=np.asarray(throws["trial"].to_numpy()),
+        x_m=x,
+        y_m=y,
+        distance_m=np.hypot(x, y),
+        hit_angle_rad=numbers(throws, "hit_angle_rad"),
+        speed_mps=numbers(throws, "release_speed_mps"),
+        elevation_rad=numbers(throws, "release_elevation_rad"),
+        code=outcomes.codes,
+    )
+    return everything[np.isfinite(x + y)]

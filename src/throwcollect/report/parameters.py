@@ -1,0 +1,99 @@
+"""What was swept: how the values of each key are spread, and what came of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from throwcollect.config.schema import Config, Range
+from throwcollect.config.shape import shape_of
+from throwcollect.report.outcomes import Outcomes
+
+_BINS = 12
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One swept key.
+
+    Attributes:
+        key: Dotted key.
+        unit: Of its values; empty when they have none.
+        logarithmic: Whether its logarithm was spread evenly.
+        values: Value of each trial, shape ``(n_trials,)``.
+        edges: Of the bins, shape ``(n_bins + 1,)``; around each value if there are but few.
+        counts: Trials in each bin by outcome, shape ``(n_bins, n_outcomes)``.
+        steps: The distinct values, one a bin, if there are but few; else None.
+    """
+
+    key: str
+    unit: str
+    logarithmic: bool
+    values: NDArray[np.float64]
+    edges: NDArray[np.float64]
+    counts: NDArray[np.intp]
+    steps: NDArray[np.float64] | None
+
+    @property
+    def label(self) -> str:
+        """Key with its unit."""
+        return f"{self.key} [{self.unit or '-'}]"
+
+    @property
+    def ticks(self) -> dict[str, list[Any]]:
+        """Ticks of a logarithmic axis, which mostly spans too little for powers of ten."""
+        values = [float(f"{value:.2g}") for value in np.geomspace(self.edges[0], self.edges[-1], 3)]
+        return {"tickvals": values, "ticktext": [f"{value:g}" for value in values]}
+
+    @property
+    def short_label(self) -> tuple[str, str]:
+        """Last part of the key, and the parts before it with the unit."""
+        above, _, last = self.key.rpartition(".")
+        return last, f"{above} [{self.unit or '-'}]".strip()
+
+
+def parameters(config: Config, throws: pa.Table, outcomes: Outcomes) -> tuple[Parameter, ...]:
+    """All swept keys, in the order of the table.
+
+    Args:
+        config: Configuration of the dataset.
+        throws: Its throws.
+        outcomes: Their outcomes.
+    """
+    return tuple(
+        _parameter(config, key, np.asarray(throws[key].to_numpy(), dtype=np.float64), outcomes)
+        for key in throws.column_names
+        if "." in key
+    )
+
+
+def _parameter(config: Config, key: str, values: NDArray[np.float64], outcomes: Outcomes) -> Parameter:
+    swept = config.sweep.parameters.get(key)
+    logarithmic = isinstance(swept, Range) and swept.scale == "log"
+    distinct = np.unique(values)
+    steps = distinct if len(distinct) <= _BINS else None
+    if steps is not None:
+        edges = np.exp(_around(np.log(steps))) if logarithmic and len(steps) > 1 else _around(steps)
+        bins = np.searchsorted(steps, values)
+    else:
+        low, high = (swept.min, swept.max) if isinstance(swept, Range) else (distinct[0], distinct[-1])
+        # A value outside of the range it was drawn from would be lost otherwise.
+        low, high = min(low, float(distinct[0])), max(high, float(distinct[-1]))
+        edges = np.geomspace(low, high, _BINS + 1) if logarithmic else np.linspace(low, high, _BINS + 1)
+        bins = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, _BINS - 1)
+    counts = np.zeros((len(edges) - 1, len(outcomes.names)), dtype=np.intp)
+    np.add.at(counts, (bins, outcomes.codes), 1)
+    return Parameter(key, shape_of(key.split(".")).unit, logarithmic, values, edges, counts, steps)
+
+
+def _around(steps: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Edges half-way between values, and as far beyond the first and the last."""
+    if len(steps) == 1:
+        half = abs(steps[0]) / 2 or 0.5
+        return np.array([steps[0] - half, steps[0] + half])
+    middles = (steps[:-1] + steps[1:]) / 2
+    return np.concatenate([[2 * steps[0] - middles[0]], middles, [2 * steps[-1] - middles[-1]]])

@@ -1,0 +1,115 @@
+"""A layout for Foxglove and Lichtblick: the scene, the ball, the joints against their limits, and what came of it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from throwcollect.episode.frames import WORLD
+from throwcollect.view.facts import HARDWARE, NAME
+
+_SCENE = "3D!throws"
+_BALL = "Plot!ball"
+_LIMITS = "Plot!limits"
+_FACTS = "DiagnosticStatusPanel!facts"
+_SPEED = 0.2
+"""Of the playback: a throw takes a second."""
+
+
+def layout(joints: Sequence[str]) -> bytes:
+    """The layout, as it is imported from a file.
+
+    Args:
+        joints: Names of the joints whose limits are plotted.
+
+    Returns:
+        JSON text.
+    """
+    shares = [_series(f"/view/limits.position[{index}]", joint) for index, joint in enumerate(joints)]
+    height = _series("/ball/odometry.pose.pose.position.z", "height [m]")
+    panels = {
+        _SCENE: _scene(),
+        _BALL: _plot([height, _series("/view/ball_speed.data", "speed [m/s]")], "Ball"),
+        _LIMITS: _plot(
+            [*shares, _series("-1", "lower limit"), _series("1", "upper limit")], "Joint positions within their limits"
+        ),
+        _FACTS: {"topicToRender": "/view/facts", "selectedHardwareId": HARDWARE, "selectedName": NAME},
+    }
+    document = {
+        "configById": panels,
+        "globalVariables": {},
+        "userNodes": {},
+        "playbackConfig": {"speed": _SPEED},
+        "layout": _split("row", _SCENE, _split("column", _FACTS, _split("column", _BALL, _LIMITS, 50), 34), 64),
+    }
+    return (json.dumps(document, indent=2) + "\n").encode()
+
+
+def _scene() -> dict[str, Any]:
+    camera = {
+        "perspective": True,
+        "distance": 4.6,
+        "phi": 72.0,
+        "thetaOffset": 215.0,
+        "target": [0.0, 0.0, 0.0],
+        "targetOffset": [0.5, 0.0, 1.05],
+        "targetOrientation": [0, 0, 0, 1],
+        "fovy": 45,
+        "near": 0.05,
+        "far": 500,
+    }
+    layers = {
+        "ground": {
+            "instanceId": "ground",
+            "layerId": "foxglove.Grid",
+            "label": "Ground",
+            "visible": True,
+            "frameId": WORLD,
+            "size": 10,
+            "divisions": 10,
+            "lineWidth": 1,
+            "color": "#248eff60",
+            "order": 1,
+        },
+    }
+    return {
+        "followMode": "follow-none",
+        "followTf": WORLD,
+        "cameraState": camera,
+        # The meshes are STL with z up, as ROS has it; the application's default is y.
+        "scene": {"meshUpAxis": "z_up", "transforms": {"showLabel": False, "axisScale": 0, "lineWidth": 0}},
+        "topics": {
+            "/view/robot": {"visible": True, "showOutlines": False},
+            "/view/throw": {"visible": True, "showOutlines": False},
+            "/view/throws": {"visible": True, "showOutlines": False},
+            "/view/path": {"visible": False},
+            # The same robot once more, by the paths of its meshes, which are not where they are on every machine.
+            "/robot_description": {"visible": False},
+        },
+        "layers": layers,
+    }
+
+
+def _plot(paths: Sequence[Mapping[str, Any]], title: str) -> dict[str, Any]:
+    return {
+        "foxglovePanelTitle": title,
+        "lichtblickPanelTitle": title,
+        "paths": list(paths),
+        "showLegend": True,
+        "legendDisplay": "left",
+        "sidebarDimension": 190,
+        "showPlotValuesInLegend": False,
+        "showXAxisLabels": True,
+        "showYAxisLabels": True,
+        "isSynced": True,
+        "xAxisVal": "timestamp",
+    }
+
+
+def _series(value: str, label: str) -> dict[str, Any]:
+    return {"value": value, "label": label, "enabled": True, "timestampMethod": "receiveTime"}
+
+
+def _split(direction: str, first: Any, second: Any, percentage: int) -> dict[str, Any]:
+    return {"direction": direction, "first": first, "second": second, "splitPercentage": percentage}

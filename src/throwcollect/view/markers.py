@@ -1,0 +1,196 @@
+"""Markers: the robot, the ball, its paths, where it was released, highest and landed, and the landing plane."""
+
+from __future__ import annotations
+
+import base64
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from throwcollect.dataset.throws import Row
+from throwcollect.episode.frames import WORLD
+from throwcollect.episode.topics import BALL
+from throwcollect.errors import ConfigError
+from throwcollect.interfaces import get_message
+from throwcollect.robots.model import share_directory
+from throwcollect.tasks.outcome import Outcome
+from throwcollect.view.robot import BALL_RGBA, Rgba, Shape
+from throwcollect.view.viewed import ViewedThrow
+
+_HELD: Rgba = (0.6, 0.6, 0.6, 0.8)
+_LANDED: Rgba = (0.0, 0.75, 0.35, 1.0)
+_FAILED: Rgba = (0.9, 0.1, 0.1, 1.0)
+_PLANE: Rgba = (0.3, 0.5, 0.9, 0.15)
+_LABEL: Rgba = (1.0, 1.0, 1.0, 1.0)
+_OTHERS_ALPHA = 0.25
+
+_POINT_M, _TEXT_M, _LINE_M, _THIN_LINE_M, _PLANE_M = 0.035, 0.07, 0.012, 0.005, 0.002
+_MARGIN_M = 0.5
+_POINTS_PER_S = 100
+"""As many points of a path as the eye can tell apart."""
+
+
+def robot_markers(shapes: Sequence[Shape], stamp_ns: int) -> Any:
+    """The robot's shapes in the frames of its links, each mesh inside as ``data:`` URL, so that nothing is to be found.
+
+    Args:
+        shapes: The shapes.
+        stamp_ns: Stamp of the markers [ns].
+
+    Returns:
+        A visualization_msgs/MarkerArray.
+
+    Raises:
+        ConfigError: If a mesh cannot be read.
+    """
+    array, marker = (get_message(f"visualization_msgs/msg/{name}") for name in ("MarkerArray", "Marker"))
+    kinds = {"mesh": marker.MESH_RESOURCE, "box": marker.CUBE, "cylinder": marker.CYLINDER}
+    meshes = {mesh: _data_url(mesh) for mesh in {shape.mesh for shape in shapes if shape.mesh}}
+    markers = []
+    for number, shape in enumerate(shapes):
+        drawn = _marker("robot", kinds[shape.kind], shape.rgba, shape.size, stamp_ns, number=number)
+        drawn.header.frame_id, drawn.frame_locked = shape.link, True
+        drawn.mesh_resource = meshes.get(shape.mesh, "")
+        _place(drawn, *shape.position)
+        x, y, z, w = shape.rotation_xyzw
+        drawn.pose.orientation = get_message("geometry_msgs/msg/Quaternion")(x=x, y=y, z=z, w=w)
+        markers.append(drawn)
+    return array(markers=markers)
+
+
+def throw_markers(throw: ViewedThrow) -> Any:
+    """Markers of the throw that is shown; they take the place of those of the throw before.
+
+    Args:
+        throw: The throw.
+
+    Returns:
+        A visualization_msgs/MarkerArray.
+    """
+    array, marker = (get_message(f"visualization_msgs/msg/{name}") for name in ("MarkerArray", "Marker"))
+    stamp = throw.start_ns
+    ball = _marker("ball", marker.SPHERE, BALL_RGBA, (2 * throw.config.ball.radius_m,) * 3, stamp)
+    ball.header.frame_id, ball.frame_locked = BALL, True
+    markers = [marker(header=_header(stamp), action=marker.DELETEALL), ball]
+    markers.append(_path("path", throw, stamp, width=_LINE_M, alpha=1.0))
+    for point in ("release", "apex", "landing"):
+        markers += _point(point, throw.row, stamp)
+    return array(markers=markers)
+
+
+def all_markers(throws: Sequence[ViewedThrow]) -> Any:
+    """Thin paths of all throws, and the landing plane of the first below them.
+
+    Args:
+        throws: The throws, at least one.
+
+    Returns:
+        A visualization_msgs/MarkerArray.
+    """
+    array, marker = (get_message(f"visualization_msgs/msg/{name}") for name in ("MarkerArray", "Marker"))
+    stamp = throws[0].start_ns
+    corners = np.concatenate([np.zeros((1, 2)), *(throw.path[:, :2] for throw in throws)])
+    low, high = corners.min(axis=0) - _MARGIN_M, corners.max(axis=0) + _MARGIN_M
+    plane = _marker("landing plane", marker.CUBE, _PLANE, (*(high - low), _PLANE_M), stamp)
+    x, y = (low + high) / 2
+    _place(plane, x, y, throws[0].config.scene.landing_height_m - _PLANE_M / 2)
+    thin = [_path("paths", throw, stamp, width=_THIN_LINE_M, alpha=_OTHERS_ALPHA) for throw in throws]
+    return array(markers=[plane, *thin])
+
+
+def path_cloud(throw: ViewedThrow) -> Any:
+    """A throw's path as points, for viewers that draw no markers.
+
+    Args:
+        throw: The throw.
+
+    Returns:
+        A sensor_msgs/PointCloud2.
+    """
+    field = get_message("sensor_msgs/msg/PointField")
+    data = throw.path.astype("<f4")
+    fields = [field(name=name, offset=4 * axis, datatype=field.FLOAT32, count=1) for axis, name in enumerate("xyz")]
+    return get_message("sensor_msgs/msg/PointCloud2")(
+        header=_header(throw.start_ns),
+        height=1,
+        width=len(data),
+        fields=fields,
+        point_step=12,
+        row_step=12 * len(data),
+        data=np.frombuffer(data.tobytes(), np.uint8),
+        is_dense=True,
+    )
+
+
+def _path(namespace: str, throw: ViewedThrow, stamp_ns: int, *, width: float, alpha: float) -> Any:
+    """A line, grey while the ball was held, with the colour of the outcome from its release on."""
+    point, color = get_message("geometry_msgs/msg/Point"), get_message("std_msgs/msg/ColorRGBA")
+    rate, released, last = throw.config.record.rate_hz, throw.row["release_time_s"], len(throw.path) - 1
+    chosen = [*range(0, last, max(1, rate // _POINTS_PER_S)), last]
+    release = math.inf if released is None else released * rate
+    flown = _LANDED if throw.row["outcome"] == Outcome.LANDED else _FAILED
+    colors = {held: color(r=r, g=g, b=b, a=a * alpha) for held, (r, g, b, a) in ((True, _HELD), (False, flown))}
+    marker = get_message("visualization_msgs/msg/Marker")
+    line = _marker(
+        namespace, marker.LINE_STRIP, (*flown[:3], alpha), (width, 0.0, 0.0), stamp_ns, number=throw.row["trial"]
+    )
+    line.points = [point(x=x, y=y, z=z) for x, y, z in throw.path[chosen].tolist()]
+    line.colors = [colors[sample < release] for sample in chosen]
+    return line
+
+
+def _point(name: str, row: Row, stamp_ns: int) -> list[Any]:
+    """A dot with a label; nothing if the throw has no such point."""
+    x, y, z = (row[f"{name}_{axis}_m"] for axis in "xyz")
+    if x is None:
+        return []
+    marker = get_message("visualization_msgs/msg/Marker")
+    text = {
+        "release": lambda: f"release {row['release_time_s']:.2f} s, {_norm(row, 'release'):.2f} m/s",
+        "apex": lambda: f"apex {z:.2f} m",
+        "landing": lambda: f"landing x {x:.2f} m, y {y:.2f} m, {_norm(row, 'landing'):.2f} m/s",
+    }[name]()
+    dot = _marker(name, marker.SPHERE, _LANDED, (_POINT_M,) * 3, stamp_ns)
+    label = _marker(name, marker.TEXT_VIEW_FACING, _LABEL, (0.0, 0.0, _TEXT_M), stamp_ns, number=1)
+    label.text = text
+    _place(dot, x, y, z)
+    # A throw released on its way down is highest where it is released.
+    _place(label, x, y, z + (-1.5 if name == "release" else 1.5) * _TEXT_M)
+    return [dot, label]
+
+
+def _norm(row: Row, name: str) -> float:
+    return math.hypot(*(row[f"{name}_v{axis}_mps"] for axis in "xyz"))
+
+
+def _marker(namespace: str, kind: int, rgba: Rgba, scale: tuple[float, ...], stamp_ns: int, *, number: int = 0) -> Any:
+    r, g, b, a = rgba
+    x, y, z = map(float, scale)
+    return get_message("visualization_msgs/msg/Marker")(
+        header=_header(stamp_ns),
+        ns=namespace,
+        id=number,
+        type=kind,
+        scale=get_message("geometry_msgs/msg/Vector3")(x=x, y=y, z=z),
+        color=get_message("std_msgs/msg/ColorRGBA")(r=r, g=g, b=b, a=a),
+    )
+
+
+def _place(marker: Any, x: float, y: float, z: float) -> None:
+    marker.pose.position = get_message("geometry_msgs/msg/Point")(x=float(x), y=float(y), z=float(z))
+
+
+def _header(stamp_ns: int) -> Any:
+    sec, nanosec = divmod(stamp_ns, 1_000_000_000)
+    stamp = get_message("builtin_interfaces/msg/Time")(sec=sec, nanosec=nanosec)
+    return get_message("std_msgs/msg/Header")(stamp=stamp, frame_id=WORLD)
+
+
+def _data_url(mesh: str) -> str:
+    path = share_directory() / mesh
+    try:
+        return f"data:model/{path.suffix[1:].lower()};base64,{base64.b64encode(path.read_bytes()).decode()}"
+    except OSError as error:
+        raise ConfigError(f"{path}: the robot's mesh cannot be read: {error.strerror}") from error

@@ -1,0 +1,140 @@
+"""The MCAP file that viewers open: throws one after another, with everything that is drawn around them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import IO
+
+from mcap.writer import CompressionType, Writer
+
+from throwcollect.config.schema import Config
+from throwcollect.dataset.bag import FileSummary
+from throwcollect.dataset.mcap_contents import declarations
+from throwcollect.dataset.mcap_file import LIBRARY, PROFILE
+from throwcollect.episode.channels import Channel, Qos
+from throwcollect.episode.frames import read_frames
+from throwcollect.episode.record import Samples
+from throwcollect.episode.topics import Recording, ball_odometry, joint_states, transform_message, transforms
+from throwcollect.interfaces import Message, get_message, serialize
+from throwcollect.robots.description import full_description
+from throwcollect.view.facts import throw_facts
+from throwcollect.view.markers import all_markers, path_cloud, robot_markers, throw_markers
+from throwcollect.view.robot import DrawnRobot, ball_urdf
+from throwcollect.view.sampled import ball_speed, range_shares, sampled_messages
+from throwcollect.view.viewed import ViewedThrow
+
+_SAMPLED = Qos("volatile", 100)
+_LATCHED = Qos("transient_local", 1)
+_LATCHED_TYPES = {
+    "/robot_description": "std_msgs/msg/String",
+    "/view/ball/robot_description": "std_msgs/msg/String",
+    "/tf_static": "tf2_msgs/msg/TFMessage",
+    "/view/robot": "visualization_msgs/msg/MarkerArray",
+    "/view/throws": "visualization_msgs/msg/MarkerArray",
+    "/view/throw": "visualization_msgs/msg/MarkerArray",
+    "/view/path": "sensor_msgs/msg/PointCloud2",
+    "/view/facts": "diagnostic_msgs/msg/DiagnosticArray",
+}
+
+
+class ViewRecording:
+    """Writes the file.
+
+    Attributes:
+        channels: Its channels.
+
+    Args:
+        stream: The file, opened for writing.
+        config: The configuration of the dataset.
+    """
+
+    def __init__(self, stream: IO[bytes], config: Config) -> None:
+        self._config = config
+        self._frames = read_frames(full_description(config), base_height=config.robot.base_height_m)
+        self._topics = [
+            transforms(self._frames.moving),
+            joint_states(),
+            ball_odometry(),
+            ball_speed(),
+            range_shares(tuple(config.task.end)),
+        ]
+        declared = [(name, kind, _LATCHED) for name, kind in _LATCHED_TYPES.items()]
+        declared += [(topic.name, topic.type_name, _SAMPLED) for topic in self._topics]
+        self.channels = tuple(Channel(number, *facts) for number, facts in enumerate(declared, start=1))
+        self._writer = Writer(stream, compression=CompressionType.ZSTD, enable_data_crcs=True)
+        self._numbers = self._declare()
+        self._counts: Counter[int] = Counter()
+        self._times = (0, 0)
+
+    def _declare(self) -> dict[str, int]:
+        self._writer.start(profile=PROFILE, library=LIBRARY)
+        schemas, channels = declarations(self.channels)
+        for schema in schemas:
+            self._writer.register_schema(schema.name, schema.encoding, schema.data)
+        return {
+            channel.topic: self._writer.register_channel(
+                channel.topic, channel.message_encoding, channel.schema_id, channel.metadata
+            )
+            for channel in channels
+        }
+
+    def write(
+        self, throws: Sequence[ViewedThrow], samples: Callable[[ViewedThrow], Samples], robot: DrawnRobot
+    ) -> None:
+        """Write throws and what is drawn around them.
+
+        Args:
+            throws: The throws in order of time, at least one.
+            samples: Reads the samples of a throw.
+            robot: The robot.
+
+        Raises:
+            DatasetError: If an episode cannot be read.
+            ConfigError: If Talos' files cannot be read.
+        """
+        start = throws[0].start_ns
+        string = get_message("std_msgs/msg/String")
+        self._put("/robot_description", start, string(data=robot.urdf))
+        self._put("/view/ball/robot_description", start, string(data=ball_urdf(self._config.ball)))
+        fixed = [
+            transform_message(frame.parent, frame.child, frame.translation, frame.rotation_xyzw, start)
+            for frame in self._frames.fixed
+        ]
+        self._put("/tf_static", start, get_message("tf2_msgs/msg/TFMessage")(transforms=fixed))
+        self._put("/view/robot", start, robot_markers(robot.shapes, start))
+        self._put("/view/throws", start, all_markers(throws))
+        for throw in throws:
+            self._put("/view/throw", throw.start_ns, throw_markers(throw))
+            self._put("/view/path", throw.start_ns, path_cloud(throw))
+            self._put("/view/facts", throw.start_ns, throw_facts(throw.row, throw.start_ns))
+            self._put_samples(samples(throw), throw.start_ns)
+
+    def finish(self, name: str) -> FileSummary:
+        """Write the end of the file.
+
+        Args:
+            name: Name of the file.
+
+        Returns:
+            What a bag's metadata say of it.
+        """
+        self._writer.finish()  # type: ignore[no-untyped-call]
+        return FileSummary(name, *self._times, dict(sorted(self._counts.items())))
+
+    def _put(self, topic: str, stamp_ns: int, message: Message) -> None:
+        self._put_data(self._numbers[topic], stamp_ns, serialize(message))
+
+    def _put_data(self, channel: int, stamp_ns: int, data: bytes) -> None:
+        self._writer.add_message(channel, stamp_ns, data, stamp_ns, self._counts[channel])
+        self._counts[channel] += 1
+        self._times = (self._times[0] or stamp_ns, stamp_ns)
+
+    def _put_samples(self, samples: Samples, start_ns: int) -> None:
+        stamps = samples.stamps_ns - samples.stamps_ns[0] + start_ns
+        recording = Recording(replace(samples, stamps_ns=stamps), {})
+        columns = [(self._numbers[topic.name], sampled_messages(topic, recording)) for topic in self._topics]
+        for number, stamp in enumerate(stamps.tolist()):
+            for channel, messages in columns:
+                self._put_data(channel, stamp, messages[number].tobytes())

@@ -1,0 +1,135 @@
+"""Writes the directory that viewers open: the recording, a bag's metadata, the meshes and a layout."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from throwcollect.dataset.bag import FileSummary, bag_information, to_yaml
+from throwcollect.dataset.directory import METADATA
+from throwcollect.dataset.new_directory import new_directory
+from throwcollect.dataset.reader import Dataset
+from throwcollect.dataset.throws import Row
+from throwcollect.episode.channels import Channel
+from throwcollect.episode.record import Samples
+from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.files import unwritable
+from throwcollect.robots.description import full_description
+from throwcollect.view.foxglove import layout
+from throwcollect.view.recording import ViewRecording
+from throwcollect.view.robot import drawn_robot
+from throwcollect.view.viewed import ViewedThrow
+
+RECORDING = "throws.mcap"
+LAYOUT = "foxglove.json"
+
+_FIRST_NS = 1_000_000_000
+_PAUSE_NS = 1_000_000_000
+
+
+@dataclass(frozen=True)
+class View:
+    """What has been written.
+
+    Attributes:
+        recording: The MCAP file.
+        layout: The layout for Foxglove.
+        throws: Number of throws.
+        messages: Number of messages.
+        duration_s: How long they take to watch at real speed [s].
+        recording_bytes: Size of the MCAP file.
+        mesh_bytes: Size of the meshes beside it.
+    """
+
+    recording: Path
+    layout: Path
+    throws: int
+    messages: int
+    duration_s: float
+    recording_bytes: int
+    mesh_bytes: int
+
+    def as_dict(self) -> dict[str, Any]:
+        """The same for JSON."""
+        return {**asdict(self), "recording": str(self.recording), "layout": str(self.layout)}
+
+
+def view(directory: Path, output: Path, trials: Iterable[int] | None = None) -> View:
+    """Make throws of a dataset ready for viewers.
+
+    Args:
+        directory: The dataset.
+        output: Directory to write; must not exist, or be empty.
+        trials: Numbers of the trials to show, in this order; None: all that have an episode.
+
+    Returns:
+        What has been written.
+
+    Raises:
+        ConfigError: If there is something at `output`, or Talos' files cannot be read.
+        DatasetError: If the dataset is damaged or not finished, a trial has no episode, or `output` cannot be written.
+    """
+    dataset = Dataset.open(directory)
+    throws = _schedule(dataset, _rows(dataset, trials))
+    robot = drawn_robot(full_description(dataset.config))
+    with new_directory(output) as beside:
+        path = beside / RECORDING
+        try:
+            with path.open("wb") as stream:
+                recording = ViewRecording(stream, dataset.config)
+                recording.write(throws, lambda throw: _samples(dataset, throw.row), robot)
+                summary = recording.finish(RECORDING)
+            (beside / METADATA).write_text(_metadata(summary, recording.channels), encoding="utf-8")
+            (beside / LAYOUT).write_bytes(layout(tuple(dataset.config.task.end)))
+            robot.copy_package(beside)
+            sizes = {mesh: (beside / mesh).stat().st_size for mesh in robot.meshes}
+            recording_bytes = path.stat().st_size
+        except OSError as error:
+            raise unwritable(output, error) from error
+    return View(
+        recording=output / RECORDING,
+        layout=output / LAYOUT,
+        throws=len(throws),
+        messages=summary.messages,
+        duration_s=(summary.end_ns - summary.start_ns) / 1e9,
+        recording_bytes=recording_bytes,
+        mesh_bytes=sum(sizes.values()),
+    )
+
+
+def _rows(dataset: Dataset, trials: Iterable[int] | None) -> list[Row]:
+    rows = dataset.throws.to_pylist()
+    if trials is None:
+        chosen = [row for row in rows if row["shard"] is not None]
+        if not chosen:
+            raise DatasetError(f"{dataset.directory}: no trial has an episode: there is nothing to show")
+        return chosen
+    numbers = list(trials)
+    for number in numbers:
+        if not 0 <= number < len(rows):
+            raise ConfigError(f"{dataset.directory}: no trial {number}", expected=f"0 to {len(rows) - 1}")
+        if rows[number]["shard"] is None:
+            reason = f"{rows[number]['outcome']}: {rows[number]['reason']}"
+            raise DatasetError(f"{dataset.directory}: trial {number} has no episode: {reason}")
+    return [rows[number] for number in numbers]
+
+
+def _schedule(dataset: Dataset, rows: Iterable[Row]) -> list[ViewedThrow]:
+    """Throws one after another, whatever lies between them in the dataset."""
+    throws, start = [], _FIRST_NS
+    for row in rows:
+        samples = _samples(dataset, row)
+        config = dataset.plan.config_of(dataset.plan.trials[row["trial"]])
+        throws.append(ViewedThrow(row, config, start, samples.ball_position.copy()))
+        start += int(samples.stamps_ns[-1] - samples.stamps_ns[0]) + _PAUSE_NS
+    return throws
+
+
+def _samples(dataset: Dataset, row: Row) -> Samples:
+    return dataset.episode(row["trial"]).samples()
+
+
+def _metadata(summary: FileSummary, channels: tuple[Channel, ...]) -> str:
+    return to_yaml({"rosbag2_bagfile_information": bag_information([summary], channels, {})})

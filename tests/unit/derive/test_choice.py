@@ -1,0 +1,170 @@
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from tests.unit.dataset.conftest import Collection
+from tests.unit.dataset.mutations import fit_manifest
+
+from throwcollect.config.loader import load
+from throwcollect.dataset.inspect import digest
+from throwcollect.dataset.reader import Dataset
+from throwcollect.dataset.verify import verify
+from throwcollect.derive.choice import filtered, merge, sample
+from throwcollect.episode.record import EpisodeHeader, Samples
+from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.sweep.plan import make_plan
+
+
+def sources(directory: Path) -> list[tuple[str, int]]:
+    table = pq.read_table(directory / "sources.parquet")
+    return list(zip(table["source_directory"].to_pylist(), table["source_trial"].to_pylist(), strict=True))
+
+
+def test_a_filtered_dataset_has_the_trials_that_fulfil_the_condition(collected: Path, tmp_path: Path) -> None:
+    before = Dataset.open(collected)
+    found = filtered(collected, tmp_path / "some", where="trial % 2 == 1")
+    after = Dataset.open(tmp_path / "some")
+    assert verify(tmp_path / "some") == []
+    assert (found.trials, found.offered, found.without_episode) == (3, 7, {})
+    assert found.digest == digest(tmp_path / "some")
+    assert sources(tmp_path / "some") == [(str(collected), number) for number in (1, 3, 5)]
+    odd = before.throws.filter(pa.array([False, True, False, True, False, True, False]))
+    measured = [name for name in odd.column_names if name not in ("trial", "shard", "chunk_offset", "digest")]
+    assert after.throws.select(measured) == odd.select(measured)
+
+
+def test_the_plan_is_the_one_that_its_configuration_gives(collected: Path, tmp_path: Path) -> None:
+    filtered(collected, tmp_path / "some", where="trial > 3")
+    config = load(tmp_path / "some" / "config.yaml")
+    assert make_plan(config, directory=tmp_path / "some") == Dataset.open(tmp_path / "some").plan
+
+
+def test_all_trials_of_a_dataset_give_its_recordings_byte_for_byte(collected: Path, tmp_path: Path) -> None:
+    filtered(collected, tmp_path / "all", where="True")
+    names = {path.name for path in (tmp_path / "all").iterdir()} - {"sources.parquet", "trials.parquet"}
+    assert names == {path.name for path in collected.iterdir()}
+    for name in names - {"README.md", "config.yaml", "plan.parquet", "datapackage.json"}:
+        assert (tmp_path / "all" / name).read_bytes() == (collected / name).read_bytes(), name
+
+
+def test_trials_without_an_episode_are_left_out_and_counted(collection: Collection, tmp_path: Path) -> None:
+    collection.refuse(2, "too fast")
+    collection.collect(tmp_path / "source", [0, 1, 3, 4, 5, 6], lost=[4])
+    found = filtered(tmp_path / "source", tmp_path / "some", where="trial < 6")
+    assert found.without_episode == {"lost": 1, "refused": 1}
+    assert [number for _, number in sources(tmp_path / "some")] == [0, 1, 3, 5]
+    with pytest.raises(ConfigError, match=r"no trial of .* that has an episode fulfils \"outcome == 'lost'\""):
+        filtered(tmp_path / "source", tmp_path / "none", where="outcome == 'lost'")
+    assert not (tmp_path / "none").exists()
+
+
+def test_a_sample_is_random_but_for_its_seed_and_stays_in_order(collected: Path, tmp_path: Path) -> None:
+    chosen = {}
+    for name, count, seed in (("a", 4, 1), ("c", 4, 2), ("d", 2, 1)):
+        sample(collected, tmp_path / name, count=count, seed=seed)
+        chosen[name] = [number for _, number in sources(tmp_path / name)]
+        assert chosen[name] == sorted(set(chosen[name]))
+        assert len(chosen[name]) == count
+    assert chosen["a"] != chosen["c"]
+    assert set(chosen["d"]) < set(chosen["a"])
+    for count in (0, 8):
+        with pytest.raises(ConfigError, match=f"should be from 1 to 7, the number of episodes of .*, got {count}"):
+            sample(collected, tmp_path / "e", count=count)
+
+
+def test_a_merged_dataset_sweeps_what_any_sweeps_and_what_they_differ_in(
+    collected: Path, make_collection: type[Collection], tmp_path: Path
+) -> None:
+    other = make_collection(
+        {
+            "name": "other",
+            "seed": 5,
+            "trials": 2,
+            "ball": {"mass_kg": 0.03},
+            "record": {"zstd_level": 3, "trials_per_shard": 8},
+            "sweep": {"sampler": "uniform", "parameters": {"task.trajectory.gamma": {"min": 1.0, "max": 1.2}}},
+        }
+    )
+    other.collect(tmp_path / "other")
+    found = merge([collected, tmp_path / "other", collected], tmp_path / "all")
+    assert verify(tmp_path / "all") == []
+    assert (found.trials, found.offered) == (16, 16)
+    merged = Dataset.open(tmp_path / "all")
+    assert merged.plan.keys == ("task.duration_s", "task.trajectory.gamma", "ball.mass_kg")
+    values = [tuple(trial.values.values()) for trial in merged.plan.trials]
+    ours = [(trial.values["task.duration_s"], 1.2, 0.045) for trial in Dataset.open(collected).plan.trials]
+    theirs = [(1.0, trial.values["task.trajectory.gamma"], 0.03) for trial in other.plan.trials]
+    assert values == [*ours, *theirs, *ours]
+    first = Dataset.open(collected).config
+    assert (merged.config.name, merged.config.seed, merged.config.record) == (first.name, first.seed, first.record)
+    card = (tmp_path / "all" / "README.md").read_text()
+    assert f"| other | {tmp_path / 'other'} | 2 | 2 | {digest(tmp_path / 'other')} |" in card
+    # What was derived can be derived from.
+    filtered(tmp_path / "all", tmp_path / "light", where="ball.mass_kg < 0.04")
+    assert verify(tmp_path / "light") == []
+    assert [number for _, number in sources(tmp_path / "light")] == [7, 8]
+
+
+def test_datasets_of_other_physics_do_not_go_together(
+    collected: Path, make_collection: type[Collection], tmp_path: Path
+) -> None:
+    tool, topics = {"mass_kg": 0.2}, ["joint_states", "ball/odometry", "clock"]
+    other = make_collection({"trials": 1, "tool": tool, "record": {"rate_hz": 125, "topics": topics}})
+    other.collect(tmp_path / "other")
+    with pytest.raises(ConfigError) as caught:
+        merge([collected, tmp_path / "other", collected], tmp_path / "all")
+    where = f"in {collected} and {collected}"
+    assert [str(problem) for problem in caught.value.problems] == [
+        f"tool.mass_kg: 0.12 {where}, 0.2 in {tmp_path / 'other'}; cannot vary from trial to trial",
+        f"record.rate_hz: 250 {where}, 125 in {tmp_path / 'other'}; cannot vary from trial to trial",
+        f"record.topics.2: absent {where}, clock in {tmp_path / 'other'}; not all have this key",
+    ]
+    assert not (tmp_path / "all").exists()
+
+
+def test_a_dataset_is_never_overwritten(collected: Path, tmp_path: Path) -> None:
+    (tmp_path / "mine").write_text("mine")
+    with pytest.raises(ConfigError, match="mine: exists"):
+        filtered(collected, tmp_path / "mine", where="True")
+    with pytest.raises(ConfigError, match="expected: a directory that is new or empty"):
+        merge([collected], collected)
+    assert [path.name for path in tmp_path.iterdir()] == ["mine"]
+
+
+def test_a_damaged_episode_is_not_given_a_new_digest(dataset: Path, tmp_path: Path) -> None:
+    shard = sorted(dataset.glob("*.mcap"))[1]
+    contents = bytearray(shard.read_bytes())
+    contents[len(contents) // 2] ^= 1
+    shard.write_bytes(contents)
+    with pytest.raises(DatasetError, match=r"dataset: trial [345]: .*\n.*throwcollect dataset verify"):
+        filtered(dataset, tmp_path / "some", where="True")
+    assert {path.name for path in tmp_path.iterdir()} == {"dataset"}
+
+
+def test_an_episode_that_is_not_the_one_of_the_table_is_refused(
+    dataset: Path, collection: Collection, tmp_path: Path
+) -> None:
+    def shorter(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
+        return samples[:-1], replace(header, samples=header.samples - 1, contacts=header.contacts[:1])
+
+    for shard in collection.collect(tmp_path / "other", change=shorter).glob("*.mcap"):
+        shutil.copy(shard, dataset / shard.name)
+    with pytest.raises(DatasetError, match=r"trial 0: digest .*\n.* as throws.parquet says"):
+        filtered(dataset, tmp_path / "some", where="trial == 0")
+
+
+def test_a_list_that_is_not_the_one_of_the_plan_is_found(collected: Path, tmp_path: Path) -> None:
+    filtered(collected, tmp_path / "some", where="trial > 3")
+    path = tmp_path / "some" / "trials.parquet"
+    table = pq.read_table(path)
+    pq.write_table(table.take([1, 0, *range(2, len(table))]), path)
+    fit_manifest(tmp_path / "some")
+    assert list(map(str, verify(tmp_path / "some"))) == [
+        "trials.parquet: begins with other points than those of plan.parquet"
+    ]
+    path.unlink()
+    fit_manifest(tmp_path / "some")
+    assert list(map(str, verify(tmp_path / "some"))) == ["trials.parquet: is missing"]

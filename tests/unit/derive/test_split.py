@@ -1,0 +1,131 @@
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import pyarrow.parquet as pq
+import pytest
+from tests.unit.dataset.conftest import Collection
+
+from throwcollect.dataset.reader import Dataset
+from throwcollect.dataset.verify import verify
+from throwcollect.dataset.writer import DatasetWriter
+from throwcollect.derive.choice import merge
+from throwcollect.derive.source import source
+from throwcollect.derive.split import assign, split
+from throwcollect.episode.record import Contact, EpisodeHeader, Samples
+from throwcollect.errors import ConfigError
+
+HALVES = "train=0.5,test=0.5"
+WIDE = ["landing_x_m=0.2"]
+
+
+def held(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
+    return samples, replace(header, contacts=(Contact("spoon", header.start_ns, None),))
+
+
+def cells(directory: Path) -> list[int | None]:
+    landings = Dataset.open(directory).throws["landing_x_m"].to_pylist()
+    return [None if x is None else int(x // 0.2) for x in landings]
+
+
+def train(directory: Path, *, seed: int, fractions: str = HALVES, axis: str = "trial=1") -> list[int]:
+    """The trials of the part of this name."""
+    return list(assign(source(Dataset.open(directory)), fractions=fractions, cells=[axis], seed=seed)["train"])
+
+
+@pytest.fixture(scope="module")
+def some(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Twelve throws, the last four of which do not land."""
+    collection = Collection({"trials": 12})
+    directory = tmp_path_factory.mktemp("split") / "some"
+    writer = DatasetWriter.create(directory, collection.plan)
+    collection.fill(writer, range(8))
+    collection.fill(writer, range(8, 12), change=held)
+    writer.finish(wall_s=1.0)
+    writer.close()
+    return directory
+
+
+def test_parts_are_datasets_that_share_no_cell(some: Path, tmp_path: Path) -> None:
+    found = split(some, tmp_path / "parts", fractions=HALVES, cells=WIDE, seed=1)
+    held, trials = {}, []
+    for name, part in found.parts.items():
+        directory = tmp_path / "parts" / name
+        # No physics holds the ball as `held` does; everything else has to fit.
+        assert [finding for finding in verify(directory) if not finding.place.startswith("trial ")] == []
+        dataset = Dataset.open(directory)
+        assert dataset.config.name == f"quick-{name}"
+        held[name] = set(cells(directory)) - {None}
+        assert (part.cells, part.uncelled) == (len(held[name]), cells(directory).count(None))
+        assert part.cells
+        assert part.uncelled
+        assert part.dataset.trials == len(dataset)
+        trials += pq.read_table(directory / "sources.parquet")["source_trial"].to_pylist()
+    assert not held["train"] & held["test"]
+    assert sorted(trials) == list(range(12))
+
+
+def test_more_trials_move_nothing_from_one_part_to_another(some: Path, collected: Path, tmp_path: Path) -> None:
+    merge([collected, some], tmp_path / "more")
+    shift = len(Dataset.open(collected))
+    for seed in range(6):
+        before = train(some, seed=seed, axis=WIDE[0])
+        after = [number - shift for number in train(tmp_path / "more", seed=seed, axis=WIDE[0])]
+        assert before == [number for number in after if number >= 0]
+
+
+def test_a_new_part_takes_from_the_one_that_shrinks_alone(some: Path) -> None:
+    assert train(some, seed=2, fractions="train=1/2,val=1/4,test=1/4") == train(some, seed=2)
+
+
+def test_the_seed_decides(some: Path) -> None:
+    assert train(some, seed=1) == train(some, seed=1) != train(some, seed=2)
+
+
+def test_cells_may_be_of_any_expression(some: Path) -> None:
+    axes = ["hypot(landing_x_m, landing_y_m)=0.3", "hit_angle_rad=0.2"]
+    found = assign(source(Dataset.open(some)), fractions=HALVES, cells=axes, seed=1)
+    rows = Dataset.open(some).throws.to_pylist()
+    for trial, cell in (item for part in found.values() for item in part.items()):
+        row = rows[trial]
+        if row["landing_x_m"] is None:
+            assert cell is None
+        else:
+            distance = math.hypot(row["landing_x_m"], row["landing_y_m"])
+            assert cell == (int(distance // 0.3), int(row["hit_angle_rad"] // 0.2))
+
+
+@pytest.mark.parametrize(
+    ("fractions", "message"),
+    [
+        ("train=0.8,test=0.1", "should add up to 1, add up to 0.9"),
+        ("train=1", "should name two parts or more"),
+        ("train=0.5,train=0.5", "names a part twice"),
+        ("train=1,test=0", "should be above 0"),
+        ("train=0.5,../test=0.5", "'../test' should be lower-case letters"),
+        ("train=0.5,test", "should be a name, an equals sign and a number such as 0.5, got 'test'"),
+        ("train=0.5,test=1/0", "should be a name, an equals sign and a number such as 0.5, got 'test=1/0'"),
+        ("train=0.5,test=1e9", "should be a name, an equals sign and a number such as 0.5, got 'test=1e9'"),
+        ("=0.5,test=0.5", "should be a name, an equals sign and a number such as 0.5, got '=0.5'"),
+        ("train=0.999999,test=0.000001", "test would get none of the 12 trials"),
+    ],
+)
+def test_wrong_fractions_are_explained(some: Path, tmp_path: Path, fractions: str, message: str) -> None:
+    with pytest.raises(ConfigError, match=f"--fractions: .*{message}"):
+        split(some, tmp_path / "parts", fractions=fractions)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("axis", "message"),
+    [
+        ("landing_x_m", "should be a name, an equals sign and a number"),
+        ("landing_x_m=0", "the width of cells should be above 0"),
+        (f"landing_x_m=0.{'0' * 400}1", "the width of cells should be above 0"),
+        ("landing_x=0.1", "no column 'landing_x'; did you mean 'landing_x_m'"),
+        ("outcome=1", "should be a number, is text"),
+    ],
+)
+def test_wrong_cells_are_explained(some: Path, tmp_path: Path, axis: str, message: str) -> None:
+    with pytest.raises(ConfigError, match=f"--cells: {message}"):
+        split(some, tmp_path / "parts", fractions=HALVES, cells=[axis])

@@ -1,0 +1,69 @@
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.unit.dataset.conftest import Collection
+
+from throwcollect.dataset.reader import Dataset
+from throwcollect.derive.statistics import statistics
+from throwcollect.episode.record import EpisodeHeader, Samples
+from throwcollect.robots.talos import JOINTS
+
+
+def test_signals_are_those_of_all_samples_together(collected: Path) -> None:
+    found = statistics(collected)
+    samples = [episode.samples() for episode in Dataset.open(collected)]
+    assert (found.episodes, found.samples) == (7, sum(map(len, samples)))
+    for group, attribute, names in (
+        ("position_rad", "position", JOINTS),
+        ("velocity_radps", "velocity", JOINTS),
+        ("effort_nm", "effort", JOINTS),
+        ("ball_position_m", "ball_position", "xyz"),
+        ("ball_velocity_mps", "ball_linear_velocity", "xyz"),
+    ):
+        table = np.concatenate([getattr(each, attribute) for each in samples])
+        assert list(found.signals[group]) == list(names)
+        for signal, column in zip(found.signals[group].values(), table.T, strict=True):
+            assert (signal.min, signal.max) == (column.min(), column.max())
+            assert signal.mean == pytest.approx(column.mean(), rel=1e-12, abs=1e-12)
+            assert signal.std == pytest.approx(column.std(), rel=1e-9, abs=1e-12)
+    # Who normalises divides by it, or not at all.
+    assert found.signals["position_rad"]["leg_left_4_joint"].std == 0
+
+
+def test_columns_are_those_of_the_rows_that_have_a_number(collection: Collection, tmp_path: Path) -> None:
+    collection.collect(tmp_path / "dataset", lost=[2, 3])
+    found = statistics(tmp_path / "dataset")
+    landings = [x for x in Dataset.open(tmp_path / "dataset").throws["landing_x_m"].to_pylist() if x is not None]
+    column = found.columns["landing_x_m"]
+    assert found.outcomes == {"landed": 5, "lost": 2}
+    assert (column.count, column.nulls) == (5, 2)
+    assert (column.min, column.max) == (min(landings), max(landings))
+    assert column.mean == pytest.approx(np.mean(landings))
+    assert column.std == pytest.approx(np.std(landings))
+    assert column.quantiles["q50"] == np.median(landings)
+    assert found.columns["task.duration_s"].count == 7
+    assert not {"trial", "chunk_offset", "outcome", "digest"} & set(found.columns)
+
+
+def test_samples_that_are_not_finite_are_left_out(collection: Collection, tmp_path: Path) -> None:
+    def spoiled(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
+        if header.trial != 1:
+            return samples, header
+        effort = samples.effort.copy()
+        effort[5:8, 3] = np.nan
+        return replace(samples, effort=effort), header
+
+    collection.collect(tmp_path / "dataset", change=spoiled)
+    found = statistics(tmp_path / "dataset")
+    assert found.samples_not_finite == 3
+    json.dumps(found.as_dict(), allow_nan=False)
+
+
+def test_without_episodes_there_are_no_signals(collection: Collection, tmp_path: Path) -> None:
+    collection.collect(tmp_path / "dataset", lost=range(7))
+    found = statistics(tmp_path / "dataset")
+    assert (found.episodes, found.samples, found.signals) == (0, 0, {})
+    assert found.columns["landing_x_m"].mean is None

@@ -1,0 +1,104 @@
+"""A small collection with everything that exporters meet, and its throws as they should come out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.unit.dataset.conftest import Collection
+from tests.unit.dataset.conftest import make_collection as make_collection
+
+from throwcollect.dataset.reader import Dataset
+from throwcollect.episode.record import EpisodeHeader, Samples
+from throwcollect.export.formats import export
+from throwcollect.robots.interpolation import sample_quintic
+from throwcollect.robots.talos import JOINTS
+from throwcollect.tasks.trajectory import throw_trajectory
+
+SETTINGS: dict[str, Any] = {
+    "trials": 6,
+    "record": {"trials_per_shard": 3},
+    "sweep": {
+        "sampler": "uniform",
+        "parameters": {
+            "task.duration_s": {"min": 0.8, "max": 1.2},
+            "task.end.arm_right_4_joint": {"min": -0.9, "max": -0.3},
+        },
+    },
+}
+LOST, REFUSED, HELD = 1, 5, 3
+WITH_EPISODE = [0, 2, 3, 4]
+MOVING = ["arm_right_1_joint", "arm_right_2_joint", "arm_right_4_joint", "arm_right_7_joint", "torso_1_joint"]
+
+Arrays = dict[str, np.ndarray]
+Export = Callable[..., Path]
+
+
+def as_in_life(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
+    """Joints are never quite where they should be, and the ball of one trial stays in the spoon."""
+    samples = replace(samples, position=samples.position + 1e-3, velocity=samples.velocity + 1e-2)
+    if header.trial != HELD:
+        return samples, header
+    return samples, replace(header, end_reason="timeout", contacts=(replace(header.contacts[0], end_ns=None),))
+
+
+@pytest.fixture(scope="session")
+def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    collection = Collection(SETTINGS)
+    collection.refuse(REFUSED, "too far")
+    directory = tmp_path_factory.mktemp("source") / "dataset"
+    return collection.collect(directory, [0, 1, 2, 3, 4], lost=[LOST], change=as_in_life)
+
+
+@pytest.fixture(scope="session")
+def exported(source: Path, tmp_path_factory: pytest.TempPathFactory) -> Export:
+    """Exports once what is asked for."""
+    made: dict[tuple[str, int | None], Path] = {}
+
+    def make(to: str, rate_hz: int | None = None) -> Path:
+        if (to, rate_hz) not in made:
+            made[to, rate_hz] = tmp_path_factory.mktemp("exports") / to
+            export(source, made[to, rate_hz], to=to, rate_hz=rate_hz)
+        return made[to, rate_hz]
+
+    return make
+
+
+def throws_of(directory: Path, step: int = 1) -> Iterator[tuple[int, Arrays]]:
+    """Trial and signals of each throw, straight from the recordings: every `step`-th sample."""
+    dataset = Dataset.open(directory)
+    for episode in dataset:
+        trial = episode.header.trial
+        samples = episode.samples()[::step]
+        time_s = (samples.stamps_ns - episode.header.start_ns) / 1e9
+        trajectory = throw_trajectory(dataset.plan.config_of(dataset.plan.trials[trial]))
+        path, speed, acceleration = sample_quintic(trajectory, time_s)
+        yield (
+            trial,
+            {
+                "time_s": time_s,
+                "joint_position_rad": samples.position,
+                "joint_velocity_radps": samples.velocity,
+                "joint_effort_nm": samples.effort,
+                "command_position_rad": path,
+                "command_velocity_radps": speed,
+                "command_acceleration_radps2": acceleration,
+                "ball_position_m": samples.ball_position,
+                "ball_orientation_xyzw": samples.ball_orientation_xyzw,
+                "ball_velocity_mps": samples.ball_linear_velocity,
+                "ball_angular_velocity_radps": samples.ball_angular_velocity,
+            },
+        )
+
+
+def moving_columns() -> list[int]:
+    return [JOINTS.index(joint) for joint in MOVING]
+
+
+def table_of(directory: Path) -> dict[str, list[Any]]:
+    """The table of throws without the places of recordings."""
+    return Dataset.open(directory).throws.drop_columns(["shard", "chunk_offset"]).to_pydict()

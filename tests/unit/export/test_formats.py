@@ -1,0 +1,171 @@
+from __future__ import annotations
+
+import resource
+import shutil
+import sys
+from pathlib import Path
+from typing import Any
+
+import pyarrow.parquet as pq
+import pytest
+from ruamel.yaml import YAML
+from tests.unit.export.conftest import MOVING, Export
+
+from throwcollect.dataset.inspect import info
+from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.export.formats import FORMATS, export
+from throwcollect.export.signals import unit_of
+
+ALL = list(FORMATS)
+
+
+@pytest.mark.parametrize("to", ALL)
+def test_every_format_has_a_card_with_digest_units_and_the_configuration(
+    to: str, exported: Export, source: Path
+) -> None:
+    directory = exported(to)
+    card = (directory / "README.md").read_text(encoding="utf-8")
+    assert (directory / "config.yaml").read_bytes() == (source / "config.yaml").read_bytes()
+    assert info(source).digest in card
+    assert "| `landing_x_m` | m | Ball centre in world when it crossed the landing plane, x [m]. |" in card
+    assert "| `task.end.arm_right_4_joint` | rad |" in card
+    assert "| landed | 3 |" in card
+    assert "| not_released | 1 |" in card
+    assert ", ".join(f"`{joint}`" for joint in MOVING) in card
+    named = [
+        name for name in ("trajectories", "throws.parquet", "throws.npz", "throws.hdf5", "data", "meta") if name in card
+    ]
+    assert all((directory / name).exists() for name in named if f"- `{name}" in card)
+
+
+@pytest.mark.parametrize("to", ["parquet", "lerobot"])
+def test_the_card_of_a_hub_dataset_names_its_data_in_the_header(to: str, exported: Export) -> None:
+    directory = exported(to)
+    _, header, _ = (directory / "README.md").read_text(encoding="utf-8").split("---\n", 2)
+    fields = YAML(typ="safe").load(header)
+    assert fields["license"] == "apache-2.0"
+    assert fields["task_categories"] == ["robotics"]
+    assert ("LeRobot" in fields["tags"]) == (to == "lerobot")
+    for each in fields["configs"]:
+        assert list(directory.glob(each["data_files"])), each
+
+
+@pytest.mark.parametrize(
+    ("rate_hz", "text"),
+    [
+        (None, "The samples are those that were recorded, at 250 Hz."),
+        (50, "Each is one of the 250 Hz record, unchanged: every 5th. Nothing is filtered: what is faster than 25 Hz"),
+        (60, "They lie between those of the 250 Hz record: positions of joints and ball on the cubic"),
+    ],
+)
+def test_the_card_says_how_the_rate_came_about(rate_hz: int | None, text: str, exported: Export) -> None:
+    assert text in (exported("npz", rate_hz) / "README.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("to", ALL)
+def test_exporting_twice_gives_the_same_numbers_of_everything(
+    to: str, exported: Export, source: Path, tmp_path: Path
+) -> None:
+    found = export(source, tmp_path / "again", to=to)
+    assert (found.trials, found.episodes, found.rate_hz, found.format) == (6, 4, 250, to)
+    assert found.samples == info(source).samples
+    assert found.size_bytes == sum(path.stat().st_size for path in exported(to).rglob("*") if path.is_file())
+    assert [path.name for path in tmp_path.iterdir()] == ["again"]
+
+
+@pytest.mark.parametrize("to", ALL)
+def test_nothing_is_left_of_an_export_that_fails(to: str, source: Path, tmp_path: Path) -> None:
+    broken = Path(shutil.copytree(source, tmp_path / "in" / "dataset"))
+    last = sorted(broken.glob("*.mcap"))[-1]
+    contents = bytearray(last.read_bytes())
+    chunk = pq.read_table(broken / "throws.parquet")["chunk_offset"].drop_null()[-1].as_py()
+    contents[chunk + 1000] ^= 0xFF
+    last.write_bytes(contents)
+    with pytest.raises(DatasetError, match=r"trial \d: chunk: |quick_00001\.mcap"):
+        export(broken, tmp_path / "out" / "export", to=to)
+    assert list((tmp_path / "out").iterdir()) == []
+
+
+@pytest.mark.parametrize("to", ALL)
+def test_what_cannot_be_written_to_the_end_leaves_one_message(to: str, source: Path, tmp_path: Path) -> None:
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, hard))
+    try:
+        with pytest.raises(DatasetError, match="out: cannot be written: File too large\n  try: raise the limit"):
+            export(source, tmp_path / "out", to=to)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_output_that_holds_something_is_left_alone(source: Path, tmp_path: Path) -> None:
+    (tmp_path / "mine.txt").write_text("precious")
+    with pytest.raises(ConfigError, match="exists"):
+        export(source, tmp_path, to="npz")
+    with pytest.raises(ConfigError, match="exists"):
+        export(source, tmp_path / "mine.txt", to="npz")
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
+
+
+def test_an_empty_output_is_used(source: Path, tmp_path: Path) -> None:
+    (tmp_path / "empty").mkdir()
+    export(source, tmp_path / "empty", to="npz")
+    assert (tmp_path / "empty" / "throws.npz").exists()
+
+
+def test_an_output_that_cannot_be_written_is_named(source: Path, tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(DatasetError, match="file/export: cannot be written: Not a directory"):
+        export(source, tmp_path / "file" / "export", to="npz")
+
+
+def test_an_unknown_format_is_answered_with_those_there_are(source: Path, tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="unknown format 'csv'\n  expected: one of parquet, npz, lerobot, hdf5, mat"):
+        export(source, tmp_path / "out", to="csv")
+
+
+@pytest.mark.parametrize("rate_hz", [0, -5, 251])
+def test_a_rate_above_the_recorded_one_is_refused(rate_hz: int, source: Path, tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=f"--rate: {rate_hz} samples per second\n  expected: 1 to 250"):
+        export(source, tmp_path / "out", to="npz", rate_hz=rate_hz)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("to", ALL)
+def test_a_dataset_without_episodes_cannot_be_exported(to: str, make_collection: Any, tmp_path: Path) -> None:
+    empty = make_collection({"trials": 2}).collect(tmp_path / "empty", lost=[0, 1])
+    with pytest.raises(DatasetError, match="none of its 2 trials has an episode to export"):
+        export(empty, tmp_path / "out", to=to)
+    assert not (tmp_path / "out").exists()
+
+
+def test_without_h5py_the_message_says_what_to_install(
+    source: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "h5py", None)
+    with pytest.raises(ConfigError, match=r"h5py is not installed\n  try: pip install 'throwcollect\[export\]'"):
+        export(source, tmp_path / "out", to="hdf5")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("column", "unit"),
+    [
+        ("landing_x_m", "m"),
+        ("landing_vx_mps", "m/s"),
+        ("release_time_s", "s"),
+        ("hit_angle_rad", "rad"),
+        ("task.end.arm_right_4_joint", "rad"),
+        ("task.trajectory.weights.arm_right_4_joint.5", "rad"),
+        ("robot.position_gain_per_s", "1/s"),
+        ("scene.gravity_mps2", "m/s^2"),
+        ("scene.air_density_kgpm3", "kg/m^3"),
+        ("ball.mass_kg", "kg"),
+        ("task.trajectory.gamma", "1"),
+        ("effort_peak_share", "1"),
+        ("joint_effort_nm", "N m"),
+        ("command_acceleration_radps2", "rad/s^2"),
+    ],
+)
+def test_units_follow_from_names(column: str, unit: str) -> None:
+    assert unit_of(column) == unit

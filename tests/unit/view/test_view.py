@@ -1,0 +1,302 @@
+"""What viewers are given: each throw as it was recorded, and around it what no viewer could know."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+from rosbags.rosbag2 import Reader
+from tests.unit.dataset.mcap_doctor import Examination
+
+from throwcollect.dataset.reader import Dataset
+from throwcollect.episode.record import EpisodeHeader, Samples
+from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.interfaces import deserialize, get_message
+from throwcollect.robots.model import joint_limits, share_directory
+from throwcollect.robots.talos import JOINTS
+from throwcollect.view.view import View, view
+
+CHOSEN = [5, 0]
+SAMPLED = ["/tf", "/joint_states", "/ball/odometry", "/view/ball_speed", "/view/limits"]
+
+Messages = dict[str, list[tuple[int, Any]]]
+
+
+def messages_of(path: Path) -> Messages:
+    found: Messages = {}
+    with path.open("rb") as file:
+        for schema, channel, message in make_reader(file, validate_crcs=True).iter_messages():
+            assert schema is not None
+            decoded = deserialize(message.data, get_message(schema.name))
+            found.setdefault(channel.topic, []).append((message.log_time, decoded))
+    return found
+
+
+@pytest.fixture(scope="module")
+def written(collected: Path, tmp_path_factory: pytest.TempPathFactory) -> View:
+    return view(collected, tmp_path_factory.mktemp("view") / "view", CHOSEN)
+
+
+@pytest.fixture(scope="module")
+def messages(written: View) -> Messages:
+    return messages_of(written.recording)
+
+
+@pytest.fixture(scope="module")
+def rows(collected: Path) -> list[dict[str, Any]]:
+    return [Dataset.open(collected).throws.to_pylist()[trial] for trial in CHOSEN]
+
+
+def fields(array: Any, *names: str) -> list[float]:
+    return [getattr(array, name) for name in names]
+
+
+def test_every_record_of_the_recording_is_sound(written: View) -> None:
+    examined = Examination(written.recording)
+    assert len(examined.times) == written.messages
+    assert examined.times[-1] - examined.times[0] == round(written.duration_s * 1e9)
+
+
+def test_the_directory_is_a_bag(written: View) -> None:
+    with Reader(written.recording.parent) as bag:
+        counts = {connection.topic: connection.msgcount for connection in bag.connections}
+    assert sum(counts.values()) == written.messages
+    assert {counts[topic] for topic in ("/robot_description", "/view/robot", "/tf_static", "/view/throws")} == {1}
+    assert {counts[topic] for topic in ("/view/throw", "/view/path", "/view/facts")} == {len(CHOSEN)}
+    assert len({counts[topic] for topic in SAMPLED}) == 1
+
+
+def test_throws_follow_one_another_in_the_order_asked_for(collected: Path, messages: Messages) -> None:
+    dataset = Dataset.open(collected)
+    states, odometry = messages["/joint_states"], messages["/ball/odometry"]
+    start = 1_000_000_000
+    for trial in CHOSEN:
+        samples = dataset.episode(trial).samples()
+        count = len(samples)
+        stamps = samples.stamps_ns - samples.stamps_ns[0] + start
+        assert [stamp for stamp, _ in states[:count]] == stamps.tolist()
+        assert np.array_equal([state.position for _, state in states[:count]], samples.position)
+        shown = [fields(state.pose.pose.position, *"xyz") for _, state in odometry[:count]]
+        assert np.array_equal(shown, samples.ball_position)
+        assert odometry[0][1].header.stamp.sec * 10**9 + odometry[0][1].header.stamp.nanosec == start
+        states, odometry = states[count:], odometry[count:]
+        start = int(stamps[-1]) + 1_000_000_000
+    assert not states
+
+
+def test_the_ball_speed_is_that_of_the_samples(collected: Path, messages: Messages) -> None:
+    samples = Dataset.open(collected).episode(CHOSEN[0]).samples()
+    shown = [speed.data for _, speed in messages["/view/ball_speed"][: len(samples)]]
+    assert shown == pytest.approx(np.linalg.norm(samples.ball_linear_velocity, axis=1))
+
+
+def test_joints_are_shown_within_their_limits(collected: Path, messages: Messages) -> None:
+    samples, limits = Dataset.open(collected).episode(CHOSEN[0]).samples(), joint_limits()
+    share = messages["/view/limits"][100][1]
+    assert len(share.name) > 1
+    for index, joint in enumerate(share.name):
+        column = JOINTS.index(joint)
+        lower, upper = limits.lower[column], limits.upper[column]
+        assert share.position[index] == pytest.approx(
+            np.interp(samples.position[100, column], [lower, upper], [-1.0, 1.0])
+        )
+
+
+def test_every_shape_moves_with_a_frame_that_is_there(messages: Messages) -> None:
+    transforms = [each for topic in ("/tf", "/tf_static") for each in messages[topic][0][1].transforms]
+    frames = {"world", *(each.child_frame_id for each in transforms)}
+    drawn = [marker for topic in ("/view/robot", "/view/throws") for marker in messages[topic][0][1].markers]
+    drawn += [marker for _, array in messages["/view/throw"] for marker in array.markers]
+    assert {marker.header.frame_id for marker in drawn} <= frames
+    moving = {marker.header.frame_id for marker in drawn if marker.frame_locked}
+    assert {"ball", "spoon_link", "arm_right_7_link"} <= moving
+    assert "world" not in moving
+
+
+def test_the_robot_holds_its_meshes_inside(messages: Messages) -> None:
+    (_, description), (_, robot) = messages["/robot_description"][0], messages["/view/robot"][0]
+    visuals = list(ElementTree.fromstring(description.data).iter("visual"))  # noqa: S314
+    assert len(visuals) == len(robot.markers) > 50
+    for visual, marker in zip(visuals, robot.markers, strict=True):
+        mesh = visual.find("geometry/mesh")
+        if mesh is None:
+            assert (marker.type in (marker.CUBE, marker.CYLINDER), marker.mesh_resource) == (True, "")
+            continue
+        kind, _, content = marker.mesh_resource.partition(";base64,")
+        path = share_directory() / mesh.attrib["filename"].removeprefix("package://")
+        assert (marker.type, kind) == (marker.MESH_RESOURCE, "data:model/stl")
+        assert base64.b64decode(content) == path.read_bytes()
+        scale = [float(number) for number in mesh.get("scale", "1 1 1").split()]
+        assert fields(marker.scale, *"xyz") == scale
+
+
+def test_the_robot_has_the_colours_of_its_description(messages: Messages) -> None:
+    robot = messages["/view/robot"][0][1]
+    colors = {marker.header.frame_id: fields(marker.color, *"rgba") for marker in robot.markers}
+    assert colors["torso_2_link"] == pytest.approx([0.9, 0.9, 0.9, 1.0])
+    assert colors["arm_right_1_link"] == pytest.approx([0.2, 0.2, 0.2, 1.0])
+    assert colors["spoon_link"] == pytest.approx([0.55, 0.35, 0.2, 1.0])
+
+
+def test_meshes_beside_the_recording_are_where_the_description_says(written: View, messages: Messages) -> None:
+    description = messages["/robot_description"][0][1].data
+    urls = set(re.findall(r'filename="package://([^"]+)"', description))
+    directory = written.recording.parent
+    assert len(urls) > 20
+    assert all((directory / url).read_bytes() == (share_directory() / url).read_bytes() for url in urls)
+    assert sum((directory / url).stat().st_size for url in urls) == written.mesh_bytes
+    for package in {url.split("/")[0] for url in urls}:
+        assert ElementTree.parse(directory / package / "package.xml").findtext("name") == package  # noqa: S314
+    assert "<collision" not in description
+
+
+def test_the_path_of_a_throw_is_grey_until_its_release(
+    collected: Path, messages: Messages, rows: list[dict[str, Any]]
+) -> None:
+    dataset = Dataset.open(collected)
+    for (_, array), row in zip(messages["/view/throw"], rows, strict=True):
+        first, ball, line, *_ = array.markers
+        assert first.action == first.DELETEALL
+        assert (ball.header.frame_id, ball.scale.x) == ("ball", 2 * dataset.config.ball.radius_m)
+        positions = dataset.episode(row["trial"]).samples().ball_position
+        shown = np.array([fields(point, *"xyz") for point in line.points])
+        assert np.array_equal(shown[[0, -1]], positions[[0, -1]])
+        assert len(shown) > len(positions) / 5
+        released = [color.g > color.r for color in line.colors]
+        where = shown[released.index(True)]
+        assert all(released[released.index(True) :])
+        release = np.array([row[f"release_{axis}_m"] for axis in "xyz"])
+        assert np.linalg.norm(where - release) < 0.04
+
+
+def test_points_of_a_throw_have_the_places_and_numbers_of_the_table(
+    messages: Messages, rows: list[dict[str, Any]]
+) -> None:
+    for (_, array), row in zip(messages["/view/throw"], rows, strict=True):
+        for name in ("release", "apex", "landing"):
+            dot, label = [marker for marker in array.markers if marker.ns == name]
+            assert fields(dot.pose.position, *"xyz") == [row[f"{name}_{axis}_m"] for axis in "xyz"]
+            assert label.type == label.TEXT_VIEW_FACING
+            assert label.text.startswith(name)
+        assert f"x {row['landing_x_m']:.2f} m, y {row['landing_y_m']:.2f} m" in label.text
+
+
+def test_all_paths_lie_over_the_landing_plane(messages: Messages, rows: list[dict[str, Any]]) -> None:
+    plane, *paths = messages["/view/throws"][0][1].markers
+    assert [path.id for path in paths] == CHOSEN
+    assert plane.pose.position.z + plane.scale.z / 2 == pytest.approx(0.0)
+    for row in rows:
+        assert abs(row["landing_x_m"] - plane.pose.position.x) < plane.scale.x / 2
+        assert abs(row["landing_y_m"] - plane.pose.position.y) < plane.scale.y / 2
+
+
+def test_a_path_is_also_points_for_viewers_without_markers(collected: Path, messages: Messages) -> None:
+    cloud = messages["/view/path"][1][1]
+    positions = Dataset.open(collected).episode(CHOSEN[1]).samples().ball_position
+    assert (cloud.width, cloud.point_step, [field.name for field in cloud.fields]) == (len(positions), 12, [*"xyz"])
+    assert np.array_equal(np.frombuffer(cloud.data.tobytes(), "<f4").reshape(-1, 3), positions.astype("f4"))
+
+
+def test_facts_are_the_row_of_the_table(messages: Messages, rows: list[dict[str, Any]]) -> None:
+    for (_, array), row in zip(messages["/view/facts"], rows, strict=True):
+        (status,) = array.status
+        facts = {pair.key: pair.value for pair in status.values}
+        assert facts.keys() == {key for key, value in row.items() if value is not None}
+        assert facts["digest"] == row["digest"]
+        assert float(facts["landing_x_m"]) == pytest.approx(row["landing_x_m"], rel=1e-5)
+        assert (status.level, status.message) == (status.OK, f"trial {row['trial']} landed")
+
+
+def leaves(tree: Any) -> Iterator[str]:
+    if isinstance(tree, str):
+        yield tree
+    else:
+        yield from (*leaves(tree["first"]), *leaves(tree["second"]))
+
+
+def test_the_layout_shows_what_is_in_the_recording(written: View, messages: Messages) -> None:
+    layout = json.loads(written.layout.read_text())
+    panels = layout["configById"]
+    assert sorted(leaves(layout["layout"])) == sorted(panels)
+    scene, facts = panels["3D!throws"], panels["DiagnosticStatusPanel!facts"]
+    assert {*scene["topics"], facts["topicToRender"]} <= set(messages)
+    (status,) = messages[facts["topicToRender"]][0][1].status
+    assert (facts["selectedHardwareId"], facts["selectedName"]) == (status.hardware_id, status.name)
+    assert scene["scene"]["meshUpAxis"] == "z_up"
+    labels = []
+    for name in ("Plot!ball", "Plot!limits"):
+        for series in panels[name]["paths"]:
+            if re.fullmatch(r"-?[0-9.]+", series["value"]):
+                continue
+            topic, _, path = series["value"].partition(".")
+            value = messages[topic][0][1]
+            for part in re.findall(r"\w+", path):
+                value = value[int(part)] if part.isdigit() else getattr(value, part)
+            assert isinstance(value, float)
+            labels.append(series["label"])
+    assert labels == ["height [m]", "speed [m/s]", *messages["/view/limits"][0][1].name]
+
+
+def test_the_same_throws_give_the_same_bytes(collected: Path, written: View, tmp_path: Path) -> None:
+    again = view(collected, tmp_path / "again", CHOSEN)
+    assert again.recording.read_bytes() == written.recording.read_bytes()
+
+
+def held(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
+    """The spoon keeps the ball."""
+    contact = replace(header.contacts[0], end_ns=None)
+    return samples, replace(header, contacts=(contact,), end_reason="timeout")
+
+
+def test_a_throw_that_was_not_released_has_no_points(make_collection: Any, tmp_path: Path) -> None:
+    dataset = make_collection({"trials": 1}).collect(tmp_path / "dataset", change=held)
+    shown = messages_of(view(dataset, tmp_path / "view").recording)
+    (_, array), (_, facts) = shown["/view/throw"][0], shown["/view/facts"][0]
+    assert [marker.ns for marker in array.markers] == ["", "ball", "path"]
+    assert {round(color.g - color.r, 6) for color in array.markers[2].colors} == {0.0}
+    assert facts.status[0].level == facts.status[0].WARN
+    assert facts.status[0].message.startswith("trial 0 not_released")
+
+
+@pytest.mark.parametrize(
+    ("trials", "error", "message"),
+    [
+        ([0, 7], ConfigError, r"no trial 7\n  expected: 0 to 6"),
+        ([1, 2], DatasetError, "trial 2 has no episode: lost: two simulations were lost"),
+    ],
+)
+def test_only_trials_with_an_episode_can_be_chosen(
+    collection: Any, tmp_path: Path, trials: list[int], error: type[Exception], message: str
+) -> None:
+    dataset = collection.collect(tmp_path / "dataset", lost=[2])
+    with pytest.raises(error) as caught:
+        view(dataset, tmp_path / "view", trials)
+    assert re.search(message, str(caught.value))
+    assert not (tmp_path / "view").exists()
+
+
+def test_what_is_already_there_is_left_alone(collected: Path, tmp_path: Path) -> None:
+    (tmp_path / "view").mkdir()
+    (tmp_path / "view" / "mine").write_text("mine")
+    with pytest.raises(ConfigError, match="view: "):
+        view(collected, tmp_path / "view", [0])
+    assert [path.name for path in tmp_path.rglob("*")] == ["view", "mine"]
+
+
+def test_a_failure_leaves_nothing_behind(collected: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("throwcollect.view.robot.shutil.copyfile", full)
+    with pytest.raises(DatasetError, match="No space left on device"):
+        view(collected, tmp_path / "view", [0])
+    assert not list(tmp_path.iterdir())
