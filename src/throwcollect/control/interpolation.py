@@ -130,6 +130,34 @@ def interpolated(
     return Curve(waypoints.times_ns, durations_ns, p, v, a, effort)
 
 
+def quintic(
+    step: NDArray[np.float64],
+    v0: NDArray[np.float64],
+    v1: NDArray[np.float64],
+    a0: NDArray[np.float64],
+    a1: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], ...]:
+    """Polynomials of degree 5 in the share of a segment that has passed, from what they are at both ends.
+
+    Args:
+        step: End minus start [rad]; all arguments have the same shape.
+        v0: Velocity at the start, times the length of the segment [rad].
+        v1: Velocity at the end, times the length of the segment [rad].
+        a0: Acceleration at the start, times the squared length of the segment [rad].
+        a1: Acceleration at the end, times the squared length of the segment [rad].
+
+    Returns:
+        Coefficients of the powers from 1 to 5 [rad]; that of power 0 is the start.
+    """
+    return (
+        v0,
+        a0 / 2,
+        10 * step - 6 * v0 - 4 * v1 - 1.5 * a0 + 0.5 * a1,
+        -15 * step + 8 * v0 + 7 * v1 + 1.5 * a0 - a1,
+        6 * step - 3 * v0 - 3 * v1 - 0.5 * a0 + 0.5 * a1,
+    )
+
+
 def shortest_turn(angle: NDArray[np.float64]) -> NDArray[np.float64]:
     """Angles brought into the interval from -π to π by whole turns [rad]."""
     return angle - 2 * math.pi * np.round(angle / (2 * math.pi))
@@ -171,13 +199,7 @@ def _splines(waypoints: Waypoints, durations_ns: NDArray[np.int64]) -> Curve:
         position[1:4, cubics] = v, 3 * d - 2 * v - w, v + w - 2 * d
     if len(quintics):
         d, v, w, a, b = step[quintics], v0[quintics], v1[quintics], a0[quintics], a1[quintics]
-        position[1:6, quintics] = (
-            v,
-            a / 2,
-            10 * d - 6 * v - 4 * w - 1.5 * a + 0.5 * b,
-            -15 * d + 8 * v + 7 * w + 1.5 * a - b,
-            6 * d - 3 * v - 3 * w - 0.5 * a + 0.5 * b,
-        )
+        position[1:6, quintics] = quintic(d, v, w, a, b)
     velocity = _derivative(position, seconds)
     acceleration = _derivative(velocity, seconds)
     velocity[0, -1], acceleration[0, -1] = waypoints.velocities[-1], waypoints.accelerations[-1]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from throwcollect.control.interpolation import quintic
 from throwcollect.robots.trajectory import JointTrajectory
 
 _ORDERS = np.arange(6)
@@ -63,10 +64,7 @@ def _polynomials_at(
     origin, moved = trajectory.positions[:-1], trajectory.positions[1:] - trajectory.positions[:-1]
     v0, v1 = trajectory.velocities[:-1] * scale, trajectory.velocities[1:] * scale
     a0, a1 = trajectory.accelerations[:-1] * scale**2, trajectory.accelerations[1:] * scale**2
-    third = 10 * moved - 6 * v0 - 4 * v1 - 1.5 * a0 + 0.5 * a1
-    fourth = -15 * moved + 8 * v0 + 7 * v1 + 1.5 * a0 - a1
-    fifth = 6 * moved - 3 * v0 - 3 * v1 - 0.5 * a0 + 0.5 * a1
-    coefficients = np.stack([origin, v0, 0.5 * a0, third, fourth, fifth], axis=1)
+    coefficients = np.stack([origin, *quintic(moved, v0, v1, a0, a1)], axis=1)
     segments = knots[1:-1].searchsorted(times, side="right")
     spans = spans[segments]
     u = np.minimum(np.maximum((times - knots[segments]) / spans, 0.0), 1.0)
