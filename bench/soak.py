@@ -23,7 +23,7 @@ from throwcollect.config.schema import Config
 from throwcollect.robots.description import start_posture
 from throwcollect.robots.talos import CONTROLLERS
 from throwcollect.ros.router import router
-from throwcollect.session_config import OVERRIDE_VARIABLE
+from throwcollect.ros.session_config import OVERRIDE_VARIABLE
 
 GOALS, WARM = 5000, 1000
 MOST_GROWTH_MB = 2.0

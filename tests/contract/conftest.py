@@ -16,7 +16,7 @@ import pytest
 from tests.contract.rig import Rig
 from throwcollect.ros.middleware import Middleware
 from throwcollect.ros.router import router
-from throwcollect.session_config import CONFIG_FILE_VARIABLE, OVERRIDE_VARIABLE
+from throwcollect.ros.session_config import CONFIG_FILE_VARIABLE, OVERRIDE_VARIABLE
 
 # Above 101, the ports of a domain are among those that any process may be given. Tests at the same time share them out.
 _WORKER, _WORKERS = os.environ.get("PYTEST_XDIST_WORKER", "gw0"), os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1")

@@ -22,9 +22,9 @@ import pytest
 from tests.e2e.collection import Running, call, start, write_config
 from throwcollect.dataset.directory import CARD
 from throwcollect.dataset.journal import read_journal
+from throwcollect.ros.session_config import OVERRIDE_VARIABLE, client_override
 from throwcollect.run_key import RunKey
 from throwcollect.runtime.records import STATE_VARIABLE, Record, Records
-from throwcollect.session_config import OVERRIDE_VARIABLE, client_override
 
 pytestmark = [
     pytest.mark.e2e,
@@ -45,8 +45,8 @@ os.setresuid({NOBODY}, {NOBODY}, {NOBODY})
 ATTEMPT = f"""
 import json, os, sys, time, zenoh
 from throwcollect.errors import ConfigError
-from throwcollect.health import REQUEST, attachment
-from throwcollect.session_config import client_config
+from throwcollect.ros.health import REQUEST, attachment
+from throwcollect.ros.session_config import client_config
 {BECOME_NOBODY}
 heard = []
 for name, override in json.loads(sys.argv[1]).items():

@@ -34,8 +34,8 @@ from throwcollect.ros import (
 )
 from throwcollect.ros.backend import VARIABLE, uses_rclpy
 from throwcollect.ros.middleware import Middleware
+from throwcollect.ros.session_config import CONFIG_FILE_VARIABLE, OVERRIDE_VARIABLE
 from throwcollect.run_key import Signer
-from throwcollect.session_config import CONFIG_FILE_VARIABLE, OVERRIDE_VARIABLE
 
 CONFIG = Config.model_validate({"name": "integration", "tool": {"cup_floor_radius_m": 0.006}})
 """Almost the defaults: the smallest balls fall through this spoon."""

@@ -67,7 +67,7 @@ def test_the_image_says_which_rclpy_it_has(client: docker.DockerClient) -> None:
 
 
 def asked(container: docker.models.containers.Container) -> tuple[int, str]:
-    code, said = container.exec_run(["python", "-m", "throwcollect.health"])
+    code, said = container.exec_run(["python", "-m", "throwcollect.ros.health"])
     return code, said.decode()
 
 

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from throwcollect import health
+import throwcollect.ros.health as health
 from throwcollect.errors import ThrowcollectError
 from throwcollect.heartbeat import SILENT_S, VARIABLE, Heartbeat, is_beating
 from throwcollect.ros.middleware import Middleware
-from throwcollect.session_config import OVERRIDE_VARIABLE
+from throwcollect.ros.session_config import OVERRIDE_VARIABLE
 
 
 @pytest.fixture

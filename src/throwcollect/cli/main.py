@@ -353,7 +353,7 @@ def health(
     ] = None,
 ) -> None:
     """Ask a node for a sign of life; exit code 1 if there is none."""
-    from throwcollect.health import check
+    from throwcollect.ros.health import check
 
     check(node)
 

@@ -7,7 +7,7 @@ embedded one. The first name that is taken from here settles which one it is; se
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from throwcollect.ros.embedded import *  # noqa: F403
-    from throwcollect.ros.embedded import __all__ as __all__
+    from throwcollect.ros.embedded.api import *  # noqa: F403
+    from throwcollect.ros.embedded.api import __all__ as __all__
 else:
     from throwcollect.ros.chosen import __getattr__ as __getattr__

@@ -20,7 +20,7 @@ def __getattr__(name: str) -> Any:
 
     if name.startswith("__"):
         raise AttributeError(name)
-    backend = import_module(f"{_EDGE}.genuine" if uses_rclpy() else f"{_EDGE}.embedded")
+    backend = import_module(f"{_EDGE}.genuine" if uses_rclpy() else f"{_EDGE}.embedded.api")
     try:
         value = getattr(backend, name)
     except AttributeError:

@@ -43,7 +43,7 @@ from rclpy.time import Time
 from throwcollect.errors import ThrowcollectError
 from throwcollect.ros.fast_dds import PLAIN_DISCOVERY, PROFILE_VARIABLE, client_profile, write_temporarily
 from throwcollect.ros.middleware import Middleware
-from throwcollect.session_config import OPEN, connect_endpoint, is_protected
+from throwcollect.ros.session_config import OPEN, connect_endpoint, is_protected
 
 _looks = itertools.count()
 

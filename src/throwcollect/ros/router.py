@@ -20,8 +20,8 @@ from throwcollect.errors import ConfigError, ThrowcollectError
 from throwcollect.interruption import stop_signals
 from throwcollect.ros.discovery_server import discovery_server
 from throwcollect.ros.middleware import Middleware
+from throwcollect.ros.session_config import OPEN, PROTECTED, in_words, router_config
 from throwcollect.run_key import RunKey
-from throwcollect.session_config import OPEN, PROTECTED, in_words, router_config
 
 DEFAULT_LISTEN = "tcp/127.0.0.1:7447"
 """Reachable from this host alone, at the port that nodes connect to by default."""

@@ -10,8 +10,8 @@ from typing import Protocol
 
 from throwcollect.config.run import RunConfig
 from throwcollect.ros.middleware import Middleware
+from throwcollect.ros.session_config import OVERRIDE_VARIABLE, client_override
 from throwcollect.run_key import KEY_VARIABLE, RunKey
-from throwcollect.session_config import OVERRIDE_VARIABLE, client_override
 
 ROUTER = "router"
 COORDINATOR = "coordinator"

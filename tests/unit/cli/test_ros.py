@@ -18,7 +18,7 @@ from ruamel.yaml import YAML
 
 from throwcollect.cli.main import main
 from throwcollect.interfaces import get_action, get_message, get_service, type_hash
-from throwcollect.ros.embedded import (
+from throwcollect.ros.embedded.api import (
     ActionServer,
     CancelResponse,
     Context,
@@ -34,10 +34,10 @@ from throwcollect.ros.embedded import (
 )
 from throwcollect.ros.middleware import Middleware
 from throwcollect.ros.router import router
+from throwcollect.ros.session_config import OVERRIDE_VARIABLE
 from throwcollect.run_key import RunKey
 from throwcollect.runtime.nodes import joining_environment
 from throwcollect.runtime.records import Record, Records
-from throwcollect.session_config import OVERRIDE_VARIABLE
 
 String: Any = get_message("std_msgs/msg/String")
 JointState: Any = get_message("sensor_msgs/msg/JointState")
@@ -415,7 +415,7 @@ def test_a_reader_that_leaves_early_is_no_error(endpoint: str) -> None:
 
 def test_a_service_that_goes_away_before_it_answers_is_told() -> None:
     server = (
-        "from throwcollect.ros import embedded as ros; from throwcollect.interfaces import get_service\n"
+        "from throwcollect.ros.embedded import api as ros; from throwcollect.interfaces import get_service\n"
         "ros.init(); node = ros.create_node('n')\n"
         "async def wait(request, response): await ros.Future()\n"
         "node.create_service(get_service('std_srvs/srv/SetBool'), 'slow', wait)\n"

@@ -7,7 +7,7 @@ import pytest
 from tests.contract.rig import Rig
 
 from throwcollect.ros.router import router
-from throwcollect.session_config import OVERRIDE_VARIABLE
+from throwcollect.ros.session_config import OVERRIDE_VARIABLE
 
 _domains = itertools.count(1)
 

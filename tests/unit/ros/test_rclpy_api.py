@@ -6,15 +6,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from throwcollect.ros import embedded
-from throwcollect.ros.embedded import (
-    action,
-    client,
-    clock,
-    service,
-    subscription,
-    timer,
-)
+from throwcollect.ros.embedded import action, client, clock, service, subscription, timer
+from throwcollect.ros.embedded import api as embedded
 from throwcollect.ros.embedded.action.client import ClientGoalHandle
 from throwcollect.ros.embedded.action.server import ServerGoalHandle
 from throwcollect.ros.embedded.logging import Logger

@@ -5,11 +5,11 @@ import sys
 import pytest
 
 from throwcollect.errors import ConfigError, ThrowcollectError
-from throwcollect.health import check
 from throwcollect.ros.embedded import session
+from throwcollect.ros.health import check
 from throwcollect.ros.router import router, serve
+from throwcollect.ros.session_config import OVERRIDE_VARIABLE, client_override, is_protected
 from throwcollect.run_key import KEY_VARIABLE, RunKey
-from throwcollect.session_config import OVERRIDE_VARIABLE, client_override, is_protected
 
 COMMAND = [sys.executable, "-m", "throwcollect.ros.router", "--listen"]
 

@@ -8,12 +8,12 @@ import pytest
 from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.ros import Context, Node, SingleThreadedExecutor
 from throwcollect.ros.router import router
+from throwcollect.ros.session_config import CONFIG_FILE_VARIABLE, OVERRIDE_VARIABLE
 from throwcollect.run_key import KEY_VARIABLE, RunKey
 from throwcollect.runtime import scaling
 from throwcollect.runtime.nodes import LAUNCHER
 from throwcollect.runtime.records import Record, Run
 from throwcollect.runtime.scaling import MOST_SIMULATIONS, offer_scaling, scale
-from throwcollect.session_config import CONFIG_FILE_VARIABLE, OVERRIDE_VARIABLE
 
 
 def living(endpoint: str | None) -> Run:

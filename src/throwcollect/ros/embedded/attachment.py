@@ -6,7 +6,8 @@ import struct
 from typing import NamedTuple
 
 _LAYOUT = struct.Struct("<qqB16s")
-_GID_LENGTH = 16
+GID_LENGTH = 16
+"""Of the identifier of an endpoint [bytes]."""
 
 
 class Attachment(NamedTuple):
@@ -24,7 +25,7 @@ class Attachment(NamedTuple):
 
     def pack(self) -> bytes:
         """The 33 bytes on the wire."""
-        return _LAYOUT.pack(self.sequence, self.source_timestamp, _GID_LENGTH, self.gid)
+        return _LAYOUT.pack(self.sequence, self.source_timestamp, GID_LENGTH, self.gid)
 
 
 def unpack(data: bytes) -> Attachment:
@@ -39,7 +40,7 @@ def unpack(data: bytes) -> Attachment:
     Raises:
         ValueError: If the data is not laid out like one.
     """
-    if len(data) != _LAYOUT.size or data[16] != _GID_LENGTH:
+    if len(data) != _LAYOUT.size or data[16] != GID_LENGTH:
         raise ValueError(f"attachment of {len(data)} bytes is not that of a ROS 2 Jazzy node")
     sequence, timestamp, _, gid = _LAYOUT.unpack(data)
     return Attachment(sequence, timestamp, gid)

@@ -7,7 +7,7 @@ import logging
 from throwcollect.ros.embedded.executors import Executor
 from throwcollect.ros.embedded.logging import LoggingSeverity
 from throwcollect.ros.embedded.node import Node
-from throwcollect.session_config import is_protected
+from throwcollect.ros.session_config import is_protected
 
 
 def graph_changes(node: Node) -> int:

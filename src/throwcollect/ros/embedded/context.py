@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import atexit
 import inspect
-import os
 import signal
 import threading
 import weakref
@@ -14,13 +13,11 @@ from types import FrameType
 
 import zenoh
 
-from throwcollect.errors import ConfigError
+from throwcollect.ros.embedded.domain import domain_of_environment
 from throwcollect.ros.embedded.exceptions import NotInitializedException
 from throwcollect.ros.embedded.graph import Graph
 from throwcollect.ros.embedded.session import open_session
 
-DOMAIN_VARIABLE = "ROS_DOMAIN_ID"
-_LARGEST_DOMAIN = 232
 _open: weakref.WeakSet[Context] = weakref.WeakSet()
 
 
@@ -50,7 +47,7 @@ class Context:
         del args
         if self._session is not None:
             raise RuntimeError("the context has been initialised already")
-        self._domain_id = _domain_from_environment() if domain_id is None else domain_id
+        self._domain_id = domain_of_environment() if domain_id is None else domain_id
         self._session = open_session()
         self._graph = Graph(self._session, self._domain_id)
         self._ids = count()
@@ -126,13 +123,6 @@ class Context:
         _open.discard(self)
         if session is not None:
             session.close()  # type: ignore[no-untyped-call]
-
-
-def _domain_from_environment() -> int:
-    text = os.environ.get(DOMAIN_VARIABLE) or "0"
-    if not text.isdecimal() or int(text) > _LARGEST_DOMAIN:
-        raise ConfigError(f"{DOMAIN_VARIABLE} must be a number from 0 to {_LARGEST_DOMAIN}, got {text!r}")
-    return int(text)
 
 
 _default: list[Context] = []

@@ -7,7 +7,7 @@ import time
 import zenoh
 
 from throwcollect.errors import ThrowcollectError
-from throwcollect.session_config import OVERRIDE_VARIABLE, client_config, in_words
+from throwcollect.ros.session_config import OVERRIDE_VARIABLE, client_config, in_words
 
 _PATIENCE_S, _RETRY_S = 5.0, 0.1
 

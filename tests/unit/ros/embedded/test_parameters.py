@@ -1,6 +1,6 @@
 """What the embedded backend lets nodes do with parameters and rclpy does not."""
 
-from throwcollect.ros.embedded import Parameter, ParameterDescriptor
+from throwcollect.ros.embedded.api import Parameter, ParameterDescriptor
 
 
 def test_a_descriptor_can_be_used_for_several_parameters(rig):

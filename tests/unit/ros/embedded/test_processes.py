@@ -9,7 +9,7 @@ import time
 import pytest
 
 from throwcollect.interfaces import get_message, get_service
-from throwcollect.session_config import OVERRIDE_VARIABLE
+from throwcollect.ros.session_config import OVERRIDE_VARIABLE
 
 String = get_message("std_msgs/msg/String")
 Trigger = get_service("std_srvs/srv/Trigger")

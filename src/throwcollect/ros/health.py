@@ -1,11 +1,12 @@
 """Whether a node answers, for health checks: they run often and in every container, so they must cost next to nothing.
 
 A request goes to a service that every node offers. Its answer comes from the loop that does the node's work, so a node
-that is stuck does not answer, however alive its process looks. The request is put together here, as a client node
-would have to load all interfaces, and everybody in the ROS graph would hear of it.
+that is stuck does not answer, however alive its process looks. The request is put together here, from the names that
+the embedded backend gives to keys, as a client node would have to load all interfaces, and everybody in the ROS graph
+would hear of it.
 
-``python -m throwcollect.health`` is ``throwcollect health`` without the command line's own cost, five times that of the
-check.
+``python -m throwcollect.ros.health`` is ``throwcollect health`` without the command line's own cost, five times that of
+the check.
 """
 
 from __future__ import annotations
@@ -21,8 +22,11 @@ import zenoh
 
 from throwcollect.errors import ConfigError, ThrowcollectError
 from throwcollect.heartbeat import is_beating
+from throwcollect.ros.embedded.attachment import GID_LENGTH, Attachment
+from throwcollect.ros.embedded.domain import domain_of_environment
+from throwcollect.ros.embedded.keys import data_key
 from throwcollect.ros.middleware import Middleware
-from throwcollect.session_config import OPEN, client_config, connect_endpoint
+from throwcollect.ros.session_config import OPEN, client_config, connect_endpoint
 
 NODE_VARIABLE = "THROWCOLLECT_NODE"
 """Names the node of a container."""
@@ -32,6 +36,9 @@ TIMEOUT_S = 3.0
 
 _ROUTER, _COORDINATOR = "router", "coordinator"
 _NAME = re.compile("[A-Za-z_][A-Za-z0-9_]*")
+
+_ANY_HASH = "*"
+"""There is but one, which is worked out from all interfaces."""
 
 REQUEST = b"\0\1\0\0" + struct.pack("<I", 0)
 """CDR of ``rcl_interfaces/srv/GetParameters_Request`` that asks for no parameter."""
@@ -103,17 +110,15 @@ def _check_discovery_server(endpoint: str) -> None:
 
 
 def attachment() -> bytes:
-    """What rmw_zenoh_cpp (0.2.4 and later) puts on a request: number, time [ns], and identifier of the client."""
-    return struct.pack("<qqB16s", 1, time.time_ns(), 16, os.urandom(16))
+    """What a client puts on its first request."""
+    return Attachment(1, time.time_ns(), os.urandom(GID_LENGTH)).pack()
 
 
 def _answers(session: zenoh.Session, name: str) -> bool:
-    domain = os.environ.get("ROS_DOMAIN_ID") or "0"
     # A simulation lives in a namespace of its own name.
     path = name if name == _COORDINATOR else f"{name}/{name}"
     replies = session.get(
-        # Type and type hash of the service follow; there is but one.
-        f"{domain}/{path}/get_parameters/**",
+        data_key(domain_of_environment(), f"{path}/get_parameters", "rcl_interfaces/srv/GetParameters", _ANY_HASH),
         target=zenoh.QueryTarget.ALL,
         consolidation=zenoh.ConsolidationMode.NONE,
         timeout=TIMEOUT_S,

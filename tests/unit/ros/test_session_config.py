@@ -3,13 +3,13 @@
 import pytest
 
 from throwcollect.errors import ConfigError
-from throwcollect.run_key import RunKey
-from throwcollect.session_config import (
+from throwcollect.ros.session_config import (
     CONFIG_FILE_VARIABLE,
     OVERRIDE_VARIABLE,
     client_override,
     connect_endpoint,
 )
+from throwcollect.run_key import RunKey
 
 ENDPOINT = "tls/127.0.0.1:7447"
 

@@ -7,12 +7,12 @@ import threading
 import pytest
 import zenoh
 
-from throwcollect import health
+import throwcollect.ros.health as health
 from throwcollect.errors import ConfigError, ThrowcollectError
-from throwcollect.health import check
 from throwcollect.interfaces import get_service, serialize
 from throwcollect.ros.embedded.attachment import unpack
-from throwcollect.session_config import OVERRIDE_VARIABLE
+from throwcollect.ros.health import check
+from throwcollect.ros.session_config import OVERRIDE_VARIABLE
 
 
 @pytest.fixture
@@ -125,12 +125,14 @@ def test_a_session_is_waited_for_no_longer_than_an_answer(environment, monkeypat
 
 
 def test_the_check_loads_neither_the_command_line_nor_the_interfaces(environment):
-    code = "import sys, throwcollect.health; print(*({'typer', 'numpy', 'rosbags'} & sys.modules.keys()))"
+    code = "import sys, throwcollect.ros.health; print(*({'typer', 'numpy', 'rosbags'} & sys.modules.keys()))"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "\n"
 
 
 @pytest.mark.parametrize(("node", "code", "message"), [("router", 0, ""), ("sim_4", 1, "sim_4: does not answer\n")])
 def test_as_a_module_it_ends_with_the_exit_code_and_one_line(environment, monkeypatch, node, code, message):
     monkeypatch.setenv("THROWCOLLECT_NODE", node)
-    ended = subprocess.run([sys.executable, "-m", "throwcollect.health"], capture_output=True, text=True, check=False)
+    ended = subprocess.run(
+        [sys.executable, "-m", "throwcollect.ros.health"], capture_output=True, text=True, check=False
+    )
     assert (ended.returncode, ended.stderr, ended.stdout) == (code, message, "")

@@ -1,4 +1,4 @@
-"""Configuration of Zenoh sessions, apart from `ros` because health checks cannot afford to import that.
+"""Configuration of Zenoh sessions.
 
 The environment variables are those of rmw_zenoh_cpp: ``ZENOH_SESSION_CONFIG_URI`` names a whole configuration file and
 ``ZENOH_CONFIG_OVERRIDE`` (``key=json5;key=json5``) is applied after it.
