@@ -8,9 +8,9 @@ from typing import Annotated
 import typer
 
 import throwcollect
-from throwcollect.cli.dataset_commands import DatasetArgument, JsonOption, dataset_app
+from throwcollect.cli.dataset.commands import DatasetArgument, JsonOption, dataset_app
 from throwcollect.cli.execution import execute
-from throwcollect.cli.ros import ros_app
+from throwcollect.cli.ros.commands import ros_app
 from throwcollect.cli.streams import end_with_reader, only_log
 from throwcollect.errors import ConfigError
 

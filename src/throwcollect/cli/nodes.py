@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from throwcollect.cli.dataset import describe
+from throwcollect.cli.dataset.info import describe
 from throwcollect.config.loader import load, loaded
 from throwcollect.coordinator.main import run
 from throwcollect.coordinator.prepare import more_trials, prepare

@@ -10,7 +10,7 @@ from typing import Any
 
 import typer
 
-from throwcollect.cli.dataset import describe
+from throwcollect.cli.dataset.info import describe
 from throwcollect.cli.streams import ensure_written
 from throwcollect.wording import command
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from throwcollect.cli.dataset import describe
+from throwcollect.cli.dataset.info import describe
 from throwcollect.dataset.inspect import Info
 
 

@@ -14,7 +14,7 @@ import pytest
 from plotly.offline import get_plotlyjs
 from typer.testing import CliRunner
 
-from throwcollect.cli.dataset_commands import dataset_app
+from throwcollect.cli.dataset.commands import dataset_app
 from throwcollect.dataset.directory import CARD, METADATA
 from throwcollect.dataset.reader import Dataset
 from throwcollect.errors import ConfigError, DatasetError

@@ -8,8 +8,8 @@ from collections import deque
 from itertools import pairwise
 from typing import Any
 
-from throwcollect.cli.ros_session import Session, absolute, full_name, interface, is_hidden, joined, known, print_names
-from throwcollect.cli.ros_values import SHORT, plain, yaml_text
+from throwcollect.cli.ros.session import Session, absolute, full_name, interface, is_hidden, joined, known, print_names
+from throwcollect.cli.ros.values import SHORT, plain, yaml_text
 from throwcollect.errors import ConfigError
 from throwcollect.ros import DurabilityPolicy, QoSProfile, ReliabilityPolicy, get_message
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from throwcollect.cli.ros_session import Session, absolute, interface, joined, known
-from throwcollect.cli.ros_values import fill, parse, plain, yaml_text
+from throwcollect.cli.ros.session import Session, absolute, interface, joined, known
+from throwcollect.cli.ros.values import fill, parse, plain, yaml_text
 from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError
 from throwcollect.ros import ActionClient, get_action, get_action_names_and_types, get_message
 

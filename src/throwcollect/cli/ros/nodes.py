@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 
-from throwcollect.cli.ros_session import Session, absolute, is_hidden, joined, known
+from throwcollect.cli.ros.session import Session, absolute, is_hidden, joined, known
 from throwcollect.ros import get_action_client_names_and_types_by_node, get_action_server_names_and_types_by_node
 
 

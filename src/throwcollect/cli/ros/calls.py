@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from throwcollect.cli.ros_session import absolute, interface, joined, known, print_names
-from throwcollect.cli.ros_values import fill, parse
+from throwcollect.cli.ros.session import absolute, interface, joined, known, print_names
+from throwcollect.cli.ros.values import fill, parse
 from throwcollect.errors import ConfigError
 from throwcollect.ros import get_action_names_and_types, get_service
 

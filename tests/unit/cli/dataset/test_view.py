@@ -11,11 +11,11 @@ import pytest
 from tests.unit.dataset.conftest import Collection
 from typer.testing import CliRunner
 
-from throwcollect.cli.dataset_view import numbers
+from throwcollect.cli.dataset.view import numbers
 from throwcollect.cli.main import app
 from throwcollect.errors import ConfigError
 
-PAGE = Path(__file__).parents[3] / "docs" / "viewing.md"
+PAGE = Path(__file__).parents[4] / "docs" / "viewing.md"
 
 
 def test_trials_are_numbers_and_ranges_in_the_order_given() -> None:

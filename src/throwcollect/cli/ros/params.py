@@ -5,9 +5,9 @@ from __future__ import annotations
 import sys
 from typing import Any
 
-from throwcollect.cli.ros_nodes import node_names
-from throwcollect.cli.ros_session import Session, absolute, is_hidden, joined, known
-from throwcollect.cli.ros_values import parse, plain
+from throwcollect.cli.ros.nodes import node_names
+from throwcollect.cli.ros.session import Session, absolute, is_hidden, joined, known
+from throwcollect.cli.ros.values import parse, plain
 from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.ros import Parameter, get_service
 

@@ -22,7 +22,7 @@ ros_app.add_typer(param_app, name="param")
 
 
 def _settle(run: str | None) -> str | None:
-    from throwcollect.cli.ros_env import settle
+    from throwcollect.cli.ros.env import settle
 
     return settle(run)
 
@@ -56,7 +56,7 @@ def env(
     ] = None,
 ) -> None:
     """Print the line that lets a shell's ROS 2 nodes join a run: eval "$(throwcollect ros env)"."""
-    from throwcollect.cli.ros_env import show_environment
+    from throwcollect.cli.ros.env import show_environment
 
     show_environment(run)
 
@@ -64,7 +64,7 @@ def env(
 @topic_app.command("list")
 def topic_list(types: TypesOption = False, hidden: HiddenOption = False, run: RunOption = None) -> None:
     """List the topics."""
-    from throwcollect.cli.ros_topics import show_topics
+    from throwcollect.cli.ros.topics import show_topics
 
     show_topics(run, types=types, hidden=hidden)
 
@@ -86,7 +86,7 @@ def topic_echo(
     run: RunOption = None,
 ) -> None:
     """Print the messages of a topic as YAML."""
-    from throwcollect.cli.ros_topics import echo
+    from throwcollect.cli.ros.topics import echo
 
     end_with_reader()
     echo(run, topic, kind, once=once, field=field, full=full)
@@ -101,7 +101,7 @@ def topic_hz(
     run: RunOption = None,
 ) -> None:
     """Print how often messages arrive."""
-    from throwcollect.cli.ros_topics import show_rate
+    from throwcollect.cli.ros.topics import show_rate
 
     end_with_reader()
     show_rate(run, topic, window=window)
@@ -114,7 +114,7 @@ def topic_info(
     run: RunOption = None,
 ) -> None:
     """Print the type of a topic and who publishes and subscribes to it."""
-    from throwcollect.cli.ros_topics import show_topic
+    from throwcollect.cli.ros.topics import show_topic
 
     show_topic(run, topic, verbose=verbose)
 
@@ -122,7 +122,7 @@ def topic_info(
 @node_app.command("list")
 def node_list(hidden: HiddenOption = False, run: RunOption = None) -> None:
     """List the nodes."""
-    from throwcollect.cli.ros_nodes import show_nodes
+    from throwcollect.cli.ros.nodes import show_nodes
 
     show_nodes(run, hidden=hidden)
 
@@ -130,7 +130,7 @@ def node_list(hidden: HiddenOption = False, run: RunOption = None) -> None:
 @node_app.command("info")
 def node_info(node: NodeArgument, hidden: HiddenOption = False, run: RunOption = None) -> None:
     """Print what a node publishes, subscribes to, offers and uses."""
-    from throwcollect.cli.ros_nodes import show_node
+    from throwcollect.cli.ros.nodes import show_node
 
     show_node(run, node, hidden=hidden)
 
@@ -138,7 +138,7 @@ def node_info(node: NodeArgument, hidden: HiddenOption = False, run: RunOption =
 @service_app.command("list")
 def service_list(types: TypesOption = False, hidden: HiddenOption = False, run: RunOption = None) -> None:
     """List the services."""
-    from throwcollect.cli.ros_calls import show_services
+    from throwcollect.cli.ros.calls import show_services
 
     show_services(run, types=types, hidden=hidden)
 
@@ -151,7 +151,7 @@ def service_call(
     run: RunOption = None,
 ) -> None:
     """Call a service and print its response."""
-    from throwcollect.cli.ros_calls import call
+    from throwcollect.cli.ros.calls import call
 
     call(run, service, kind, values)
 
@@ -159,7 +159,7 @@ def service_call(
 @action_app.command("list")
 def action_list(types: TypesOption = False, run: RunOption = None) -> None:
     """List the actions."""
-    from throwcollect.cli.ros_calls import show_actions
+    from throwcollect.cli.ros.calls import show_actions
 
     show_actions(run, types=types)
 
@@ -176,7 +176,7 @@ def action_send(
     run: RunOption = None,
 ) -> None:
     """Send a goal and print its result; Ctrl-C cancels the goal."""
-    from throwcollect.cli.ros_goals import send
+    from throwcollect.cli.ros.goals import send
 
     send(run, action, kind, goal, feedback=feedback)
 
@@ -187,7 +187,7 @@ def param_list(
     run: RunOption = None,
 ) -> None:
     """List the parameters of a node, or of all nodes."""
-    from throwcollect.cli.ros_params import show_parameters
+    from throwcollect.cli.ros.params import show_parameters
 
     show_parameters(run, node)
 
@@ -195,7 +195,7 @@ def param_list(
 @param_app.command("get")
 def param_get(node: NodeArgument, name: ParameterArgument, run: RunOption = None) -> None:
     """Print the value of a parameter."""
-    from throwcollect.cli.ros_params import show_value
+    from throwcollect.cli.ros.params import show_value
 
     show_value(run, node, name)
 
@@ -208,6 +208,6 @@ def param_set(
     run: RunOption = None,
 ) -> None:
     """Set a parameter."""
-    from throwcollect.cli.ros_params import change_value
+    from throwcollect.cli.ros.params import change_value
 
     change_value(run, node, name, value)

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from throwcollect import ros
-from throwcollect.cli.ros_env import joining_environment, named
+from throwcollect.cli.ros.env import joining_environment, named
 from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError, WorkerError
 from throwcollect.ros.middleware import Middleware
 

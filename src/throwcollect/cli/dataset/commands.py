@@ -16,7 +16,7 @@ JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 @dataset_app.command("info")
 def dataset_info(directory: DatasetArgument, json: JsonOption = False) -> None:
     """Say what a dataset holds."""
-    from throwcollect.cli.dataset import show_info
+    from throwcollect.cli.dataset.info import show_info
 
     show_info(directory, json=json)
 
@@ -31,7 +31,7 @@ def dataset_verify(
     json: JsonOption = False,
 ) -> None:
     """Check a dataset against itself and against physics; exit code 4 if anything is wrong."""
-    from throwcollect.cli.dataset_verify import show_verification
+    from throwcollect.cli.dataset.verify import show_verification
 
     show_verification(directory, replay=replay, json=json)
 
@@ -39,7 +39,7 @@ def dataset_verify(
 @dataset_app.command("rebuild")
 def dataset_rebuild(directory: DatasetArgument, json: JsonOption = False) -> None:
     """Write throws.parquet, datapackage.json and metadata.yaml anew, from the recordings."""
-    from throwcollect.cli.dataset_repair import show_rebuilt
+    from throwcollect.cli.dataset.repair import show_rebuilt
 
     show_rebuilt(directory, json=json)
 
@@ -51,7 +51,7 @@ def dataset_repair(
     json: JsonOption = False,
 ) -> None:
     """Write a sound dataset with all that is whole in a damaged one; exit code 3 if trials are lost."""
-    from throwcollect.cli.dataset_repair import show_repaired
+    from throwcollect.cli.dataset.repair import show_repaired
 
     show_repaired(directory, output, json=json)
 
@@ -59,7 +59,7 @@ def dataset_repair(
 @dataset_app.command("digest")
 def dataset_digest(directory: DatasetArgument) -> None:
     """Print one hash over all episodes in trial order."""
-    from throwcollect.cli.dataset import show_digest
+    from throwcollect.cli.dataset.info import show_digest
 
     show_digest(directory)
 
@@ -75,7 +75,7 @@ def dataset_export(
     json: JsonOption = False,
 ) -> None:
     """Write a dataset in another format, with a data card."""
-    from throwcollect.cli.export import export_dataset
+    from throwcollect.cli.dataset.export import export_dataset
 
     export_dataset(directory, output, to=to, rate_hz=rate, json=json)
 
@@ -91,7 +91,7 @@ def dataset_merge(
     json: JsonOption = False,
 ) -> None:
     """Put the trials of several datasets one after the other."""
-    from throwcollect.cli.dataset_derive import show_merged
+    from throwcollect.cli.dataset.derive import show_merged
 
     show_merged(directories, output, json=json)
 
@@ -104,7 +104,7 @@ def dataset_filter(
     json: JsonOption = False,
 ) -> None:
     """Take the trials that fulfil a condition on columns of throws.parquet."""
-    from throwcollect.cli.dataset_derive import show_filtered
+    from throwcollect.cli.dataset.derive import show_filtered
 
     show_filtered(directory, output, where=where, json=json)
 
@@ -118,7 +118,7 @@ def dataset_sample(
     json: JsonOption = False,
 ) -> None:
     """Take trials at random; they stay in their order."""
-    from throwcollect.cli.dataset_derive import show_sample
+    from throwcollect.cli.dataset.derive import show_sample
 
     show_sample(directory, output, count=count, seed=seed, json=json)
 
@@ -138,7 +138,7 @@ def dataset_split(
     json: JsonOption = False,
 ) -> None:
     """Split a dataset so that throws to the same place, by default a square of 5 cm, go to the same part."""
-    from throwcollect.cli.dataset_derive import show_split
+    from throwcollect.cli.dataset.derive import show_split
 
     show_split(directory, output, fractions=fractions, cells=cells, seed=seed, json=json)
 
@@ -146,7 +146,7 @@ def dataset_split(
 @dataset_app.command("stats")
 def dataset_stats(directory: DatasetArgument, json: JsonOption = False) -> None:
     """Print statistics of the table of throws and of all trajectories."""
-    from throwcollect.cli.dataset_derive import show_statistics
+    from throwcollect.cli.dataset.derive import show_statistics
 
     show_statistics(directory, json=json)
 
@@ -165,7 +165,7 @@ def dataset_report(
     json: JsonOption = False,
 ) -> None:
     """Write a page that shows what a dataset holds, and pictures for papers."""
-    from throwcollect.cli.report import report_dataset
+    from throwcollect.cli.dataset.report import report_dataset
 
     report_dataset(directory, output, pictures=png, json=json)
 
@@ -180,7 +180,7 @@ def dataset_view(
     json: JsonOption = False,
 ) -> None:
     """Write throws with frames, meshes, markers and a layout, for Foxglove, Rerun and RViz."""
-    from throwcollect.cli.dataset_view import write_view
+    from throwcollect.cli.dataset.view import write_view
 
     write_view(directory, output, trials=trials, json=json)
 
@@ -198,6 +198,6 @@ def dataset_replay(
     json: JsonOption = False,
 ) -> None:
     """Simulate stored throws again and compare them bit for bit; exit code 4 if any differs."""
-    from throwcollect.cli.replay import show_replay
+    from throwcollect.cli.dataset.replay import show_replay
 
     show_replay(directory, trials or [], everything=everything, sample=sample, json=json)

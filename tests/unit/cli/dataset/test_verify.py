@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from tests.unit.dataset.conftest import Collection
 
-from throwcollect.cli import dataset_verify as module
+from throwcollect.cli.dataset import verify as module
 from throwcollect.errors import DatasetError
 from throwcollect.replay.comparison import Comparison
 

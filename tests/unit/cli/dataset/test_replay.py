@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import pyarrow as pa
 import pytest
 
-from throwcollect.cli import replay as module
+from throwcollect.cli.dataset import replay as module
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.replay.comparison import Comparison
 
