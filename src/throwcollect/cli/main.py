@@ -7,12 +7,12 @@ from typing import Annotated
 
 import typer
 
-import throwcollect
 from throwcollect.cli.dataset.commands import DatasetArgument, JsonOption, dataset_app
 from throwcollect.cli.execution import execute
 from throwcollect.cli.ros.commands import ros_app
 from throwcollect.cli.streams import end_with_reader, only_log
 from throwcollect.errors import ConfigError
+from throwcollect.version import __version__
 
 app = typer.Typer(
     name="throwcollect",
@@ -65,7 +65,7 @@ def _overrides(settings: list[str] | None, **options: str | None) -> list[str]:
 
 def _print_version(wanted: bool) -> None:
     if wanted:
-        typer.echo(f"throwcollect {throwcollect.__version__}")
+        typer.echo(f"throwcollect {__version__}")
         raise typer.Exit
 
 

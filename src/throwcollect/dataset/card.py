@@ -17,11 +17,11 @@ from importlib.metadata import PackageNotFoundError, version
 import pyarrow as pa
 import pyarrow.compute as pc
 
-import throwcollect
 from throwcollect.config.schema import Config
 from throwcollect.dataset.bag import to_yaml
 from throwcollect.dataset.directory import TRIALS
 from throwcollect.sweep.plan import FIRST_TRIALS
+from throwcollect.version import __version__
 
 HOST_VARIABLE = "THROWCOLLECT_HOST"
 """Name of the machine for processes that cannot know it; empty if nobody does."""
@@ -64,7 +64,7 @@ class Provenance:
             host=os.environ.get(HOST_VARIABLE, socket.gethostname()) or None,
             platform=platform.platform(),
             python=platform.python_version(),
-            libraries={"throwcollect": throwcollect.__version__, **_versions()},
+            libraries={"throwcollect": __version__, **_versions()},
             simulations=simulations,
             wall_s=wall_s,
             was_open=was_open,

@@ -169,7 +169,17 @@ def _as_array(which: Any) -> pa.Array:
     return values
 
 
-def load_dataset(directory: str | os.PathLike[str]) -> ThrowDataset:
-    """Open a finished dataset; see `throwcollect.load`."""
+def load(directory: str | os.PathLike[str]) -> ThrowDataset:
+    """Open a finished dataset for reading.
+
+    Its tables are read and checked against each other; recordings are opened when they are looked at.
+
+    Args:
+        directory: Its directory.
+
+    Raises:
+        DatasetError: If the directory holds no dataset, an unfinished one, or one whose tables are damaged.
+        ConfigError: If its ``config.yaml`` is wrong.
+    """
     dataset = Dataset.open(Path(directory))
     return ThrowDataset(dataset.directory, dataset.config, dataset.plan.keys, dataset.throws)

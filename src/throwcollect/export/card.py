@@ -8,12 +8,12 @@ from typing import Any
 
 import pyarrow as pa
 
-import throwcollect
 from throwcollect.dataset.bag import to_yaml
 from throwcollect.dataset.card import outcome_lines
 from throwcollect.dataset.directory import CONFIG
 from throwcollect.export.source import Source
 from throwcollect.robots.talos import JOINTS
+from throwcollect.version import __version__
 
 _TAGS = ("robotics", "throwing", "talos", "simulation")
 
@@ -52,7 +52,7 @@ def card(source: Source, layout: Layout) -> str:
         f"# {config.name}",
         "",
         f"{len(source.table)} simulated throws of a ball by the humanoid robot Talos; {len(source.entries)} of them "
-        f"have time series, at {source.rate_hz} Hz. Exported by throwcollect {throwcollect.__version__} from the "
+        f"have time series, at {source.rate_hz} Hz. Exported by throwcollect {__version__} from the "
         f"dataset with the digest `{source.digest}`.",
         "",
         *outcome_lines(source.table),

@@ -11,11 +11,11 @@ from typing import Any
 
 from plotly.offline import get_plotlyjs
 
-import throwcollect
 from throwcollect.report.facts import Facts
 from throwcollect.report.heading import heading
 from throwcollect.report.panels import Panel, Section
 from throwcollect.report.sections import sections
+from throwcollect.version import __version__
 
 
 def page(facts: Facts) -> str:
@@ -29,7 +29,7 @@ def page(facts: Facts) -> str:
     return template.substitute(
         name=escape(facts.info.name),
         trials=facts.info.trials,
-        version=escape(throwcollect.__version__),
+        version=escape(__version__),
         heading=heading(facts, shown),
         sections="\n".join(map(_section, shown)),
         plotly=get_plotlyjs(),

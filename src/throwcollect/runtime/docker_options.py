@@ -11,7 +11,6 @@ from typing import Any
 
 from docker.types import EndpointConfig, LogConfig, Mount, Ulimit
 
-import throwcollect
 from throwcollect.config.containers import NodeContainerConfig
 from throwcollect.config.schema import Config
 from throwcollect.dataset.card import HOST_VARIABLE
@@ -21,6 +20,7 @@ from throwcollect.run_key import RunKey
 from throwcollect.runtime.image import default_tag
 from throwcollect.runtime.nodes import COORDINATOR, ROUTER, node_environment, protocol_of
 from throwcollect.runtime.ports import LOOPBACK
+from throwcollect.version import __version__
 
 RUN_LABEL = "throwcollect.run"
 NODE_LABEL = "throwcollect.node"
@@ -84,7 +84,7 @@ class RunPlace:
         labels = {
             RUN_LABEL: self.run_id,
             DIRECTORY_LABEL: self.source,
-            VERSION_LABEL: throwcollect.__version__,
+            VERSION_LABEL: __version__,
         }
         return labels if node is None else {**labels, NODE_LABEL: node}
 

@@ -17,13 +17,15 @@ from urllib.parse import urlsplit
 from docker.client import DockerClient
 from docker.errors import ImageNotFound
 
-import throwcollect
 from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.runtime.docker_engine import engine_errors
+from throwcollect.version import __version__
 
 DEFAULT_BASE = "python:3.11-slim-bookworm"
 """Base image, as in the Dockerfile."""
 
+_PACKAGE = Path(__file__).parents[1]
+"""This package, as it is installed."""
 _DOCKERFILE = "docker/Dockerfile"
 _TARGET = "throwcollect"
 _SOURCES = ("pyproject.toml", "README.md", "configs/quickstart.yaml", "src")
@@ -50,7 +52,7 @@ _UNKNOWN = "unknown"
 
 def default_tag() -> str:
     """Tag of the image that belongs to this version."""
-    return f"throwcollect:{throwcollect.__version__}"
+    return f"throwcollect:{__version__}"
 
 
 def build(
@@ -91,7 +93,7 @@ def build(
     revision, address = _revision(root), _address(root)
     arguments = {
         "BASE_IMAGE": base,
-        "VERSION": throwcollect.__version__,
+        "VERSION": __version__,
         "REVISION": revision or _UNKNOWN,
         "SOURCES": _digest_of(root),
     }
@@ -173,10 +175,10 @@ def source_root() -> Path:
     Raises:
         ConfigError: If it was installed in another way than from a clone, in editable mode.
     """
-    root = Path(throwcollect.__path__[0]).parents[1]
+    root = _PACKAGE.parents[1]
     if not all((root / name).exists() for name in (_DOCKERFILE, *_SOURCES)):
         raise ConfigError(
-            f"{throwcollect.__path__[0]}: is not in a clone of the project, so there is nothing to build an image from",
+            f"{_PACKAGE}: is not in a clone of the project, so there is nothing to build an image from",
             hint="clone it and run: pip install -e .; or name an image that exists",
         )
     return root

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import throwcollect
 from throwcollect.errors import ConfigError, RequestError
 from throwcollect.ros import Node, get_message, get_service
 from throwcollect.sim.answers import answering
@@ -12,6 +11,7 @@ from throwcollect.sim.entity_services import EntityServices
 from throwcollect.sim.simulation import Scope, Simulation, State
 from throwcollect.sim.spawn_services import SpawnServices
 from throwcollect.sim.stepping import Stepping
+from throwcollect.version import __version__
 
 GetSimulatorFeatures: Any = get_service("simulation_interfaces/srv/GetSimulatorFeatures")
 GetSimulationState: Any = get_service("simulation_interfaces/srv/GetSimulationState")
@@ -78,7 +78,7 @@ class SimulationControl:
         response.features.features = [getattr(Features, name) for name in _FEATURES]
         response.features.spawn_formats = list(_FORMATS)
         response.features.custom_info = (
-            f"throwcollect {throwcollect.__version__}; one step is one physics step of "
+            f"throwcollect {__version__}; one step is one physics step of "
             f"{1.0 / self._simulation.config.sim.physics_hz:g} s; the clock runs while a trial runs"
         )
         return response

@@ -159,7 +159,7 @@ def test_a_base_image_that_cannot_be_had_is_named_with_a_way_out(said: list[str]
 
 
 def test_a_package_outside_a_clone_cannot_be_built_from(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(throwcollect, "__path__", [str(tmp_path / "lib" / "throwcollect")])
+    monkeypatch.setattr("throwcollect.runtime.image._PACKAGE", tmp_path / "lib" / "throwcollect")
     with pytest.raises(ConfigError, match="is not in a clone of the project"):
         source_root()
 
@@ -193,7 +193,7 @@ def test_an_image_that_cannot_be_pulled_is_an_error_of_the_runtime(said: list[st
 def test_without_a_clone_the_default_image_cannot_be_had(
     monkeypatch: pytest.MonkeyPatch, said: list[str], tmp_path: Path
 ) -> None:
-    monkeypatch.setattr(throwcollect, "__path__", [str(tmp_path / "lib" / "throwcollect")])
+    monkeypatch.setattr("throwcollect.runtime.image._PACKAGE", tmp_path / "lib" / "throwcollect")
     with pytest.raises(WorkerError, match=f"{default_tag()} is not here and cannot be built: .* not in a clone"):
         ensure(Engine(), default_tag(), say=said.append)
 
@@ -268,7 +268,7 @@ def test_an_image_is_outdated_if_its_label_names_other_sources_than_those_of_the
     for labels, outdated in (({}, False), ("unknown", False), (own, False), ("0" * 64, True)):
         engine.labels = labels and {image.SOURCES_LABEL: labels}
         assert is_outdated(engine, "mine") == outdated
-    monkeypatch.setattr(throwcollect, "__path__", [str(tmp_path / "lib" / "throwcollect")])
+    monkeypatch.setattr("throwcollect.runtime.image._PACKAGE", tmp_path / "lib" / "throwcollect")
     assert not is_outdated(engine, "mine")
 
 
