@@ -16,9 +16,9 @@ from throwcollect.dataset.writer import create
 from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
 from throwcollect.runtime.docker import DockerRuntime
-from throwcollect.runtime.listening import Listening
 from throwcollect.runtime.local import LocalRuntime
 from throwcollect.runtime.nodes import Runtime, endpoint_of
+from throwcollect.runtime.run_listener import RunListener
 from throwcollect.runtime.supervisor import Supervisor
 from throwcollect.sweep.plan import Plan
 
@@ -55,10 +55,10 @@ class _Mark:
     kernel_s: dict[str, float]
 
 
-def _until(supervisor: Supervisor, listening: Listening, reports: list[Progress], ended: int) -> float:
+def _until(supervisor: Supervisor, listener: RunListener, reports: list[Progress], ended: int) -> float:
     """Wait until so many trials have ended; the time."""
     while not reports or reports[-1].ended < ended:
-        listening.spin(endpoint_of(supervisor.runtime), _POLL_S)
+        listener.spin(endpoint_of(supervisor.runtime), _POLL_S)
         if (end := supervisor.poll()[0]) is not None:
             raise RuntimeError(f"the collection ended early: {end.reason}: {end.log}")
     return time.monotonic()
@@ -67,16 +67,16 @@ def _until(supervisor: Supervisor, listening: Listening, reports: list[Progress]
 class _Watch:
     """Follows one collection from the outside."""
 
-    def __init__(self, supervisor: Supervisor, listening: Listening, reports: list[Progress]) -> None:
+    def __init__(self, supervisor: Supervisor, listener: RunListener, reports: list[Progress]) -> None:
         self._supervisor = supervisor
-        self._listening = listening
+        self._listener = listener
         self._reports = reports
         names = supervisor.runtime.running()
         self._nodes = {name: _process(supervisor.runtime.handle(name) or "") for name in names}
 
     def until(self, ended: int) -> _Mark:
         return _Mark(
-            _until(self._supervisor, self._listening, self._reports, ended),
+            _until(self._supervisor, self._listener, self._reports, ended),
             self._reports[-1].ended,
             self._sum(lambda node: sum(node.cpu_times()[:2])),
             self._sum(lambda node: node.cpu_times().system),
@@ -90,7 +90,7 @@ class _Watch:
 
     def finish(self) -> None:
         while self._supervisor.poll()[0] is None:
-            self._listening.spin(endpoint_of(self._supervisor.runtime), _POLL_S)
+            self._listener.spin(endpoint_of(self._supervisor.runtime), _POLL_S)
 
     def _sum(self, measure) -> dict[str, float]:
         return {
@@ -153,12 +153,12 @@ def measure(
     runtime = make_runtime(plan, directory)
     with Supervisor(runtime, run, simulations=simulations) as supervisor:
         supervisor.start()
-        listening = Listening(
+        listener = RunListener(
             reports.append, domain_id=run.domain_id, key=_key(directory), middleware=Middleware.of_process()
         )
-        with listening:
-            first = _until(supervisor, listening, reports, 1)
-            watch = _Watch(supervisor, listening, reports)
+        with listener:
+            first = _until(supervisor, listener, reports, 1)
+            watch = _Watch(supervisor, listener, reports)
             start, stop = watch.until(trials // 10), watch.until(trials * 9 // 10)
             memory = watch.memory_mb()
             watch.finish()

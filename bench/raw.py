@@ -12,8 +12,8 @@ import pybullet
 
 from throwcollect.config.schema import Config
 from throwcollect.robots.description import physics_description
-from throwcollect.robots.interpolation import sample_quintic
 from throwcollect.robots.model import joint_limits
+from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.robots.talos import JOINTS
 from throwcollect.sim.world import World
 from throwcollect.sweep.plan import Plan

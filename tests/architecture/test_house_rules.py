@@ -75,7 +75,7 @@ HARMLESS = {
 
 
 def processor_dependent(tree: ast.AST) -> set[str]:
-    """What NumPy, BLAS or LAPACK may compute otherwise on another processor; see `throwcollect.portable`."""
+    """What NumPy, BLAS or LAPACK may compute otherwise on another processor; see `throwcollect.reproducible_math`."""
     found = set()
     for node in ast.walk(tree):
         match node:

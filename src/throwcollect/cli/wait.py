@@ -31,7 +31,7 @@ def wait_for(named: str | None, *, json: bool) -> None:
     records = Records()
     run = to_watch(records, named, say=partial(typer.echo, err=True))
     run.record.middleware.joining.settle()
-    from throwcollect.runtime.listening import follow
+    from throwcollect.runtime.run_listener import follow
 
     events = Tail(Path(run.record.logs) / EVENTS)
     events.skip()

@@ -11,9 +11,9 @@ from throwcollect.dataset.writer import create
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.robots.feasibility import Feasibility
 from throwcollect.sweep.plan import Check, Plan, make_plan
+from throwcollect.sweep.point_file import read_points
 from throwcollect.sweep.points import Points
 from throwcollect.sweep.rounds import Rounds
-from throwcollect.sweep.table import read_points
 from throwcollect.tasks.trajectory import throw_trajectory
 
 

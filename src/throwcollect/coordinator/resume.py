@@ -20,7 +20,7 @@ from throwcollect.dataset.verify_tables import wrong_trials
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError, Problem
 from throwcollect.files import check_regular, is_there, remove, write_file
 from throwcollect.sweep.plan import Plan, Trial
-from throwcollect.sweep.table import encode_points
+from throwcollect.sweep.point_file import encode_points
 from throwcollect.tasks.throw import Outcome
 from throwcollect.wording import command
 

@@ -11,7 +11,7 @@ from throwcollect.dataset.directory import CONFIG, MANIFEST, METADATA, PLAN, THR
 from throwcollect.dataset.findings import Finding
 from throwcollect.dataset.manifest import FileEntry, entry_of_file, read_manifest
 from throwcollect.dataset.mcap_file import MAGIC
-from throwcollect.dataset.throws import read_throws_table
+from throwcollect.dataset.throws_table import read_throws_table
 from throwcollect.dataset.verify import verify
 from throwcollect.errors import DatasetError
 from throwcollect.files import is_there, open_regular

@@ -9,7 +9,7 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from throwcollect.dataset.card import count_outcomes
+from throwcollect.dataset.data_card import count_outcomes
 from throwcollect.dataset.digest import combined_digest
 from throwcollect.dataset.journal import collected_s
 from throwcollect.dataset.reader import Dataset

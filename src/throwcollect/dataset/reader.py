@@ -15,7 +15,7 @@ from throwcollect.config.schema import Config
 from throwcollect.dataset.bag import from_yaml
 from throwcollect.dataset.directory import METADATA, PLAN, THROWS, config_path
 from throwcollect.dataset.mcap_reader import opened
-from throwcollect.dataset.throws import read_throws_table
+from throwcollect.dataset.throws_table import read_throws_table
 from throwcollect.episode.message import Episode
 from throwcollect.errors import DatasetError
 from throwcollect.sweep.plan import Plan

@@ -12,7 +12,7 @@ import pyarrow as pa
 
 from throwcollect.config.loader import load
 from throwcollect.dataset.bag import FileSummary, dataset_metadata
-from throwcollect.dataset.card import Provenance, data_card, outcome_lines
+from throwcollect.dataset.data_card import Provenance, data_card, outcome_lines
 from throwcollect.dataset.digest import combined_digest
 from throwcollect.dataset.directory import CARD, MANIFEST, METADATA, PLAN, SHARD_SUFFIX, THROWS, config_path
 from throwcollect.dataset.journal import was_open
@@ -20,7 +20,7 @@ from throwcollect.dataset.lock import held_alone
 from throwcollect.dataset.manifest import entry_of, entry_of_file, manifest_text, promised_names
 from throwcollect.dataset.mcap_reader import StoredEpisode
 from throwcollect.dataset.recovery import remove_unfinished
-from throwcollect.dataset.throws import Row, ThrowsTable, encode_table, read_throws_table
+from throwcollect.dataset.throws_table import Row, ThrowsTable, encode_table, read_throws_table
 from throwcollect.dataset.verify_episode import EpisodeCheck, RowJudge
 from throwcollect.dataset.verify_shard import ShardCheck
 from throwcollect.dataset.verify_tables import shard_of, wrong_trials

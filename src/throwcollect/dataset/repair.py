@@ -16,7 +16,7 @@ from throwcollect.dataset.judging import judged
 from throwcollect.dataset.new_directory import new_directory
 from throwcollect.dataset.rebuild import earlier_rows, reason_lost
 from throwcollect.dataset.salvage import Salvaged, salvage
-from throwcollect.dataset.throws import REFUSED, Row, ThrowsTable
+from throwcollect.dataset.throws_table import REFUSED, Row, ThrowsTable
 from throwcollect.dataset.verify_episode import EpisodeCheck
 from throwcollect.dataset.verify_tables import wrong_trials
 from throwcollect.dataset.writer import DatasetWriter
@@ -24,7 +24,7 @@ from throwcollect.episode.channels import Channels
 from throwcollect.episode.message import Episode
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError
 from throwcollect.robots.description import full_description
-from throwcollect.sweep.parquet import read_parquet
+from throwcollect.sweep.parquet_file import read_parquet
 from throwcollect.sweep.plan import Plan, make_trials
 from throwcollect.sweep.points import Points
 

@@ -13,8 +13,8 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from throwcollect.config.schema import Config
-from throwcollect.dataset.card import count_outcomes
 from throwcollect.dataset.columns import COLUMNS, Place
+from throwcollect.dataset.data_card import count_outcomes
 from throwcollect.dataset.expression import Expression
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.throw import Throw

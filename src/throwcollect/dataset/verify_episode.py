@@ -12,7 +12,7 @@ from throwcollect.config.schema import Config
 from throwcollect.dataset.judging import judged
 from throwcollect.dataset.mcap_file import EpisodeRun, episode_run
 from throwcollect.dataset.mcap_reader import StoredEpisode
-from throwcollect.dataset.throws import Place, ThrowsTable
+from throwcollect.dataset.throws_table import Place, ThrowsTable
 from throwcollect.dataset.verify_header import header_problems
 from throwcollect.dataset.verify_motion import ball_problems, infinite_columns, joint_problems
 from throwcollect.episode.channels import Channels

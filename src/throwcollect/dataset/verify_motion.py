@@ -16,8 +16,8 @@ from throwcollect.config.schema import Config
 from throwcollect.dataset.verify_header import Steps, contact_name
 from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.robots.description import locked_joints, start_posture
-from throwcollect.robots.interpolation import sample_positions
 from throwcollect.robots.model import joint_limits
+from throwcollect.robots.quintic_curve import sample_positions
 from throwcollect.robots.talos import JOINTS
 from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.tasks.flight import NS_PER_S, ballistic_steps

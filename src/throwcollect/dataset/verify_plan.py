@@ -15,7 +15,7 @@ from throwcollect.config.schema import Config
 from throwcollect.dataset.directory import PLAN
 from throwcollect.dataset.findings import Finding
 from throwcollect.dataset.row_result import row_result
-from throwcollect.dataset.throws import REFUSED
+from throwcollect.dataset.throws_table import REFUSED
 from throwcollect.errors import ConfigError
 from throwcollect.sweep.plan import Check, Plan, make_trials, refusal
 from throwcollect.sweep.points import Points

@@ -13,12 +13,12 @@ from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
 from throwcollect.dataset.directory import CONFIG, PLAN, THROWS, TRIALS, config_path, shard_name
 from throwcollect.dataset.findings import Finding
-from throwcollect.dataset.throws import REFUSED, read_throws_table
+from throwcollect.dataset.throws_table import REFUSED, read_throws_table
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError
 from throwcollect.sweep.digest import trial_digests
 from throwcollect.sweep.plan import Plan
+from throwcollect.sweep.point_file import read_points
 from throwcollect.sweep.points import Points
-from throwcollect.sweep.table import read_points
 from throwcollect.tasks.throw import Outcome
 
 WITHOUT_EPISODE = (REFUSED, Outcome.LOST.value)

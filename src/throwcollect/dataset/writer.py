@@ -18,7 +18,7 @@ import pyarrow as pa
 from throwcollect.config.loader import load, resolved_yaml
 from throwcollect.config.schema import Config
 from throwcollect.dataset.bag import FileSummary, dataset_metadata
-from throwcollect.dataset.card import Provenance, data_card
+from throwcollect.dataset.data_card import Provenance, data_card
 from throwcollect.dataset.digest import combined_digest
 from throwcollect.dataset.directory import (
     CARD,
@@ -37,15 +37,15 @@ from throwcollect.dataset.lock import held_alone, held_together
 from throwcollect.dataset.manifest import FileEntry, entry_of, entry_of_file, manifest_text
 from throwcollect.dataset.recovery import recover_shard, remove_unfinished
 from throwcollect.dataset.shard import FinishedShard, OpenShard
-from throwcollect.dataset.throws import Place, Row, ThrowsTable, encode_table
+from throwcollect.dataset.throws_table import Place, Row, ThrowsTable, encode_table
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.message import Episode
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.files import remove, write_file
 from throwcollect.robots.description import full_description
 from throwcollect.sweep.plan import Plan, Trial
+from throwcollect.sweep.point_file import encode_points
 from throwcollect.sweep.points import Points
-from throwcollect.sweep.table import encode_points
 from throwcollect.tasks.throw import Outcome, ThrowResult
 from throwcollect.wording import command, counted
 

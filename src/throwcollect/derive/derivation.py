@@ -19,9 +19,9 @@ from throwcollect.dataset.new_directory import new_directory
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.row_result import row_result
 from throwcollect.dataset.writer import DatasetWriter
-from throwcollect.derive.records import encode_sources, sources_section
+from throwcollect.derive.origins import encode_sources, sources_section
 from throwcollect.derive.source import Source
-from throwcollect.derive.union import list_of_trials
+from throwcollect.derive.trial_list import list_of_trials
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.message import Episode
 from throwcollect.episode.restamp import Restamper

@@ -26,7 +26,7 @@ from throwcollect.dataset.new_directory import new_directory
 from throwcollect.dataset.reader import Dataset
 from throwcollect.derive.derivation import Derived, write
 from throwcollect.derive.source import Source, source
-from throwcollect.derive.union import list_of_trials
+from throwcollect.derive.trial_list import list_of_trials
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.sweep.digest import trial_digests
 

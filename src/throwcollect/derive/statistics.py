@@ -13,7 +13,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from throwcollect.dataset.card import count_outcomes
+from throwcollect.dataset.data_card import count_outcomes
 from throwcollect.dataset.reader import Dataset
 from throwcollect.episode.record import Samples
 from throwcollect.robots.talos import JOINTS

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.errors import ConfigError
-from throwcollect.portable import cos, sin
+from throwcollect.reproducible_math import cos, sin
 
 WORLD = "world"
 """Name of the fixed frame: x forward, y left, z up, on the ground."""

@@ -11,8 +11,8 @@ from throwcollect.dataset.directory import CARD, CONFIG
 from throwcollect.dataset.new_directory import new_directory
 from throwcollect.errors import ConfigError
 from throwcollect.export import hdf5, lerobot, mat, npz, parquet
-from throwcollect.export.card import Layout, card
-from throwcollect.export.source import Source
+from throwcollect.export.readme import Layout, card
+from throwcollect.export.throw_source import Source
 
 
 @dataclass(frozen=True)

@@ -12,10 +12,10 @@ import numpy as np
 import pyarrow as pa
 
 from throwcollect.errors import ConfigError
-from throwcollect.export.card import Layout, signal_lines
 from throwcollect.export.npz import as_array
+from throwcollect.export.readme import Layout, signal_lines
 from throwcollect.export.signals import Signal
-from throwcollect.export.source import Source, Throw
+from throwcollect.export.throw_source import Source, Throw
 from throwcollect.files import write_all
 
 ACTION = "command_position_rad"

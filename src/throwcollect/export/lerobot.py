@@ -14,11 +14,11 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from throwcollect.dataset.directory import THROWS
-from throwcollect.dataset.throws import encode_table
-from throwcollect.export.card import Layout, joint_lines
+from throwcollect.dataset.throws_table import encode_table
+from throwcollect.export.lerobot_statistics import Frames, Moments, Statistics, of_all, of_episode
 from throwcollect.export.parquet_series import FILES_PER_CHUNK, MEGABYTES_PER_FILE, PATH, ParquetSeries
-from throwcollect.export.source import Source, Throw
-from throwcollect.export.statistics import Frames, Moments, Statistics, of_all, of_episode
+from throwcollect.export.readme import Layout, joint_lines
+from throwcollect.export.throw_source import Source, Throw
 from throwcollect.robots.talos import JOINTS
 
 _VERSION = "v3.0"

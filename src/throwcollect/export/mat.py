@@ -17,10 +17,10 @@ from scipy.io import savemat
 
 from throwcollect.config.schema import Config, DynamicMovementPrimitive
 from throwcollect.errors import DatasetError
-from throwcollect.export.card import Layout, joint_lines
 from throwcollect.export.npz import as_array
-from throwcollect.export.source import Entry, Source, Throw
-from throwcollect.robots.interpolation import sample_quintic
+from throwcollect.export.readme import Layout, joint_lines
+from throwcollect.export.throw_source import Entry, Source, Throw
+from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.robots.talos import JOINTS
 from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.tasks.dmp import fit_dmp, kernels, roll_out

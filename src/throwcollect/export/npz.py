@@ -13,8 +13,8 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from throwcollect.export.card import Layout, signal_lines
-from throwcollect.export.source import Entry, Source
+from throwcollect.export.readme import Layout, signal_lines
+from throwcollect.export.throw_source import Entry, Source
 from throwcollect.robots.talos import JOINTS
 
 _EPOCH = (1980, 1, 1, 0, 0, 0)

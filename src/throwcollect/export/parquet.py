@@ -9,9 +9,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from throwcollect.dataset.directory import THROWS
-from throwcollect.dataset.throws import encode_table
-from throwcollect.export.card import Layout, signal_lines
-from throwcollect.export.source import Source, Throw
+from throwcollect.dataset.throws_table import encode_table
+from throwcollect.export.readme import Layout, signal_lines
+from throwcollect.export.throw_source import Source, Throw
 
 _TRAJECTORIES = "trajectories"
 _ROWS_PER_GROUP = 30_000

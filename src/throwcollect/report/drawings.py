@@ -13,12 +13,12 @@ from matplotlib.ticker import FuncFormatter, MaxNLocator, NullLocator
 from numpy.typing import NDArray
 
 from throwcollect.report.coverage import Coverage
+from throwcollect.report.dataset_facts import Facts
 from throwcollect.report.episodes import BallPath, JointMotion, Residuals
-from throwcollect.report.facts import Facts
 from throwcollect.report.landing import Landings
 from throwcollect.report.limits import JointPeaks
 from throwcollect.report.outcomes import LANDED, Outcomes, in_words, style_of
-from throwcollect.report.parameters import Parameter
+from throwcollect.report.swept_keys import Parameter
 from throwcollect.report.thinning import thinned
 from throwcollect.tasks.flight import BALLISTIC_TOLERANCE_M
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from throwcollect.dataset.reader import Dataset
 from throwcollect.report.landing import Landings
 from throwcollect.report.outcomes import LANDED, Outcomes
-from throwcollect.robots.interpolation import sample_positions
+from throwcollect.robots.quintic_curve import sample_positions
 from throwcollect.robots.talos import JOINTS
 from throwcollect.tasks.flight import NS_PER_S, flight_residual, release_of
 from throwcollect.tasks.trajectory import throw_trajectory

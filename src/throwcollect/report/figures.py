@@ -14,7 +14,7 @@ from throwcollect.report.episodes import BallPath, JointMotion, Residuals
 from throwcollect.report.landing import Landings
 from throwcollect.report.limits import JointPeaks
 from throwcollect.report.outcomes import LANDED, Outcomes, in_words, style_of
-from throwcollect.report.parameters import Parameter
+from throwcollect.report.swept_keys import Parameter
 from throwcollect.report.thinning import thinned
 from throwcollect.report.throughput import Throughput
 from throwcollect.tasks.flight import BALLISTIC_TOLERANCE_M

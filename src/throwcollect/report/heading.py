@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from html import escape
 
-from throwcollect.report.facts import Facts
+from throwcollect.report.dataset_facts import Facts
 from throwcollect.report.outcomes import in_words, style_of
 from throwcollect.report.panels import Section
 

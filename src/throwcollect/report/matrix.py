@@ -9,7 +9,7 @@ import plotly.graph_objects as go
 
 from throwcollect.report.figures import NEUTRAL
 from throwcollect.report.outcomes import Outcomes, in_words, style_of
-from throwcollect.report.parameters import Parameter
+from throwcollect.report.swept_keys import Parameter
 from throwcollect.report.thinning import thinned
 
 MOST_KEYS = 8

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.dataset.throws import REFUSED
+from throwcollect.dataset.throws_table import REFUSED
 from throwcollect.tasks.throw import Outcome
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from plotly.offline import get_plotlyjs
 
-from throwcollect.report.facts import Facts
+from throwcollect.report.dataset_facts import Facts
 from throwcollect.report.heading import heading
 from throwcollect.report.panels import Panel, Section
 from throwcollect.report.sections import sections

@@ -13,7 +13,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from throwcollect.report import drawings
-from throwcollect.report.facts import Facts
+from throwcollect.report.dataset_facts import Facts
 
 WIDTH_IN = 3.5
 """One column of a paper in two columns [in]."""

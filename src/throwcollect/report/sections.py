@@ -9,7 +9,7 @@ import numpy as np
 
 from throwcollect.report import figures
 from throwcollect.report.coverage import Coverage
-from throwcollect.report.facts import Facts
+from throwcollect.report.dataset_facts import Facts
 from throwcollect.report.heading import share
 from throwcollect.report.matrix import MOST_KEYS, parameter_matrix, points_of_panel, width_of
 from throwcollect.report.outcomes import LANDED, in_words

@@ -10,7 +10,7 @@ from throwcollect.dataset.new_directory import new_directory
 from throwcollect.dataset.reader import Dataset
 from throwcollect.errors import ConfigError
 from throwcollect.files import write_file
-from throwcollect.report.facts import Facts, gather
+from throwcollect.report.dataset_facts import Facts, gather
 
 
 @dataclass(frozen=True)

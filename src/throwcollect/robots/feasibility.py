@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from throwcollect.config.schema import Config, ToolConfig
 from throwcollect.robots.clearance import GRIPPER, MARGIN_M, Clearance, spoon_mount
 from throwcollect.robots.description import joint_model, locked_joints, start_posture
-from throwcollect.robots.interpolation import sample_quintic
 from throwcollect.robots.model import joint_limits
+from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.robots.spoon import ball_seat, inertia, way_out
 from throwcollect.robots.talos import JOINTS
 from throwcollect.robots.trajectory import JointTrajectory

@@ -10,4 +10,4 @@ if TYPE_CHECKING:
     from throwcollect.ros.embedded.api import *  # noqa: F403
     from throwcollect.ros.embedded.api import __all__ as __all__
 else:
-    from throwcollect.ros.chosen import __getattr__ as __getattr__
+    from throwcollect.ros.backend_names import __getattr__ as __getattr__

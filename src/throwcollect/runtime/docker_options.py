@@ -13,7 +13,7 @@ from docker.types import EndpointConfig, LogConfig, Mount, Ulimit
 
 from throwcollect.config.containers import NodeContainerConfig
 from throwcollect.config.schema import Config
-from throwcollect.dataset.card import HOST_VARIABLE
+from throwcollect.dataset.data_card import HOST_VARIABLE
 from throwcollect.dataset.directory import DIRECTORY_VARIABLE
 from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey

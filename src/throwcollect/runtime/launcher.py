@@ -22,10 +22,10 @@ from throwcollect.errors import ConfigError, DatasetError, Interrupted, LossErro
 from throwcollect.ros.fast_dds import SERVER_REST_S
 from throwcollect.run_key import RunKey
 from throwcollect.runtime.events import EventLog, RunEvent
-from throwcollect.runtime.listening import Listening
 from throwcollect.runtime.local import LocalRuntime
 from throwcollect.runtime.nodes import COORDINATOR, LAUNCHER, ROUTER, NodeExit, endpoint_of
 from throwcollect.runtime.records import OpenRun, Record
+from throwcollect.runtime.run_listener import RunListener
 from throwcollect.runtime.runs import goes_on
 from throwcollect.runtime.scaling import MOST_SIMULATIONS, offer_scaling
 from throwcollect.runtime.supervisor import NodeState, Supervisor
@@ -223,7 +223,7 @@ class _Launcher:
         self._place = place
         rest_s = SERVER_REST_S if run.record.middleware.is_fast_dds else 0.0
         self._supervisor = Supervisor(self._place, config.run, simulations=self._simulations, router_rest_s=rest_s)
-        self._listening = Listening(
+        self._listener = RunListener(
             self._report,
             domain_id=run.record.domain_id,
             key=run.key,
@@ -234,7 +234,7 @@ class _Launcher:
 
     def run_to_the_end(self) -> dict[str, Any]:
         self._run.update(launcher=os.getpid(), nodes=(), endpoint=None)
-        with self._supervisor, self._listening:
+        with self._supervisor, self._listener:
             found = self._open()
             self._notes.event("adopted" if found else "started", simulations=self._simulations)
             self._supervisor.start(found=found)
@@ -292,7 +292,7 @@ class _Launcher:
         return info(Path(record.directory)).as_dict()
 
     def _listen(self) -> None:
-        self._listening.spin(endpoint_of(self._place), _POLL_S)
+        self._listener.spin(endpoint_of(self._place), _POLL_S)
 
     def _report(self, progress: Progress) -> None:
         self._notes.progress(progress)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from throwcollect.ros import Node, get_message, get_service
-from throwcollect.sim.limb import Limb
+from throwcollect.sim.limb_controller import LimbController
 from throwcollect.sim.simulation import Simulation
 
 ListControllers: Any = get_service("controller_manager_msgs/srv/ListControllers")
@@ -33,7 +33,7 @@ class ControllerManager(Node):
         return response
 
 
-def _described(limb: Limb, hz: int) -> Any:
+def _described(limb: LimbController, hz: int) -> Any:
     parameters = limb.controller.parameters
     commands, states = (
         [f"{joint}/{interface}" for joint in parameters.joints for interface in interfaces]

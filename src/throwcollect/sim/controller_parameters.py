@@ -11,7 +11,7 @@ from throwcollect.control.parameters import least
 from throwcollect.errors import ConfigError
 from throwcollect.ros import Node, Parameter, ParameterDescriptor, SetParametersResult
 from throwcollect.sim.descriptors import floating_range
-from throwcollect.sim.limb import Limb
+from throwcollect.sim.limb_controller import LimbController
 from throwcollect.sim.present_trial import PresentTrial
 
 _READ_ONLY = {
@@ -43,7 +43,7 @@ class ParameterFace:
         trial: The simulation's trial; while it is leased, nothing is changed.
     """
 
-    def __init__(self, node: Node, limb: Limb, trial: PresentTrial) -> None:
+    def __init__(self, node: Node, limb: LimbController, trial: PresentTrial) -> None:
         self._limb = limb
         self._trial = trial
         for name, value, description, read_only in _declared(limb.controller.parameters):

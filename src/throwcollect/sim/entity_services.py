@@ -6,10 +6,10 @@ from typing import Any
 
 from throwcollect.errors import RequestError
 from throwcollect.ros import Node, get_message, get_service
-from throwcollect.sim.answers import answering
 from throwcollect.sim.body_messages import body_state, entity_state
 from throwcollect.sim.entities import EntityInfo
 from throwcollect.sim.entity_filter import BoxRegion, EntityFilter, SphereRegion
+from throwcollect.sim.service_results import answering
 from throwcollect.sim.simulation import Simulation
 
 GetEntities: Any = get_service("simulation_interfaces/srv/GetEntities")

@@ -26,7 +26,7 @@ from throwcollect.errors import RequestError
 from throwcollect.robots.description import start_posture
 from throwcollect.robots.talos import CONTROLLERS
 from throwcollect.sim.entities import Entities
-from throwcollect.sim.limb import Limb
+from throwcollect.sim.limb_controller import LimbController
 from throwcollect.sim.pace import Pace, longest_steps, slice_steps
 from throwcollect.sim.present_trial import PresentTrial, TrialSetup
 from throwcollect.sim.step_request import StepRequest
@@ -75,14 +75,14 @@ class Simulation:
         self.world = World(config)
         self.entities = Entities(self.world, config.robot.name)
         self._steps: StepRequest | None = None
-        self._period_ns = round(10**9 / config.sim.physics_hz)
+        self._period_ns = period_ns = round(10**9 / config.sim.physics_hz)
         self._stride = config.sim.physics_hz // config.record.rate_hz
         self.limbs = {
-            name: Limb(name, joints, moving=self.world.moving, period_ns=self._period_ns, config=config.controllers)
+            name: LimbController(name, joints, moving=self.world.moving, period_ns=period_ns, config=config.controllers)
             for name, joints in CONTROLLERS.items()
         }
         self._measures_velocity = any(limb.measures_velocity for limb in self.limbs.values())
-        self._watched: list[Limb] = []
+        self._watched: list[LimbController] = []
         self._keeps_states = "controller_state" in config.record.topics
         self._pace = Pace()
         self.real_time_factor = config.sim.real_time_factor
@@ -329,7 +329,7 @@ class Simulation:
         return self._observed(controller).controller.query(time_ns)
 
     def watch(self, controllers: Iterable[str]) -> None:
-        """Keep the states of these controllers, in every control period, for `Limb.pop_states`."""
+        """Keep the states of these controllers, in every control period, for `LimbController.pop_states`."""
         self._watched = [self.limbs[name] for name in controllers]
         for limb in self.limbs.values():
             limb.watched = limb in self._watched
@@ -375,7 +375,7 @@ class Simulation:
         self._collect_results()
         return taken
 
-    def _look(self, limbs: Iterable[Limb]) -> None:
+    def _look(self, limbs: Iterable[LimbController]) -> None:
         """Let controllers see the measured state, for one control period."""
         positions, velocities = self._joint_readings()
         keeps = self._keeps_states and self.world.steps % self._stride == 0
@@ -384,7 +384,7 @@ class Simulation:
             if keeps:
                 limb.keep_state()
 
-    def _observed(self, controller: str) -> Limb:
+    def _observed(self, controller: str) -> LimbController:
         """A limb whose controller knows the state of its joints."""
         limb = self.limbs[controller]
         limb.controller.observe(limb.measured(*self._joint_readings()))

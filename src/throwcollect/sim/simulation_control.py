@@ -6,8 +6,8 @@ from typing import Any
 
 from throwcollect.errors import ConfigError, RequestError
 from throwcollect.ros import Node, get_message, get_service
-from throwcollect.sim.answers import answering
 from throwcollect.sim.entity_services import EntityServices
+from throwcollect.sim.service_results import answering
 from throwcollect.sim.simulation import Scope, Simulation, State
 from throwcollect.sim.spawn_services import SpawnServices
 from throwcollect.sim.stepping import Stepping

@@ -6,9 +6,9 @@ from typing import Any
 
 from throwcollect.errors import RequestError
 from throwcollect.ros import Node, get_message, get_service
-from throwcollect.sim.answers import Result, answering, refusal
 from throwcollect.sim.body_messages import body_state
 from throwcollect.sim.resources import find_resources
+from throwcollect.sim.service_results import Result, answering, refusal
 from throwcollect.sim.simulation import Simulation
 from throwcollect.sim.spawning import SpawnRequest, spawn
 

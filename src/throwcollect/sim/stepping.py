@@ -6,7 +6,7 @@ from typing import Any
 
 from throwcollect.errors import RequestError
 from throwcollect.ros import ActionServer, CancelResponse, Future, Node, get_action, get_service
-from throwcollect.sim.answers import Result, refusal
+from throwcollect.sim.service_results import Result, refusal
 from throwcollect.sim.simulation import Simulation
 from throwcollect.sim.step_request import StepRequest
 

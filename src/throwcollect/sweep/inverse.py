@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from throwcollect.portable import matmul, solve
+from throwcollect.reproducible_math import matmul, solve
 
 _BASES = 8
 """Landed throws near a goal from which a way to it is looked for."""

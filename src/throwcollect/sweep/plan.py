@@ -17,7 +17,7 @@ from throwcollect.config.values import reason_not_sweepable, with_values
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError, PlanError, Problem
 from throwcollect.files import write_file
 from throwcollect.sweep.digest import config_digest, trial_digests
-from throwcollect.sweep.parquet import read_parquet
+from throwcollect.sweep.parquet_file import read_parquet
 from throwcollect.sweep.points import Points
 from throwcollect.sweep.samplers import draw_points
 from throwcollect.wording import counted

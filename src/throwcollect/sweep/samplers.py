@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config, Parameter, Range, Values
 from throwcollect.errors import PlanError, Problem
-from throwcollect.portable import exp, log
+from throwcollect.reproducible_math import exp, log
+from throwcollect.sweep.point_file import read_points
 from throwcollect.sweep.points import Points
-from throwcollect.sweep.table import read_points
 
 _MOST_TRIALS = 10_000_000
 _TRIALS_PER_LANDED = 10

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config, Parameter
 from throwcollect.config.sweep import TargetConfig
-from throwcollect.sweep.cells import NOWHERE, Cells, Thinness
 from throwcollect.sweep.inverse import InverseModel
 from throwcollect.sweep.plan import ROUND_TRIALS, Trial
 from throwcollect.sweep.samplers import places, spread
+from throwcollect.sweep.target_cells import NOWHERE, Cells, Thinness
 from throwcollect.tasks.outcome import Outcome, ThrowResult
 
 _RANDOMNESS = 0

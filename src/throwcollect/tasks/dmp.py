@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from throwcollect.config.schema import DynamicMovementPrimitive
 from throwcollect.errors import ConfigError
-from throwcollect.portable import exp, matmul
+from throwcollect.reproducible_math import exp, matmul
 from throwcollect.robots.trajectory import JointTrajectory
 
 _SETTLED_RAD = 1e-3

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import MinimumJerk
-from throwcollect.portable import power
+from throwcollect.reproducible_math import power
 from throwcollect.robots.trajectory import JointTrajectory
 
 

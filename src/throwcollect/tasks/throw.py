@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
 from throwcollect.episode.record import Contact, EpisodeHeader, Samples
-from throwcollect.robots.interpolation import sample_positions
 from throwcollect.robots.model import JointLimits
+from throwcollect.robots.quintic_curve import sample_positions
 from throwcollect.robots.talos import JOINTS
 from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.tasks.drop import drop, lost_before_start

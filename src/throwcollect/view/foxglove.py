@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from throwcollect.episode.frames import WORLD
-from throwcollect.view.facts import HARDWARE, NAME
+from throwcollect.view.throw_status import HARDWARE, NAME
 
 _SCENE = "3D!throws"
 _BALL = "Plot!ball"

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from throwcollect.dataset.throws import Row
+from throwcollect.dataset.throws_table import Row
 from throwcollect.episode.frames import WORLD
 from throwcollect.episode.topics import BALL
 from throwcollect.errors import ConfigError

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
-from throwcollect.dataset.throws import Row
+from throwcollect.dataset.throws_table import Row
 
 
 @dataclass(frozen=True)

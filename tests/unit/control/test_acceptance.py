@@ -975,7 +975,7 @@ ELSEWHERE = {
     "F2": (CONTROLLERS, "test_steps_advance_a_trajectory_by_as_many_periods"),
     "F3": (TRAJECTORIES, "test_a_reset_aborts_a_goal_even_right_after_it"),
     "F5": (CONTROLLERS, "test_after_a_reset_the_start_posture_is_held"),
-    "F6": ("tests/unit/sim/test_limb.py", "test_a_result_comes_before_time_goes_on"),
+    "F6": ("tests/unit/sim/test_limb_controller.py", "test_a_result_comes_before_time_goes_on"),
     "G1": ("tests/integration/test_graph.py", "test_a_controller_offers_what_it_offers_on_the_robot"),
     "G2": ("tests/integration/test_play_motion.py", "test_motions_of_the_real_robot_are_played"),
     "G4": ("tests/integration/test_play_motion.py", "test_joint_states_have_velocity_and_effort_of_every_joint"),

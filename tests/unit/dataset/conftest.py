@@ -19,8 +19,8 @@ from throwcollect.episode.chunk import ChunkEncoder
 from throwcollect.episode.message import Episode
 from throwcollect.episode.record import Contact, ControllerSamples, EpisodeHeader, GoalOutcome, Samples
 from throwcollect.robots.description import full_description, start_posture
-from throwcollect.robots.interpolation import sample_quintic
 from throwcollect.robots.model import joint_limits
+from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.robots.talos import CONTROLLERS, JOINTS
 from throwcollect.sweep.plan import Plan, make_plan
 from throwcollect.tasks.flight import ballistic_positions

@@ -14,7 +14,7 @@ from tests.unit.dataset.conftest import SETTINGS, Change, Collection, throw
 
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.prepare import checked_plan, feasibility_check
-from throwcollect.dataset.throws import ThrowsTable
+from throwcollect.dataset.throws_table import ThrowsTable
 from throwcollect.dataset.verify import verify
 from throwcollect.dataset.verify_episode import EpisodeCheck
 from throwcollect.dataset.verify_plan import drawing_findings, refusal_findings

@@ -17,7 +17,7 @@ from throwcollect.dataset.rebuild import rebuild
 from throwcollect.dataset.repair import repair
 from throwcollect.dataset.verify import verify
 from throwcollect.dataset.writer import DatasetWriter
-from throwcollect.derive.choice import filtered
+from throwcollect.derive.selection import filtered
 from throwcollect.errors import DatasetError, ThrowcollectError
 
 BEGUN = "quick_00001.mcap.part"

@@ -22,7 +22,7 @@ from throwcollect.dataset.rebuild import rebuild
 from throwcollect.dataset.repair import repair
 from throwcollect.dataset.verify import verify
 from throwcollect.dataset.verify_manifest import manifest_findings
-from throwcollect.derive.choice import filtered
+from throwcollect.derive.selection import filtered
 from throwcollect.errors import DatasetError
 
 MANIFEST = "datapackage.json"

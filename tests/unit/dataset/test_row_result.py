@@ -3,7 +3,7 @@ from dataclasses import replace
 from tests.unit.dataset.conftest import Collection
 
 from throwcollect.dataset.row_result import row_result
-from throwcollect.dataset.throws import Place, ThrowsTable
+from throwcollect.dataset.throws_table import Place, ThrowsTable
 from throwcollect.episode.record import Contact, EpisodeHeader, Samples
 from throwcollect.tasks.throw import Outcome
 

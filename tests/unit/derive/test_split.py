@@ -9,7 +9,7 @@ from tests.unit.dataset.conftest import Collection
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.verify import verify
 from throwcollect.dataset.writer import DatasetWriter
-from throwcollect.derive.choice import merge
+from throwcollect.derive.selection import merge
 from throwcollect.derive.source import source
 from throwcollect.derive.split import assign, split
 from throwcollect.episode.record import Contact, EpisodeHeader, Samples

@@ -15,7 +15,7 @@ from tests.unit.dataset.conftest import make_collection as make_collection
 from throwcollect.dataset.reader import Dataset
 from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.export.formats import export
-from throwcollect.robots.interpolation import sample_quintic
+from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.robots.talos import JOINTS
 from throwcollect.tasks.trajectory import throw_trajectory
 

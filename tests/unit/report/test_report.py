@@ -18,7 +18,7 @@ from throwcollect.cli.dataset.commands import dataset_app
 from throwcollect.dataset.directory import CARD, METADATA
 from throwcollect.dataset.reader import Dataset
 from throwcollect.errors import ConfigError, DatasetError
-from throwcollect.report.facts import gather
+from throwcollect.report.dataset_facts import gather
 from throwcollect.report.page import page as html
 from throwcollect.report.write import write_report
 

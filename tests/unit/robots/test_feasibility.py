@@ -12,8 +12,8 @@ from throwcollect.errors import ConfigError
 from throwcollect.robots import model
 from throwcollect.robots.clearance import MARGIN_M, Clearance, spoon_mount
 from throwcollect.robots.feasibility import Feasibility
-from throwcollect.robots.interpolation import sample_quintic
 from throwcollect.robots.model import half_sitting, joint_limits, share_directory, urdf_path
+from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.robots.spoon import ball_seat
 from throwcollect.robots.talos import JOINTS
 from throwcollect.tasks.trajectory import throw_trajectory

@@ -12,8 +12,8 @@ from scipy.spatial import cKDTree
 from tests.unit.sweep.thrower import DISTANCE, HIT_ANGLE, PARAMETERS, TARGET, collected, configuration, throw
 
 from throwcollect.config.sweep import TargetConfig
-from throwcollect.sweep.cells import Cells, Thinness
 from throwcollect.sweep.plan import Trial, make_plan
+from throwcollect.sweep.target_cells import Cells, Thinness
 from throwcollect.tasks.outcome import BallState, Outcome, ThrowResult
 
 TRIALS = 960

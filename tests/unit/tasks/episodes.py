@@ -6,8 +6,8 @@ import numpy as np
 
 from throwcollect.config.schema import Config
 from throwcollect.episode.record import Contact, EpisodeHeader, GoalOutcome, Samples
-from throwcollect.robots.interpolation import sample_quintic
 from throwcollect.robots.model import half_sitting
+from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.robots.talos import JOINTS
 from throwcollect.tasks.trajectory import throw_trajectory
 

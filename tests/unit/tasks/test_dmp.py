@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from throwcollect.config.schema import Config, DynamicMovementPrimitive
 from throwcollect.errors import ConfigError
-from throwcollect.robots.interpolation import sample_quintic
+from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.tasks.dmp import basis, dmp_trajectory, fit_dmp, roll_out
 from throwcollect.tasks.trajectory import throw_trajectory
 

@@ -9,8 +9,8 @@ from typing import Any
 
 import typer
 
-from throwcollect.derive.choice import filtered, merge, sample
 from throwcollect.derive.derivation import Derived
+from throwcollect.derive.selection import filtered, merge, sample
 from throwcollect.derive.split import SQUARES, split
 from throwcollect.derive.statistics import Statistics, statistics
 from throwcollect.wording import counted

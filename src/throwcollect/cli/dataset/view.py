@@ -9,7 +9,7 @@ from pathlib import Path
 import typer
 
 from throwcollect.errors import ConfigError
-from throwcollect.view.view import view
+from throwcollect.view.viewer_directory import view
 
 
 def write_view(directory: Path, output: Path, *, trials: str | None, json: bool) -> None:

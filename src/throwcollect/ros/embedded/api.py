@@ -10,10 +10,10 @@ from throwcollect.ros.embedded.action import (
     get_action_names_and_types,
     get_action_server_names_and_types_by_node,
 )
-from throwcollect.ros.embedded.beyond import graph_changes, joins_protected, pass_on_log, provide_time, spin_some
 from throwcollect.ros.embedded.context import Context, init, ok, shutdown, try_shutdown
 from throwcollect.ros.embedded.exceptions import ExternalShutdownException
 from throwcollect.ros.embedded.executors import Executor, SingleThreadedExecutor
+from throwcollect.ros.embedded.extensions import graph_changes, joins_protected, pass_on_log, provide_time, spin_some
 from throwcollect.ros.embedded.node import Node, create_node
 from throwcollect.ros.embedded.parameter import (
     FloatingPointRange,

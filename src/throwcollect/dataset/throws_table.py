@@ -12,7 +12,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from throwcollect.errors import DatasetError
-from throwcollect.sweep.parquet import read_parquet
+from throwcollect.sweep.parquet_file import read_parquet
 from throwcollect.sweep.plan import Plan
 from throwcollect.tasks.throw import Outcome, ThrowResult
 

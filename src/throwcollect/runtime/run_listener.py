@@ -22,7 +22,7 @@ _SILENT_S = 8.0
 """Reports come several times a second; after a silence like this the connection is made anew, should it be broken."""
 
 
-class Listening:
+class RunListener:
     """Hears the progress of a run, and moves along when its router gets another address; use it as a context manager.
 
     Args:
@@ -54,7 +54,7 @@ class Listening:
         self._endpoint: str | None = None
         self._heard_at = 0.0
 
-    def __enter__(self) -> Listening:
+    def __enter__(self) -> RunListener:
         return self
 
     def __exit__(
@@ -120,10 +120,10 @@ def follow(
     """
     found = records.get(run)
     record = found.record
-    listening = Listening(on_progress, domain_id=record.domain_id, key=found.key, middleware=record.middleware)
-    with listening:
+    listener = RunListener(on_progress, domain_id=record.domain_id, key=found.key, middleware=record.middleware)
+    with listener:
         yield found
         while found.status == "running" and keep_on():
-            listening.spin(found.record.endpoint, _POLL_S)
+            listener.spin(found.record.endpoint, _POLL_S)
             found = records.get(run)
             yield found

@@ -4,7 +4,7 @@ import pytest
 
 from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError
-from throwcollect.sweep.table import read_points
+from throwcollect.sweep.point_file import read_points
 
 HEADER = "ball.mass_kg,task.duration_s\n"
 

@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 from tests import processors
 
-from throwcollect.portable import cos, exp, log, matmul, power, sin, solve
+from throwcollect.reproducible_math import cos, exp, log, matmul, power, sin, solve
 
 ROOT = Path(__file__).parents[2]
 
@@ -25,7 +25,7 @@ from tests.unit.sweep.thrower import collected, configuration
 
 from throwcollect.config.loader import load
 from throwcollect.episode.frames import MovingFrame
-from throwcollect.robots.interpolation import sample_quintic
+from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.sweep.plan import make_plan
 from throwcollect.tasks.trajectory import throw_trajectory
 

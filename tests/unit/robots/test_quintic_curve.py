@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from throwcollect.robots.interpolation import sample_positions, sample_quintic
+from throwcollect.robots.quintic_curve import sample_positions, sample_quintic
 from throwcollect.robots.trajectory import JointTrajectory
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from throwcollect.dataset.throws import Row
+from throwcollect.dataset.throws_table import Row
 from throwcollect.interfaces import get_message
 from throwcollect.tasks.outcome import Outcome
 

@@ -23,7 +23,7 @@ from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.interfaces import deserialize, get_message
 from throwcollect.robots.model import joint_limits, share_directory
 from throwcollect.robots.talos import JOINTS
-from throwcollect.view.view import View, view
+from throwcollect.view.viewer_directory import View, view
 
 CHOSEN = [5, 0]
 SAMPLED = ["/tf", "/joint_states", "/ball/odometry", "/view/ball_speed", "/view/limits"]

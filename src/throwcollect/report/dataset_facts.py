@@ -24,8 +24,8 @@ from throwcollect.report.failures import Failure, failures
 from throwcollect.report.landing import Landings, landings
 from throwcollect.report.limits import KINDS, JointPeaks, joint_peaks
 from throwcollect.report.outcomes import LANDED, Outcomes
-from throwcollect.report.parameters import Parameter, parameters
 from throwcollect.report.provenance import config_text, provenance
+from throwcollect.report.swept_keys import Parameter, parameters
 from throwcollect.report.throughput import Throughput, throughput
 
 

@@ -11,16 +11,16 @@ from throwcollect.dataset.bag import FileSummary, bag_information, to_yaml
 from throwcollect.dataset.directory import METADATA
 from throwcollect.dataset.new_directory import new_directory
 from throwcollect.dataset.reader import Dataset
-from throwcollect.dataset.throws import Row
+from throwcollect.dataset.throws_table import Row
 from throwcollect.episode.channels import Channel
 from throwcollect.episode.record import Samples
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.files import unwritable
 from throwcollect.robots.description import full_description
 from throwcollect.view.foxglove import layout
-from throwcollect.view.recording import ViewRecording
 from throwcollect.view.robot import drawn_robot
 from throwcollect.view.viewed import ViewedThrow
+from throwcollect.view.viewer_recording import ViewRecording
 
 RECORDING = "throws.mcap"
 LAYOUT = "foxglove.json"

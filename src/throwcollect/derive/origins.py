@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import pyarrow as pa
 
-from throwcollect.dataset.throws import encode_table
+from throwcollect.dataset.throws_table import encode_table
 from throwcollect.derive.source import Source
 
 

@@ -16,7 +16,7 @@ from throwcollect.episode.record import Samples
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.export.resampling import resample, resampled_count
 from throwcollect.export.signals import Signal, signals_of, unit_of
-from throwcollect.robots.interpolation import sample_quintic
+from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.robots.talos import JOINTS
 from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.tasks.outcome import Outcome

@@ -26,7 +26,7 @@ from throwcollect.robots.talos import graph_name
 _LOCKED_TOLERANCE_RAD = 1e-6
 
 
-class Limb:
+class LimbController:
     """A controller bound to the joints of a world.
 
     Joints that are locked are measured where they are locked, and goals that would move them are refused.

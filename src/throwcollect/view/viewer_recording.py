@@ -19,10 +19,10 @@ from throwcollect.episode.record import Samples
 from throwcollect.episode.topics import Recording, ball_odometry, joint_states, transform_message, transforms
 from throwcollect.interfaces import Message, get_message, serialize
 from throwcollect.robots.description import full_description
-from throwcollect.view.facts import throw_facts
 from throwcollect.view.markers import all_markers, path_cloud, robot_markers, throw_markers
 from throwcollect.view.robot import DrawnRobot, ball_urdf
 from throwcollect.view.sampled import ball_speed, range_shares, sampled_messages
+from throwcollect.view.throw_status import throw_facts
 from throwcollect.view.viewed import ViewedThrow
 
 _SAMPLED = Qos("volatile", 100)

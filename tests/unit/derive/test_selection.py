@@ -12,7 +12,7 @@ from throwcollect.config.loader import load
 from throwcollect.dataset.inspect import digest
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.verify import verify
-from throwcollect.derive.choice import filtered, merge, sample
+from throwcollect.derive.selection import filtered, merge, sample
 from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.sweep.plan import make_plan

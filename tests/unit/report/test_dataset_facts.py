@@ -11,10 +11,10 @@ import pytest
 from throwcollect.config.sweep import TargetConfig
 from throwcollect.dataset.directory import JOURNAL
 from throwcollect.dataset.reader import Dataset
-from throwcollect.dataset.throws import REFUSED
+from throwcollect.dataset.throws_table import REFUSED
 from throwcollect.report.coverage import coverage
+from throwcollect.report.dataset_facts import gather
 from throwcollect.report.episodes import residuals
-from throwcollect.report.facts import gather
 from throwcollect.report.failures import Failure, failures
 from throwcollect.report.landing import Landings
 from throwcollect.report.limits import joint_peaks

@@ -9,9 +9,9 @@ from typing import Any
 import pyarrow as pa
 
 from throwcollect.dataset.bag import to_yaml
-from throwcollect.dataset.card import outcome_lines
+from throwcollect.dataset.data_card import outcome_lines
 from throwcollect.dataset.directory import CONFIG
-from throwcollect.export.source import Source
+from throwcollect.export.throw_source import Source
 from throwcollect.robots.talos import JOINTS
 from throwcollect.version import __version__
 
