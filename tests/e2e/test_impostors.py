@@ -119,7 +119,7 @@ def test_a_dataset_is_that_of_its_configuration_whoever_poses_as_a_simulation(
 def forged(directory: Path, path: Path) -> bytes:
     """A sound episode of the first trial, of another configuration, and with another key."""
     config = load(path)
-    delivery = Replayer(config).delivery(make_plan(config, directory=directory), 0)
+    delivery = Replayer(config).delivery(make_plan(config, directory=directory).trials[0])
     return pack(delivery.episode, delivery.conditions, Signer(b"a key of its own"))
 
 

@@ -3,10 +3,12 @@
 import signal
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tests import processors
 from tests.e2e.collection import call, collect, fingerprints, start, write_config
+from throwcollect import Simulator, load
 from throwcollect.dataset.verify import verify
 
 pytestmark = pytest.mark.e2e
@@ -44,6 +46,21 @@ def test_stored_throws_come_out_of_the_simulation_again(reference: Path) -> None
     said = call("dataset", "replay", reference, "--all", "--sample", "5")
     assert (said.returncode, said.stderr) == (0, "")
     assert said.stdout == f"{reference}: 5 throws replayed, the same bit for bit\n"
+
+
+def test_a_simulator_gives_the_throws_of_the_dataset(config: Path, reference: Path) -> None:
+    dataset = load(reference)
+    with Simulator(config) as simulator:
+        for stored in dataset[:3]:
+            throw = simulator.throw(stored.parameters, trial=stored.trial)
+            assert {**throw.row, "shard": None, "chunk_offset": None} == {
+                **stored.row,
+                "shard": None,
+                "chunk_offset": None,
+            }
+            assert throw.events.contacts == stored.events.contacts
+            assert np.array_equal(throw.ball.velocity, stored.ball.velocity)
+            assert np.array_equal(throw.joints.effort, stored.joints.effort)
 
 
 @pytest.mark.parametrize("simulations", [2, 4])

@@ -50,4 +50,4 @@ def test_nothing_is_held_against_an_honest_throw(name: str, tmp_path: Path) -> N
     run = [trial.number for trial in plan.trials if trial.refused is None]
     assert run
     for trial in run:
-        assert list(check.content_problems(replayer.run(plan, trial), channels)) == [], trial
+        assert list(check.content_problems(replayer.run(plan.trials[trial]), channels)) == [], trial

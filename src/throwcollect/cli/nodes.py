@@ -36,7 +36,7 @@ def simulate(directory: Path, trials: Sequence[int]) -> None:
     plan = Plan.read(directory / PLAN, load(directory / CONFIG))
     replayer = Replayer(plan.config)
     for trial in trials:
-        print(json.dumps({"trial": trial, "digest": replayer.run(plan, trial).digest}), flush=True)
+        print(json.dumps({"trial": trial, "digest": replayer.run(plan.trials[trial]).digest}), flush=True)
 
 
 def coordinate(directory: Path, *, config: Path | None) -> None:

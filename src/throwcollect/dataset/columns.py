@@ -9,13 +9,14 @@ from dataclasses import dataclass
 from itertools import groupby
 from operator import attrgetter
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.dataset.mcap_reader import McapContents, opened
 from throwcollect.episode.chunk import CHUNK_HEADER_BYTES, Chunk
+from throwcollect.episode.record import EpisodeHeader
 from throwcollect.episode.topics import rotate
 from throwcollect.episode.trajectory_rows import (
     BALL_ORIENTATION,
@@ -48,9 +49,35 @@ _LARGE_BYTES = 4 << 20
 _NS_PER_S = 1_000_000_000
 
 
+class Recorded(Protocol):
+    """The episode of a throw, wherever it is."""
+
+    @property
+    def start_ns(self) -> int:
+        """Simulated time at which the trial starts [ns]."""
+
+    @property
+    def samples(self) -> int:
+        """Number of samples."""
+
+    def read_rows(self) -> NDArray[np.void]:
+        """The rows of the episode; see `trajectory_rows`.
+
+        Raises:
+            DatasetError: If the episode is not where it should be, or its chunk is damaged.
+        """
+
+    def read_header(self) -> EpisodeHeader:
+        """What is known of the episode besides its samples.
+
+        Raises:
+            DatasetError: If the episode is not where it should be, or it is damaged.
+        """
+
+
 @dataclass(frozen=True)
 class Place:
-    """Where the episode of a throw lies.
+    """Where the episode of a throw lies in a file.
 
     Attributes:
         trial: Number of the trial.
@@ -65,6 +92,16 @@ class Place:
     path: Path
     offset: int
     samples: int
+
+    def read_rows(self) -> NDArray[np.void]:
+        """The rows of the episode, from its file; see `Recorded`."""
+        (rows,) = stored_rows([self])
+        return rows
+
+    def read_header(self) -> EpisodeHeader:
+        """What is known of the episode besides its samples, from its file; see `Recorded`."""
+        with opened(self.path) as contents:
+            return contents.episode(self.offset).episode.header
 
     def rows(self, contents: McapContents) -> NDArray[np.void]:
         """The rows of the episode; see `trajectory_rows`.
@@ -138,7 +175,7 @@ def stored_rows(throws: Iterable[Place]) -> Iterator[NDArray[np.void]]:
 
 def fill(
     columns: Mapping[str, Column],
-    throws: Sequence[Place],
+    throws: Sequence[Recorded],
     tables: Iterable[NDArray[np.void]],
     joints: Sequence[str] = JOINTS,
 ) -> None:

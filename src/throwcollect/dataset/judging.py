@@ -1,28 +1,27 @@
-"""Judges the episodes of a plan's trials as the coordinator does."""
+"""Judges episodes that are stored, or were simulated in this process, as the coordinator does."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from throwcollect.config.schema import Config
 from throwcollect.episode.message import Episode
 from throwcollect.errors import DatasetError
 from throwcollect.robots.model import joint_limits
-from throwcollect.sweep.plan import Plan
 from throwcollect.tasks.throw import ThrowResult, judge
 from throwcollect.tasks.trajectory import throw_trajectory
 
 
-def judged(plan: Plan, episode: Episode) -> ThrowResult:
+def judged(config: Config, episode: Episode) -> ThrowResult:
     """What came of a trial.
 
     Args:
-        plan: The plan that has the trial.
+        config: Configuration of the trial.
         episode: Its episode.
 
     Raises:
         DatasetError: If the episode is damaged.
     """
-    config = plan.config_of(plan.trials[episode.header.trial])
     samples = episode.samples()
     if (np.diff(samples.stamps_ns) <= 0).any():
         raise DatasetError("chunk: the stamps do not increase")

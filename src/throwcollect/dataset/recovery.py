@@ -124,7 +124,7 @@ def _whole_episodes(path: Path, plan: Plan, channels: Channels, wanted: Collecti
         if not salvaged.intact or trial not in wanted or trial in found:
             continue
         try:
-            result = judged(plan, episode)
+            result = judged(plan.config_of(plan.trials[episode.header.trial]), episode)
         except DatasetError:
             continue
         columns = [channel.id for channel in channels.recorded]

@@ -261,7 +261,7 @@ class _Sorting:
                     self.remarks.append(f"{told}; kept, as nothing else speaks against it")
 
     def _write(self, name: str, episode: Episode) -> None:
-        self.writer.append(episode, judged(self.plan, episode))
+        self.writer.append(episode, judged(self.plan.config_of(self.plan.trials[episode.header.trial]), episode))
         self.taken[episode.header.trial] = (name, episode.digest)
 
     def give_up(self, earlier: Mapping[int, Row]) -> tuple[LostTrial, ...]:

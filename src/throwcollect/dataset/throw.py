@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from throwcollect.dataset.columns import TIMES, Column, Place, empty_columns, fill, stored_rows
-from throwcollect.dataset.mcap_reader import opened
+from throwcollect.dataset.columns import TIMES, Column, Recorded, empty_columns, fill
 from throwcollect.episode.trajectory_rows import STAMPS
 from throwcollect.errors import DatasetError
 from throwcollect.robots.talos import JOINTS
@@ -54,18 +52,17 @@ class ContactInterval:
 class _Recording:
     """The rows of an episode, decompressed when a column is first asked for, and kept."""
 
-    def __init__(self, place: Place) -> None:
-        self._place = place
+    def __init__(self, recorded: Recorded) -> None:
+        self._recorded = recorded
 
     @cached_property
     def _rows(self) -> NDArray[np.void]:
-        (rows,) = stored_rows([self._place])
-        return rows
+        return self._recorded.read_rows()
 
     def column(self, name: str) -> Column:
         """A column in an array of its own."""
-        columns = empty_columns([name], self._place.samples)
-        fill(columns, [self._place], [self._rows])
+        columns = empty_columns([name], self._recorded.samples)
+        fill(columns, [self._recorded], [self._rows])
         return columns[name]
 
 
@@ -173,9 +170,7 @@ class Events:
         Raises:
             DatasetError: If the throw has no episode, or it is damaged.
         """
-        place = self._throw.place
-        with opened(place.path) as contents:
-            header = contents.episode(place.offset).episode.header
+        header = self._throw.episode.read_header()
         return tuple(
             ContactInterval(
                 contact.body,
@@ -203,18 +198,18 @@ class Throw:
         table: Table of throws.
         position: Its row there.
         parameters: Swept keys.
-        place: Where its episode lies; None if it has none.
-        directory: Directory of the dataset.
+        episode: Its episode; None if it has none.
+        source: What it belongs to, for messages: the directory of a dataset, or a configuration.
     """
 
     def __init__(
-        self, table: pa.Table, position: int, parameters: tuple[str, ...], place: Place | None, directory: Path
+        self, table: pa.Table, position: int, parameters: tuple[str, ...], episode: Recorded | None, source: str
     ) -> None:
         self._table = table
         self._position = position
         self._keys = parameters
-        self._place = place
-        self._directory = directory
+        self._episode = episode
+        self._source = source
 
     def __repr__(self) -> str:
         text = f"Throw({self.trial}: {self.outcome}"
@@ -223,12 +218,12 @@ class Throw:
         if (landing := self.events.landing) is not None:
             x, y, _ = landing.position
             text += f" at x = {x:.3f} m, y = {y:.3f} m after {landing.time_s:.3f} s"
-        return f"{text}; {self._place.samples} samples)" if self._place else f"{text}; not recorded)"
+        return f"{text}; {self._episode.samples} samples)" if self._episode else f"{text}; not recorded)"
 
     def __reduce__(self) -> tuple[type[Throw], tuple[object, ...]]:
         # Neither the whole table nor what has been read travels with it.
         table = pa.Table.from_pylist([self.row], schema=self._table.schema)
-        return Throw, (table, 0, self._keys, self._place, self._directory)
+        return Throw, (table, 0, self._keys, self._episode, self._source)
 
     @cached_property
     def row(self) -> Mapping[str, Any]:
@@ -260,7 +255,7 @@ class Throw:
     @property
     def recorded(self) -> bool:
         """Whether it has an episode; trials that were refused or lost have none."""
-        return self._place is not None
+        return self._episode is not None
 
     @cached_property
     def events(self) -> Events:
@@ -268,23 +263,23 @@ class Throw:
         return Events(self.row, self)
 
     @property
-    def place(self) -> Place:
-        """Where its episode lies.
+    def episode(self) -> Recorded:
+        """Its episode.
 
         Raises:
             DatasetError: If it has none.
         """
-        if self._place is None:
+        if self._episode is None:
             why = self.outcome if self.reason is None else f"{self.outcome}: {self.reason}"
             raise DatasetError(
-                f"{self._directory}: trial {self.trial} has no episode: {why}",
+                f"{self._source}: trial {self.trial} has no episode: {why}",
                 hint="leave such trials out: dataset.recorded",
             )
-        return self._place
+        return self._episode
 
     @cached_property
     def _recording(self) -> _Recording:
-        return _Recording(self.place)
+        return _Recording(self.episode)
 
     @cached_property
     def ball(self) -> Ball:

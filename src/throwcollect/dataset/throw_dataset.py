@@ -65,7 +65,7 @@ class ThrowDataset(Sequence[Throw]):
         if not -len(self) <= which < len(self):
             raise IndexError(f"{self.directory}: no throw {which} of {len(self)}")
         position = which % len(self)
-        return Throw(self.throws, position, self.parameters, self._places[position], self.directory)
+        return Throw(self.throws, position, self.parameters, self._places[position], str(self.directory))
 
     def __iter__(self) -> Iterator[Throw]:
         return (self[position] for position in range(len(self)))

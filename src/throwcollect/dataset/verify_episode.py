@@ -55,7 +55,7 @@ class RowJudge:
         episode = stored.episode
         trial = self._plan.trials[episode.header.trial]
         place = Place(shard, stored.chunk.offset, episode.header.samples, episode.digest)
-        return self._table.row(trial.number, trial.values, judged(self._plan, episode), place)
+        return self._table.row(trial.number, trial.values, judged(self._plan.config_of(trial), episode), place)
 
 
 class EpisodeCheck:

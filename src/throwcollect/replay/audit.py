@@ -6,7 +6,6 @@ import multiprocessing
 import os
 import signal
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from pathlib import Path
 
 from throwcollect.dataset.reader import Dataset
@@ -62,26 +61,13 @@ class _Worker:
     """What a process keeps from one trial to the next."""
 
     def __init__(self, directory: Path) -> None:
-        with _silence():
-            from throwcollect.replay.throw import Replayer
+        from throwcollect.replay.throw import Replayer
+
         self.dataset = Dataset.open(directory)
         self.replayer = Replayer(self.dataset.config)
 
 
 _worker: list[_Worker] = []
-
-
-@contextmanager
-def _silence() -> Iterator[None]:
-    """Nothing reaches standard error: Bullet tells there when it was built."""
-    kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, 2)
-    try:
-        yield
-    finally:
-        os.dup2(kept, 2)
-        os.close(kept)
-        os.close(nowhere)
 
 
 def _begin(directory: Path, child: bool = False) -> None:
@@ -93,4 +79,4 @@ def _begin(directory: Path, child: bool = False) -> None:
 
 def _replay(trial: int) -> Comparison:
     worker = _worker[0]
-    return compare(worker.dataset.episode(trial), worker.replayer.run(worker.dataset.plan, trial))
+    return compare(worker.dataset.episode(trial), worker.replayer.run(worker.dataset.plan.trials[trial]))

@@ -12,7 +12,7 @@ from throwcollect.errors import ThrowcollectError
 from throwcollect.robots.description import full_description, start_posture
 from throwcollect.sim.present_trial import TrialSetup
 from throwcollect.sim.simulation import Simulation
-from throwcollect.sweep.plan import Plan
+from throwcollect.sweep.plan import Trial
 from throwcollect.tasks.trajectory import throw_trajectory
 
 
@@ -37,31 +37,29 @@ class Replayer:
         """Free the world; no trial can be run afterwards."""
         self._simulation.world.close()
 
-    def run(self, plan: Plan, trial: int) -> Episode:
+    def run(self, trial: Trial) -> Episode:
         """The episode of a trial; see `delivery`."""
-        return self.delivery(plan, trial).episode
+        return self.delivery(trial).episode
 
-    def delivery(self, plan: Plan, trial: int) -> Delivery:
+    def delivery(self, trial: Trial) -> Delivery:
         """The episode of a trial, and what it was simulated with.
 
         Args:
-            plan: The plan that has it.
-            trial: Its number.
+            trial: A trial of the collection, whether its plan has it or not.
 
         Raises:
             ThrowcollectError: If a controller refuses its goal, as it would in a collection.
         """
         simulation = self._simulation
-        values = plan.trials[trial].values
-        config = plan.config_of(plan.trials[trial])
+        config = with_values(self._config, trial.values)
         goals = trial_goals(throw_trajectory(config), start_posture(config))
-        physics = with_values(self._config, {key: value for key, value in values.items() if is_physics(key)})
-        simulation.trial.setup = TrialSetup(trial, tuple(goals), physics)
+        physics = with_values(self._config, {key: value for key, value in trial.values.items() if is_physics(key)})
+        simulation.trial.setup = TrialSetup(trial.number, tuple(goals), physics)
         simulation.reset()
         for controller, goal in goals.items():
-            refusal = simulation.submit(controller, trial, goal)
+            refusal = simulation.submit(controller, trial.number, goal)
             if refusal is not None:
-                raise ThrowcollectError(f"trial {trial}: {controller} refuses its goal: {refusal}")
+                raise ThrowcollectError(f"trial {trial.number}: {controller} refuses its goal: {refusal}")
         while (ended := simulation.episode()) is None:
             simulation.advance(watched=False)
         header, samples, states = ended

@@ -33,7 +33,7 @@ def replayer() -> Iterator[Replayer]:
 
 @pytest.fixture(scope="module")
 def delivery(replayer: Replayer) -> Delivery:
-    return replayer.delivery(PLAN, 1)
+    return replayer.delivery(PLAN.trials[1])
 
 
 @pytest.fixture(scope="module")

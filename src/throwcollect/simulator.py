@@ -1,0 +1,182 @@
+"""Throws of a configuration, simulated in this process: no nodes, no files, the same bits."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from functools import cache, partial
+from pathlib import Path
+from types import TracebackType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from throwcollect.config.loader import load
+from throwcollect.config.schema import Config
+from throwcollect.config.values import reason_not_sweepable, with_values
+from throwcollect.coordinator.prepare import feasibility_check
+from throwcollect.dataset.judging import judged
+from throwcollect.dataset.throw import Throw
+from throwcollect.dataset.throws_table import ThrowsTable
+from throwcollect.episode.message import Episode
+from throwcollect.episode.record import EpisodeHeader
+from throwcollect.episode.trajectory_rows import trajectory_rows
+from throwcollect.errors import ConfigError, PlanError, Problem, WorkerError
+from throwcollect.replay.throw import Replayer
+from throwcollect.sweep.plan import Trial, make_trials
+from throwcollect.sweep.points import Points
+
+Point = Mapping[str, float]
+"""Values that replace those of the configuration, by dotted key, in the key's unit."""
+
+
+class Simulator:
+    """Simulates throws of one configuration, one after the other, as a collection of it would.
+
+    A throw has the samples, the events and the digest that a dataset of the same configuration has for the same values
+    under the same number. It takes about a tenth of a second; the first takes two, as the robot is loaded.
+
+    Use it as a context manager, or `close` it: a process can have a few physics engines at a time.
+
+    Args:
+        config: YAML file of a configuration; its sweep is not looked at.
+        overrides: ``key=value`` pairs that win over the file, as ``--set`` takes them.
+
+    Attributes:
+        config: The resolved configuration.
+
+    Raises:
+        ConfigError: If the configuration is wrong, or does not describe a world.
+        WorkerError: If the physics engine does not start.
+    """
+
+    def __init__(self, config: str | os.PathLike[str], *, overrides: Sequence[str] = ()) -> None:
+        self._source = os.fspath(config)
+        self._overrides = tuple(overrides)
+        self.config: Config = load(Path(config), self._overrides)
+        self._check = feasibility_check(self.config)
+        self._replayer = Replayer(self.config)
+
+    def __enter__(self) -> Simulator:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Free the physics engine; nothing can be simulated afterwards."""
+        self._replayer.close()
+
+    def throw(self, values: Point | None = None, *, trial: int = 0) -> Throw:
+        """Simulate one throw.
+
+        Args:
+            values: What differs from the configuration: any key that a sweep may vary, such as
+                ``{"task.duration_s": 1.1}``.
+            trial: Number of the trial, from 0. The clock of a later trial shows a later time, which is in the stamps
+                and in the digest; nothing else depends on the number.
+
+        Returns:
+            The throw, as `throwcollect.load` gives it; it is in no shard.
+
+        Raises:
+            ConfigError: If a key cannot vary, or a value is out of its range.
+            PlanError: If the plan of a collection would refuse it, for the reason that it would have.
+        """
+        point = dict(values or {})
+        wrong = {key: reason for key in point if (reason := reason_not_sweepable(self.config, key)) is not None}
+        if wrong:
+            raise ConfigError([Problem(reason, key=key) for key, reason in wrong.items()])
+        if trial < 0:
+            raise ConfigError(f"trial {trial}: there is no such trial", expected="a number from 0")
+        points = Points(tuple(point), np.array([list(point.values())], np.float64).reshape(1, len(point)))
+        (planned,) = make_trials(self.config, points, check=self._check, first=trial)
+        if planned.refused is not None:
+            raise PlanError([Problem(planned.refused)], hint="a collection would leave this trial out, as refused")
+        return self._throw(planned)
+
+    def throw_many(self, points: Iterable[Point], *, processes: int = 1) -> Iterator[Throw]:
+        """Simulate many throws, which are the trials 0, 1, 2 and so on.
+
+        With several processes, the program must do its work below ``if __name__ == "__main__":``, because each process
+        imports it (see `multiprocessing`). All points are taken before the first throw is there then.
+
+        Args:
+            points: What differs from the configuration, for each of them.
+            processes: How many processes simulate, each with a physics engine of its own; 1 is this process alone.
+
+        Yields:
+            The throws, in the order of their points.
+
+        Raises:
+            ConfigError: As `throw`, when it is the turn of that throw.
+            PlanError: As `throw`, when it is the turn of that throw.
+            WorkerError: If the physics engine of a process does not start, or a process is killed.
+        """
+        if processes < 1:
+            raise ConfigError(f"processes: got {processes}", expected="1 or more")
+        if processes == 1:
+            for trial, point in enumerate(points):
+                yield self.throw(point, trial=trial)
+            return
+        # A new interpreter each: the physics engine must not be forked.
+        spawn = multiprocessing.get_context("spawn")
+        workers = ProcessPoolExecutor(processes, spawn, _begin, (self._source, self._overrides))
+        try:
+            yield from workers.map(_throw, enumerate(points))
+        except BrokenProcessPool as error:
+            raise WorkerError("a process that simulates was killed", hint="the kernel's log may say why") from error
+        finally:
+            workers.shutdown(cancel_futures=True)
+
+    def _throw(self, trial: Trial) -> Throw:
+        episode = self._replayer.run(trial)
+        keys = tuple(trial.values)
+        table = ThrowsTable(keys, tuple(self.config.task.end))
+        row = table.row(trial.number, trial.values, judged(with_values(self.config, trial.values), episode), None)
+        row |= {"samples": episode.header.samples, "digest": episode.digest}
+        return Throw(table.table([row]), 0, keys, _Simulated(episode), self._source)
+
+
+@dataclass(frozen=True)
+class _Simulated:
+    """The episode of a throw that is in memory alone."""
+
+    episode: Episode
+
+    @property
+    def start_ns(self) -> int:
+        return self.episode.header.start_ns
+
+    @property
+    def samples(self) -> int:
+        return self.episode.header.samples
+
+    def read_rows(self) -> NDArray[np.void]:
+        return trajectory_rows(self.episode.contents, self.samples)
+
+    def read_header(self) -> EpisodeHeader:
+        return self.episode.header
+
+
+_make: list[Callable[[], Simulator]] = []
+"""Makes the simulator of a process of `Simulator.throw_many`, or gives the one that was made before."""
+
+
+def _begin(config: str, overrides: tuple[str, ...]) -> None:
+    # Ctrl-C is for the process that started this one, which ends it.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # It is made for the first throw and not here, where an error would not reach whoever asked for throws.
+    _make[:] = [cache(partial(Simulator, config, overrides=overrides))]
+
+
+def _throw(numbered: tuple[int, Point]) -> Throw:
+    trial, point = numbered
+    return _make[0]().throw(point, trial=trial)

@@ -1,0 +1,101 @@
+"""Single throws in this process."""
+
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from throwcollect import Simulator
+from throwcollect.errors import ConfigError, PlanError
+
+ROOT = Path(__file__).parents[2]
+PAGE = (ROOT / "docs" / "simulator.md").read_text(encoding="utf-8")
+POINT = {"task.duration_s": 1.1, "ball.mass_kg": 0.04}
+
+
+@pytest.fixture(scope="module")
+def simulator() -> Iterator[Simulator]:
+    with Simulator(ROOT / "configs" / "quickstart.yaml") as simulator:
+        yield simulator
+
+
+def test_a_throw_does_not_depend_on_those_before_it(simulator: Simulator) -> None:
+    first = simulator.throw(POINT)
+    other = simulator.throw({"ball.mass_kg": 0.05})
+    again = simulator.throw(POINT)
+    assert first.row == again.row
+    assert first.row["digest"] != other.row["digest"]
+    assert np.array_equal(first.ball.position, again.ball.position)
+
+
+def test_the_number_of_the_trial_is_in_the_stamps_alone(simulator: Simulator) -> None:
+    first, second = simulator.throw(POINT), simulator.throw(POINT, trial=1)
+    assert (first.trial, second.trial) == (0, 1)
+    assert first.joints.stamps_ns[0] < second.joints.stamps_ns[0]
+    assert np.array_equal(first.joints.time_s, second.joints.time_s)
+    assert np.array_equal(first.joints.effort, second.joints.effort)
+
+
+def test_a_throw_has_all_that_one_of_a_dataset_has(simulator: Simulator) -> None:
+    throw = simulator.throw(POINT)
+    assert (throw.outcome, throw.reason, throw.recorded, throw.parameters) == ("landed", None, True, POINT)
+    assert throw.row["samples"] == len(throw.ball) == len(throw.joints)
+    assert throw.events.release.time_s < throw.events.apex.time_s < throw.events.landing.time_s
+    assert throw.events.contacts[0].body == "spoon"
+    assert repr(throw).startswith("Throw(0: landed at x = ")
+
+
+def test_several_processes_give_the_same_throws(simulator: Simulator) -> None:
+    points = [POINT, {}, {"task.duration_s": 1.2}]
+    alone = [throw.row for throw in simulator.throw_many(points)]
+    assert [row["trial"] for row in alone] == [0, 1, 2]
+    together = list(simulator.throw_many(points, processes=2))
+    assert [throw.row for throw in together] == alone
+    assert together[0].ball.position.shape == (alone[0]["samples"], 3)
+
+
+@pytest.mark.parametrize("processes", [1, 2])
+def test_the_throws_before_one_that_is_refused_are_given_out(simulator: Simulator, processes: int) -> None:
+    throws = simulator.throw_many([{}, {"task.duration_s": 0.2}], processes=processes)
+    assert next(throws).trial == 0
+    with pytest.raises(PlanError, match=r"moves at .* rad/s at .* its limit is"):
+        next(throws)
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"task.duration": 1.0}, "task.duration: unknown key; did you mean 'task.duration_s'"),
+        ({"record.rate_hz": 100.0}, "record.rate_hz: cannot vary from trial to trial"),
+        ({"ball.mass_kg": -1.0}, "ball.mass_kg: should be a number above 0"),
+    ],
+)
+def test_wrong_values_are_named(simulator: Simulator, values: dict[str, float], message: str) -> None:
+    with pytest.raises(ConfigError, match=re.escape(message)):
+        simulator.throw(values)
+
+
+def test_there_are_no_negative_numbers(simulator: Simulator) -> None:
+    with pytest.raises(ConfigError, match="trial -1: there is no such trial"):
+        simulator.throw(trial=-1)
+    with pytest.raises(ConfigError, match="processes: got 0"):
+        next(simulator.throw_many([{}], processes=0))
+
+
+def test_a_configuration_that_is_not_there_is_named(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=re.escape(f"{tmp_path / 'no.yaml'}: no such file")):
+        Simulator(tmp_path / "no.yaml")
+
+
+def test_the_program_of_the_page_runs_and_says_nothing_else(tmp_path: Path) -> None:
+    (program,) = re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL)
+    (tmp_path / "program.py").write_text(program)
+    said = subprocess.run(
+        [sys.executable, tmp_path / "program.py"], capture_output=True, text=True, timeout=120, cwd=ROOT, check=False
+    )
+    assert (said.returncode, said.stderr) == (0, "")
+    assert len(said.stdout.splitlines()) == 4
