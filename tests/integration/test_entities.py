@@ -104,6 +104,8 @@ def found(robot: Robot, **filters: Any) -> list[str]:
         ("al", ["ball", "talos"]),
         ("^(b|t)al{1,2}$|nothing", ["ball"]),
         ("[[:digit:]]", []),
+        ("^[b-t]a[^[:upper:]]{1,3}$", ["ball", "talos"]),
+        (r"ball\.", []),
     ],
 )
 def test_entities_are_found_by_extended_regular_expressions(pattern: str, names: list[str], robot: Robot) -> None:
@@ -113,14 +115,14 @@ def test_entities_are_found_by_extended_regular_expressions(pattern: str, names:
 @pytest.mark.parametrize(
     ("pattern", "words"),
     [
-        ("(", "unmatched ("),
-        ("*", "nothing before * to repeat"),
-        ("a{1,255}{1,255}{1,255}", "repetitions multiply"),
+        ("(", "missing )"),
+        ("*", "no argument for repetition operator: *"),
+        ("a{1,255}{1,255}{1,255}", "invalid repetition size"),
         ("a" * 10_000, "10000 characters; at most 256"),
-        ("\\w", "not part of extended regular expressions"),
+        ("\\w", "invalid escape sequence: \\w"),
     ],
 )
-def test_expressions_that_are_none_are_refused_with_the_place(pattern: str, words: str, robot: Robot) -> None:
+def test_expressions_that_are_none_are_refused_with_the_reason(pattern: str, words: str, robot: Robot) -> None:
     refused = robot.call("get_entities", filters=EntityFilters(filter=pattern))
     assert refused.result.result == Result.RESULT_OPERATION_FAILED
     assert words in refused.result.error_message
