@@ -227,7 +227,7 @@ def _prepared(records: Records, request: _Request, plan: Plan | None, shown: Dis
         )
         from throwcollect.runtime.launcher import place_of
 
-        # Finds what cannot be had of what the configuration asks for.
+        # A dry run: constructing the runtime checks image, mounts, networks and ports.
         place_of(record, config, run.key, warn=shown.warn).close()
         run.write(record)
         undo.pop_all()

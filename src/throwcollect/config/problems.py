@@ -90,7 +90,7 @@ def findings(error: ValidationError, values: Any, *, above: Location = ()) -> li
             # A union reports once for each alternative; the sentence speaks of all of them anyway.
             found.setdefault(finding.location, finding)
     for location in [place[:length] for place in found for length in range(len(place))]:
-        # Of the alternatives of a union, the one that got as far as an item is meant.
+        # A union reports every branch. Keep the deepest error: it is of the branch that the user meant.
         found.pop(location, None)
     unknown = [finding for finding in found.values() if finding.unknown]
     meant = {(*finding.location[:-1], _nearest(finding)) for finding in unknown}

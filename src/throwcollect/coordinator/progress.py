@@ -37,7 +37,7 @@ class Progress:
 
     @property
     def landed(self) -> int:
-        """Number of throws that landed without blemish."""
+        """Number of throws whose outcome is ``landed``."""
         return self.outcomes.get("landed", 0)
 
     @property

@@ -170,7 +170,7 @@ def _refuse_changes(directory: Path, stored: Config, config: Config) -> None:
 def _grows(before: int | None, after: int | None, config: Config) -> bool:
     """Whether a number of trials or throws may take the place of another; none is the largest."""
     if not config.grows:
-        # Its trials are counted.
+        # `_extended` compares the trials of a plan that does not grow.
         return True
     return after is None or (before is not None and after >= before)
 

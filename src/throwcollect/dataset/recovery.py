@@ -27,7 +27,7 @@ from throwcollect.tasks.throw import ThrowResult
 
 @dataclass(frozen=True)
 class RecoveredEpisode:
-    """An episode that needs not be run again.
+    """A complete episode that was found on disk, so that its trial need not be run again.
 
     Attributes:
         trial: Number of its trial.

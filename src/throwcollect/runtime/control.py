@@ -1,4 +1,4 @@
-"""How others than its launcher end a run."""
+"""End a run from another process than its launcher."""
 
 from __future__ import annotations
 

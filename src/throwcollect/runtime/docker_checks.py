@@ -36,7 +36,7 @@ def check(client: DockerClient, place: RunPlace, config: Config) -> None:
     with engine_errors("the Docker engine cannot be asked"):
         networks = {each["Name"] for each in client.api.networks()}
         root = os.path.realpath(client.api.info()["DockerRootDir"])
-        # Those of a launcher that died hold their ports, and go on with them.
+        # The containers of a launcher that died hold the port already, and are taken over with it.
         begun = client.api.containers(all=True, filters={"label": f"{RUN_LABEL}={place.run_id}"})
         try:
             client.images.get(image(config))

@@ -41,7 +41,7 @@ def place_directory(client: DockerClient, place: RunPlace, config: Config, direc
     with (
         engine_errors(f"{directory} cannot be copied into the volume {place.source}"),
         tempfile.SpooledTemporaryFile(_IN_MEMORY) as packed,
-        # It need not run: the engine writes into its mounts.
+        # The container is never started: the engine writes into the mounts of a stopped one, too.
         _single(client, place, config, ["--version"], place.mount(read_only=False)) as container,
     ):
         with tarfile.open(fileobj=packed, mode="w") as archive:

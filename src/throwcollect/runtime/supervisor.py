@@ -214,7 +214,7 @@ class Supervisor:
         self._frozen_since = {name: self._frozen_since.get(name, now) for name in frozen}
         for name, since in self._frozen_since.items():
             if now - since >= _FROZEN_S:
-                # Told once.
+                # Report each frozen node only once.
                 self._frozen_since[name] = math.inf
                 news.append(f"{name} is frozen (paused or stopped) and is ended")
                 self.runtime.signal(name, signal.SIGKILL)

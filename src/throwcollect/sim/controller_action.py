@@ -92,7 +92,7 @@ class ControllerAction:
         if refusal is not None and not self._aborts_refused:
             return GoalResponse.REJECT
         self._count += 1
-        # There is nothing to tell of a goal before time has passed.
+        # Send no feedback until simulated time has passed since the goal was accepted.
         self._told_ns = self._simulation.now_ns
         self._considered[self._count] = []
         self._results[self._count] = Future()

@@ -56,7 +56,7 @@ class SphereRegion:
 
 @dataclass(frozen=True)
 class EntityFilter:
-    """What an entity must be like; what is empty does not matter.
+    """Conditions that an entity must meet; an empty one matches every entity.
 
     Attributes:
         name: POSIX extended regular expression that is found in its name; empty for any.

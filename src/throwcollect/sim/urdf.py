@@ -1,4 +1,4 @@
-"""Robots and objects in URDF, as strangers write them: checked, and written anew for the physics engine.
+"""Robots and objects in URDF, from untrusted files: checked, and written anew for the physics engine.
 
 Bullet ends its process on some descriptions and guesses on others, so it gets to see only what was understood here:
 links with mass and inertia, collision shapes, joints that form a tree.

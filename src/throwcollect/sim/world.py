@@ -141,7 +141,7 @@ class World:
         Args:
             start_ns: Simulated time of the present state [ns].
         """
-        # What was taken out of the world since the last step presses no more.
+        # Drop contacts with bodies that were removed since the last step.
         self._pressing = {surface for surface in self._pressing if surface in self._names}
         self._begin(start_ns, self._joint_states())
 

@@ -109,7 +109,7 @@ class Thinness:
         return taken
 
     def doubt(self, cells: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Give cells back that it seems useless to throw at; from now on they count as if missed four times more.
+        """Give back cells for which no promising throw was found; from now on they count as missed four times more.
 
         Args:
             cells: Some that were taken, shape ``(n_cells,)``.

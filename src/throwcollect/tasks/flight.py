@@ -125,7 +125,7 @@ def without_impact(flight: Flight, impact_s: float, *, config: Config) -> Flight
         The knots before the impact, and in place of the first one from it on where free flight would have led; the
         flight itself if it has no such pair of knots.
     """
-    # Half a step is in no doubt of rounding.
+    # Subtract half a step, so that rounding cannot pick the next knot.
     knot = int(np.searchsorted(flight.times, impact_s - 0.5 / config.sim.physics_hz))
     if not 0 < knot < len(flight.times):
         return flight

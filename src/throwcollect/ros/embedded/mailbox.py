@@ -75,7 +75,7 @@ class Receiver:
         surplus = None
         with self.mailbox.lock:
             if len(self._items) == self._queue_length:
-                # One item more and one less: the receiver is already in the mailbox often enough.
+                # The queue is full: the oldest item makes room, and the number of pending wake-ups stays right.
                 surplus = self._items.popleft()
                 self._items.append(item)
             else:
