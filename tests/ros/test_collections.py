@@ -48,8 +48,12 @@ heard = []
 node.create_subscription(JointState, "/sim_0/joint_states", heard.append, 10)
 client = node.create_client(GetParameters, "/sim_0/sim_0/get_parameters")
 assert client.wait_for_service(20)
-answer = client.call_async(GetParameters.Request(names=["ball.mass_kg"]))
-rclpy.spin_until_future_complete(node, answer, timeout_sec=10)
+for _ in range(10):
+    # A service of rclpy may answer before it knows the client.
+    answer = client.call_async(GetParameters.Request(names=["ball.mass_kg"]))
+    rclpy.spin_until_future_complete(node, answer, timeout_sec=3)
+    if answer.done():
+        break
 assert answer.result().values[0].double_value > 0
 for _ in range(200):
     if heard:
