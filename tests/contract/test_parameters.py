@@ -1,6 +1,7 @@
 """Parameters of a node, and the services by which others change them."""
 
 import re
+import time
 from array import array
 
 import pytest
@@ -12,8 +13,10 @@ from throwcollect.ros import (
     Parameter,
     ParameterDescriptor,
     SetParametersResult,
+    SingleThreadedExecutor,
     get_message,
     get_service,
+    spin_some,
 )
 
 FloatingPointRange = get_message("rcl_interfaces/msg/FloatingPointRange")
@@ -203,8 +206,30 @@ def test_unknown_names_and_types_are_answered_and_not_fatal(rig, node):
         Parameter("use_sim_time", value=True).to_parameter_msg(),
     )
     odd.value.type = 77
-    # rclpy ends spinning at a type that there is not.
+    # `spin_once` of rclpy ends at a type that there is not; `spin_some` does not, as the next test shows.
     wanted = [absent] if ON_RCLPY else [absent, odd]
     results = remote.call("SetParameters", parameters=wanted).results
     assert [result.successful for result in results] == [False] * len(wanted)
     assert said(embedded="not declared", rclpy="undeclared") in results[0].reason
+
+
+def test_a_request_that_cannot_be_read_ends_no_node(rig):
+    _, caller = rig.node("asked"), rig.node("caller")
+    (executor, _), asking = rig.executors[0], SingleThreadedExecutor(context=caller.context)
+    asking.add_node(caller)
+    client = caller.create_client(get_service("rcl_interfaces/srv/SetParameters"), "/asked/set_parameters")
+    odd = Parameter("use_sim_time", value=True).to_parameter_msg()
+    odd.value.type = 77
+
+    def asked(parameter):
+        future = client.call_async(client.srv_type.Request(parameters=[parameter]))
+        deadline = time.monotonic() + 2
+        while not future.done() and time.monotonic() < deadline:
+            spin_some(executor, 0.01)
+            asking.spin_once(timeout_sec=0.01)
+        return future.done() and future.result().results[0].successful
+
+    assert rig.sees(client.service_is_ready)
+    assert not asked(odd)
+    assert any(asked(Parameter("use_sim_time", value=False).to_parameter_msg()) for _ in range(10))
+    asking.shutdown()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import logging
 import os
+import traceback
 from contextlib import suppress
 from importlib import import_module
 from typing import Any
@@ -32,6 +33,7 @@ from rclpy.action import (
 from rclpy.context import Context
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor, TimeoutException
 from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
@@ -151,10 +153,24 @@ def spin_some(executor: Executor, timeout_sec: float) -> None:
         while True:
             callback, _, _ = executor.wait_for_ready_callbacks(timeout_sec=wait)
             callback()
-            if (error := callback.exception()) is not None:
+            error = callback.exception()
+            if error is not None and not _is_of_request(error):
                 raise error
+            if error is not None:
+                get_logger("rclpy").warning(
+                    f"a request that cannot be read is left without an answer: {error}", throttle_duration_sec=1.0
+                )
             # From now on the executor looks once at all that is ready, and says so at the end of that.
             wait = 0.0
+
+
+def _is_of_request(error: BaseException) -> bool:
+    """Whether rclpy itself stumbled over what a request says, such as a parameter of a type that there is not.
+
+    Nobody who may send requests to a node shall be able to end it.
+    """
+    modules = [frame.f_globals.get("__name__", "") for frame, _ in traceback.walk_tb(error.__traceback__)]
+    return isinstance(error, ValueError) and not any(name.startswith("throwcollect.") for name in modules)
 
 
 def pass_on_log(node: Node, record: logging.LogRecord) -> None:
