@@ -259,6 +259,8 @@ def test_a_simulation_goes_on_while_its_router_is_away_and_is_all_there_when_it_
         with connected(endpoint) as context:
             robot = Robot(context, OWN)
             robot.wait_until_ready(simulation)
+            # It asks itself for something before it says that it is ready, by a client that goes then.
+            robot.wait_until(lambda: not endpoints(robot, EntityKind.CLIENT), "it has asked itself")
             before = {token.key() for kind in EntityKind for token in endpoints(robot, kind)}
             assert robot.set({"sim.real_time_factor": 1.0}).successful
             handle = robot.send(swing(1.0))
