@@ -114,7 +114,8 @@ def test_the_documented_command_runs(environment: dict[str, str], tmp_path: Path
 
 @pytest.mark.parametrize("environment", ["v2"], indirect=True)
 def test_a_node_that_dies_is_started_again(environment: dict[str, str], tmp_path: Path) -> None:
-    config = write_config(tmp_path, trials=100)
+    # So many that the collection outlives both kills on a fast machine, too.
+    config = write_config(tmp_path, trials=300)
     collect(config, tmp_path / "undisturbed", 2)
     command = [str(SCRIPT), str(config), "2", str(tmp_path / "data")]
     process = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
