@@ -115,8 +115,8 @@ def attachment() -> bytes:
 
 
 def _answers(session: zenoh.Session, name: str) -> bool:
-    # A simulation lives in a namespace of its own name.
-    path = name if name == _COORDINATOR else f"{name}/{name}"
+    # A simulation lives in a namespace of its own name, or in that of the root.
+    path = name if name == _COORDINATOR else f"**/{name}"
     replies = session.get(
         data_key(domain_of_environment(), f"{path}/get_parameters", "rcl_interfaces/srv/GetParameters", _ANY_HASH),
         target=zenoh.QueryTarget.ALL,

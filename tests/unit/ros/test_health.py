@@ -38,7 +38,7 @@ def test_the_request_is_what_a_client_node_would_send():
     assert health.attachment() != health.attachment()
 
 
-@pytest.mark.parametrize(("name", "namespace"), [("sim_3", "/sim_3"), ("coordinator", "/")])
+@pytest.mark.parametrize(("name", "namespace"), [("sim_3", "/sim_3"), ("sim_3", "/"), ("coordinator", "/")])
 def test_a_node_that_works_answers(rig, spinning, name, namespace):
     rig.node(name, namespace=namespace)
     spinning()
