@@ -18,7 +18,7 @@ import tomllib
 ROOT = Path(__file__).resolve().parents[1]
 INTERFACES = ROOT / "packaging" / "ros_interfaces"
 CONSTRAINTS = ROOT / "packaging" / "ros_constraints.txt"
-DEFINITIONS = ROOT / "src" / "throwcollect" / "interfaces" / "definitions"
+DEFINITIONS = ROOT / "src" / "rclzenoh" / "interfaces" / "definitions"
 STAMP = "made-from.sha256"
 
 

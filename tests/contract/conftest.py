@@ -13,10 +13,10 @@ from collections.abc import Iterator, Mapping
 
 import pytest
 
+from rclzenoh.session_config import CONFIG_FILE_VARIABLE, OVERRIDE_VARIABLE
 from tests.contract.rig import Rig
 from throwcollect.ros.middleware import Middleware
 from throwcollect.ros.router import router
-from throwcollect.ros.session_config import CONFIG_FILE_VARIABLE, OVERRIDE_VARIABLE
 
 # Above 101, the ports of a domain are among those that any process may be given. Tests at the same time share them out.
 _WORKER, _WORKERS = os.environ.get("PYTEST_XDIST_WORKER", "gw0"), os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1")

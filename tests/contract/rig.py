@@ -7,8 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 from throwcollect.ros import Context, Future, Node, SingleThreadedExecutor
-from throwcollect.ros.backend import uses_rclpy
-from throwcollect.ros.middleware import Middleware
+from throwcollect.ros.middleware import Middleware, uses_rclpy
 
 ON_RCLPY = uses_rclpy()
 ON_DDS = Middleware.of_process().is_fast_dds
@@ -22,11 +21,11 @@ if ON_RCLPY:
     from rclpy.logging import get_logger as get_logger
     from rclpy.utilities import get_default_context as get_default_context
 else:
-    from throwcollect.ros.embedded import exceptions as exceptions
-    from throwcollect.ros.embedded.context import get_default_context as get_default_context
-    from throwcollect.ros.embedded.exceptions import InvalidHandle as InvalidHandle
-    from throwcollect.ros.embedded.exceptions import NotInitializedException as NotInitializedException
-    from throwcollect.ros.embedded.logging import Logger
+    from rclzenoh import exceptions as exceptions
+    from rclzenoh.context import get_default_context as get_default_context
+    from rclzenoh.exceptions import InvalidHandle as InvalidHandle
+    from rclzenoh.exceptions import NotInitializedException as NotInitializedException
+    from rclzenoh.logging import Logger
 
     get_logger = Logger
 

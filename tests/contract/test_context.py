@@ -23,7 +23,7 @@ def test_a_context_lives_from_init_to_shutdown(environment):
 def test_a_context_can_be_used_again(environment):
     for _ in range(2):
         ros.init()
-        ros.create_node("n")
+        ros.Node("n")
         ros.shutdown()
 
 

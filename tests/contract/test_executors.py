@@ -1,11 +1,9 @@
 import threading
 import time
-from contextlib import suppress
 
 import pytest
 
-from tests.contract.rig import ON_RCLPY, get_default_context, said
-from throwcollect import ros
+from tests.contract.rig import ON_RCLPY, said
 from throwcollect.ros import ExternalShutdownException, Future, SingleThreadedExecutor, get_message
 
 String = get_message("std_msgs/msg/String")
@@ -156,26 +154,3 @@ def test_shutting_the_executor_down_ends_spinning(node, executor):
     executor.spin()
     # On rclpy, nodes remember the last executor they were in.
     assert ON_RCLPY or node.executor is None
-
-
-def test_module_functions_spin_a_node_with_the_shared_executor(environment):
-    ros.init()
-    try:
-        node = ros.create_node("node")
-        calls = []
-        node.create_timer(0.001, lambda: calls.append(1))
-        while not calls:
-            ros.spin_once(node, timeout_sec=1)
-        assert ON_RCLPY or node.executor is None
-        future = Future()
-        node.create_timer(0.001, lambda: future.set_result(1))
-        ros.spin_until_future_complete(node, future, timeout_sec=5)
-        assert future.done()
-        threading.Timer(0.05, get_default_context().shutdown).start()
-        # On rclpy, the executor is shut down, too, and whichever it sees first ends spinning.
-        ends = suppress(ExternalShutdownException) if ON_RCLPY else pytest.raises(ExternalShutdownException)
-        with ends:
-            ros.spin(node)
-    finally:
-        ros.try_shutdown()
-    assert not ros.ok()

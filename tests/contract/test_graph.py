@@ -1,7 +1,7 @@
 """What nodes see of each other."""
 
+from rclzenoh.interfaces import type_hash
 from tests.contract.rig import ON_DDS, ON_RCLPY, names_of
-from throwcollect.interfaces import type_hash
 from throwcollect.ros import DurabilityPolicy, QoSProfile, ReliabilityPolicy, get_message, get_service
 
 STRING, INT32, TRIGGER = "std_msgs/msg/String", "std_msgs/msg/Int32", "std_srvs/srv/Trigger"

@@ -12,16 +12,18 @@ SERVER = """
 from throwcollect import ros
 
 ros.init()
-node = ros.create_node("server")
+node = ros.Node("server")
 
 def answer(request, response):
     response.success = True
     return response
 
 node.create_service(ros.get_service("std_srvs/srv/Trigger"), "trigger", answer)
+executor = ros.SingleThreadedExecutor()
+executor.add_node(node)
 print("ready", flush=True)
 try:
-    ros.spin(node)
+    executor.spin()
 except ros.ExternalShutdownException:
     pass
 print("asked to end", flush=True)
@@ -34,7 +36,7 @@ def start(*arguments, **options):
 
 
 def test_a_process_that_forgets_to_shut_down_ends(environment):
-    script = "from throwcollect import ros; ros.init(); ros.create_node('n')"
+    script = "from throwcollect import ros; ros.init(); ros.Node('n')"
     assert subprocess.run([sys.executable, "-c", script], timeout=20, check=False).returncode == 0
 
 

@@ -4,8 +4,8 @@ import time
 
 import pytest
 
+from rclzenoh.interfaces import message_class, serialize
 from tests.contract.rig import ON_RCLPY, InvalidHandle, said
-from throwcollect.interfaces import message_class, serialize
 from throwcollect.ros import DurabilityPolicy, QoSProfile, ReliabilityPolicy, get_message
 
 String = get_message("std_msgs/msg/String")

@@ -66,7 +66,7 @@ class Project:
 def definitions() -> Path:
     """Directory of the definitions: ``<package>/{msg,srv,action}/<name>.<kind>``."""
     carried = ROOT / "definitions"
-    return carried if carried.is_dir() else _CLONE / "src" / "throwcollect" / "interfaces" / "definitions"
+    return carried if carried.is_dir() else _CLONE / "src" / "rclzenoh" / "interfaces" / "definitions"
 
 
 def license_files() -> tuple[Path, ...]:

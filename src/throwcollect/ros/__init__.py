@@ -1,13 +1,14 @@
 """The ROS 2 edge: what a node needs of rclpy's API, and the classes of its messages.
 
 Nodes import from here and from nowhere below, so that they run unchanged on both backends: genuine rclpy, and the
-embedded one. The first name that is taken from here settles which one it is; see `backend`.
+embedded one. The first name that is taken from here settles which one it is; see `middleware`.
 """
 
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from throwcollect.ros.embedded.api import *  # noqa: F403
-    from throwcollect.ros.embedded.api import __all__ as __all__
+    from rclzenoh.api import *  # noqa: F403
+    from throwcollect.ros.embedded import init as init
+    from throwcollect.ros.embedded import joins_protected as joins_protected
 else:
     from throwcollect.ros.backend_names import __getattr__ as __getattr__

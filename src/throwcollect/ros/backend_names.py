@@ -10,20 +10,24 @@ _EDGE = "throwcollect.ros"
 
 
 def __getattr__(name: str) -> Any:
-    """A name of the backend, which `throwcollect.ros` has from then on.
+    if name.startswith("__"):
+        raise AttributeError(name)
+    value = backend_name(name)
+    setattr(sys.modules[_EDGE], name, value)
+    return value
+
+
+def backend_name(name: str) -> Any:
+    """A name of the backend.
 
     Raises:
         AttributeError: If the backend has no such name.
         ConfigError: If the environment asks for a backend that is not there.
     """
-    from throwcollect.ros.backend import uses_rclpy
+    from throwcollect.ros.middleware import uses_rclpy
 
-    if name.startswith("__"):
-        raise AttributeError(name)
-    backend = import_module(f"{_EDGE}.genuine" if uses_rclpy() else f"{_EDGE}.embedded.api")
+    backend = import_module(f"{_EDGE}.genuine" if uses_rclpy() else f"{_EDGE}.embedded")
     try:
-        value = getattr(backend, name)
+        return getattr(backend, name)
     except AttributeError:
         raise AttributeError(f"module {_EDGE!r} has no attribute {name!r}") from None
-    setattr(sys.modules[_EDGE], name, value)
-    return value

@@ -5,22 +5,16 @@ from __future__ import annotations
 import itertools
 import logging
 import os
+import threading
 import traceback
-from contextlib import suppress
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from typing import Any
 
 import rclpy
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
-from rclpy import (
-    create_node,
-    ok,
-    shutdown,
-    spin,
-    spin_once,
-    spin_until_future_complete,
-    try_shutdown,
-)
+from rclpy import shutdown
 from rclpy.action import (
     ActionClient,
     ActionServer,
@@ -31,6 +25,7 @@ from rclpy.action import (
     get_action_server_names_and_types_by_node,
 )
 from rclpy.context import Context
+from rclpy.exceptions import NameValidationException
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor, TimeoutException
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.logging import get_logger
@@ -42,38 +37,95 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 from rclpy.time import Time
 
-from throwcollect.errors import ThrowcollectError
+from rclzenoh.session_config import OPEN, OVERRIDE_VARIABLE, client_override, connect_endpoint, is_protected
+from throwcollect.errors import ThrowcollectError, WorkerError
+from throwcollect.ros.connection import Connection
 from throwcollect.ros.fast_dds import PLAIN_DISCOVERY, PROFILE_VARIABLE, client_profile, write_temporarily
-from throwcollect.ros.middleware import Middleware
-from throwcollect.ros.session_config import OPEN, connect_endpoint, is_protected
+from throwcollect.ros.middleware import RMW_VARIABLE, Middleware
+from throwcollect.ros.zenoh_errors import zenoh_errors
 
 _looks = itertools.count()
 
 
-def init(args: list[str] | None = None, *, context: Context | None = None, domain_id: int | None = None) -> None:
+def init(*, context: Context | None = None, connection: Connection | None = None) -> None:
     """Initialise a context, as ``rclpy.init`` does but for signals: they are left to whoever handles them.
 
     rclpy's own handlers would take the context away from nodes that still have to finish something.
 
     Args:
-        args: Command line arguments.
         context: The context; None for the default one.
-        domain_id: Domain identifier; None takes ``ROS_DOMAIN_ID``, or 0.
+        connection: The way into the graph; None for the one that the environment describes.
 
     Raises:
         RuntimeError: If the context is in use already.
-        ConfigError: If a variable of the environment does not hold what it should.
-        ThrowcollectError: If the RMW does not start, as rmw_zenoh_cpp does not without a router.
+        ConfigError: If a variable of the environment does not hold what it should, or the connection is one by other
+            middleware.
+        ThrowcollectError: If the RMW does not start, as rmw_zenoh_cpp does not without a router, or this process is in
+            another run on Fast DDS.
     """
+    # rclpy loads its RMW at the first look at it, and finds its name in the environment alone.
+    os.environ[RMW_VARIABLE] = Middleware.of_process().rmw
     middleware = Middleware("rclpy", rclpy.get_rmw_implementation_identifier())
-    endpoint = connect_endpoint()
+    variables: Mapping[str, str] = {}
+    domain_id = None
+    if connection is None:
+        with zenoh_errors():
+            endpoint = connect_endpoint()
+    else:
+        connection.check(middleware.rmw)
+        endpoint = connection.endpoint
+        domain_id = connection.domain_id
+        variables = {OVERRIDE_VARIABLE: client_override(endpoint, connection.session_key)}
     if middleware.is_fast_dds and endpoint is not None and not endpoint.startswith(OPEN):
-        profile = write_temporarily(client_profile(endpoint))
-        os.environ.update({PROFILE_VARIABLE: str(profile), **PLAIN_DISCOVERY})
+        _use_discovery_server(endpoint)
     try:
-        rclpy.init(args=args, context=context, domain_id=domain_id, signal_handler_options=SignalHandlerOptions.NO)
+        with _environment(variables):
+            rclpy.init(context=context, domain_id=domain_id, signal_handler_options=SignalHandlerOptions.NO)
     except rclpy_implementation.RCLError as error:
         raise ThrowcollectError(f"ROS 2 does not start: {error}") from error
+
+
+_discovery_server: list[str] = []
+"""Endpoint of the discovery server that nodes of this process look for."""
+
+
+def _use_discovery_server(endpoint: str) -> None:
+    """Have the nodes of this process find others by a discovery server of Fast DDS.
+
+    Fast DDS reads its profile when the first node is made, and never again. So the variable stays, and a process can
+    have one discovery server only.
+
+    Raises:
+        ConfigError: If the endpoint has no address.
+        WorkerError: If this process has another one.
+    """
+    if _discovery_server and _discovery_server != [endpoint]:
+        raise WorkerError(
+            f"this process is in the run at {_discovery_server[0]}, and on Fast DDS it cannot be in that at {endpoint}",
+            hint="join it from a process of its own",
+        )
+    profile = write_temporarily(client_profile(endpoint))
+    os.environ.update({PROFILE_VARIABLE: str(profile), **PLAIN_DISCOVERY})
+    _discovery_server[:] = [endpoint]
+
+
+_environment_lock = threading.Lock()
+
+
+@contextmanager
+def _environment(variables: Mapping[str, str]) -> Iterator[None]:
+    """Set environment variables for a moment: while a context is initialised, its RMW reads them, and nothing else."""
+    with _environment_lock:
+        before = {name: os.environ.get(name) for name in variables}
+        os.environ.update(variables)
+        try:
+            yield
+        finally:
+            for name, value in before.items():
+                if value is None:
+                    del os.environ[name]
+                else:
+                    os.environ[name] = value
 
 
 def get_message(name: str) -> Any:
@@ -136,7 +188,10 @@ def joins_protected() -> bool:
     Raises:
         ConfigError: If an environment variable does not hold what it should.
     """
-    return Middleware("rclpy", rclpy.get_rmw_implementation_identifier()).keeps_others_out and is_protected()
+    if not Middleware("rclpy", rclpy.get_rmw_implementation_identifier()).keeps_others_out:
+        return False
+    with zenoh_errors():
+        return is_protected()
 
 
 def spin_some(executor: Executor, timeout_sec: float) -> None:
@@ -205,6 +260,7 @@ __all__ = [
     "GoalResponse",
     "HistoryPolicy",
     "IntegerRange",
+    "NameValidationException",
     "Node",
     "Parameter",
     "ParameterDescriptor",
@@ -214,7 +270,6 @@ __all__ = [
     "SetParametersResult",
     "SingleThreadedExecutor",
     "Time",
-    "create_node",
     "get_action",
     "get_action_client_names_and_types_by_node",
     "get_action_names_and_types",
@@ -224,13 +279,8 @@ __all__ = [
     "graph_changes",
     "init",
     "joins_protected",
-    "ok",
     "pass_on_log",
     "provide_time",
     "shutdown",
-    "spin",
-    "spin_once",
     "spin_some",
-    "spin_until_future_complete",
-    "try_shutdown",
 ]

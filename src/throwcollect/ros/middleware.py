@@ -1,13 +1,27 @@
-"""What carries the messages of a run: all its nodes have to agree on it, and so has everybody who joins."""
+"""What carries the messages of a run: all its nodes have to agree on it, and so has everybody who joins.
+
+What a process has is settled by its environment: ``THROWCOLLECT_ROS`` is ``auto``, ``rclpy`` or ``embedded``, and
+genuine rclpy has its own variable for the RMW. A program that joins a run settles it by `Middleware.settle` instead.
+"""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import Literal
 
-from throwcollect.ros.backend import EMBEDDED_RMW, RMW_VARIABLE, VARIABLE, uses_rclpy
+from throwcollect.errors import ConfigError
+from throwcollect.ros_installation import how_to_install, missing, rmws
+from throwcollect.wording import listed
+
+VARIABLE = "THROWCOLLECT_ROS"
+"""Name of the environment variable that chooses the backend."""
+RMW_VARIABLE = "RMW_IMPLEMENTATION"
+"""Name of the environment variable by which rclpy chooses what it talks through."""
+EMBEDDED_RMW = "rmw_zenoh_cpp"
+"""The RMW whose wire protocol the embedded backend speaks."""
 
 Backend = Literal["embedded", "rclpy"]
 
@@ -29,14 +43,14 @@ class Middleware:
 
     @classmethod
     def of_process(cls) -> Middleware:
-        """That of this process.
+        """That of this process: the one it has settled on, or else the one that its environment asks for.
 
         Raises:
             ConfigError: If the environment asks for a backend that is not there.
         """
-        if not uses_rclpy():
-            return cls()
-        return cls("rclpy", os.environ.get(RMW_VARIABLE) or _DEFAULT_RMW)
+        if _settled:
+            return _settled[0]
+        return _installed(os.environ.get(VARIABLE) or "auto", os.environ.get(RMW_VARIABLE) or None)
 
     @property
     def is_fast_dds(self) -> bool:
@@ -60,14 +74,18 @@ class Middleware:
         return {VARIABLE: self.backend, RMW_VARIABLE: self.rmw}
 
     def settle(self) -> None:
-        """Make it that of this process, before anything of `throwcollect.ros` is imported.
+        """Make it that of this process, whatever its environment says.
+
+        It has to be done before the first name is taken from `throwcollect.ros`, as a process has one backend.
 
         Raises:
-            ConfigError: If the backend is not there.
+            ConfigError: If the backend or its RMW is not there.
         """
-        os.environ.update(self.environment())
-        uses_rclpy.cache_clear()
-        uses_rclpy()
+        _settled[:] = [_installed(self.backend, self.rmw if self.backend == "rclpy" else None)]
+
+
+_settled: list[Middleware] = []
+"""What this process has settled on; empty while its environment decides."""
 
 
 def wanted(backend: Literal["auto", "embedded", "rclpy"]) -> Middleware:
@@ -79,7 +97,50 @@ def wanted(backend: Literal["auto", "embedded", "rclpy"]) -> Middleware:
     Raises:
         ConfigError: If the backend is not there.
     """
-    if backend != "auto":
-        os.environ[VARIABLE] = backend
-        uses_rclpy.cache_clear()
-    return Middleware.of_process()
+    if backend == "auto":
+        return Middleware.of_process()
+    return _installed(backend, os.environ.get(RMW_VARIABLE) or None)
+
+
+def uses_rclpy() -> bool:
+    """Whether nodes of this process run on genuine rclpy.
+
+    Raises:
+        ConfigError: If the environment asks for a backend that is not there.
+    """
+    return Middleware.of_process().backend == "rclpy"
+
+
+# To look for all interfaces takes milliseconds, and every name of `throwcollect.ros` asks.
+@cache
+def _installed(backend: str, rmw: str | None) -> Middleware:
+    """The middleware that is asked for: genuine rclpy by default, if Python finds it and all interfaces.
+
+    By default it is not taken where rmw_zenoh_cpp is asked for and ROS does not have it: the embedded backend speaks as
+    that does.
+
+    Raises:
+        ConfigError: If there is no such backend, or rclpy is asked for and is not there or lacks interfaces, or there
+            is no such RMW.
+    """
+    if backend not in ("auto", "rclpy", "embedded"):
+        raise ConfigError(f"{VARIABLE}: got {backend!r}", expected="auto, rclpy or embedded")
+    if backend == "embedded":
+        return Middleware()
+    if lacking := missing():
+        if backend == "auto":
+            return Middleware()
+        raise ConfigError(
+            f"{VARIABLE} is rclpy, but Python does not find {listed(lacking)}",
+            hint=f"{how_to_install()}; or set it to embedded",
+        )
+    installed = rmws()
+    if rmw is None or rmw in installed:
+        return Middleware("rclpy", rmw or _DEFAULT_RMW)
+    if backend == "auto" and rmw == EMBEDDED_RMW:
+        return Middleware()
+    raise ConfigError(
+        f"{RMW_VARIABLE} is {rmw}, which is not installed",
+        expected=listed(installed, "or") or "an installed RMW",
+        hint=f"unset {RMW_VARIABLE}, or set {VARIABLE}=embedded",
+    )

@@ -16,11 +16,13 @@ from queue import Empty, SimpleQueue
 
 import zenoh
 
+from rclzenoh.session_config import OPEN, PROTECTED, in_words, router_config
 from throwcollect.errors import ConfigError, ThrowcollectError
 from throwcollect.interruption import stop_signals
+from throwcollect.ros.connection import session_key
 from throwcollect.ros.discovery_server import discovery_server
 from throwcollect.ros.middleware import Middleware
-from throwcollect.ros.session_config import OPEN, PROTECTED, in_words, router_config
+from throwcollect.ros.zenoh_errors import zenoh_errors
 from throwcollect.run_key import RunKey
 
 DEFAULT_LISTEN = "tcp/127.0.0.1:7447"
@@ -77,8 +79,15 @@ def _open(listen: str, key: RunKey | None) -> tuple[zenoh.Session, str]:
     wants_any = port == "0"
     for attempt in range(_PORT_ATTEMPTS):
         endpoint = f"{address}:{_free_port(address)}" if wants_any else listen
+        with zenoh_errors():
+            config = router_config(endpoint, session_key(endpoint, key) if key is not None else None)
+        if endpoint.startswith(PROTECTED) and key is None:
+            raise ConfigError(
+                f"the router cannot listen on {endpoint}: no key is named",
+                expected="--key DIR, where a new key is made if there is none; or tcp/..., which lets anybody in",
+            )
         try:
-            return zenoh.open(router_config(endpoint, key)), endpoint
+            return zenoh.open(config), endpoint
         except zenoh.ZError as error:
             # Somebody may have taken the free port in between.
             if not wants_any or attempt == _PORT_ATTEMPTS - 1:

@@ -12,9 +12,11 @@ from types import SimpleNamespace
 import pytest
 
 import throwcollect.ros
+from rclzenoh.interfaces.catalog import DEFINITIONS
+from rclzenoh.interfaces.typed_names import ACTIONS, MESSAGES, SERVICES
 from throwcollect.errors import ConfigError
-from throwcollect.interfaces.catalog import DEFINITIONS
-from throwcollect.ros.backend import RMW_VARIABLE, VARIABLE, uses_rclpy
+from throwcollect.ros import embedded
+from throwcollect.ros.middleware import RMW_VARIABLE, VARIABLE, _installed, uses_rclpy
 from throwcollect.ros_installation import PACKAGES, how_to_install, missing, module_name
 
 ROOT = Path(__file__).parents[3]
@@ -22,9 +24,9 @@ ROOT = Path(__file__).parents[3]
 
 @pytest.fixture(autouse=True)
 def _fresh():
-    uses_rclpy.cache_clear()
+    _installed.cache_clear()
     yield
-    uses_rclpy.cache_clear()
+    _installed.cache_clear()
 
 
 def test_the_embedded_backend_can_be_asked_for(monkeypatch):
@@ -59,7 +61,7 @@ def ros(monkeypatch, tmp_path):
 
 def test_rclpy_is_taken_where_it_and_all_interfaces_are_found(ros, monkeypatch):
     assert uses_rclpy()
-    uses_rclpy.cache_clear()
+    _installed.cache_clear()
     monkeypatch.setenv(VARIABLE, "embedded")
     assert not uses_rclpy()
 
@@ -78,7 +80,7 @@ def test_an_rclpy_without_all_interfaces_is_taken_only_if_asked_for_and_then_say
     (ros / package / files).unlink()
     assert missing() == [lacking]
     assert not uses_rclpy()
-    uses_rclpy.cache_clear()
+    _installed.cache_clear()
     monkeypatch.setenv(VARIABLE, "rclpy")
     with pytest.raises(ConfigError, match=f"THROWCOLLECT_ROS is rclpy, but Python does not find {lacking}\n  try: "):
         uses_rclpy()
@@ -113,7 +115,7 @@ def test_an_rmw_that_is_not_installed_is_one_message(ros, monkeypatch):
 def test_where_ros_has_no_zenoh_the_embedded_backend_speaks_it(ros, monkeypatch):
     monkeypatch.setenv(RMW_VARIABLE, "rmw_zenoh_cpp")
     assert not uses_rclpy()
-    uses_rclpy.cache_clear()
+    _installed.cache_clear()
     monkeypatch.setenv(VARIABLE, "rclpy")
     with pytest.raises(ConfigError, match="rmw_zenoh_cpp, which is not installed"):
         uses_rclpy()
@@ -124,7 +126,8 @@ def test_all_packages_whose_interfaces_nodes_use_are_looked_for():
     rooms = [path for room in ("coordinator", "runtime", "sim", "episode") for path in (source / room).rglob("*.py")]
     named = re.compile(r"""["']([a-z0-9_]+)/(?:msg|srv|action)/""")
     used = {package for path in rooms for package in named.findall(path.read_text(encoding="utf-8"))}
-    assert used <= {*PACKAGES, *OF_DATASETS}
+    used |= {name.partition("/")[0] for names in (MESSAGES, SERVICES, ACTIONS) for name in names.values()}
+    assert used == {*PACKAGES, *OF_DATASETS}
 
 
 OF_DATASETS = {"diagnostic_msgs", "visualization_msgs"}
@@ -144,18 +147,15 @@ def test_another_value_is_one_clear_message_and_exit_code_2(tmp_path):
 
 
 def test_both_backends_offer_the_same_names():
-    root = Path(throwcollect.ros.__file__).parent
-    offered = {}
-    for name in ("embedded/api.py", "genuine.py"):
-        tree = ast.parse((root / name).read_text())
-        bound = {
-            alias.asname or alias.name for node in tree.body if isinstance(node, ast.ImportFrom) for alias in node.names
-        } | {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
-        (listed,) = [
-            ast.literal_eval(node.value)
-            for node in tree.body
-            if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__"
-        ]
-        assert set(listed) <= bound
-        offered[name] = listed
-    assert offered["embedded/api.py"] == offered["genuine.py"]
+    tree = ast.parse(Path(throwcollect.ros.__file__).with_name("genuine.py").read_text())
+    bound = {
+        alias.asname or alias.name for node in tree.body if isinstance(node, ast.ImportFrom) for alias in node.names
+    } | {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
+    (listed,) = [
+        ast.literal_eval(node.value)
+        for node in tree.body
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__"
+    ]
+    assert set(listed) <= bound
+    assert listed == sorted(embedded.__all__)
+    assert all(hasattr(embedded, name) for name in listed)

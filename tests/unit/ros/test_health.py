@@ -8,11 +8,9 @@ import pytest
 import zenoh
 
 import throwcollect.ros.health as health
+from rclzenoh.session_config import OVERRIDE_VARIABLE
 from throwcollect.errors import ConfigError, ThrowcollectError
-from throwcollect.interfaces import get_service, serialize
-from throwcollect.ros.embedded.attachment import unpack
 from throwcollect.ros.health import check
-from throwcollect.ros.session_config import OVERRIDE_VARIABLE
 
 
 @pytest.fixture
@@ -29,13 +27,6 @@ def spinning(rig):
 @pytest.fixture
 def impatient(monkeypatch):
     monkeypatch.setattr(health, "TIMEOUT_S", 0.3)
-
-
-def test_the_request_is_what_a_client_node_would_send():
-    assert serialize(get_service("rcl_interfaces/srv/GetParameters").Request()) == health.REQUEST
-    received = unpack(health.attachment())
-    assert received.sequence == 1
-    assert health.attachment() != health.attachment()
 
 
 @pytest.mark.parametrize(("name", "namespace"), [("sim_3", "/sim_3"), ("sim_3", "/"), ("coordinator", "/")])

@@ -5,8 +5,7 @@ import os
 import pytest
 
 from throwcollect.errors import ConfigError
-from throwcollect.ros.backend import RMW_VARIABLE, VARIABLE, uses_rclpy
-from throwcollect.ros.middleware import Middleware, wanted
+from throwcollect.ros.middleware import RMW_VARIABLE, VARIABLE, Middleware, _installed, uses_rclpy, wanted
 
 EMBEDDED, FAST_DDS = Middleware(), Middleware("rclpy", "rmw_fastrtps_cpp")
 ZENOH, OTHER = Middleware("rclpy", "rmw_zenoh_cpp"), Middleware("rclpy", "rmw_cyclonedds_cpp")
@@ -18,16 +17,16 @@ def _fresh(monkeypatch):
         # Both calls, so that whatever a test leaves there is taken away.
         monkeypatch.setenv(variable, "")
         monkeypatch.delenv(variable)
-    uses_rclpy.cache_clear()
+    _installed.cache_clear()
     yield
-    uses_rclpy.cache_clear()
+    _installed.cache_clear()
 
 
 @pytest.fixture
 def rclpy(monkeypatch):
     """As if rclpy with two RMWs were there."""
-    monkeypatch.setattr("throwcollect.ros.backend.missing", list)
-    monkeypatch.setattr("throwcollect.ros.backend.rmws", lambda: ["rmw_fastrtps_cpp", "rmw_cyclonedds_cpp"])
+    monkeypatch.setattr("throwcollect.ros.middleware.missing", list)
+    monkeypatch.setattr("throwcollect.ros.middleware.rmws", lambda: ["rmw_fastrtps_cpp", "rmw_cyclonedds_cpp"])
 
 
 @pytest.mark.parametrize(
@@ -51,17 +50,18 @@ def test_that_of_a_process_is_what_its_environment_says(rclpy, monkeypatch):
     assert Middleware.of_process() == FAST_DDS
     monkeypatch.setenv(RMW_VARIABLE, OTHER.rmw)
     assert Middleware.of_process() == OTHER
-    uses_rclpy.cache_clear()
     monkeypatch.setenv(VARIABLE, "embedded")
     assert Middleware.of_process() == EMBEDDED
 
 
-def test_settling_it_holds_for_the_process_and_what_it_starts(rclpy):
-    assert uses_rclpy()
-    EMBEDDED.settle()
-    assert (uses_rclpy(), os.environ[VARIABLE]) == (False, "embedded")
-    FAST_DDS.settle()
-    assert (uses_rclpy(), os.environ[RMW_VARIABLE]) == (True, FAST_DDS.rmw)
+def test_a_process_settles_it_whatever_its_environment_says_and_leaves_that_alone(rclpy, monkeypatch):
+    monkeypatch.setenv(VARIABLE, "embedded")
+    before = dict(os.environ)
+    assert not uses_rclpy()
+    for middleware in (OTHER, EMBEDDED, FAST_DDS):
+        middleware.settle()
+        assert Middleware.of_process() == middleware
+    assert dict(os.environ) == before
     with pytest.raises(ConfigError, match="rmw_zenoh_cpp, which is not installed"):
         ZENOH.settle()
 
@@ -69,6 +69,8 @@ def test_settling_it_holds_for_the_process_and_what_it_starts(rclpy):
 def test_a_configuration_may_leave_it_open_or_ask_for_a_backend(rclpy, monkeypatch):
     assert wanted("auto") == FAST_DDS
     assert wanted("embedded") == EMBEDDED
-    monkeypatch.setattr("throwcollect.ros.backend.missing", lambda: ["rclpy"])
+    assert Middleware.of_process() == FAST_DDS
+    _installed.cache_clear()
+    monkeypatch.setattr("throwcollect.ros.middleware.missing", lambda: ["rclpy"])
     with pytest.raises(ConfigError, match="THROWCOLLECT_ROS is rclpy, but Python does not find rclpy"):
         wanted("rclpy")

@@ -4,11 +4,14 @@ import sys
 
 import pytest
 
+from rclzenoh import session
+from rclzenoh.session_config import OVERRIDE_VARIABLE, client_override, is_protected
+from throwcollect import ros
 from throwcollect.errors import ConfigError, ThrowcollectError
-from throwcollect.ros.embedded import session
+from throwcollect.interruption import stop_signals
+from throwcollect.ros.connection import session_key
 from throwcollect.ros.health import check
 from throwcollect.ros.router import router, serve
-from throwcollect.ros.session_config import OVERRIDE_VARIABLE, client_override, is_protected
 from throwcollect.run_key import KEY_VARIABLE, RunKey
 
 COMMAND = [sys.executable, "-m", "throwcollect.ros.router", "--listen"]
@@ -60,19 +63,25 @@ def key(tmp_path):
     return made
 
 
+def override_of(endpoint, key):
+    return client_override(endpoint, session_key(endpoint, key))
+
+
 def test_a_protected_router_lets_in_who_has_its_key_and_nobody_else(environment, rig, monkeypatch, key, tmp_path):
     stranger = RunKey(tmp_path / "stranger")
     stranger.create()
     monkeypatch.setattr(session, "_PATIENCE_S", 0.1)
     with router("tls/127.0.0.1:0", key) as endpoint:
-        monkeypatch.setenv(OVERRIDE_VARIABLE, client_override(endpoint, key))
+        monkeypatch.setenv(OVERRIDE_VARIABLE, override_of(endpoint, key))
         assert is_protected()
         rig.context().shutdown()
         check("router")
-        for override in (client_override(endpoint, stranger), client_override(endpoint.replace("tls", "tcp"), key)):
+        for override in (override_of(endpoint, stranger), override_of(endpoint.replace("tls", "tcp"), key)):
             monkeypatch.setenv(OVERRIDE_VARIABLE, override)
-            with pytest.raises(ThrowcollectError, match="no Zenoh session"):
-                rig.context()
+            with pytest.raises(ThrowcollectError, match="no Zenoh session") as caught:
+                ros.init()
+            assert "python -m throwcollect.ros.router" in caught.value.hint
+            assert ".rs" not in caught.value.evidence
             with pytest.raises(ThrowcollectError, match="no session with the router"):
                 check("router")
 
@@ -90,14 +99,14 @@ def test_a_key_where_zenoh_does_not_find_it_is_refused(tmp_path):
     key = RunKey(tmp_path / "what;now?")
     key.create()
     with pytest.raises(ConfigError, match="what;now\\?: Zenoh finds no key in a directory with ; or \\? in its name"):
-        client_override("tls/127.0.0.1:1", key)
+        override_of("tls/127.0.0.1:1", key)
 
 
-def test_a_client_is_told_of_a_key_that_cannot_be_read(environment, monkeypatch, key, rig):
+def test_a_client_is_told_of_a_key_that_cannot_be_read(environment, monkeypatch, key):
     key.certificate.unlink()
-    monkeypatch.setenv(OVERRIDE_VARIABLE, client_override("tls/127.0.0.1:1", key))
+    monkeypatch.setenv(OVERRIDE_VARIABLE, override_of("tls/127.0.0.1:1", key))
     with pytest.raises(ConfigError, match=r"cannot be read: .*/certificate.pem: No such file"):
-        rig.context()
+        ros.init()
 
 
 def test_the_command_makes_a_key_where_there_is_none_and_keeps_the_one_that_is_there(tmp_path):
@@ -111,12 +120,23 @@ def test_the_command_makes_a_key_where_there_is_none_and_keeps_the_one_that_is_t
     assert keys[0] == keys[1]
 
 
+@pytest.fixture
+def signal_handlers():
+    """Whoever serves in this process takes its signals."""
+    before = {number: signal.getsignal(number) for number in stop_signals()}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+@pytest.mark.usefixtures("signal_handlers")
 def test_a_key_that_would_keep_nobody_out_is_refused(tmp_path):
     with pytest.raises(ConfigError, match=r"--key: tcp/127.0.0.1:0 lets anybody in"):
         serve("tcp/127.0.0.1:0", tmp_path / "new")
     assert not (tmp_path / "new").exists()
 
 
+@pytest.mark.usefixtures("signal_handlers")
 def test_the_key_of_the_environment_is_used_and_never_made(monkeypatch, tmp_path):
     monkeypatch.setenv(KEY_VARIABLE, str(tmp_path / "gone"))
     with pytest.raises(ConfigError, match=r"cannot be read: .*gone/key.pem"):

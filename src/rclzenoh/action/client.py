@@ -1,0 +1,188 @@
+"""Action clients."""
+
+from __future__ import annotations
+
+import uuid
+import weakref
+from collections.abc import Callable
+from typing import Any
+
+from rclzenoh.interfaces import Action, AnyMessage, Message
+from rclzenoh.interfaces.msg import UUID, GoalInfo, GoalStatus, GoalStatusArray, Time
+from rclzenoh.interfaces.srv import CancelGoal
+from rclzenoh.keys import EntityKind, dds_type
+from rclzenoh.node_endpoints import NodeEndpoints
+from rclzenoh.qos import QoSProfile, qos_profile_action_status_default
+from rclzenoh.subscription import Subscription
+from rclzenoh.task import Future
+
+FeedbackCallback = Callable[[Any], Any]
+
+
+class ClientGoalHandle:
+    """A goal, as its client sees it."""
+
+    def __init__(self, client: ActionClient, goal_id: UUID, response: AnyMessage) -> None:
+        self._client = client
+        self.goal_id = goal_id
+        self.accepted: bool = response.accepted
+        self.stamp: Time = response.stamp
+        self._status: int = GoalStatus.STATUS_UNKNOWN
+
+    @property
+    def status(self) -> int:
+        """State of the goal, as far as the server has told; asking for it is what makes the client listen."""
+        self._client.listen_to_status()
+        return self._status
+
+    def update(self, status: int) -> None:
+        """Take over the state that the server tells."""
+        self._status = status
+
+    def get_result_async(self) -> Future:
+        """Ask for the result.
+
+        Returns:
+            A future of the response, which has ``status`` and ``result``.
+        """
+        return self._client.request_result(self)
+
+    def cancel_goal_async(self) -> Future:
+        """Ask for the goal to be cancelled.
+
+        Returns:
+            A future of the response of action_msgs/srv/CancelGoal.
+        """
+        return self._client.request_cancel(self)
+
+
+class ActionClient:
+    """Sends goals.
+
+    A client subscribes to feedback when it is first given a callback for it, and to the status when a goal's status is
+    first asked for: servers then spare messages that nobody looks at.
+
+    Args:
+        node: Node that the client belongs to.
+        action_type: Class of the action.
+        action_name: Name of the action.
+    """
+
+    def __init__(self, node: NodeEndpoints, action_type: type[Action], action_name: str) -> None:
+        self._node = node
+        self._action_type = action_type
+        self._handles: weakref.WeakValueDictionary[bytes, ClientGoalHandle] = weakref.WeakValueDictionary()
+        self._feedback_callbacks: dict[bytes, FeedbackCallback] = {}
+        protocol, prefix = action_type.Impl, f"{action_name}/_action"
+        self._goal_client = node.create_client(protocol.SendGoalService, f"{prefix}/send_goal")
+        self._cancel_client = node.create_client(CancelGoal, f"{prefix}/cancel_goal")
+        self._result_client = node.create_client(protocol.GetResultService, f"{prefix}/get_result")
+        self._feedback_topic, self._status_topic = f"{prefix}/feedback", f"{prefix}/status"
+        self._feedback: Subscription | None = None
+        self._status: Subscription | None = None
+        self._topics = [
+            (node.resolve_topic_name(self._feedback_topic), dds_type(protocol.FeedbackMessage.TYPE)),
+            (node.resolve_topic_name(self._status_topic), dds_type(GoalStatusArray.TYPE)),
+        ]
+
+    def server_is_ready(self) -> bool:
+        """Whether somebody offers the action, with all its services and topics."""
+        clients = (self._goal_client, self._cancel_client, self._result_client)
+        graph = self._node.context.graph
+        return all(client.service_is_ready() for client in clients) and all(
+            graph.count(EntityKind.PUBLISHER, name, type_name) for name, type_name in self._topics
+        )
+
+    def wait_for_server(self, timeout_sec: float | None = None) -> bool:
+        """Wait until somebody offers the action.
+
+        Args:
+            timeout_sec: Longest time [s]; None or negative for no limit.
+
+        Returns:
+            Whether somebody does.
+        """
+        context = self._node.context
+        return context.graph.wait_for(self.server_is_ready, timeout_sec, context.ok)
+
+    def send_goal_async(
+        self, goal: Message, feedback_callback: FeedbackCallback | None = None, goal_uuid: UUID | None = None
+    ) -> Future:
+        """Send a goal.
+
+        Args:
+            goal: Goal of the action's type.
+            feedback_callback: Called with each feedback message, which has ``goal_id`` and ``feedback``, until the
+                result has been received.
+            goal_uuid: Identifier of the goal; None for a random one.
+
+        Returns:
+            A future of a `ClientGoalHandle`, once the goal is accepted or rejected.
+
+        Raises:
+            TypeError: If the goal is of another type.
+        """
+        if not isinstance(goal, self._action_type.Goal):
+            raise TypeError(f"expected {self._action_type.TYPE}.Goal, got {type(goal).__name__}")
+        goal_id = UUID(uuid=uuid.uuid4().bytes) if goal_uuid is None else goal_uuid
+        key = bytes(goal_id.uuid)
+        if feedback_callback is not None:
+            self._feedback_callbacks[key] = feedback_callback
+            self._listen_to_feedback()
+
+        def handle(response: AnyMessage) -> ClientGoalHandle:
+            goal_handle = ClientGoalHandle(self, goal_id, response)
+            if goal_handle.accepted:
+                self._handles[key] = goal_handle
+            else:
+                self._feedback_callbacks.pop(key, None)
+            return goal_handle
+
+        request = self._action_type.Impl.SendGoalService.Request(goal_id=goal_id, goal=goal)
+        return self._goal_client.send(request, handle)
+
+    def request_result(self, goal_handle: ClientGoalHandle) -> Future:
+        """Ask for a goal's result; see `ClientGoalHandle.get_result_async`."""
+
+        def take(response: Message) -> Message:
+            self._feedback_callbacks.pop(bytes(goal_handle.goal_id.uuid), None)
+            return response
+
+        request = self._action_type.Impl.GetResultService.Request(goal_id=goal_handle.goal_id)
+        return self._result_client.send(request, take)
+
+    def request_cancel(self, goal_handle: ClientGoalHandle) -> Future:
+        """Ask for a goal to be cancelled; see `ClientGoalHandle.cancel_goal_async`."""
+        return self._cancel_client.call_async(CancelGoal.Request(goal_info=GoalInfo(goal_id=goal_handle.goal_id)))
+
+    def destroy(self) -> None:
+        """Withdraw the client; what is pending stays so."""
+        for client in (self._goal_client, self._cancel_client, self._result_client):
+            self._node.destroy_client(client)
+        for subscription in (self._feedback, self._status):
+            if subscription is not None:
+                self._node.destroy_subscription(subscription)
+
+    def listen_to_status(self) -> None:
+        """Hear of the states of goals from now on, the present ones included."""
+        if self._status is None:
+            self._status = self._node.create_subscription(
+                GoalStatusArray, self._status_topic, self._on_status, qos_profile_action_status_default
+            )
+
+    def _listen_to_feedback(self) -> None:
+        if self._feedback is None:
+            feedback = self._action_type.Impl.FeedbackMessage
+            self._feedback = self._node.create_subscription(
+                feedback, self._feedback_topic, self._on_feedback, QoSProfile(depth=10)
+            )
+
+    def _on_feedback(self, message: AnyMessage) -> Any:
+        callback = self._feedback_callbacks.get(bytes(message.goal_id.uuid))
+        return callback(message) if callback is not None else None
+
+    def _on_status(self, message: GoalStatusArray) -> None:
+        for status in message.status_list:
+            goal_handle = self._handles.get(bytes(status.goal_info.goal_id.uuid))
+            if goal_handle is not None:
+                goal_handle.update(status.status)

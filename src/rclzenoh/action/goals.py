@@ -1,0 +1,150 @@
+"""The goals of an action server: their states, and which of them are meant by a wish to cancel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+from rclzenoh.duration import S_TO_NS
+from rclzenoh.interfaces.msg import GoalInfo, GoalStatus
+from rclzenoh.interfaces.srv import CancelGoal
+
+_ACCEPTED, _EXECUTING = GoalStatus.STATUS_ACCEPTED, GoalStatus.STATUS_EXECUTING
+_CANCELING, _SUCCEEDED = GoalStatus.STATUS_CANCELING, GoalStatus.STATUS_SUCCEEDED
+_CANCELED, _ABORTED = GoalStatus.STATUS_CANCELED, GoalStatus.STATUS_ABORTED
+
+
+class GoalEvent(Enum):
+    """What can happen to a goal."""
+
+    EXECUTE = "executed"
+    CANCEL = "cancelled by request"
+    SUCCEED = "reached"
+    ABORT = "aborted"
+    CANCELED = "finished as cancelled"
+
+
+_MOVES = {
+    (_ACCEPTED, GoalEvent.EXECUTE): _EXECUTING,
+    (_ACCEPTED, GoalEvent.CANCEL): _CANCELING,
+    (_EXECUTING, GoalEvent.CANCEL): _CANCELING,
+    (_EXECUTING, GoalEvent.SUCCEED): _SUCCEEDED,
+    (_EXECUTING, GoalEvent.ABORT): _ABORTED,
+    (_CANCELING, GoalEvent.SUCCEED): _SUCCEEDED,
+    (_CANCELING, GoalEvent.ABORT): _ABORTED,
+    (_CANCELING, GoalEvent.CANCELED): _CANCELED,
+}
+"""The state machine of rcl_action (Jazzy)."""
+
+_NAMES = ("unknown", "accepted", "executing", "canceling", "succeeded", "canceled", "aborted")
+
+
+@dataclass
+class TrackedGoal:
+    """A goal that was accepted.
+
+    Attributes:
+        info: Identifier and time of acceptance.
+        status: Of action_msgs/msg/GoalStatus; unknown once the goal is forgotten.
+        ended_ns: Time at which it ended [ns]; None before.
+    """
+
+    info: GoalInfo
+    status: int = _ACCEPTED
+    ended_ns: int | None = None
+
+    @property
+    def is_active(self) -> bool:
+        """Whether the goal has not ended."""
+        return self.status in (_ACCEPTED, _EXECUTING, _CANCELING)
+
+
+class GoalTable(dict[bytes, TrackedGoal]):
+    """Goals by identifier, in order of acceptance.
+
+    Args:
+        result_timeout_ns: Time for which a goal is kept after its end [ns].
+    """
+
+    def __init__(self, result_timeout_ns: int) -> None:
+        super().__init__()
+        self._result_timeout_ns = result_timeout_ns
+
+    def add(self, key: bytes, info: GoalInfo) -> TrackedGoal:
+        """Accept a goal."""
+        self[key] = TrackedGoal(info)
+        return self[key]
+
+    def can(self, key: bytes, event: GoalEvent) -> bool:
+        """Whether something can happen to a goal in its present state."""
+        return key in self and (self[key].status, event) in _MOVES
+
+    def change(self, key: bytes, event: GoalEvent, now_ns: int) -> None:
+        """Change a goal's state.
+
+        Args:
+            key: Its identifier.
+            event: What happens to it.
+            now_ns: Present time [ns].
+
+        Raises:
+            RuntimeError: If that cannot happen in its present state.
+        """
+        if not self.can(key, event):
+            status = self[key].status if key in self else GoalStatus.STATUS_UNKNOWN
+            raise RuntimeError(f"goal {key.hex()} is {_NAMES[status]} and cannot be {event.value}")
+        goal = self[key]
+        goal.status = _MOVES[goal.status, event]
+        if not goal.is_active:
+            goal.ended_ns = now_ns
+
+    def select(self, key: bytes, stamp_ns: int) -> tuple[int, list[bytes]]:
+        """Goals that a wish to cancel means.
+
+        Args:
+            key: Identifier in the request; all zeros for none.
+            stamp_ns: Stamp in the request [ns]; 0 for none.
+
+        Returns:
+            Return code of action_msgs/srv/CancelGoal and the identifiers.
+        """
+        has_key = any(key)
+        if has_key and not stamp_ns:
+            if key not in self:
+                return CancelGoal.Response.ERROR_UNKNOWN_GOAL_ID, []
+            if not self.can(key, GoalEvent.CANCEL):
+                return CancelGoal.Response.ERROR_GOAL_TERMINATED, []
+            return CancelGoal.Response.ERROR_NONE, [key]
+        everything = not has_key and not stamp_ns
+        meant = [
+            other
+            for other, goal in self.items()
+            if self.can(other, GoalEvent.CANCEL) and (everything or other == key or _stamp_ns(goal) <= stamp_ns)
+        ]
+        return CancelGoal.Response.ERROR_NONE, meant
+
+    def expire(self, now_ns: int) -> list[bytes]:
+        """Forget goals that ended long enough ago.
+
+        Args:
+            now_ns: Present time [ns].
+
+        Returns:
+            Their identifiers.
+        """
+        old = []
+        for key, goal in self.items():
+            if goal.ended_ns is None:
+                continue
+            # A simulation that was reset has turned the clock back: the time of the end means nothing any more.
+            goal.ended_ns = min(goal.ended_ns, now_ns)
+            if now_ns - goal.ended_ns > self._result_timeout_ns:
+                old.append(key)
+        for key in old:
+            self.pop(key).status = GoalStatus.STATUS_UNKNOWN
+        return old
+
+
+def _stamp_ns(goal: TrackedGoal) -> int:
+    stamp = goal.info.stamp
+    return int(stamp.sec * S_TO_NS + stamp.nanosec)

@@ -1,0 +1,332 @@
+"""Action servers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from enum import Enum
+from typing import Any
+
+from rclzenoh.action.goals import GoalEvent, GoalTable, TrackedGoal
+from rclzenoh.duration import S_TO_NS
+from rclzenoh.interfaces import Action, AnyMessage, Message
+from rclzenoh.interfaces.msg import UUID, GoalInfo, GoalStatus, GoalStatusArray
+from rclzenoh.interfaces.srv import CancelGoal
+from rclzenoh.node_endpoints import NodeEndpoints
+from rclzenoh.qos import QoSProfile, qos_profile_action_status_default
+from rclzenoh.task import Future, submit
+
+_RESULT_TIMEOUT_S = 900
+
+
+class GoalResponse(Enum):
+    """Answers to a goal."""
+
+    REJECT = 1
+    ACCEPT = 2
+
+
+class CancelResponse(Enum):
+    """Answers to the wish to cancel a goal."""
+
+    REJECT = 1
+    ACCEPT = 2
+
+
+class ServerGoalHandle:
+    """An accepted goal, as its server sees it."""
+
+    def __init__(self, server: ActionServer, goal: TrackedGoal, request: Message) -> None:
+        self._server = server
+        self._goal = goal
+        self.request = request
+        self.result_future = Future()
+
+    @property
+    def goal_id(self) -> UUID:
+        """Identifier of the goal."""
+        return self._goal.info.goal_id
+
+    @property
+    def status(self) -> int:
+        """Status, of action_msgs/msg/GoalStatus; unknown once the goal is forgotten."""
+        return self._goal.status
+
+    @property
+    def is_active(self) -> bool:
+        """Whether the goal has not ended."""
+        return self._goal.is_active
+
+    @property
+    def is_cancel_requested(self) -> bool:
+        """Whether the goal is to be cancelled."""
+        return bool(self._goal.status == GoalStatus.STATUS_CANCELING)
+
+    def execute(self, execute_callback: Callable[[ServerGoalHandle], Any] | None = None) -> None:
+        """Begin to carry the goal out.
+
+        Args:
+            execute_callback: Called with this handle, returns the result; may be a coroutine function. None for that of
+                the server; if that has none either, the goal is merely said to be executing.
+        """
+        if not self.is_cancel_requested:
+            self._server.change(self, GoalEvent.EXECUTE)
+        self._server.schedule(self, execute_callback)
+
+    def publish_feedback(self, feedback: Message) -> None:
+        """Publish how far the goal has come.
+
+        Args:
+            feedback: Feedback of the action's type.
+
+        Raises:
+            TypeError: If it is of another type.
+        """
+        self._server.publish_feedback(self, feedback)
+
+    def succeed(self, response: Message | None = None) -> None:
+        """End the goal as reached; see `finish`."""
+        self.finish(GoalEvent.SUCCEED, response)
+
+    def abort(self, response: Message | None = None) -> None:
+        """End the goal as failed; see `finish`."""
+        self.finish(GoalEvent.ABORT, response)
+
+    def canceled(self, response: Message | None = None) -> None:
+        """End the goal as cancelled; see `finish`."""
+        self.finish(GoalEvent.CANCELED, response)
+
+    def finish(self, event: GoalEvent, response: Message | None) -> None:
+        """End the goal.
+
+        Args:
+            event: How.
+            response: Result of the action's type; None leaves it to the execute callback.
+
+        Raises:
+            RuntimeError: If the goal cannot end like this in its present state.
+        """
+        self._server.change(self, event)
+        if response is not None:
+            self._server.set_result(self, response)
+
+
+def default_goal_callback(goal_request: Message) -> GoalResponse:
+    """Accept every goal."""
+    del goal_request
+    return GoalResponse.ACCEPT
+
+
+def default_handle_accepted_callback(goal_handle: ServerGoalHandle) -> None:
+    """Execute at once."""
+    goal_handle.execute()
+
+
+def default_cancel_callback(goal_handle: ServerGoalHandle) -> CancelResponse:
+    """Cancel no goal."""
+    del goal_handle
+    return CancelResponse.REJECT
+
+
+class ActionServer:
+    """Carries out goals.
+
+    All callbacks may be coroutine functions; other callbacks are called while they wait.
+
+    Args:
+        node: Node that the server belongs to.
+        action_type: Class of the action.
+        action_name: Name of the action.
+        execute_callback: Called with the goal handle, returns the result.
+        goal_callback: Called with the goal, returns a `GoalResponse`.
+        handle_accepted_callback: Called with the goal handle of an accepted goal.
+        cancel_callback: Called with the goal handle, returns a `CancelResponse`.
+        result_timeout: Time for which a result is kept [s], on the node's clock.
+    """
+
+    def __init__(
+        self,
+        node: NodeEndpoints,
+        action_type: type[Action],
+        action_name: str,
+        execute_callback: Callable[[ServerGoalHandle], Any] | None = None,
+        *,
+        goal_callback: Callable[[Any], Any] = default_goal_callback,
+        handle_accepted_callback: Callable[[ServerGoalHandle], Any] = default_handle_accepted_callback,
+        cancel_callback: Callable[[ServerGoalHandle], Any] = default_cancel_callback,
+        result_timeout: float = _RESULT_TIMEOUT_S,
+    ) -> None:
+        self._node = node
+        self.action_type = action_type
+        self._execute_callback = execute_callback
+        self._goal_callback = goal_callback
+        self._handle_accepted_callback = handle_accepted_callback
+        self._cancel_callback = cancel_callback
+        self._logger = node.get_logger()
+        self._goals = GoalTable(int(result_timeout * S_TO_NS))
+        self._handles: dict[bytes, ServerGoalHandle] = {}
+        protocol, prefix = action_type.Impl, f"{action_name}/_action"
+        self._services = [
+            node.create_service(protocol.SendGoalService, f"{prefix}/send_goal", self._on_goal),
+            node.create_service(CancelGoal, f"{prefix}/cancel_goal", self._on_cancel),
+            node.create_service(protocol.GetResultService, f"{prefix}/get_result", self._on_result),
+        ]
+        self._feedback = node.create_publisher(protocol.FeedbackMessage, f"{prefix}/feedback", QoSProfile(depth=10))
+        self._status = node.create_publisher(GoalStatusArray, f"{prefix}/status", qos_profile_action_status_default)
+
+    def destroy(self) -> None:
+        """Withdraw the server; nobody gets a result any more."""
+        for service in self._services:
+            self._node.destroy_service(service)
+        self._node.destroy_publisher(self._feedback)
+        self._node.destroy_publisher(self._status)
+        self._handles.clear()
+
+    def change(self, handle: ServerGoalHandle, event: GoalEvent) -> None:
+        """Change a goal's state, and tell everybody.
+
+        Args:
+            handle: The goal.
+            event: What happens to it.
+
+        Raises:
+            RuntimeError: If that cannot happen in its present state.
+        """
+        self._goals.change(_key(handle.goal_id), event, self._now_ns())
+        self._publish_status()
+
+    def publish_feedback(self, handle: ServerGoalHandle, feedback: Message) -> None:
+        """Publish how far a goal has come.
+
+        Args:
+            handle: The goal.
+            feedback: Feedback of the action's type.
+
+        Raises:
+            TypeError: If it is of another type.
+        """
+        if not isinstance(feedback, self.action_type.Feedback):
+            raise TypeError(f"expected {self.action_type.TYPE}.Feedback, got {type(feedback).__name__}")
+        self._feedback.publish(self.action_type.Impl.FeedbackMessage(goal_id=handle.goal_id, feedback=feedback))
+
+    def schedule(self, handle: ServerGoalHandle, execute_callback: Callable[[ServerGoalHandle], Any] | None) -> None:
+        """Have the executor carry a goal out.
+
+        Args:
+            handle: The goal.
+            execute_callback: Callback that does; None for the server's.
+        """
+        callback = execute_callback or self._execute_callback
+        if callback is not None:
+            submit(self._node.mailbox, self._execute(handle, callback))
+
+    def set_result(self, handle: ServerGoalHandle, result: Message) -> None:
+        """Set a goal's result and answer those who wait for it; the first result counts.
+
+        Args:
+            handle: The goal, which has ended.
+            result: Result of the action's type.
+
+        Raises:
+            TypeError: If it is of another type.
+        """
+        if not isinstance(result, self.action_type.Result):
+            raise TypeError(f"expected {self.action_type.TYPE}.Result, got {type(result).__name__}")
+        if not handle.result_future.done():
+            response = self.action_type.Impl.GetResultService.Response(status=handle.status, result=result)
+            handle.result_future.set_result(response)
+
+    async def _execute(self, handle: ServerGoalHandle, callback: Callable[[ServerGoalHandle], Any]) -> None:
+        try:
+            result = await _outcome(callback(handle))
+        except GeneratorExit:
+            raise  # The executor is gone, and with it those who could be told.
+        except BaseException:
+            # Whatever happened, those who wait for a result must get one.
+            self._abort_if_active(handle, "failed")
+            self.set_result(handle, self.action_type.Result())
+            raise
+        self._abort_if_active(handle, "returned")
+        self.set_result(handle, self.action_type.Result() if result is None else result)
+
+    def _abort_if_active(self, handle: ServerGoalHandle, how: str) -> None:
+        if handle.is_active:
+            self._logger.warning(
+                f"the execute callback {how} without ending goal {_key(handle.goal_id).hex()}: aborted"
+            )
+            if handle.status == GoalStatus.STATUS_ACCEPTED:
+                self.change(handle, GoalEvent.EXECUTE)
+            handle.abort()
+
+    async def _on_goal(self, request: AnyMessage, response: AnyMessage) -> Message:
+        now = self._node.get_clock().now()
+        self._forget_old()
+        key = _key(request.goal_id)
+        answer = None
+        if key not in self._goals:
+            answer = await _outcome(self._goal_callback(request.goal))
+            if not isinstance(answer, GoalResponse):
+                raise TypeError(f"the goal callback must return a GoalResponse, got {answer!r:.80}")
+        response.accepted = answer is GoalResponse.ACCEPT and key not in self._goals
+        if response.accepted:
+            response.stamp = now.to_msg()
+            goal = self._goals.add(key, GoalInfo(goal_id=request.goal_id, stamp=response.stamp))
+            handle = self._handles[key] = ServerGoalHandle(self, goal, request.goal)
+            # Once the response is on its way, as its receiver must know the goal before it hears of its fate.
+            self._begin_after_response(handle)
+        return response
+
+    def _begin_after_response(self, handle: ServerGoalHandle) -> None:
+        async def begin() -> None:
+            self._publish_status()
+            await _outcome(self._handle_accepted_callback(handle))
+
+        submit(self._node.mailbox, begin())
+
+    async def _on_cancel(self, request: CancelGoal.Request, response: CancelGoal.Response) -> Message:
+        self._forget_old()
+        stamp_ns = request.goal_info.stamp.sec * S_TO_NS + request.goal_info.stamp.nanosec
+        response.return_code, keys = self._goals.select(_key(request.goal_info.goal_id), stamp_ns)
+        canceling = []
+        for key in keys:
+            handle = self._handles[key]
+            answer = await _outcome(self._cancel_callback(handle))
+            # The goal may have ended while the callback was waiting.
+            if answer is CancelResponse.ACCEPT and self._goals.can(key, GoalEvent.CANCEL):
+                self._goals.change(key, GoalEvent.CANCEL, self._now_ns())
+                canceling.append(self._goals[key].info)
+        if canceling:
+            self._publish_status()
+        elif keys:
+            response.return_code = CancelGoal.Response.ERROR_REJECTED
+        response.goals_canceling = canceling
+        return response
+
+    async def _on_result(self, request: AnyMessage, response: AnyMessage) -> Message:
+        self._forget_old()
+        handle = self._handles.get(_key(request.goal_id))
+        if handle is None:
+            response.status = GoalStatus.STATUS_UNKNOWN
+            return response
+        result: Message = await handle.result_future
+        return result
+
+    def _forget_old(self) -> None:
+        for key in self._goals.expire(self._now_ns()):
+            del self._handles[key]
+
+    def _publish_status(self) -> None:
+        self._forget_old()
+        status_list = [GoalStatus(goal_info=goal.info, status=goal.status) for goal in self._goals.values()]
+        self._status.publish(GoalStatusArray(status_list=status_list))
+
+    def _now_ns(self) -> int:
+        return self._node.get_clock().now().nanoseconds
+
+
+async def _outcome(value: Any) -> Any:
+    """What a callback returned, after waiting for it if it is a coroutine function."""
+    return await value if hasattr(value, "__await__") else value
+
+
+def _key(goal_id: UUID) -> bytes:
+    return bytes(goal_id.uuid)

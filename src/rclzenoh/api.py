@@ -1,0 +1,63 @@
+"""What nodes use of rclpy's API, and the little beyond it.
+
+`init` is no part of what a star import takes: whoever offers these names to nodes says itself how a session is found.
+"""
+
+from rclzenoh.action import (
+    ActionClient,
+    ActionServer,
+    CancelResponse,
+    GoalResponse,
+    get_action_client_names_and_types_by_node,
+    get_action_names_and_types,
+    get_action_server_names_and_types_by_node,
+)
+from rclzenoh.context import Context, shutdown
+from rclzenoh.context import init as init
+from rclzenoh.exceptions import ExternalShutdownException, NameValidationException
+from rclzenoh.executors import Executor, SingleThreadedExecutor
+from rclzenoh.extensions import graph_changes, pass_on_log, provide_time, spin_some
+from rclzenoh.interfaces import get_action, get_message, get_service
+from rclzenoh.interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
+from rclzenoh.node import Node
+from rclzenoh.parameter import Parameter
+from rclzenoh.publisher import Publisher
+from rclzenoh.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclzenoh.task import Future
+from rclzenoh.time import Time
+
+__all__ = [
+    "ActionClient",
+    "ActionServer",
+    "CancelResponse",
+    "Context",
+    "DurabilityPolicy",
+    "Executor",
+    "ExternalShutdownException",
+    "FloatingPointRange",
+    "Future",
+    "GoalResponse",
+    "HistoryPolicy",
+    "IntegerRange",
+    "NameValidationException",
+    "Node",
+    "Parameter",
+    "ParameterDescriptor",
+    "Publisher",
+    "QoSProfile",
+    "ReliabilityPolicy",
+    "SetParametersResult",
+    "SingleThreadedExecutor",
+    "Time",
+    "get_action",
+    "get_action_client_names_and_types_by_node",
+    "get_action_names_and_types",
+    "get_action_server_names_and_types_by_node",
+    "get_message",
+    "get_service",
+    "graph_changes",
+    "pass_on_log",
+    "provide_time",
+    "shutdown",
+    "spin_some",
+]

@@ -1,0 +1,147 @@
+"""Service clients."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+import zenoh
+
+from rclzenoh.attachment import Attachment, unpack
+from rclzenoh.endpoint import Endpoint
+from rclzenoh.exceptions import InvalidHandle
+from rclzenoh.interfaces import Message, deserialize, serialize
+from rclzenoh.interfaces import Service as ServiceType
+from rclzenoh.keys import EntityKind
+from rclzenoh.mailbox import Receiver
+from rclzenoh.node_base import NodeBase
+from rclzenoh.qos import QoSProfile
+from rclzenoh.task import Future
+
+_PATIENT_SERVICE = "/_action/get_result"
+_ENDLESS_S = 1e9
+"""Timeout of requests that may last as long as an action."""
+
+
+class Client(Receiver):
+    """Calls a service. Made by `Node.create_client`."""
+
+    def __init__(self, node: NodeBase, srv_type: type[ServiceType], srv_name: str, qos_profile: QoSProfile) -> None:
+        # Unbounded: there is at most one response per request, and one that is lost would be waited for in vain.
+        super().__init__(node.mailbox, None)
+        self.srv_type = srv_type
+        self.qos_profile = qos_profile
+        self._pending: dict[int, tuple[Future, Callable[[Any], Any] | None]] = {}
+        self._sequence = 0
+        self._lock = threading.Lock()
+        self._endpoint = Endpoint(node, EntityKind.CLIENT, srv_name, srv_type.TYPE, qos_profile)
+        self._querier: Any = self._endpoint.session.declare_querier(
+            self._endpoint.key,
+            target=zenoh.QueryTarget.ALL_COMPLETE,
+            consolidation=zenoh.ConsolidationMode.NONE,
+            timeout=_ENDLESS_S if self.service_name.endswith(_PATIENT_SERVICE) else None,
+        )
+        self._endpoint.announce(self._querier)
+
+    @property
+    def service_name(self) -> str:
+        """Absolute name of the service."""
+        return self._endpoint.name
+
+    def service_is_ready(self) -> bool:
+        """Whether somebody offers the service."""
+        endpoint = self._endpoint
+        return endpoint.node.context.graph.count(EntityKind.SERVICE, endpoint.name, endpoint.type) > 0
+
+    def wait_for_service(self, timeout_sec: float | None = None) -> bool:
+        """Wait until somebody offers the service.
+
+        Args:
+            timeout_sec: Longest time [s]; None or negative for no limit.
+
+        Returns:
+            Whether somebody does.
+        """
+        context = self._endpoint.node.context
+        return context.graph.wait_for(self.service_is_ready, timeout_sec, context.ok)
+
+    def call_async(self, request: Message) -> Future:
+        """Send a request.
+
+        Args:
+            request: The request.
+
+        Returns:
+            A future of the response. It stays pending if nobody answers.
+
+        Raises:
+            TypeError: If the request is not of the service's type.
+            ValueError: If a field does not fit its type.
+            InvalidHandle: If the client was destroyed or the session closed.
+        """
+        return self.send(request, None)
+
+    def send(self, request: Message, convert: Callable[[Any], Any] | None) -> Future:
+        """Send a request.
+
+        Args:
+            request: The request.
+            convert: Makes the future's result from the response; None leaves it as it is.
+
+        Returns:
+            A future of the result.
+
+        Raises:
+            TypeError: If the request is not of the service's type.
+            ValueError: If a field does not fit its type.
+            InvalidHandle: If the client was destroyed or the session closed.
+        """
+        if not isinstance(request, self.srv_type.Request):
+            raise TypeError(f"{self.service_name}: expected {self.srv_type.TYPE}.Request, got {type(request).__name__}")
+        payload, future = serialize(request), Future()
+        with self._lock:
+            self._sequence += 1
+            sequence = self._sequence
+        if self._querier is None:
+            raise InvalidHandle(f"{self.service_name}: the client was destroyed")
+        self._pending[sequence] = future, convert
+        handler = zenoh.handlers.Callback(self.deliver, drop=lambda: self.deliver(sequence), indirect=False)
+        attachment = Attachment(sequence, time.time_ns(), self._endpoint.gid).pack()
+        try:
+            self._querier.get(handler, payload=payload, attachment=attachment)
+        except zenoh.ZError as error:
+            del self._pending[sequence]
+            raise self._endpoint.invalid(error) from error
+        return future
+
+    def handle(self, item: zenoh.Reply | int) -> None:
+        """Decode a response and complete its future; a number says that no further response to that request comes."""
+        if isinstance(item, int):
+            self._pending.pop(item, None)
+            return
+        sample = item.ok
+        if sample is None:
+            self._endpoint.complain(f"the service answered with an error: {item.err and item.err.payload.to_bytes()!r}")
+            return
+        try:
+            attachment = unpack(sample.attachment.to_bytes() if sample.attachment is not None else b"")
+            response = deserialize(sample.payload.to_bytes(), self.srv_type.Response)
+        except ValueError as error:
+            self._endpoint.complain(error)
+            return
+        if attachment.sequence not in self._pending:
+            self._endpoint.complain("unexpected response; there may be more than one server of this name")
+            return
+        future, convert = self._pending.pop(attachment.sequence)
+        future.call_back_through(self.mailbox)
+        if not future.cancelled():
+            future.set_result(convert(response) if convert else response)
+
+    def destroy(self) -> None:
+        """Withdraw the client; what is pending stays so. See `Node.destroy_client`."""
+        self._querier = None
+        self._endpoint.close()
+        self._pending.clear()
+        self.discard_all()

@@ -1,0 +1,194 @@
+"""Contexts: the life of a session and everything that hangs on it."""
+
+from __future__ import annotations
+
+import atexit
+import inspect
+import signal
+import threading
+import weakref
+from collections.abc import Callable
+from itertools import count
+from types import FrameType
+
+import zenoh
+
+from rclzenoh.domain import domain_of_environment
+from rclzenoh.exceptions import NotInitializedException
+from rclzenoh.graph import Graph
+from rclzenoh.session import open_session
+from rclzenoh.session_config import environment_config
+
+_open: weakref.WeakSet[Context] = weakref.WeakSet()
+
+
+class Context:
+    """One Zenoh session, from `init` to `shutdown`."""
+
+    def __init__(self) -> None:
+        self._ok = False
+        self._session: zenoh.Session | None = None
+        self._graph: Graph | None = None
+        self._on_shutdown: list[Callable[[], Callable[[], None] | None]] = []
+        self._ids = count()
+        self._domain_id = 0
+
+    def init(
+        self, args: list[str] | None = None, *, domain_id: int | None = None, config: zenoh.Config | None = None
+    ) -> None:
+        """Open the session.
+
+        Args:
+            args: Accepted for the sake of rclpy's signature; remapping by arguments is not supported.
+            domain_id: Domain identifier; None takes ``ROS_DOMAIN_ID``, or 0.
+            config: Configuration of the session; None for the one that the environment asks for.
+
+        Raises:
+            RuntimeError: If the context is in use already.
+            ConfigurationError: If the environment does not hold what it should.
+            NoRouterError: If there is no router.
+        """
+        del args
+        if self._session is not None:
+            raise RuntimeError("the context has been initialised already")
+        self._domain_id = domain_of_environment() if domain_id is None else domain_id
+        self._session = open_session(environment_config() if config is None else config)
+        self._graph = Graph(self._session, self._domain_id)
+        self._ids = count()
+        self._ok = True
+        _open.add(self)
+
+    def ok(self) -> bool:
+        """Whether the context can be used."""
+        return self._ok
+
+    def is_open(self) -> bool:
+        """Whether there is a session, if only to withdraw what was declared."""
+        return self._session is not None
+
+    @property
+    def session(self) -> zenoh.Session:
+        """The session.
+
+        Raises:
+            NotInitializedException: If there is none.
+        """
+        if self._session is None:
+            raise NotInitializedException("init() has not been called, or shutdown() has")
+        return self._session
+
+    @property
+    def graph(self) -> Graph:
+        """The ROS graph.
+
+        Raises:
+            NotInitializedException: If there is no session.
+        """
+        if self._graph is None:
+            raise NotInitializedException("init() has not been called, or shutdown() has")
+        return self._graph
+
+    def get_domain_id(self) -> int:
+        """Domain identifier."""
+        return self._domain_id
+
+    def next_id(self) -> int:
+        """A number that no node or endpoint of the session has yet."""
+        return next(self._ids)
+
+    def on_shutdown(self, callback: Callable[[], None]) -> None:
+        """Call something when the context shuts down; methods are called as long as their object lives."""
+        self._on_shutdown.append(weakref.WeakMethod(callback) if inspect.ismethod(callback) else lambda: callback)
+
+    def request_shutdown(self) -> None:
+        """End all spinning; the session stays open until `shutdown`. May be called in a signal handler."""
+        self._ok = False
+        for reference in list(self._on_shutdown):
+            callback = reference()
+            if callback is not None:
+                callback()
+
+    def shutdown(self) -> None:
+        """End all spinning and close the session.
+
+        Raises:
+            RuntimeError: If the context was never initialised.
+        """
+        if self._session is None:
+            raise RuntimeError("the context has not been initialised, or was shut down already")
+        self.try_shutdown()
+
+    def try_shutdown(self) -> None:
+        """Like `shutdown`, but does nothing if there is nothing to shut down."""
+        if self._ok:
+            self.request_shutdown()
+        session, self._session, self._graph = self._session, None, None
+        self._on_shutdown.clear()
+        _open.discard(self)
+        if session is not None:
+            session.close()  # type: ignore[no-untyped-call]
+
+
+_default: list[Context] = []
+
+
+def get_default_context() -> Context:
+    """The context that is used when none is given."""
+    if not _default:
+        _default.append(Context())
+    return _default[0]
+
+
+def init(
+    args: list[str] | None = None,
+    *,
+    context: Context | None = None,
+    domain_id: int | None = None,
+    config: zenoh.Config | None = None,
+) -> None:
+    """Initialise a context; for the default one, a SIGTERM ends all spinning from now on.
+
+    Args:
+        args: See `Context.init`.
+        context: The context; None for the default one.
+        domain_id: Domain identifier; None takes ``ROS_DOMAIN_ID``, or 0.
+        config: Configuration of the session; None for the one that the environment asks for.
+
+    Raises:
+        RuntimeError: If the context is in use already.
+        ConfigurationError: If the environment does not hold what it should.
+        NoRouterError: If there is no router.
+    """
+    (context or get_default_context()).init(args, domain_id=domain_id, config=config)
+    in_main_thread = threading.current_thread() is threading.main_thread()
+    if context is None and in_main_thread and signal.getsignal(signal.SIGTERM) is signal.SIG_DFL:
+        signal.signal(signal.SIGTERM, _on_sigterm)
+
+
+def shutdown(*, context: Context | None = None) -> None:
+    """Shut a context down.
+
+    Args:
+        context: The context; None for the default one.
+
+    Raises:
+        RuntimeError: If it was never initialised.
+    """
+    (context or get_default_context()).shutdown()
+    _restore_sigterm()
+
+
+def _restore_sigterm() -> None:
+    if threading.current_thread() is threading.main_thread() and signal.getsignal(signal.SIGTERM) is _on_sigterm:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+
+
+def _on_sigterm(_signal: int, _frame: FrameType | None) -> None:
+    for context in list(_open):
+        context.request_shutdown()
+
+
+@atexit.register
+def _close_all() -> None:
+    for context in list(_open):
+        context.try_shutdown()

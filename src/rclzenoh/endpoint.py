@@ -1,0 +1,81 @@
+"""What publishers, subscriptions, services and clients have in common: identity, token, and how they end."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import zenoh
+
+from rclzenoh.exceptions import InvalidHandle
+from rclzenoh.gid import gid_of
+from rclzenoh.interfaces import type_hash
+from rclzenoh.keys import EntityKind, Token, data_key, dds_type
+from rclzenoh.node_base import NodeBase
+from rclzenoh.qos import QoSProfile, encode
+
+
+class Endpoint:
+    """Identity of one publisher, subscription, service or client.
+
+    Args:
+        node: The node it belongs to.
+        kind: What it is.
+        name: Absolute, relative or private name of the topic or service.
+        type_name: ROS name of the message or service type.
+        qos: Quality of service.
+
+    Attributes:
+        name: Absolute name of the topic or service.
+        key: Key on which samples or requests travel.
+        token: Token that announces the endpoint.
+        gid: Identifier that is part of every attachment.
+    """
+
+    def __init__(self, node: NodeBase, kind: EntityKind, name: str, type_name: str, qos: QoSProfile) -> None:
+        self.node = node
+        self.name = node.resolve_topic_name(name)
+        self.type = dds_type(type_name)
+        self.session = node.context.session
+        domain, hashed = node.context.get_domain_id(), type_hash(type_name)
+        self.key = data_key(domain, self.name, type_name, hashed)
+        self.token = Token(
+            domain=domain,
+            session=str(self.session.zid()),
+            node_id=node.token.node_id,
+            entity_id=node.context.next_id(),
+            kind=kind,
+            namespace=node.get_namespace(),
+            node=node.get_name(),
+            name=self.name,
+            type=self.type,
+            type_hash=hashed,
+            qos=encode(qos),
+        )
+        self.gid = gid_of(self.token.key())
+        self._declared: list[Any] = []
+        self._has_complained = False
+
+    def announce(self, declared: Any) -> None:
+        """Show the endpoint in the graph, now that it works.
+
+        Args:
+            declared: The Zenoh object behind it, which is undeclared after the token.
+        """
+        self._declared = [self.session.liveliness().declare_token(self.token.key()), declared]
+
+    def close(self) -> None:
+        """Withdraw the token, then the endpoint; does nothing the second time."""
+        declared, self._declared = self._declared, []
+        if not self.session.is_closed():
+            for thing in declared:
+                thing.undeclare()
+
+    def invalid(self, error: zenoh.ZError) -> InvalidHandle:
+        """What to raise when Zenoh refuses to send."""
+        return InvalidHandle(f"{self.name}: cannot send, the session is closed or lost: {error}")
+
+    def complain(self, problem: object) -> None:
+        """Log what is wrong with something that was received, the first time only."""
+        if not self._has_complained:
+            self._has_complained = True
+            self.node.get_logger().warning(f"{self.name}: ignored (this is logged once): {problem}")

@@ -1,0 +1,91 @@
+"""Every error that rclzenoh raises on purpose; those that rclpy has, too, by the names that they have there."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+
+class RclzenohError(Exception):
+    """Root of all errors raised on purpose.
+
+    Args:
+        message: What is wrong, in one line.
+        expected: What would have been right.
+    """
+
+    def __init__(self, message: str, *, expected: str | None = None) -> None:
+        self.message = message
+        self.expected = expected
+        super().__init__(message)
+
+    def __str__(self) -> str:
+        return f"{self.message}\n  expected: {self.expected}" if self.expected else self.message
+
+
+class ConfigurationError(RclzenohError):
+    """A session cannot be opened as it is asked for, whatever there is at the other end."""
+
+
+class UnreadableKeyError(ConfigurationError):
+    """A file of the key that a session shows to its router cannot be read.
+
+    Args:
+        path: The file.
+        reason: Why, in words.
+    """
+
+    def __init__(self, path: Path, reason: str) -> None:
+        self.path = path
+        self.reason = reason
+        super().__init__(f"the key of the session cannot be read: {path}: {reason}")
+
+
+class NoRouterError(RclzenohError):
+    """There is no router where a session looks for one.
+
+    Args:
+        endpoints: Where it looks, as JSON.
+        seconds: How long it has looked [s].
+        reason: What Zenoh says.
+    """
+
+    def __init__(self, endpoints: str, seconds: float, reason: str) -> None:
+        self.endpoints = endpoints
+        self.reason = reason
+        super().__init__(f"no Zenoh session within {seconds:g} s; connecting to {endpoints}")
+
+
+class NotInitializedException(RclzenohError):
+    """A node was made, or a context used, before `init` or after `shutdown`."""
+
+
+class ExternalShutdownException(RclzenohError):
+    """The context was shut down while an executor was spinning."""
+
+
+class InvalidHandle(RclzenohError):
+    """A publisher, client or the like was used after it, or the session, was closed."""
+
+
+class NameValidationException(RclzenohError):
+    """Name of a node, namespace, topic, service or parameter that ROS does not allow."""
+
+
+class ParameterException(RclzenohError):
+    """Root of the errors about parameters."""
+
+
+class ParameterNotDeclaredException(ParameterException):
+    """A parameter was used that the node has not declared."""
+
+
+class ParameterAlreadyDeclaredException(ParameterException):
+    """A parameter was declared twice."""
+
+
+class InvalidParameterValueException(ParameterException):
+    """The value of a parameter was refused by its range or by a callback."""
+
+
+class ParameterUninitializedException(ParameterException):
+    """A parameter was read that has a type but no value yet."""

@@ -1,0 +1,164 @@
+"""Executors: they call the callbacks of nodes, one at a time, in the thread that spins."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Coroutine
+from functools import partial
+from queue import Empty
+from typing import Any
+
+from rclzenoh.context import Context, get_default_context
+from rclzenoh.duration import S_TO_NS
+from rclzenoh.exceptions import ExternalShutdownException
+from rclzenoh.mailbox import Mailbox
+from rclzenoh.node_base import NodeBase
+from rclzenoh.task import Future, Task, call, submit
+from rclzenoh.timer import Timer
+
+_FOREVER = float("inf")
+_LONGEST_WAIT_S = 0.5
+"""A signal that comes just before the wait begins has its Python handler run only when the wait ends."""
+
+
+class Executor:
+    """Calls the callbacks of its nodes in order of arrival; timers take turns with everything else.
+
+    Args:
+        context: Context of the nodes; None for the default one.
+    """
+
+    def __init__(self, *, context: Context | None = None) -> None:
+        self.context = context or get_default_context()
+        self._mailbox = Mailbox()
+        self._queue = self._mailbox.queue
+        self._nodes: list[NodeBase] = []
+        self._is_shutdown = False
+        self._timer_was_last = False
+        self.context.on_shutdown(self.wake)
+
+    def add_node(self, node: NodeBase) -> bool:
+        """Take care of a node's callbacks; returns whether the node is new here."""
+        if node in self._nodes:
+            return False
+        if node.executor is not None:
+            node.executor.remove_node(node)
+        self._nodes.append(node)
+        node.executor = self
+        node.mailbox.attach(self._queue)
+        self.wake()
+        return True
+
+    def remove_node(self, node: NodeBase) -> None:
+        """Stop taking care of a node's callbacks."""
+        if node in self._nodes:
+            self._nodes.remove(node)
+            node.executor = None
+            node.mailbox.detach()
+
+    def wake(self) -> None:
+        """Let a waiting executor look around."""
+        self._queue.put(None)
+
+    def create_task(self, callback: Callable[..., Any] | Coroutine[Any, Any, Any], *args: Any, **kwargs: Any) -> Task:
+        """Have a function called, or a coroutine carried out, by the thread that spins.
+
+        Args:
+            callback: Function, coroutine function or coroutine.
+            args: Arguments of the function.
+            kwargs: Keyword arguments of the function.
+
+        Returns:
+            A future of the outcome.
+        """
+        work = callback if isinstance(callback, Coroutine) else partial(callback, *args, **kwargs)
+        return submit(self._mailbox, work)
+
+    def shutdown(self) -> None:
+        """End spinning and let go of all nodes."""
+        self._is_shutdown = True
+        for node in list(self._nodes):
+            self.remove_node(node)
+        self.wake()
+
+    def spin(self) -> None:
+        """Call callbacks until the executor is shut down.
+
+        Raises:
+            ExternalShutdownException: If the context is shut down meanwhile.
+        """
+        while self.context.ok() and not self._is_shutdown:
+            self.spin_once()
+
+    def spin_until_future_complete(self, future: Future, timeout_sec: float | None = None) -> None:
+        """Call callbacks until a future is done or cancelled.
+
+        Args:
+            future: What to wait for.
+            timeout_sec: Longest time [s]; None or negative for no limit.
+
+        Raises:
+            ExternalShutdownException: If the context is shut down meanwhile.
+        """
+        future.add_done_callback(lambda _: self.wake())
+        limited = timeout_sec is not None and timeout_sec >= 0
+        deadline = time.monotonic() + (timeout_sec or 0.0)
+        while self.context.ok() and not (future.done() or future.cancelled() or self._is_shutdown):
+            left = deadline - time.monotonic() if limited else None
+            self._spin_once(max(left, 0.0) if left is not None else None, future)
+            if limited and time.monotonic() >= deadline:
+                return
+
+    def spin_once(self, timeout_sec: float | None = None) -> None:
+        """Call one callback, waiting for it if need be.
+
+        Args:
+            timeout_sec: Longest time to wait [s]; None or negative for no limit.
+
+        Raises:
+            ExternalShutdownException: If the context is not usable.
+        """
+        self._spin_once(timeout_sec, None)
+
+    def _spin_once(self, timeout_s: float | None, until: Future | None) -> None:
+        deadline: float | None = None
+        while True:
+            if not self.context.ok():
+                raise ExternalShutdownException("the context was shut down")
+            timer, wait = self._next_timer()
+            queued = not self._queue.empty()
+            if timer is not None and wait <= 0 and not (self._timer_was_last and queued):
+                self._timer_was_last = True
+                timer.advance()
+                call(self._mailbox, timer.callback)
+                return
+            self._timer_was_last = False
+            if not queued:
+                if timeout_s == 0 or self._is_shutdown or (until is not None and (until.done() or until.cancelled())):
+                    return
+                if timeout_s is not None and timeout_s > 0:
+                    now = time.monotonic()
+                    deadline = now + timeout_s if deadline is None else deadline
+                    if now >= deadline:
+                        return
+                    wait = min(wait, deadline - now)
+            try:
+                work = self._queue.get(timeout=0 if queued else min(wait, _LONGEST_WAIT_S))
+            except Empty:
+                continue
+            if work is not None and work.run():
+                return
+
+    def _next_timer(self) -> tuple[Timer | None, float]:
+        """The timer that is due first, and the time until then [s]."""
+        first, least = None, _FOREVER
+        for node in self._nodes:
+            for timer in node.timers:
+                left = timer.time_until_next_call()
+                if (left <= 0 or not timer.clock.is_driven) and left / S_TO_NS < least:
+                    first, least = timer, left / S_TO_NS
+        return first, least
+
+
+class SingleThreadedExecutor(Executor):
+    """The executor: one thread, one callback at a time."""

@@ -1,0 +1,125 @@
+"""The ROS graph: who publishes, subscribes, serves and calls what, as liveliness tokens tell it.
+
+Tokens are parsed when somebody asks about the graph, in the asking thread. Asking again while nothing changed costs a
+dictionary lookup.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import Counter, deque
+from collections.abc import Callable, Iterable, Iterator
+
+import zenoh
+
+from rclzenoh.keys import PREFIX, EntityKind, Token, parse_token
+
+_MOST_UNREAD = 10_000
+"""Changes after which they are read even though nobody asks."""
+_POLL_S = 0.1
+_HISTORY_TIMEOUT_S = 10.0
+
+
+class Graph:
+    """Nodes and endpoints that are known in one domain.
+
+    Args:
+        session: Open session.
+        domain: Domain identifier.
+    """
+
+    def __init__(self, session: zenoh.Session, domain: int) -> None:
+        self._changed = threading.Condition()
+        self._unread: deque[tuple[bool, str]] = deque()
+        self._tokens: dict[str, Token] = {}
+        self._counts: Counter[tuple[EntityKind, str, str]] = Counter()
+        self.changes = 0
+        """Number of changes so far: while it stays the same, so does everything else here."""
+        key = f"{PREFIX}/{domain}/**"
+        handler = zenoh.handlers.Callback(self._on_change, indirect=False)
+        self._subscriber = session.liveliness().declare_subscriber(key, handler, history=True)
+        # Nobody has an answer, but the router says so after the history that the subscriber asked for: now the graph
+        # is complete. Not a liveliness query, which never ends while there is a subscriber to its tokens (Zenoh 1.10).
+        list(session.get(f"{PREFIX}/{domain}/{session.zid()}", timeout=_HISTORY_TIMEOUT_S))
+
+    def _on_change(self, sample: zenoh.Sample) -> None:
+        with self._changed:
+            self._unread.append((sample.kind == zenoh.SampleKind.PUT, str(sample.key_expr)))
+            self.changes += 1
+            if len(self._unread) > _MOST_UNREAD:
+                self._read()
+            self._changed.notify_all()
+
+    def _read(self) -> None:
+        with self._changed:
+            while self._unread:
+                appeared, key = self._unread.popleft()
+                token = parse_token(key)
+                if token is None:
+                    continue
+                # Tokens that are known already are announced again after the connection to the router was lost.
+                if appeared and key not in self._tokens:
+                    self._tokens[key] = token
+                    self._counts[token.kind, token.name, token.type] += 1
+                elif not appeared and self._tokens.pop(key, None) is not None:
+                    self._counts[token.kind, token.name, token.type] -= 1
+
+    def tokens(self, *kinds: EntityKind) -> Iterator[Token]:
+        """All nodes and endpoints of some kinds."""
+        self._read()
+        return (token for token in list(self._tokens.values()) if token.kind in kinds)
+
+    def count(self, kind: EntityKind, name: str, dds_type: str | None = None) -> int:
+        """Endpoints of one kind, name and, if given, DDS type."""
+        if self._unread:
+            self._read()
+        if dds_type is not None:
+            return self._counts.get((kind, name, dds_type), 0)
+        return sum(token.name == name for token in self.tokens(kind))
+
+    def names_and_types(self, *kinds: EntityKind, node: tuple[str, str] | None = None) -> list[tuple[str, list[str]]]:
+        """Names and ROS types of endpoints.
+
+        Args:
+            kinds: Which endpoints.
+            node: Namespace and name of the node they belong to; None for all.
+
+        Returns:
+            Names, sorted, each with its types, sorted.
+        """
+        return group_types(
+            (token.name, token.ros_type)
+            for token in self.tokens(*kinds)
+            if node is None or (token.namespace, token.node) == node
+        )
+
+    def wait_for(self, condition: Callable[[], bool], timeout_s: float | None, alive: Callable[[], bool]) -> bool:
+        """Wait until something is true of the graph.
+
+        Args:
+            condition: What to wait for.
+            timeout_s: Longest time [s]; None or negative for no limit.
+            alive: Whether waiting still makes sense.
+
+        Returns:
+            Whether the condition is true.
+        """
+        limited = timeout_s is not None and timeout_s >= 0
+        deadline = time.monotonic() + (timeout_s or 0.0)
+        while not condition():
+            left = deadline - time.monotonic() if limited else _POLL_S
+            if left <= 0 or not alive():
+                return False
+            with self._changed:
+                if not self._unread:
+                    self._changed.wait(min(left, _POLL_S))
+        return True
+
+
+def group_types(pairs: Iterable[tuple[str, str]]) -> list[tuple[str, list[str]]]:
+    """Pairs of name and type as one sorted entry per name."""
+    types: dict[str, set[str]] = {}
+    for name, type_name in pairs:
+        types.setdefault(name, set()).add(type_name)
+    return [(name, sorted(of_name)) for name, of_name in sorted(types.items())]

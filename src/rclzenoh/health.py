@@ -1,0 +1,51 @@
+"""Whether a node answers, asked so that it costs next to nothing: for health checks, which run often.
+
+A request goes to a service that every node offers. Its answer comes from the loop that does the node's work, so a node
+that is stuck does not answer, however alive its process looks. The request is put together here, from the names that
+keys have: a client node would have to load all interfaces, and everybody in the ROS graph would hear of it.
+"""
+
+from __future__ import annotations
+
+import os
+import struct
+import time
+
+import zenoh
+
+from rclzenoh.attachment import GID_LENGTH, Attachment
+from rclzenoh.keys import data_key
+
+_ANY_HASH = "*"
+"""There is but one, which is worked out from all interfaces."""
+
+REQUEST = b"\0\1\0\0" + struct.pack("<I", 0)
+"""CDR of ``rcl_interfaces/srv/GetParameters_Request`` that asks for no parameter."""
+
+
+def node_answers(session: zenoh.Session, node: str, *, domain_id: int, timeout_s: float) -> bool:
+    """Ask a node for a sign of life.
+
+    Args:
+        session: An open session.
+        node: Full name of the node without its first slash; ``**/`` in front of a name stands for any namespace.
+        domain_id: ROS domain.
+        timeout_s: Time for the answer [s].
+
+    Returns:
+        Whether it has answered.
+    """
+    replies = session.get(
+        data_key(domain_id, f"{node}/get_parameters", "rcl_interfaces/srv/GetParameters", _ANY_HASH),
+        target=zenoh.QueryTarget.ALL,
+        consolidation=zenoh.ConsolidationMode.NONE,
+        timeout=timeout_s,
+        payload=REQUEST,
+        attachment=attachment(),
+    )
+    return any(reply.ok is not None for reply in replies)
+
+
+def attachment() -> bytes:
+    """What a client puts on its first request."""
+    return Attachment(1, time.time_ns(), os.urandom(GID_LENGTH)).pack()

@@ -1,0 +1,257 @@
+"""Every interface that is known: rosbags' Jazzy store, completed by the files in ``definitions``.
+
+The store has messages only. Services and actions, messages that it lacks, and messages whose default values it does
+not keep are read from ``definitions/<package>/{msg,srv,action}/`` when they are first asked for; a file wins over the
+store.
+
+What the generators of ROS 2 derive from a service or an action (requests, events, the services and the feedback message
+behind an action) is derived here too, because the type hash of a service covers all of it (rosidl 4.6, Jazzy).
+"""
+
+from __future__ import annotations
+
+import difflib
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from rosbags.interfaces import Nodetype
+from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys.base import create_field_desc
+from rosbags.typesys.msg import MSGParser
+
+DEFINITIONS = Path(__file__).parent / "definitions"
+"""Our own definition files."""
+
+PLACEHOLDER = "structure_needs_at_least_one_member"
+"""Field that rosidl puts into a structure without fields; it is one byte on the wire and invisible in Python."""
+
+Default = bool | int | float | str
+
+
+@dataclass(frozen=True)
+class Field:
+    """One field of a structure.
+
+    Attributes:
+        name: Name of the field.
+        type: Primitive type (``float64``, ``string``…) or full name of the nested structure.
+        nested: Whether ``type`` names a structure.
+        length: Length of a fixed array; None otherwise.
+        sequence: Whether the field is a sequence.
+        bound: Largest length of a bounded sequence or string; None when unbounded.
+        default: Value of a field that is not set; None for zero, empty, or the nested structure's own defaults.
+    """
+
+    name: str
+    type: str
+    nested: bool
+    length: int | None = None
+    sequence: bool = False
+    bound: int | None = None
+    default: Default | None = None
+
+
+@dataclass(frozen=True)
+class Structure:
+    """A message, or a part of a service or action.
+
+    Attributes:
+        name: Full name, such as ``sensor_msgs/msg/JointState``.
+        constants: Values by name.
+        fields: Fields in order; empty when the wire has only the placeholder.
+    """
+
+    name: str
+    constants: dict[str, Default]
+    fields: tuple[Field, ...]
+
+
+_BASE, _NAME, _ARRAY, _SEQUENCE = Nodetype.BASE, Nodetype.NAME, Nodetype.ARRAY, Nodetype.SEQUENCE
+_STORE = get_typestore(Stores.ROS2_JAZZY)
+_FIELDDEFS: dict[str, Any] = _STORE.fielddefs
+_DEFAULTS: dict[str, dict[str, Default]] = {}
+_READ: set[Path] = set()
+_COMPLETE: set[str] = set()
+
+
+def structure(name: str) -> Structure:
+    """Constants and fields of a structure.
+
+    Args:
+        name: Full name, such as ``sensor_msgs/msg/JointState`` or ``std_srvs/srv/Trigger_Response``.
+
+    Returns:
+        The structure.
+
+    Raises:
+        ValueError: If no such structure is known.
+    """
+    _require(name)
+    constants, fields = _FIELDDEFS[name]
+    defaults = _DEFAULTS.get(name, {})
+    return Structure(
+        name,
+        {constant: value for constant, _, value in constants},
+        tuple(_field(field, description, defaults.get(field)) for field, description in fields if field != PLACEHOLDER),
+    )
+
+
+@cache
+def type_hash(name: str) -> str:
+    """Type hash (REP 2016) of a message, service, action or a part of one.
+
+    Args:
+        name: Full name, such as ``std_srvs/srv/Trigger``.
+
+    Returns:
+        ``RIHS01_`` and 64 hexadecimal digits.
+
+    Raises:
+        ValueError: If no such interface is known.
+    """
+    _require(name)
+    return _STORE.hash_rihs01(name)
+
+
+@cache
+def message_definition(name: str) -> str:
+    """Definition text of a message and all messages it consists of, as rosbag2 stores it (``ros2msg``).
+
+    Args:
+        name: Full name, such as ``sensor_msgs/msg/JointState``.
+
+    Returns:
+        The message's definition, then those of its dependencies, each after a line of 80 ``=`` and ``MSG: <name>``.
+
+    Raises:
+        ValueError: If no such message is known.
+    """
+    _require(name)
+    return _STORE.generate_msgdef(name, ros_version=2)[0]
+
+
+def _field(name: str, description: tuple[Nodetype, Any], default: Default | None) -> Field:
+    kind, content = description
+    length: int | None = None
+    sequence = kind == _SEQUENCE
+    bound: int | None = None
+    if kind in (_ARRAY, _SEQUENCE):
+        (kind, content), size = content
+        length = None if sequence else size
+        bound = size or None if sequence else None
+    if kind == _NAME:
+        return Field(name, content, True, length, sequence, bound, default)
+    primitive, capacity = content
+    return Field(name, primitive, False, length, sequence, bound or capacity or None, default)
+
+
+def _require(name: str) -> None:
+    """Read the files that define ``name`` and everything it refers to, unless that was done before."""
+    if name in _COMPLETE:
+        return
+    package, _, rest = name.partition("/")
+    kind, _, type_name = rest.partition("/")
+    whole = type_name.split("_")[0]
+    path = DEFINITIONS / package / kind / f"{whole}.{kind}"
+    is_plausible = kind in ("msg", "srv", "action") and type_name.isidentifier()
+    if is_plausible and path not in _READ and path.is_file():
+        _READ.add(path)
+        parts = path.read_text().split("---\n")
+        {"msg": _add_message, "srv": _add_service, "action": _add_action}[kind](package, whole, parts)
+    if name not in _FIELDDEFS:
+        raise ValueError(f"unknown interface {name!r}{_similar(name)}")
+    _COMPLETE.add(name)
+    for _, (field_kind, content) in _FIELDDEFS[name][1]:
+        element = content[0] if field_kind in (_ARRAY, _SEQUENCE) else (field_kind, content)
+        if element[0] == _NAME:
+            _require(element[1])
+
+
+def _similar(name: str) -> str:
+    files = (path.relative_to(DEFINITIONS).with_suffix("").as_posix() for path in DEFINITIONS.rglob("*.*"))
+    near = difflib.get_close_matches(name, {*files, *_FIELDDEFS}, n=3)
+    return f"; did you mean {' or '.join(map(repr, near))}?" if near else ""
+
+
+def _char_to_uint8(description: Any) -> Any:
+    """Do to a field what rosidl does before it hashes it, and rosbags does not."""
+    if isinstance(description, tuple):
+        return tuple(_char_to_uint8(part) for part in description)
+    return "uint8" if description == "char" else description
+
+
+def _parse(package: str, name: str, text: str) -> None:
+    # Relative names resolve to messages of the package, so all parts are parsed as if they were one.
+    message = MSGParser(f"MSG: {package}/msg/{name.rpartition('/')[2]}\n{text}").specification()[0]
+    _DEFAULTS[name] = {
+        field.name: field.value
+        for field in message.fields
+        if field.value is not None and not isinstance(field.value, list)
+    }
+    _add(
+        name,
+        [(field.name, create_field_desc(field.typ)) for field in message.fields],
+        [(constant.name, constant.typ.value, constant.value) for constant in message.constants],
+    )
+
+
+def _add(name: str, fields: list[tuple[str, object]], constants: list[tuple[str, str, Default]] | None = None) -> None:
+    content = [(field, _char_to_uint8(description)) for field, description in fields]
+    _FIELDDEFS[name] = (constants or [], content or [(PLACEHOLDER, (_BASE, ("uint8", 0)))])
+
+
+def _add_message(package: str, name: str, parts: list[str]) -> None:
+    _parse(package, f"{package}/msg/{name}", parts[0])
+
+
+def _add_service(package: str, name: str, parts: list[str]) -> None:
+    full = f"{package}/srv/{name}"
+    _parse(package, f"{full}_Request", parts[0])
+    _parse(package, f"{full}_Response", parts[1])
+    _derive_service(full)
+
+
+def _derive_service(full: str) -> None:
+    info = (_NAME, "service_msgs/msg/ServiceEventInfo")
+    request, response = (_NAME, f"{full}_Request"), (_NAME, f"{full}_Response")
+    _add(
+        f"{full}_Event",
+        [("info", info), ("request", (_SEQUENCE, (request, 1))), ("response", (_SEQUENCE, (response, 1)))],
+    )
+    _add(
+        full,
+        [("request_message", request), ("response_message", response), ("event_message", (_NAME, f"{full}_Event"))],
+    )
+
+
+def _add_action(package: str, name: str, parts: list[str]) -> None:
+    full = f"{package}/action/{name}"
+    for part, text in zip(("Goal", "Result", "Feedback"), parts, strict=True):
+        _parse(package, f"{full}_{part}", text)
+    goal_id = ("goal_id", (_NAME, "unique_identifier_msgs/msg/UUID"))
+    goal, result, feedback = ((_NAME, f"{full}_{part}") for part in ("Goal", "Result", "Feedback"))
+    stamp = (_NAME, "builtin_interfaces/msg/Time")
+    _add(f"{full}_SendGoal_Request", [goal_id, ("goal", goal)])
+    _add(f"{full}_SendGoal_Response", [("accepted", (_BASE, ("bool", 0))), ("stamp", stamp)])
+    _add(f"{full}_GetResult_Request", [goal_id])
+    _add(f"{full}_GetResult_Response", [("status", (_BASE, ("int8", 0))), ("result", result)])
+    _add(f"{full}_FeedbackMessage", [goal_id, ("feedback", feedback)])
+    _derive_service(f"{full}_SendGoal")
+    _derive_service(f"{full}_GetResult")
+    _add(
+        full,
+        [
+            ("goal", goal),
+            ("result", result),
+            ("feedback", feedback),
+            ("send_goal_service", (_NAME, f"{full}_SendGoal")),
+            ("get_result_service", (_NAME, f"{full}_GetResult")),
+            ("feedback_message", (_NAME, f"{full}_FeedbackMessage")),
+        ],
+    )
+
+
+for _name, (_constants, _fields) in list(_FIELDDEFS.items()):
+    _add(_name, _fields, _constants)

@@ -1,0 +1,62 @@
+"""Messages to bytes and back: CDR as it is on the wire and in MCAP files."""
+
+from __future__ import annotations
+
+import struct
+from typing import TypeVar
+
+from rclzenoh.interfaces.decoder import decoder
+from rclzenoh.interfaces.encoder import HEADER, encoder
+from rclzenoh.interfaces.message import Message
+
+_M = TypeVar("_M", bound=Message)
+
+
+def serialize(message: Message) -> bytes:
+    """Bytes of a message, with the encapsulation header.
+
+    Args:
+        message: The message.
+
+    Returns:
+        Little-endian CDR.
+
+    Raises:
+        TypeError: If a field holds something that is not of its type.
+        ValueError: If a number does not fit its type, or an array has the wrong length.
+    """
+    try:
+        return bytes(encoder(message.TYPE)(message))
+    except (AttributeError, TypeError) as error:
+        raise TypeError(f"{message.TYPE} cannot be serialised: {error}") from error
+    except (struct.error, OverflowError, ValueError) as error:
+        raise ValueError(f"{message.TYPE} cannot be serialised: {error}") from error
+
+
+def deserialize(data: bytes, message_class: type[_M]) -> _M:
+    """Message from its bytes.
+
+    Args:
+        data: Little-endian CDR with its encapsulation header. What follows the message is left alone: rmw_serialize
+            gives as many bytes as the message might have taken, and whoever publishes those sends them all.
+        message_class: Class of the message.
+
+    Returns:
+        A message that shares no memory with ``data``; its number sequences may be changed.
+
+    Raises:
+        ValueError: If the data is malformed or too short.
+    """
+    name = message_class.TYPE
+    if data[:2] != HEADER[:2] or len(data) < len(HEADER):
+        raise ValueError(f"{name}: not little-endian CDR: begins with {bytes(data[:4]).hex(' ') or 'nothing'}")
+    size = len(data) - 4
+    body = bytearray(data[4:] + bytes(-size & 7))
+    try:
+        message: _M
+        message, end = decoder(name)(data, body)
+    except (struct.error, IndexError, ValueError) as error:
+        raise ValueError(f"{name}: malformed CDR of {len(data)} bytes: {error}") from error
+    if end > size:
+        raise ValueError(f"{name}: expected {end + 4} bytes of CDR, got {len(data)}")
+    return message

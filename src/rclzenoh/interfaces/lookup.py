@@ -1,0 +1,108 @@
+"""Classes of services and actions by name, as ``rosidl_runtime_py.utilities`` gives them."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import ClassVar
+
+from rclzenoh.interfaces.catalog import structure
+from rclzenoh.interfaces.message import AnyMessage, message_class
+
+
+class Service:
+    """Base of all service classes."""
+
+    TYPE: ClassVar[str]
+    Request: ClassVar[type[AnyMessage]]
+    Response: ClassVar[type[AnyMessage]]
+
+
+class ActionProtocol:
+    """Services and messages by which an action is carried out."""
+
+    SendGoalService: ClassVar[type[Service]]
+    GetResultService: ClassVar[type[Service]]
+    CancelGoalService: ClassVar[type[Service]]
+    FeedbackMessage: ClassVar[type[AnyMessage]]
+    GoalStatusMessage: ClassVar[type[AnyMessage]]
+
+
+class Action:
+    """Base of all action classes."""
+
+    TYPE: ClassVar[str]
+    Goal: ClassVar[type[AnyMessage]]
+    Result: ClassVar[type[AnyMessage]]
+    Feedback: ClassVar[type[AnyMessage]]
+    Impl: ClassVar[type[ActionProtocol]]
+
+
+def get_message(name: str) -> type[AnyMessage]:
+    """Class of a message.
+
+    Args:
+        name: Full name, such as ``sensor_msgs/msg/JointState``.
+
+    Returns:
+        The class.
+
+    Raises:
+        ValueError: If no such message is known, or the name is not one of a message.
+    """
+    _expect_kind(name, "msg")
+    return message_class(name)
+
+
+@cache
+def get_service(name: str) -> type[Service]:
+    """Class of a service, which holds the classes of its request and response.
+
+    Args:
+        name: Full name, such as ``std_srvs/srv/Trigger``.
+
+    Returns:
+        The class.
+
+    Raises:
+        ValueError: If no such service is known, or the name is not one of a service.
+    """
+    _expect_kind(name, "srv")
+    structure(name)  # Refuses an unknown service by its own name, not by that of its request.
+    return _service(name)
+
+
+@cache
+def get_action(name: str) -> type[Action]:
+    """Class of an action, which holds the classes of its goal, result and feedback.
+
+    Args:
+        name: Full name, such as ``control_msgs/action/FollowJointTrajectory``.
+
+    Returns:
+        The class.
+
+    Raises:
+        ValueError: If no such action is known, or the name is not one of an action.
+    """
+    _expect_kind(name, "action")
+    structure(name)
+    parts = {part: message_class(f"{name}_{part}") for part in ("Goal", "Result", "Feedback")}
+    protocol = {
+        "SendGoalService": _service(f"{name}_SendGoal"),
+        "GetResultService": _service(f"{name}_GetResult"),
+        "CancelGoalService": get_service("action_msgs/srv/CancelGoal"),
+        "FeedbackMessage": message_class(f"{name}_FeedbackMessage"),
+        "GoalStatusMessage": get_message("action_msgs/msg/GoalStatusArray"),
+    }
+    short = name.rpartition("/")[2]
+    return type(short, (Action,), {"TYPE": name, **parts, "Impl": type("Impl", (ActionProtocol,), protocol)})
+
+
+def _service(name: str) -> type[Service]:
+    parts = {part: message_class(f"{name}_{part}") for part in ("Request", "Response")}
+    return type(name.rpartition("/")[2], (Service,), {"TYPE": name, **parts})
+
+
+def _expect_kind(name: str, kind: str) -> None:
+    if name.split("/")[1:2] != [kind]:
+        raise ValueError(f"expected a name of the form package/{kind}/Name, got {name!r}")

@@ -1,0 +1,128 @@
+"""Logging: one line a message to standard error and, for nodes, to ``/rosout``."""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import IntEnum
+
+from rclzenoh.duration import S_TO_NS
+
+
+class LoggingSeverity(IntEnum):
+    """How severe a message is; the values are those of rcl_interfaces/msg/Log."""
+
+    UNSET = 0
+    DEBUG = 10
+    INFO = 20
+    WARN = 30
+    ERROR = 40
+    FATAL = 50
+
+
+@dataclass(frozen=True)
+class LogRecord:
+    """One message of a logger.
+
+    Attributes:
+        severity: How severe it is.
+        name: Name of the logger.
+        text: The message.
+        stamp_ns: System time [ns].
+        file: Absolute path of the source that logged it.
+        function: Function that logged it.
+        line: Line in the source.
+    """
+
+    severity: LoggingSeverity
+    name: str
+    text: str
+    stamp_ns: int
+    file: str
+    function: str
+    line: int
+
+
+Sink = Callable[[LogRecord], None]
+"""Takes what is logged."""
+
+_writing = threading.Lock()
+
+
+class Logger:
+    """Logs under a name.
+
+    Attributes:
+        name: Name of the logger.
+        sink: Gets what is logged besides standard error; None for nothing.
+    """
+
+    def __init__(self, name: str, sink: Sink | None = None) -> None:
+        self.name = name
+        self.sink = sink
+        self._seen: dict[str, float] = {}
+
+    def log(
+        self,
+        message: object,
+        severity: LoggingSeverity,
+        *,
+        throttle_duration_sec: float | None = None,
+    ) -> bool:
+        """Log a message.
+
+        Args:
+            message: What to log.
+            severity: How severe it is.
+            throttle_duration_sec: Log this text at most once in so many seconds.
+
+        Returns:
+            Whether it was logged.
+        """
+        text = str(message)
+        if throttle_duration_sec is not None:
+            now, last = time.monotonic(), self._seen.get(text)
+            if last is not None and now - last < throttle_duration_sec:
+                return False
+            self._seen[text] = now
+        caller = sys._getframe(1)
+        while caller.f_back is not None and caller.f_code.co_filename == __file__:
+            caller = caller.f_back
+        code = caller.f_code
+        return self.log_from((os.path.abspath(code.co_filename), code.co_name, caller.f_lineno), text, severity)
+
+    def log_from(self, place: tuple[str, str, int], text: str, severity: LoggingSeverity) -> bool:
+        """Log a message that comes from another place than the caller.
+
+        Args:
+            place: Absolute path of the source, function and line.
+            text: What to log.
+            severity: How severe it is.
+
+        Returns:
+            Whether it was logged.
+        """
+        stamp = time.time_ns()
+        line = f"[{severity.name}] [{stamp // S_TO_NS}.{stamp % S_TO_NS:09d}] [{self.name}]: {text}\n"
+        with _writing:
+            sys.stderr.write(line)
+            sys.stderr.flush()
+        if self.sink is not None:
+            self.sink(LogRecord(severity, self.name, text, stamp, *place))
+        return True
+
+    def info(self, message: object, *, throttle_duration_sec: float | None = None) -> bool:
+        """Log with severity INFO; see `log`."""
+        return self.log(message, LoggingSeverity.INFO, throttle_duration_sec=throttle_duration_sec)
+
+    def warning(self, message: object, *, throttle_duration_sec: float | None = None) -> bool:
+        """Log with severity WARN; see `log`."""
+        return self.log(message, LoggingSeverity.WARN, throttle_duration_sec=throttle_duration_sec)
+
+    def error(self, message: object, *, throttle_duration_sec: float | None = None) -> bool:
+        """Log with severity ERROR; see `log`."""
+        return self.log(message, LoggingSeverity.ERROR, throttle_duration_sec=throttle_duration_sec)

@@ -1,0 +1,110 @@
+"""How what arrives from Zenoh gets to the thread that spins.
+
+Zenoh's threads only put the raw item into the receiver's queue and the receiver into the mailbox of its node, which is
+one queue for all receivers of all nodes of an executor. So an executor that waits wakes at once, items are handled in
+their order of arrival across topics and services, and looking for work costs next to nothing when there is none.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from queue import SimpleQueue
+from typing import Any, Protocol
+
+
+class Work(Protocol):
+    """Something an executor can do."""
+
+    def run(self) -> bool:
+        """Do it; returns False if there was nothing to do after all."""
+
+
+WorkQueue = SimpleQueue[Work | None]
+"""Work in order of arrival; None only wakes the executor."""
+
+
+class Mailbox:
+    """Queue of a node's work; that of its executor while it has one."""
+
+    def __init__(self) -> None:
+        # Reentrant: the garbage collector may close a query, and with it deliver, while the lock is held.
+        self.lock = threading.RLock()
+        self.queue: WorkQueue = SimpleQueue()
+
+    def submit(self, work: Work | None) -> None:
+        """Have something done by the thread that spins; None only wakes it."""
+        with self.lock:
+            self.queue.put(work)
+
+    def attach(self, queue: WorkQueue) -> None:
+        """Deliver to another queue from now on, beginning with what is waiting in the present one."""
+        with self.lock:
+            while not self.queue.empty():
+                queue.put(self.queue.get())
+            self.queue = queue
+
+    def detach(self) -> None:
+        """Deliver to a queue of its own again, and take back what the executor has not done yet."""
+        with self.lock:
+            shared, own, others = self.queue, SimpleQueue[Work | None](), []
+            while not shared.empty():
+                work = shared.get()
+                if isinstance(work, Receiver) and work.mailbox is self:
+                    own.put(work)
+                else:
+                    others.append(work)
+            for work in others:
+                shared.put(work)
+            self.queue = own
+
+
+class Receiver:
+    """What gets items from Zenoh and handles them when its executor spins.
+
+    Args:
+        mailbox: Mailbox of the node.
+        queue_length: Items kept; the oldest is refused when there are more. None keeps all.
+    """
+
+    def __init__(self, mailbox: Mailbox, queue_length: int | None) -> None:
+        self.mailbox = mailbox
+        self._queue_length = queue_length
+        self._items: deque[Any] = deque()
+
+    def deliver(self, item: Any) -> None:
+        """Take an item, in any thread."""
+        surplus = None
+        with self.mailbox.lock:
+            if len(self._items) == self._queue_length:
+                # The queue is full: the oldest item makes room, and the number of pending wake-ups stays right.
+                surplus = self._items.popleft()
+                self._items.append(item)
+            else:
+                self._items.append(item)
+                self.mailbox.queue.put(self)
+        if surplus is not None:
+            self.refuse(surplus)
+
+    def run(self) -> bool:
+        """Handle the oldest item; returns whether there was one."""
+        with self.mailbox.lock:
+            if not self._items:
+                return False
+            item = self._items.popleft()
+        self.handle(item)
+        return True
+
+    def handle(self, item: Any) -> None:
+        """Handle one item, in the thread that spins."""
+        raise NotImplementedError
+
+    def refuse(self, item: Any) -> None:
+        """Get rid of an item for which there is no room, in Zenoh's thread."""
+
+    def discard_all(self) -> None:
+        """Get rid of everything that waits."""
+        with self.mailbox.lock:
+            items, self._items = self._items, deque()
+        for item in items:
+            self.refuse(item)

@@ -1,0 +1,78 @@
+"""Names of nodes, topics and services: what ROS allows, and how relative names are resolved."""
+
+from __future__ import annotations
+
+import re
+
+from rclzenoh.exceptions import NameValidationException
+
+_PART = r"[A-Za-z_][A-Za-z0-9_]*"
+_NODE = re.compile(_PART)
+_ABSOLUTE = re.compile(rf"(/{_PART})+")
+
+
+def check_node_name(name: str) -> None:
+    """Refuse what is no node name.
+
+    Args:
+        name: Name without namespace.
+
+    Raises:
+        NameValidationException: If it has other characters than letters, digits and underscores, or begins with
+            a digit.
+    """
+    if not _NODE.fullmatch(name):
+        raise NameValidationException(
+            f"invalid node name {name!r}", expected="letters, digits and underscores, not beginning with a digit"
+        )
+
+
+def absolute_namespace(namespace: str) -> str:
+    """Namespace with its leading slash.
+
+    Args:
+        namespace: Absolute, relative or empty.
+
+    Returns:
+        ``/`` or an absolute name.
+
+    Raises:
+        NameValidationException: If it is not made of valid names.
+    """
+    absolute = "/" + namespace.removeprefix("/")
+    if absolute != "/" and not _ABSOLUTE.fullmatch(absolute):
+        raise NameValidationException(f"invalid namespace {namespace!r}", expected="names separated by single slashes")
+    return absolute
+
+
+def join(namespace: str, name: str) -> str:
+    """Absolute name of ``name`` in ``namespace``."""
+    return f"{namespace.removesuffix('/')}/{name}"
+
+
+def resolve(name: str, namespace: str, node: str) -> str:
+    """Absolute name of a topic or service.
+
+    Args:
+        name: Absolute (``/x``), relative (``x``) or private (``~/x``) name.
+        namespace: Absolute namespace of the node.
+        node: Name of the node.
+
+    Returns:
+        The absolute name.
+
+    Raises:
+        NameValidationException: If the result is no valid name.
+    """
+    if name.startswith("/"):
+        absolute = name
+    elif name == "~" or name.startswith("~/"):
+        absolute = join(namespace, node) + name[1:]
+    else:
+        absolute = join(namespace, name)
+    if not _ABSOLUTE.fullmatch(absolute):
+        raise NameValidationException(
+            f"invalid topic or service name {name!r}",
+            expected="letters, digits and underscores between single slashes, optionally after a leading '/' or '~/'",
+        )
+    return absolute

@@ -1,0 +1,90 @@
+"""Nodes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rclzenoh.context import Context
+from rclzenoh.exceptions import InvalidHandle
+from rclzenoh.interfaces.msg import Log, ParameterEvent
+from rclzenoh.logging import LogRecord
+from rclzenoh.node_endpoints import NodeEndpoints
+from rclzenoh.node_graph import NodeGraph
+from rclzenoh.node_parameters import NodeParameters
+from rclzenoh.parameter_service import offer_parameters
+from rclzenoh.qos import qos_profile_parameter_events, qos_profile_rosout
+from rclzenoh.time import Time
+from rclzenoh.time_source import TimeSource
+
+
+class Node(NodeEndpoints, NodeGraph, NodeParameters):
+    """A node of the ROS graph.
+
+    Args:
+        node_name: Name of the node.
+        context: Context; None for the default one.
+        namespace: Namespace of the node and its relative names.
+        enable_rosout: Whether what the node logs is published on ``/rosout``.
+        start_parameter_services: Whether other nodes may read and change the parameters.
+
+    Raises:
+        NotInitializedException: If the context is not initialised.
+        NameValidationException: If the name or namespace is invalid.
+    """
+
+    def __init__(
+        self,
+        node_name: str,
+        *,
+        context: Context | None = None,
+        namespace: str | None = None,
+        enable_rosout: bool = True,
+        start_parameter_services: bool = True,
+    ) -> None:
+        NodeEndpoints.__init__(self, node_name, namespace or "", context)
+        NodeParameters.__init__(self, self._publish_parameter_event)
+        is_taken = (node_name, self._namespace) in self.get_node_names_and_namespaces()
+        self._declared_token: Any = self.context.session.liveliness().declare_token(self.token.key())
+        if enable_rosout:
+            self._rosout = self.create_publisher(Log, "/rosout", qos_profile_rosout)
+            self._logger.sink = self._publish_log
+        self._parameter_events = self.create_publisher(
+            ParameterEvent, "/parameter_events", qos_profile_parameter_events
+        )
+        self._time_source = TimeSource(self, self)
+        if start_parameter_services:
+            offer_parameters(self, self)
+        if is_taken:
+            self._logger.warning(
+                f"there is another node {self.get_fully_qualified_name()}: both work, but whoever calls one by its "
+                "name, to set a parameter for example, calls both"
+            )
+
+    def destroy_node(self) -> None:
+        """Withdraw the node and all that it has."""
+        if self.executor is not None:
+            self.executor.remove_node(self)
+        self.destroy_endpoints()
+        token, self._declared_token = self._declared_token, None
+        if token is not None and self.context.is_open():
+            token.undeclare()
+
+    def _publish_parameter_event(self, event: ParameterEvent) -> None:
+        event.node = self.get_fully_qualified_name()
+        event.stamp = self._clock.now().to_msg()
+        self._parameter_events.publish(event)
+
+    def _publish_log(self, record: LogRecord) -> None:
+        message = Log(
+            stamp=Time(nanoseconds=record.stamp_ns).to_msg(),
+            level=int(record.severity),
+            name=record.name,
+            msg=record.text,
+            file=record.file,
+            function=record.function,
+            line=record.line,
+        )
+        try:
+            self._rosout.publish(message)
+        except InvalidHandle:
+            self._logger.sink = None  # The node or its session ended; standard error has the message.

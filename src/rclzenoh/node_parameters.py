@@ -1,0 +1,218 @@
+"""The parameters of a node, with the methods that rclpy's nodes have."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from rclzenoh.exceptions import (
+    InvalidParameterValueException,
+    ParameterAlreadyDeclaredException,
+    ParameterNotDeclaredException,
+    ParameterUninitializedException,
+)
+from rclzenoh.interfaces.msg import (
+    ListParametersResult,
+    ParameterDescriptor,
+    ParameterEvent,
+    SetParametersResult,
+)
+from rclzenoh.interfaces.srv import ListParameters
+from rclzenoh.parameter import Parameter, ParameterKind
+from rclzenoh.parameter_rules import check
+
+OnSet = Callable[[list[Parameter]], SetParametersResult]
+"""Is asked before parameters are set."""
+PostSet = Callable[[list[Parameter]], None]
+"""Is told after parameters were set."""
+
+
+class NodeParameters:
+    """Parameters that were declared, and the rules for setting them.
+
+    Args:
+        announce: Gets the event of each change, without node and stamp.
+    """
+
+    def __init__(self, announce: Callable[[ParameterEvent], None]) -> None:
+        self._announce = announce
+        self._parameters: dict[str, Parameter] = {}
+        self._descriptors: dict[str, ParameterDescriptor] = {}
+        self._on_set: list[OnSet] = []
+        self._post_set: list[PostSet] = []
+
+    def declare_parameter(
+        self, name: str, value: Any = None, descriptor: ParameterDescriptor | None = None
+    ) -> Parameter:
+        """Declare a parameter.
+
+        Args:
+            name: Name of the parameter.
+            value: Default value, or the type of a parameter without default.
+            descriptor: What is known of it; None for one that fixes the type only.
+
+        Returns:
+            The parameter with its value.
+
+        Raises:
+            ParameterAlreadyDeclaredException: If it is declared already.
+            InvalidParameterValueException: If the value is out of range or refused by a callback.
+            ValueError: If the parameter has neither type nor value, and not ``dynamic_typing``.
+        """
+        if name in self._parameters:
+            raise ParameterAlreadyDeclaredException(f"parameter {name!r} is declared already")
+        described = ParameterDescriptor() if descriptor is None else copy.deepcopy(descriptor)
+        described.name = name
+        if isinstance(value, ParameterKind):
+            described.type, value = value.value, None
+        else:
+            described.type = ParameterKind.from_parameter_value(value).value
+        if described.type == ParameterKind.NOT_SET.value and not described.dynamic_typing:
+            raise ValueError(f"parameter {name!r}: give a default value, a type, or a descriptor with dynamic_typing")
+        result = self._set([Parameter(name, value=value)], {name: described})
+        if not result.successful:
+            raise InvalidParameterValueException(f"parameter {name!r} cannot be {value!r}: {result.reason}")
+        return self._parameters[name]
+
+    def has_parameter(self, name: str) -> bool:
+        """Whether a parameter is declared."""
+        return name in self._parameters
+
+    def get_parameter(self, name: str) -> Parameter:
+        """A parameter with its value.
+
+        Args:
+            name: Name of the parameter.
+
+        Returns:
+            The parameter.
+
+        Raises:
+            ParameterNotDeclaredException: If it is not declared.
+            ParameterUninitializedException: If it has a type but no value yet.
+        """
+        descriptor = self.describe_parameter(name)
+        parameter = self._parameters[name]
+        if parameter.type_ is ParameterKind.NOT_SET and not descriptor.dynamic_typing:
+            raise ParameterUninitializedException(f"parameter {name!r} has no value yet")
+        return parameter
+
+    def get_parameter_or(self, name: str, alternative_value: Parameter | None = None) -> Parameter:
+        """A parameter, or an alternative if it is not declared or has no value."""
+        parameter = self._parameters.get(name)
+        if parameter is not None and parameter.type_ is not ParameterKind.NOT_SET:
+            return parameter
+        return Parameter(name) if alternative_value is None else alternative_value
+
+    def describe_parameter(self, name: str) -> ParameterDescriptor:
+        """Descriptor of a parameter.
+
+        Args:
+            name: Name of the parameter.
+
+        Returns:
+            The descriptor.
+
+        Raises:
+            ParameterNotDeclaredException: If it is not declared.
+        """
+        if name not in self._descriptors:
+            known = ", ".join(sorted(self._descriptors))
+            raise ParameterNotDeclaredException(f"parameter {name!r} is not declared", expected=f"one of {known}")
+        return self._descriptors[name]
+
+    def set_parameters(self, parameter_list: Sequence[Parameter]) -> list[SetParametersResult]:
+        """Set parameters one after the other.
+
+        Args:
+            parameter_list: Parameters with their new values.
+
+        Returns:
+            One result each.
+
+        Raises:
+            ParameterNotDeclaredException: If one is not declared; those before it are set.
+        """
+        return [self.set_parameters_atomically([parameter]) for parameter in parameter_list]
+
+    def set_parameters_atomically(self, parameter_list: Sequence[Parameter]) -> SetParametersResult:
+        """Set parameters all at once, or none of them.
+
+        Args:
+            parameter_list: Parameters with their new values.
+
+        Returns:
+            Whether they were set, and if not, why.
+
+        Raises:
+            ParameterNotDeclaredException: If one is not declared.
+        """
+        for parameter in parameter_list:
+            self.describe_parameter(parameter.name)
+        return self._set(list(parameter_list), None)
+
+    def add_on_set_parameters_callback(self, callback: OnSet) -> None:
+        """Ask a callback before parameters are set; the last one added is asked first."""
+        self._on_set.insert(0, callback)
+
+    def add_post_set_parameters_callback(self, callback: PostSet) -> None:
+        """Tell a callback after parameters were set; the last one added is told first."""
+        self._post_set.insert(0, callback)
+
+    def list_parameters(self, prefixes: Sequence[str], depth: int) -> ListParametersResult:
+        """Names of parameters and their prefixes.
+
+        Args:
+            prefixes: Names and prefixes to list; empty for all.
+            depth: Number of name parts below a prefix; 0 for any number.
+
+        Returns:
+            The names and prefixes.
+        """
+        everything = depth == ListParameters.Request.DEPTH_RECURSIVE
+
+        def is_wanted(name: str) -> bool:
+            if not prefixes:
+                return everything or name.count(".") < depth
+            return any(
+                name == prefix
+                or (name.startswith(prefix + ".") and (everything or name[len(prefix) + 1 :].count(".") < depth))
+                for prefix in prefixes
+            )
+
+        names = [name for name in self._parameters if is_wanted(name)]
+        nested = dict.fromkeys(name.rpartition(".")[0] for name in names if "." in name)
+        return ListParametersResult(names=names, prefixes=list(nested))
+
+    def _set(self, parameters: list[Parameter], declared: dict[str, ParameterDescriptor] | None) -> SetParametersResult:
+        """Set parameters, if descriptors and callbacks agree; ``declared`` has the descriptors of new ones."""
+        descriptors = self._descriptors if declared is None else declared
+        for parameter in parameters:
+            result = check(parameter, descriptors[parameter.name], is_declared=declared is None)
+            if not result.successful:
+                return result
+        for callback in list(self._on_set):
+            result = callback(parameters)
+            if not isinstance(result, SetParametersResult):
+                raise TypeError(f"a callback for parameters must return SetParametersResult, got {result!r:.80}")
+            if not result.successful:
+                return result
+        event = ParameterEvent()
+        for parameter in parameters:
+            name, message = parameter.name, parameter.to_parameter_msg()
+            if declared is None and parameter.type_ is ParameterKind.NOT_SET:
+                self._parameters.pop(name, None)
+                self._descriptors.pop(name, None)
+                event.deleted_parameters.append(message)
+                continue
+            is_new = self.get_parameter_or(name).type_ is ParameterKind.NOT_SET
+            (event.new_parameters if is_new else event.changed_parameters).append(message)
+            self._descriptors[name] = descriptors[name]
+            if self._descriptors[name].dynamic_typing:
+                self._descriptors[name].type = parameter.type_.value
+            self._parameters[name] = parameter
+        self._announce(event)
+        for post in list(self._post_set):
+            post(parameters)
+        return SetParametersResult(successful=True)

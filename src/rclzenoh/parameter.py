@@ -1,0 +1,163 @@
+"""Parameters: a name, a type and a value."""
+
+from __future__ import annotations
+
+import array
+from collections.abc import Sequence
+from enum import Enum
+from typing import Any
+
+import numpy as np
+
+from rclzenoh.interfaces.msg import Parameter as ParameterMessage
+from rclzenoh.interfaces.msg import ParameterValue
+
+
+class ParameterKind(Enum):
+    """Type of a parameter."""
+
+    NOT_SET = 0
+    BOOL = 1
+    INTEGER = 2
+    DOUBLE = 3
+    STRING = 4
+    BYTE_ARRAY = 5
+    BOOL_ARRAY = 6
+    INTEGER_ARRAY = 7
+    DOUBLE_ARRAY = 8
+    STRING_ARRAY = 9
+
+    @classmethod
+    def from_parameter_value(cls, value: object) -> ParameterKind:
+        """Type that a Python value has as a parameter.
+
+        Args:
+            value: The value.
+
+        Returns:
+            The type.
+
+        Raises:
+            TypeError: If parameters cannot have such values.
+        """
+        if value is None:
+            return cls.NOT_SET
+        for type_, python in _SCALARS.items():
+            if isinstance(value, python):
+                return cls(type_)
+        if isinstance(value, (list, tuple, array.array)):
+            for type_, python in _ELEMENTS.items():
+                if all(isinstance(element, python) for element in value):
+                    return cls(type_)
+        raise TypeError(f"{value!r:.80} is no value of a parameter")
+
+    def check(self, value: object) -> bool:
+        """Whether a Python value is of this type."""
+        if self is ParameterKind.NOT_SET:
+            return value is None
+        if self.value in _SCALARS:
+            return isinstance(value, _SCALARS[self.value]) and (
+                self is ParameterKind.BOOL or not isinstance(value, bool)
+            )
+        is_sequence = isinstance(value, (list, tuple, array.array))
+        return is_sequence and all(isinstance(element, _ELEMENTS[self.value]) for element in _sequence(value))
+
+
+# In this order: True is an int, too.
+_SCALARS: dict[int, type] = {1: bool, 2: int, 3: float, 4: str}
+_ELEMENTS: dict[int, type] = {5: bytes, 6: bool, 7: int, 8: float, 9: str}
+_FIELDS = {
+    ParameterKind.BOOL: "bool_value",
+    ParameterKind.INTEGER: "integer_value",
+    ParameterKind.DOUBLE: "double_value",
+    ParameterKind.STRING: "string_value",
+    ParameterKind.BYTE_ARRAY: "byte_array_value",
+    ParameterKind.BOOL_ARRAY: "bool_array_value",
+    ParameterKind.INTEGER_ARRAY: "integer_array_value",
+    ParameterKind.DOUBLE_ARRAY: "double_array_value",
+    ParameterKind.STRING_ARRAY: "string_array_value",
+}
+
+
+def _sequence(value: Any) -> Sequence[Any]:
+    sequence: Sequence[Any] = value
+    return sequence
+
+
+class Parameter:
+    """A parameter. Values are bool, int, float, str, lists of these, or lists of single bytes.
+
+    Args:
+        name: Name, with dots between its parts.
+        type_: Type; None takes that of the value.
+        value: Value; None together with `ParameterKind.NOT_SET`.
+    """
+
+    Type = ParameterKind
+
+    def __init__(self, name: str, type_: ParameterKind | None = None, value: Any = None) -> None:
+        self.name = name
+        self.type_ = ParameterKind.from_parameter_value(value) if type_ is None else type_
+        self.value = value
+        if not self.type_.check(value):
+            raise ValueError(f"parameter {name!r}: {value!r:.80} is not of type {self.type_.name}")
+
+    def __repr__(self) -> str:
+        return f"Parameter({self.name!r}, {self.type_}, {self.value!r})"
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Parameter):
+            return NotImplemented
+        return (self.name, self.type_, self.value) == (other.name, other.type_, other.value)
+
+    __hash__ = None  # type: ignore[assignment]  # values may be lists
+
+    def get_parameter_value(self) -> ParameterValue:
+        """The value as a message."""
+        message = ParameterValue(type=self.type_.value)
+        if self.type_ is ParameterKind.BYTE_ARRAY:
+            message.byte_array_value = b"".join(self.value)
+        elif self.type_ is not ParameterKind.NOT_SET:
+            setattr(message, _FIELDS[self.type_], list(self.value) if self.type_.value in _ELEMENTS else self.value)
+        return message
+
+    def to_parameter_msg(self) -> ParameterMessage:
+        """The parameter as a message."""
+        return ParameterMessage(name=self.name, value=self.get_parameter_value())
+
+    @classmethod
+    def from_parameter_msg(cls, param_msg: ParameterMessage) -> Parameter:
+        """Parameter that a message holds.
+
+        Args:
+            param_msg: The message.
+
+        Returns:
+            The parameter.
+
+        Raises:
+            ValueError: If the message's type is none of `Type`.
+        """
+        type_ = ParameterKind(param_msg.value.type)
+        return cls(param_msg.name, type_, parameter_value_to_python(param_msg.value))
+
+
+def parameter_value_to_python(message: ParameterValue) -> Any:
+    """Python value that a message holds.
+
+    Args:
+        message: The message.
+
+    Returns:
+        The value; None if it is not set.
+
+    Raises:
+        ValueError: If the message's type is none of `Type`.
+    """
+    type_ = ParameterKind(message.type)
+    if type_ is ParameterKind.NOT_SET:
+        return None
+    value = getattr(message, _FIELDS[type_])
+    if type_ is ParameterKind.BYTE_ARRAY:
+        return [bytes([octet]) for octet in value]
+    return value.tolist() if isinstance(value, np.ndarray) else value

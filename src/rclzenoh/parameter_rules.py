@@ -1,0 +1,67 @@
+"""What a parameter's descriptor allows."""
+
+from __future__ import annotations
+
+import math
+
+from rclzenoh.interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
+from rclzenoh.parameter import Parameter, ParameterKind
+
+_RELATIVE_TOLERANCE = 1e-6
+"""Within which a floating point value counts as a bound or a step of its range; that of rclpy."""
+
+WRONG_TYPE = "Wrong parameter type"
+
+
+def check(parameter: Parameter, descriptor: ParameterDescriptor, *, is_declared: bool) -> SetParametersResult:
+    """Whether a parameter may take a value.
+
+    Args:
+        parameter: The parameter with its new value.
+        descriptor: What is known of the parameter.
+        is_declared: Whether the parameter exists, so that this is a change.
+
+    Returns:
+        Whether it may, and if not, why.
+    """
+    if is_declared and descriptor.read_only:
+        return _refused(f"Trying to set a read-only parameter: {parameter.name}.")
+    if not descriptor.dynamic_typing:
+        if is_declared and parameter.type_ is ParameterKind.NOT_SET:
+            return _refused("Static parameter cannot be undeclared")
+        if parameter.type_ is not ParameterKind.NOT_SET and parameter.type_.value != descriptor.type:
+            expected = ParameterKind(descriptor.type).name
+            return _refused(f"{WRONG_TYPE} of {parameter.name}, expected {expected}, got {parameter.type_.name}")
+    if parameter.type_ is ParameterKind.INTEGER and len(descriptor.integer_range):
+        return _check_integer(parameter, descriptor.integer_range[0])
+    if parameter.type_ is ParameterKind.DOUBLE and len(descriptor.floating_point_range):
+        return _check_double(parameter, descriptor.floating_point_range[0])
+    return SetParametersResult(successful=True)
+
+
+def _refused(reason: str) -> SetParametersResult:
+    return SetParametersResult(successful=False, reason=reason)
+
+
+def _check_integer(parameter: Parameter, allowed: IntegerRange) -> SetParametersResult:
+    low, high = sorted((allowed.from_value, allowed.to_value))
+    value = parameter.value
+    if not low <= value <= high:
+        return _refused(f"Parameter {parameter.name} out of range. Min: {low}, max: {high}, value: {value}")
+    if value not in (low, high) and allowed.step and (value - low) % allowed.step:
+        return _refused(f"{value} of parameter {parameter.name} is no step of {allowed.step} from {low}")
+    return SetParametersResult(successful=True)
+
+
+def _check_double(parameter: Parameter, allowed: FloatingPointRange) -> SetParametersResult:
+    low, high = sorted((allowed.from_value, allowed.to_value))
+    value = parameter.value
+    if any(math.isclose(value, bound, rel_tol=_RELATIVE_TOLERANCE) for bound in (low, high)):
+        return SetParametersResult(successful=True)
+    if not low < value < high:
+        return _refused(f"Parameter {parameter.name} out of range. Min: {low}, max: {high}, value: {value}")
+    if allowed.step:
+        nearest = low + round((value - low) / allowed.step) * allowed.step
+        if not math.isclose(nearest, value, rel_tol=_RELATIVE_TOLERANCE):
+            return _refused(f"{value} of parameter {parameter.name} is no step of {allowed.step} from {low}")
+    return SetParametersResult(successful=True)

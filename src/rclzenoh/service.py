@@ -1,0 +1,119 @@
+"""Services."""
+
+from __future__ import annotations
+
+import inspect
+import time
+from collections.abc import Callable
+from typing import Any
+
+import zenoh
+
+from rclzenoh.attachment import Attachment, unpack
+from rclzenoh.endpoint import Endpoint
+from rclzenoh.interfaces import Message, deserialize, serialize
+from rclzenoh.interfaces import Service as ServiceType
+from rclzenoh.keys import EntityKind
+from rclzenoh.mailbox import Receiver
+from rclzenoh.node_base import NodeBase
+from rclzenoh.qos import QoSProfile
+from rclzenoh.task import start
+
+Callback = Callable[[Any, Any], Any]
+
+
+class Service(Receiver):
+    """Answers requests. Made by `Node.create_service`.
+
+    The callback gets the request and an empty response and returns the response; it may be a coroutine function, and
+    other callbacks are called while it waits.
+    """
+
+    def __init__(
+        self, node: NodeBase, srv_type: type[ServiceType], srv_name: str, callback: Callback, qos_profile: QoSProfile
+    ) -> None:
+        super().__init__(node.mailbox, qos_profile.queue_length)
+        self.srv_type = srv_type
+        self.qos_profile = qos_profile
+        self.callback = callback
+        self._open: set[_OpenRequest] = set()
+        self._endpoint = Endpoint(node, EntityKind.SERVICE, srv_name, srv_type.TYPE, qos_profile)
+        handler = zenoh.handlers.Callback(self.deliver, indirect=False)
+        # Clients of rmw_zenoh_cpp ask complete queryables only.
+        queryable = self._endpoint.session.declare_queryable(self._endpoint.key, handler, complete=True)
+        self._endpoint.announce(queryable)
+
+    @property
+    def service_name(self) -> str:
+        """Absolute name of the service."""
+        return self._endpoint.name
+
+    def handle(self, item: zenoh.Query) -> None:
+        """Decode a request, call back, and answer when the response is there."""
+        try:
+            attachment = unpack(item.attachment.to_bytes() if item.attachment is not None else b"")
+            payload = item.payload.to_bytes() if item.payload is not None else b""
+            request = deserialize(payload, self.srv_type.Request)
+        except ValueError as error:
+            self._endpoint.complain(error)
+            _refuse(item, str(error))
+            return
+        open_request = _OpenRequest(item, attachment)
+        self._open.add(open_request)
+        start(self.mailbox, self._serve(open_request, request))
+
+    def refuse(self, item: zenoh.Query) -> None:  # noqa: D102 - see `Receiver`
+        _refuse(item, f"{self.service_name}: more than {self.qos_profile.depth} requests are waiting")
+
+    async def _serve(self, open_request: _OpenRequest, request: Message) -> None:
+        try:
+            response = self.callback(request, self.srv_type.Response())
+            if inspect.iscoroutine(response):
+                response = await response
+            if not isinstance(response, self.srv_type.Response):
+                raise TypeError(
+                    f"{self.service_name}: the callback must return {self.srv_type.TYPE}.Response, got {response!r:.80}"
+                )
+            self._reply(open_request, response)
+        finally:
+            # A query that is not dropped stays open at the client until its timeout.
+            self._open.discard(open_request)
+            open_request.query.drop()  # type: ignore[no-untyped-call]
+
+    def _reply(self, open_request: _OpenRequest, response: Message) -> None:
+        received = open_request.attachment
+        attachment = Attachment(received.sequence, time.time_ns(), received.gid).pack()
+        if open_request not in self._open:
+            return
+        try:
+            open_request.query.reply(self._endpoint.key, serialize(response), attachment=attachment)
+        except zenoh.ZError as error:
+            self._endpoint.complain(f"a response could not be sent, the client may be gone: {error}")
+
+    def destroy(self) -> None:
+        """Withdraw the service; requests without an answer get none. See `Node.destroy_service`."""
+        self._endpoint.close()
+        self.discard_all()
+        for open_request in self._open:
+            open_request.query.drop()  # type: ignore[no-untyped-call]
+        self._open.clear()
+
+
+class _OpenRequest:
+    """A request that has no answer yet."""
+
+    __slots__ = ("attachment", "query")
+
+    def __init__(self, query: zenoh.Query, attachment: Attachment) -> None:
+        self.query = query
+        self.attachment = attachment
+
+
+def _refuse(query: zenoh.Query, reason: str) -> None:
+    """Answer with an error, which clients log, and close the query."""
+    try:
+        query.reply_err(reason)
+    except zenoh.ZError:
+        return  # The client is gone, or the session is being closed.
+    finally:
+        query.drop()  # type: ignore[no-untyped-call]

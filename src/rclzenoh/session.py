@@ -1,0 +1,35 @@
+"""The Zenoh session of a context: how it is opened."""
+
+from __future__ import annotations
+
+import time
+
+import zenoh
+
+from rclzenoh.exceptions import NoRouterError
+from rclzenoh.session_config import in_words
+
+_PATIENCE_S, _RETRY_S = 5.0, 0.1
+
+
+def open_session(config: zenoh.Config) -> zenoh.Session:
+    """Open a session with a router.
+
+    Args:
+        config: Configuration of the session.
+
+    Returns:
+        The session, which the caller has to close.
+
+    Raises:
+        NoRouterError: If there is no router within some seconds.
+    """
+    zenoh.try_init_log_from_env()  # type: ignore[no-untyped-call]
+    deadline = time.monotonic() + _PATIENCE_S
+    while True:
+        try:
+            return zenoh.open(config)
+        except zenoh.ZError as error:
+            if time.monotonic() > deadline:
+                raise NoRouterError(config.get_json("connect/endpoints"), _PATIENCE_S, in_words(error)) from error
+            time.sleep(_RETRY_S)

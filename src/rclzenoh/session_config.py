@@ -1,0 +1,197 @@
+"""Configuration of Zenoh sessions: of one that a program describes, or of the one that the environment asks for.
+
+The environment variables are those of rmw_zenoh_cpp: ``ZENOH_SESSION_CONFIG_URI`` names a whole configuration file and
+``ZENOH_CONFIG_OVERRIDE`` (``key=json5;key=json5``) is applied after it.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import zenoh
+
+from rclzenoh.exceptions import ConfigurationError, UnreadableKeyError
+
+DEFAULT_ENDPOINT = "tcp/localhost:7447"
+"""Where the router of a host listens."""
+
+CONFIG_FILE_VARIABLE = "ZENOH_SESSION_CONFIG_URI"
+OVERRIDE_VARIABLE = "ZENOH_CONFIG_OVERRIDE"
+OPEN = "tcp/"
+"""What endpoints begin with whose router lets anybody in."""
+PROTECTED = "tls/"
+"""What endpoints begin with whose router lets nobody in without a key."""
+NOT_IN_PATHS = ";?"
+"""Zenoh puts paths into endpoints, in which these have a meaning: it finds no key in a directory with one of them."""
+
+_TLS = "transport/link/tls"
+_SETTINGS = {
+    "scouting/multicast/enabled": False,
+    # Advanced subscribers, which all those of rmw_zenoh_cpp are, order samples by the time stamps of the session.
+    "timestamping/enabled": True,
+    "queries_default_timeout": 600_000,
+}
+
+
+@dataclass(frozen=True)
+class Key:
+    """By which a router and its clients know each other: all show the same certificate and trust no other (mutual TLS).
+
+    Attributes:
+        private_key: File of the private key, in PEM.
+        certificate: File of the certificate, in PEM.
+    """
+
+    private_key: Path
+    certificate: Path
+
+
+def client_config(endpoint: str, key: Key | None = None) -> zenoh.Config:
+    """Configuration of a client of a router, whatever the environment says.
+
+    Args:
+        endpoint: Endpoint of the router, such as ``tcp/127.0.0.1:7447``.
+        key: Key that a router at ``tls/...`` lets nobody in without.
+
+    Raises:
+        ConfigurationError: If the endpoint is malformed, or the key cannot be read.
+    """
+    config = zenoh.Config()
+    _apply(config, {**_client_settings(endpoint, key), **_SETTINGS}, "endpoint")
+    _check_key(config)
+    return config
+
+
+def environment_config() -> zenoh.Config:
+    """Configuration that the environment asks for; by default, that of a client of the router on this host.
+
+    Raises:
+        ConfigurationError: If an environment variable does not hold what it should, or the key cannot be read.
+    """
+    path = os.environ.get(CONFIG_FILE_VARIABLE)
+    if path:
+        try:
+            config = zenoh.Config.from_file(path)
+        except zenoh.ZError as error:
+            raise ConfigurationError(
+                f"{CONFIG_FILE_VARIABLE}: {path} is no Zenoh configuration: {in_words(error)}"
+            ) from error
+    else:
+        config = zenoh.Config()
+        _apply(config, {"mode": "client", "connect/endpoints": [DEFAULT_ENDPOINT], **_SETTINGS}, "default")
+    for assignment in filter(str.strip, os.environ.get(OVERRIDE_VARIABLE, "").split(";")):
+        key, separator, value = assignment.partition("=")
+        if not separator:
+            raise ConfigurationError(
+                f"{OVERRIDE_VARIABLE}: {assignment.strip()!r} has no '='", expected="key/path=json5;key/path=json5"
+            )
+        _insert(config, key.strip(), value.strip(), OVERRIDE_VARIABLE)
+    _check_key(config)
+    return config
+
+
+def connect_endpoint() -> str | None:
+    """Where the environment says that the router is; None if it says nothing of it.
+
+    Raises:
+        ConfigurationError: As `environment_config`.
+    """
+    if not (os.environ.get(OVERRIDE_VARIABLE) or os.environ.get(CONFIG_FILE_VARIABLE)):
+        return None
+    endpoints = _endpoints(environment_config())
+    return endpoints[0] if endpoints else None
+
+
+def is_protected() -> bool:
+    """Whether the session that the environment asks for is one with a router that lets nobody in without a key.
+
+    Raises:
+        ConfigurationError: As `environment_config`.
+    """
+    return all(endpoint.startswith(PROTECTED) for endpoint in _endpoints(environment_config()))
+
+
+def client_override(endpoint: str, key: Key | None = None) -> str:
+    """Value of ``ZENOH_CONFIG_OVERRIDE`` by which a session is that of `client_config`; it holds no secrets."""
+    return ";".join(f"{name}={json.dumps(value)}" for name, value in _client_settings(endpoint, key).items())
+
+
+def router_config(endpoint: str, key: Key | None = None) -> zenoh.Config:
+    """Configuration of a router that listens on one endpoint.
+
+    Args:
+        endpoint: Such as ``tcp/127.0.0.1:7447``.
+        key: Key that nobody is let in without, if the endpoint is a protected one.
+
+    Raises:
+        ConfigurationError: If the endpoint is malformed, or the key cannot be read.
+    """
+    config = zenoh.Config()
+    _apply(config, {"mode": "router", "listen/endpoints": [endpoint], **_SETTINGS}, "listen endpoint")
+    if endpoint.startswith(PROTECTED) and key is not None:
+        _apply(config, _tls_settings(key, "listen"), "key")
+        _check_key(config)
+    return config
+
+
+def in_words(error: zenoh.ZError) -> str:
+    """What Zenoh says is wrong, without the names and places of its sources."""
+    return re.sub(r'^\w+\([^"]*"', "", re.split(r' at /| \(os error|", location: |"\)', str(error))[0])
+
+
+def _client_settings(endpoint: str, key: Key | None) -> Mapping[str, object]:
+    settings: dict[str, object] = {"mode": "client", "connect/endpoints": [endpoint]}
+    if key is None or not endpoint.startswith(PROTECTED):
+        return settings
+    return {**settings, **_tls_settings(key, "connect")}
+
+
+def _tls_settings(key: Key, side: Literal["connect", "listen"]) -> Mapping[str, object]:
+    return {
+        f"{_TLS}/root_ca_certificate": str(key.certificate),
+        f"{_TLS}/{side}_private_key": str(key.private_key),
+        f"{_TLS}/{side}_certificate": str(key.certificate),
+        f"{_TLS}/enable_mtls": True,
+        # Routers of containers have no address that a certificate could name beforehand.
+        f"{_TLS}/verify_name_on_connect": False,
+    }
+
+
+def _check_key(config: zenoh.Config) -> None:
+    """Find out whether the files of a key can be read: without them Zenoh would only say that it cannot connect."""
+    for name in ("private_key", "certificate"):
+        for side in ("connect", "listen"):
+            if path := json.loads(config.get_json(f"{_TLS}/{side}_{name}")):
+                _check_readable(Path(path))
+    if path := json.loads(config.get_json(f"{_TLS}/root_ca_certificate")):
+        _check_readable(Path(path))
+
+
+def _check_readable(path: Path) -> None:
+    try:
+        path.read_bytes()
+    except OSError as error:
+        raise UnreadableKeyError(path, error.strerror or str(error)) from error
+
+
+def _endpoints(config: zenoh.Config) -> list[str]:
+    endpoints: list[str] = json.loads(config.get_json("connect/endpoints"))
+    return endpoints
+
+
+def _apply(config: zenoh.Config, settings: Mapping[str, object], where: str) -> None:
+    for key, value in settings.items():
+        _insert(config, key, json.dumps(value), where)
+
+
+def _insert(config: zenoh.Config, key: str, value: str, where: str) -> None:
+    try:
+        config.insert_json5(key, value)
+    except zenoh.ZError as error:
+        raise ConfigurationError(f"{where}: {key} cannot be {value}: {in_words(error)}") from error

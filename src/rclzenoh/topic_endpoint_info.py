@@ -1,0 +1,80 @@
+"""What the graph tells about one publisher or subscription."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+from rclzenoh.gid import gid_of
+from rclzenoh.keys import EntityKind, Token
+from rclzenoh.qos import HistoryPolicy, QoSProfile, decode
+
+
+class TopicEndpointTypeEnum(IntEnum):
+    """What an endpoint is."""
+
+    INVALID = 0
+    PUBLISHER = 1
+    SUBSCRIPTION = 2
+
+
+@dataclass(frozen=True)
+class TopicEndpointInfo:
+    """One publisher or subscription.
+
+    Attributes:
+        node_name: Name of its node.
+        node_namespace: Namespace of its node.
+        topic_type: ROS name of the type.
+        topic_type_hash: Type hash.
+        endpoint_type: What it is.
+        endpoint_gid: Identifier, 16 numbers.
+        qos_profile: Quality of service.
+    """
+
+    node_name: str
+    node_namespace: str
+    topic_type: str
+    topic_type_hash: str
+    endpoint_type: TopicEndpointTypeEnum
+    endpoint_gid: list[int]
+    qos_profile: QoSProfile
+
+    def __str__(self) -> str:
+        qos = self.qos_profile
+        depth = f" ({qos.depth})" if qos.history is HistoryPolicy.KEEP_LAST else ""
+        return "\n".join(
+            [
+                f"Node name: {self.node_name}",
+                f"Node namespace: {self.node_namespace}",
+                f"Topic type: {self.topic_type}",
+                f"Topic type hash: {self.topic_type_hash}",
+                f"Endpoint type: {self.endpoint_type.name}",
+                f"GID: {'.'.join(format(octet, '02x') for octet in self.endpoint_gid)}",
+                "QoS profile:",
+                f"  Reliability: {qos.reliability.name}",
+                f"  History (Depth): {(qos.history or HistoryPolicy.UNKNOWN).name}{depth}",
+                f"  Durability: {qos.durability.name}",
+                f"  Lifespan: {qos.lifespan}",
+                f"  Deadline: {qos.deadline}",
+                f"  Liveliness: {qos.liveliness.name}",
+                f"  Liveliness lease duration: {qos.liveliness_lease_duration}",
+            ]
+        )
+
+
+def endpoint_info(token: Token) -> TopicEndpointInfo | None:
+    """What a token tells; None if its quality of service is malformed, as genuine nodes ignore it then."""
+    qos = decode(token.qos)
+    if qos is None:
+        return None
+    is_publisher = token.kind is EntityKind.PUBLISHER
+    return TopicEndpointInfo(
+        node_name=token.node,
+        node_namespace=token.namespace,
+        topic_type=token.ros_type,
+        topic_type_hash=token.type_hash,
+        endpoint_type=TopicEndpointTypeEnum.PUBLISHER if is_publisher else TopicEndpointTypeEnum.SUBSCRIPTION,
+        endpoint_gid=list(gid_of(token.key())),
+        qos_profile=qos,
+    )

@@ -1,0 +1,1 @@
+from rclzenoh.interfaces.action import *  # noqa: F403

@@ -1,0 +1,92 @@
+"""The way into the ROS graph of one run, as a value: a program may have several at once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from rclzenoh.domain import DOMAIN_VARIABLE
+from rclzenoh.session_config import NOT_IN_PATHS, OVERRIDE_VARIABLE, PROTECTED, Key, client_override
+from throwcollect.errors import ConfigError
+from throwcollect.ros.middleware import Middleware
+from throwcollect.run_key import KEY_VARIABLE, RunKey
+
+_EMBEDDED = Middleware()
+
+
+@dataclass(frozen=True)
+class Connection:
+    """The way into the ROS graph of a run; `throwcollect.ros.init` takes it.
+
+    A context that is initialised with one takes nothing from the environment. On the embedded backend, and on genuine
+    rclpy with rmw_zenoh_cpp, contexts of one process may be in different runs. On Fast DDS a process is in one run, as
+    that reads only once where its discovery server is.
+
+    Attributes:
+        endpoint: Endpoint of the router, such as ``tls/127.0.0.1:7447``.
+        key: Key of the run, which a router at ``tls/...`` lets nobody in without.
+        domain_id: ROS domain.
+        middleware: What carries the messages of the run.
+    """
+
+    endpoint: str
+    key: RunKey
+    domain_id: int = 0
+    middleware: Middleware = _EMBEDDED
+
+    def environment(self) -> Mapping[str, str]:
+        """Environment variables by which a process of ours joins the run; they name the key's files and hold no secret.
+
+        Raises:
+            ConfigError: If the key lies where Zenoh cannot find it.
+        """
+        return {
+            **self.middleware.environment(),
+            OVERRIDE_VARIABLE: client_override(self.endpoint, self.session_key),
+            DOMAIN_VARIABLE: str(self.domain_id),
+            KEY_VARIABLE: str(self.key.directory),
+        }
+
+    @property
+    def session_key(self) -> Key | None:
+        """The key of the run as a Zenoh session takes it; None if its router lets anybody in.
+
+        Raises:
+            ConfigError: If the key lies where Zenoh cannot find it.
+        """
+        return session_key(self.endpoint, self.key)
+
+    def check(self, rmw: str) -> None:
+        """Refuse to join a run by middleware that its nodes do not understand.
+
+        Args:
+            rmw: Middleware of this process.
+
+        Raises:
+            ConfigError: If it is another one than that of the run.
+        """
+        if self.middleware.rmw != rmw:
+            raise ConfigError(
+                f"the run at {self.endpoint} is on {self.middleware.rmw}, and this process on {rmw}",
+                hint="join it from a process of its own",
+            )
+
+
+def session_key(endpoint: str, key: RunKey) -> Key | None:
+    """The key of a run as a Zenoh session takes it; None if its router lets anybody in.
+
+    Args:
+        endpoint: Endpoint of the router.
+        key: The key of the run.
+
+    Raises:
+        ConfigError: If it lies where Zenoh cannot find it.
+    """
+    if not endpoint.startswith(PROTECTED):
+        return None
+    if wrong := sorted(set(NOT_IN_PATHS) & set(str(key.directory))):
+        raise ConfigError(
+            f"{key.directory}: Zenoh finds no key in a directory with {' or '.join(wrong)} in its name",
+            expected=f"a path without {' and '.join(NOT_IN_PATHS)}, as of the directory that THROWCOLLECT_STATE names",
+        )
+    return Key(key.private_key, key.certificate)

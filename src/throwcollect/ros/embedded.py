@@ -1,0 +1,47 @@
+"""The embedded backend: `rclzenoh`, which needs no installation of ROS 2."""
+
+from __future__ import annotations
+
+import rclzenoh.context
+from rclzenoh import api
+from rclzenoh.api import *  # noqa: F403
+from rclzenoh.context import Context
+from rclzenoh.session_config import client_config, is_protected
+from throwcollect.ros.connection import Connection
+from throwcollect.ros.middleware import EMBEDDED_RMW
+from throwcollect.ros.zenoh_errors import zenoh_errors
+
+
+def init(*, context: Context | None = None, connection: Connection | None = None) -> None:
+    """Initialise a context.
+
+    Args:
+        context: The context; None for the default one, for which a SIGTERM ends all spinning from now on.
+        connection: The way into the graph; None for the one that the environment describes.
+
+    Raises:
+        RuntimeError: If the context is in use already.
+        ConfigError: If the environment or the connection cannot be used, or the connection is one by other middleware.
+        ThrowcollectError: If there is no router.
+    """
+    with zenoh_errors():
+        if connection is None:
+            rclzenoh.context.init(context=context)
+            return
+        connection.check(EMBEDDED_RMW)
+        config = client_config(connection.endpoint, connection.session_key)
+        rclzenoh.context.init(context=context, domain_id=connection.domain_id, config=config)
+
+
+def joins_protected() -> bool:
+    """Whether nodes of this process join a graph that lets nobody in without a key.
+
+    Raises:
+        ConfigError: If an environment variable does not hold what it should.
+    """
+    with zenoh_errors():
+        return is_protected()
+
+
+__all__ = ["init", "joins_protected"]
+__all__ += api.__all__

@@ -1,0 +1,1 @@
+from rclzenoh.interfaces.msg import *  # noqa: F403

@@ -1,0 +1,1 @@
+from rclzenoh.interfaces.srv import *  # noqa: F403

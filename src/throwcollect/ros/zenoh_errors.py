@@ -1,0 +1,34 @@
+"""Errors of `rclzenoh` in the words of throwcollect."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from rclzenoh.exceptions import ConfigurationError, NoRouterError, UnreadableKeyError
+from rclzenoh.session_config import OVERRIDE_VARIABLE
+from throwcollect.errors import ConfigError, ThrowcollectError
+from throwcollect.run_key import unreadable
+
+
+@contextmanager
+def zenoh_errors() -> Iterator[None]:
+    """Raise what is wrong with a session as an error of throwcollect.
+
+    Raises:
+        ConfigError: If the session cannot be opened as it is asked for.
+        ThrowcollectError: If there is no router.
+    """
+    try:
+        yield
+    except UnreadableKeyError as error:
+        raise unreadable(error.path, error.reason) from error
+    except ConfigurationError as error:
+        raise ConfigError(error.message, expected=error.expected) from error
+    except NoRouterError as error:
+        raise ThrowcollectError(
+            error.message,
+            evidence=error.reason,
+            hint="start a router: python -m throwcollect.ros.router, or ros2 run rmw_zenoh_cpp rmw_zenohd; "
+            f"or name another one in {OVERRIDE_VARIABLE}",
+        ) from error

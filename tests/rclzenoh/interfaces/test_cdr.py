@@ -1,0 +1,163 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from rosbags.typesys import Stores, get_typestore
+
+from rclzenoh.interfaces import deserialize, get_action, get_message, message_class, serialize
+from rclzenoh.interfaces.catalog import _FIELDDEFS, DEFINITIONS, structure
+from rclzenoh.interfaces.message import DTYPES
+
+FJT = get_action("control_msgs/action/FollowJointTrajectory")
+OURS = [
+    *(p.relative_to(DEFINITIONS).with_suffix("").as_posix() for p in DEFINITIONS.rglob("*.msg")),
+    *(f"{FJT.TYPE}_{part}" for part in ("Goal", "Result", "Feedback", "FeedbackMessage", "SendGoal_Request")),
+    "simulation_interfaces/srv/GetEntityState_Response",
+    "rcl_interfaces/srv/SetParameters_Request",
+]
+
+
+def random_value(field, random, depth):
+    if field.nested:
+        return random_message(field.type, random, depth + 1)
+    if field.type == "string":
+        return random.choice(["", "a", "äß", "joint_17", "x" * 13])
+    if field.type == "bool":
+        return random.random() < 0.5
+    if field.type.startswith("float"):
+        return float(np.float32(random.uniform(-1e3, 1e3)))
+    info = np.iinfo(DTYPES[field.type])
+    return random.randint(int(info.min), int(info.max))
+
+
+def random_message(name, random, depth=0):
+    values = {}
+    for field in structure(name).fields:
+        if field.length is None and not field.sequence:
+            values[field.name] = random_value(field, random, depth)
+            continue
+        most = min(3 if depth < 3 else 1, field.bound or 3)
+        count = random.randint(0, most) if field.length is None else field.length
+        values[field.name] = [random_value(field, random, depth) for _ in range(count)]
+    return message_class(name)(**values)
+
+
+@pytest.fixture(scope="module")
+def store():
+    """Rosbags' own store, to which our definitions are added."""
+    store = get_typestore(Stores.ROS2_JAZZY)
+    for name in OURS:
+        structure(name)
+    store.register({name: definition for name, definition in _FIELDDEFS.items() if name not in store.fielddefs})
+    return store
+
+
+def check_against_rosbags(name, store, random):
+    message = random_message(name, random)
+    data = serialize(message)
+    theirs = store.deserialize_cdr(data, name)
+    assert bytes(store.serialize_cdr(theirs, name)) == data, name
+    assert deserialize(data, message_class(name)) == message, name
+
+
+@pytest.mark.parametrize(
+    "package", ["std_msgs", "sensor_msgs", "trajectory_msgs", "tf2_msgs", "rcl_interfaces", "nav_msgs"]
+)
+@settings(deadline=None, max_examples=3)
+@given(random=st.randoms(use_true_random=False))
+def test_bytes_equal_those_of_rosbags(store, package, random):
+    for name in [name for name in store.fielddefs if name.startswith(f"{package}/msg/")]:
+        check_against_rosbags(name, store, random)
+
+
+@pytest.mark.parametrize("name", OURS)
+@settings(deadline=None, max_examples=10)
+@given(random=st.randoms(use_true_random=False))
+def test_bytes_of_our_definitions_equal_those_of_rosbags(store, name, random):
+    check_against_rosbags(name, store, random)
+
+
+def test_a_known_message_has_known_bytes():
+    header = get_message("std_msgs/msg/Header")(frame_id="ab")
+    header.stamp.sec, header.stamp.nanosec = 1, 2
+    assert serialize(header) == bytes.fromhex("00010000 01000000 02000000 03000000 616200".replace(" ", ""))
+    assert serialize(get_message("std_msgs/msg/Empty")()) == bytes.fromhex("0001000000")
+
+
+def test_received_sequences_may_be_changed_and_share_nothing_with_the_data():
+    joints = get_message("sensor_msgs/msg/JointState")
+    data = serialize(joints(position=[1.0, 2.0]))
+    message = deserialize(data, joints)
+    message.position[0] = 5.0
+    assert deserialize(data, joints).position.tolist() == [1.0, 2.0]
+
+
+def test_remembered_names_belong_to_one_message():
+    joints = get_message("sensor_msgs/msg/JointState")
+    data = serialize(joints(name=["a", "b"]))
+    first, second = deserialize(data, joints), deserialize(data, joints)
+    first.name.append("c")
+    assert second.name == ["a", "b"]
+    assert deserialize(serialize(joints(name=["a", "c"])), joints).name == ["a", "c"]
+
+
+@pytest.mark.parametrize("length", range(4, 60))
+def test_nothing_is_remembered_of_data_that_is_cut_off(length):
+    state = get_message("sensor_msgs/msg/JointState")
+    message = state(name=["arm_right_1_joint", "arm_right_2_joint"], position=[1.0, 2.0])
+    data = serialize(message)
+    deserialize(serialize(state(name=["another"])), state)
+    with pytest.raises(ValueError, match=r"malformed CDR|bytes of CDR"):
+        deserialize(data[:length], state)
+    assert deserialize(data, state) == message
+
+
+@pytest.mark.parametrize("more", [bytes(3), bytes(64), b"\x07" * 8])
+def test_what_follows_a_message_is_left_alone(more):
+    string = get_message("std_msgs/msg/String")
+    assert deserialize(serialize(string(data="abc")) + more, string).data == "abc"
+
+
+@pytest.mark.parametrize("data", [b"", b"\x00", b"\x00\x01", b"\x00\x01\x00", bytes(4), b"\x01\x01\x00\x00abcd"])
+def test_other_encapsulations_are_refused(data):
+    with pytest.raises(ValueError, match="not little-endian CDR"):
+        deserialize(data, get_message("std_msgs/msg/String"))
+
+
+@pytest.mark.parametrize("length", range(4, 300, 7))
+def test_truncated_data_is_refused(length):
+    goal = FJT.Goal()
+    goal.trajectory.joint_names = ["a", "b"]
+    points = get_message("trajectory_msgs/msg/JointTrajectoryPoint")
+    goal.trajectory.points = [points(positions=[1.0, 2.0], velocities=[0.0, 1.0]) for _ in range(4)]
+    data = serialize(goal)
+    assert len(data) > 300
+    with pytest.raises(ValueError, match=r"malformed CDR|bytes of CDR"):
+        deserialize(data[:length], FJT.Goal)
+
+
+@settings(deadline=None, max_examples=300)
+@given(st.binary(max_size=200))
+def test_random_bytes_are_decoded_or_refused_with_a_value_error(body):
+    for cls in (FJT.Goal, get_message("tf2_msgs/msg/TFMessage"), get_message("rcl_interfaces/msg/ParameterEvent")):
+        try:
+            deserialize(b"\x00\x01\x00\x00" + body, cls)
+        except ValueError:
+            continue
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "error"),
+    [("frame_id", 5, TypeError), ("stamp", None, TypeError)],
+)
+def test_a_field_of_another_type_is_refused(field, value, error):
+    header = get_message("std_msgs/msg/Header")()
+    setattr(header, field, value)
+    with pytest.raises(error, match="std_msgs/msg/Header cannot be serialised"):
+        serialize(header)
+
+
+def test_a_number_that_does_not_fit_is_refused():
+    time = get_message("builtin_interfaces/msg/Time")(sec=2**31)
+    with pytest.raises(ValueError, match="builtin_interfaces/msg/Time cannot be serialised"):
+        serialize(time)

@@ -1,0 +1,43 @@
+"""What type checkers are told of messages is what they are."""
+
+import importlib.util
+from pathlib import Path
+
+import pytest
+
+from rclzenoh.interfaces import action, get_action, get_message, get_service, msg, srv, typed_names
+
+GENERATOR = Path(__file__).parents[3] / "packaging" / "interface_stubs.py"
+
+
+@pytest.fixture(scope="module")
+def generator():
+    spec = importlib.util.spec_from_file_location("interface_stubs", GENERATOR)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_the_stubs_are_those_of_the_definitions(generator):
+    for path, text in generator.stubs().items():
+        assert path.read_text(encoding="utf-8") == text, f"python packaging/{GENERATOR.name} writes {path.name} again"
+
+
+def test_a_part_of_a_typed_interface_has_to_be_typed_itself(generator, monkeypatch):
+    monkeypatch.setattr(generator, "MESSAGES", {"Header": "std_msgs/msg/Header"})
+    with pytest.raises(ValueError, match="builtin_interfaces/msg/Time is part of a typed interface"):
+        generator.stubs()
+
+
+@pytest.mark.parametrize(
+    ("module", "names", "get"),
+    [
+        (msg, typed_names.MESSAGES, get_message),
+        (srv, typed_names.SERVICES, get_service),
+        (action, typed_names.ACTIONS, get_action),
+    ],
+)
+def test_typed_names_are_those_of_the_classes(module, names, get):
+    assert {name: getattr(module, name) for name in names} == {name: get(full) for name, full in names.items()}
+    with pytest.raises(AttributeError, match="has no attribute 'Nothing'"):
+        _ = module.Nothing

@@ -1,0 +1,44 @@
+import signal
+
+import pytest
+
+from rclzenoh import api as ros
+from rclzenoh.context import get_default_context
+from rclzenoh.exceptions import ConfigurationError, NotInitializedException
+
+
+@pytest.mark.parametrize("text", ["-1", "x", "1000"])
+def test_the_domain_must_be_a_number(environment, monkeypatch, text):
+    monkeypatch.setenv("ROS_DOMAIN_ID", text)
+    with pytest.raises(ConfigurationError, match="ROS_DOMAIN_ID must be a number"):
+        ros.Context().init()
+
+
+def test_sigterm_is_handled_as_long_as_the_default_context_lives(environment):
+    assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+    ros.init()
+    assert signal.getsignal(signal.SIGTERM) is not signal.SIG_DFL
+    signal.raise_signal(signal.SIGTERM)
+    assert not get_default_context().ok()
+    ros.shutdown()
+    assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+
+
+def test_a_session_is_there_from_init_to_shutdown(environment):
+    context = ros.Context()
+    with pytest.raises(NotInitializedException, match=r"init\(\) has not been called"):
+        _ = context.session
+    context.init()
+    session = context.session
+    context.shutdown()
+    assert session.is_closed()
+
+
+def test_a_shutdown_that_was_requested_ends_what_spins_before_it_is_carried_out(environment):
+    context, calls = ros.Context(), []
+    context.init()
+    context.on_shutdown(lambda: calls.append(1))
+    context.request_shutdown()
+    assert not context.ok()
+    context.shutdown()
+    assert calls == [1]

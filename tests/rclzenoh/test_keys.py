@@ -1,0 +1,80 @@
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rclzenoh.keys import EntityKind, Token, data_key, dds_type, parse_token, ros_type
+
+NODE = Token(7, "1a2b3c", 4, 4, EntityKind.NODE, "/talos", "sim")
+PUBLISHER = Token(
+    0,
+    "1a2b3c",
+    4,
+    9,
+    EntityKind.PUBLISHER,
+    "/",
+    "sim",
+    "/talos/tf",
+    "tf2_msgs::msg::dds_::TFMessage_",
+    "RIHS01_e369",
+    "::,10:,:,:,,",
+)
+
+
+def test_a_node_token_is_written_as_rmw_zenoh_does():
+    assert NODE.key() == "@ros2_lv/7/1a2b3c/4/4/NN/%/%talos/sim"
+
+
+def test_an_endpoint_token_is_written_as_rmw_zenoh_does():
+    assert PUBLISHER.key() == (
+        "@ros2_lv/0/1a2b3c/4/9/MP/%/%/sim/%talos%tf/tf2_msgs::msg::dds_::TFMessage_/RIHS01_e369/::,10:,:,:,,"
+    )
+
+
+@pytest.mark.parametrize("token", [NODE, PUBLISHER])
+def test_tokens_survive_writing_and_parsing(token):
+    assert parse_token(token.key()) == token
+
+
+def test_an_enclave_is_part_of_the_token():
+    token = replace(NODE, enclave="/a/b")
+    assert "/NN/%a%b/" in token.key()
+    assert parse_token(token.key()) == token
+
+
+def test_chunks_that_later_versions_append_are_ignored():
+    assert parse_token(PUBLISHER.key() + "/more") == PUBLISHER
+
+
+@pytest.mark.parametrize(
+    "key",
+    [
+        "",
+        "@ros2_lv/0/1a",
+        "@ros2_lv/x/1a/0/0/NN/%/%/n",
+        "@ros2_lv/0/1a/0/x/NN/%/%/n",
+        "@ros2_lv/0/1a/0/0/XX/%/%/n",
+        "@ros2_lv/0/1a/0/0/MP/%/%/n",
+        "@ros2_lv/0/1a/0/0/NN//%/n",
+        "other/0/1a/0/0/NN/%/%/n",
+        "@ros2_lv/0/1a/0/" + 5000 * "9" + "/NN/%/%/n",
+    ],
+)
+def test_malformed_tokens_are_ignored(key):
+    assert parse_token(key) is None
+
+
+@given(st.text(alphabet="@ros2_lv/0aNMP%:,", max_size=80))
+def test_parsing_never_fails(text):
+    parse_token("@ros2_lv/" + text)
+
+
+def test_a_data_key_has_domain_name_type_and_hash():
+    key = data_key(0, "/talos/joint_states", "sensor_msgs/msg/JointState", "RIHS01_a1")
+    assert key == "0/talos/joint_states/sensor_msgs::msg::dds_::JointState_/RIHS01_a1"
+
+
+@pytest.mark.parametrize("name", ["std_srvs/srv/Trigger", "control_msgs/action/FollowJointTrajectory_SendGoal"])
+def test_type_names_survive_translation(name):
+    assert ros_type(dds_type(name)) == name

@@ -1,0 +1,35 @@
+import pytest
+
+from rclzenoh.exceptions import NameValidationException
+from rclzenoh.names import absolute_namespace, check_node_name, resolve
+
+
+@pytest.mark.parametrize(
+    ("name", "absolute"),
+    [("/a/b", "/a/b"), ("a", "/ns/a"), ("~/a", "/ns/node/a"), ("a/_action/status", "/ns/a/_action/status")],
+)
+def test_names_are_resolved_in_the_namespace_of_the_node(name, absolute):
+    assert resolve(name, "/ns", "node") == absolute
+
+
+def test_names_in_the_root_namespace_have_one_slash():
+    assert resolve("a", "/", "node") == "/a"
+    assert resolve("~/a", "/", "node") == "/node/a"
+
+
+@pytest.mark.parametrize("name", ["", "/", "a//b", "a/", "1a", "a-b", "a b", "~a", "/a/*", "a%b", "@x"])
+def test_invalid_names_are_refused(name):
+    with pytest.raises(NameValidationException, match="invalid topic or service name"):
+        resolve(name, "/", "node")
+
+
+@pytest.mark.parametrize("name", ["", "a/b", "1a", "a-b"])
+def test_invalid_node_names_are_refused(name):
+    with pytest.raises(NameValidationException, match="invalid node name"):
+        check_node_name(name)
+
+
+def test_namespaces_become_absolute():
+    assert [absolute_namespace(name) for name in ("", "/", "a/b", "/a")] == ["/", "/", "/a/b", "/a"]
+    with pytest.raises(NameValidationException, match="invalid namespace"):
+        absolute_namespace("a//b")

@@ -1,0 +1,12 @@
+"""What the embedded backend lets nodes do with parameters and rclpy does not."""
+
+from rclzenoh.api import Parameter, ParameterDescriptor
+
+
+def test_a_descriptor_can_be_used_for_several_parameters(rig):
+    node = rig.node("node")
+    descriptor = ParameterDescriptor(description="shared")
+    node.declare_parameter("group.a", 1, descriptor)
+    node.declare_parameter("group.b", "x", descriptor)
+    assert node.describe_parameter("group.a").name == "group.a"
+    assert node.describe_parameter("group.b").type == Parameter.Type.STRING.value

@@ -1,0 +1,89 @@
+"""Services and clients, through a real router."""
+
+import numpy as np
+import pytest
+import zenoh
+
+from rclzenoh.attachment import Attachment, unpack
+from rclzenoh.interfaces import get_service, serialize, type_hash
+from rclzenoh.keys import data_key
+
+Trigger = get_service("std_srvs/srv/Trigger")
+SetBool = get_service("std_srvs/srv/SetBool")
+
+
+def answer(request, response):
+    response.success, response.message = request.data, "done"
+    return response
+
+
+@pytest.fixture
+def pair(rig):
+    server, client = rig.node("server"), rig.node("client")
+    return server, client, client.create_client(SetBool, "/server/set")
+
+
+def test_the_wire_is_that_of_rmw_zenoh(rig, pair):
+    server, node, client = pair
+    server.create_service(SetBool, "~/set", answer)
+    assert client.wait_for_service(5)
+    key = data_key(node.context.get_domain_id(), "/server/set", SetBool.TYPE, type_hash(SetBool.TYPE))
+    attachment = Attachment(7, 5, bytes(range(16))).pack()
+    replies = []
+    node.context.session.get(
+        key,
+        zenoh.handlers.Callback(replies.append, drop=lambda: replies.append(None), indirect=False),
+        target=zenoh.QueryTarget.ALL_COMPLETE,
+        consolidation=zenoh.ConsolidationMode.NONE,
+        payload=serialize(SetBool.Request(data=True)),
+        attachment=attachment,
+    )
+    # The query ends at once, because the server drops it.
+    assert rig.spin(lambda: replies and replies[-1] is None)
+    assert str(replies[0].ok.key_expr) == key
+    assert replies[0].ok.payload.to_bytes() == serialize(SetBool.Response(success=True, message="done"))
+    received = unpack(replies[0].ok.attachment.to_bytes())
+    assert (received.sequence, received.gid) == (7, bytes(range(16)))
+
+
+def test_garbage_is_answered_with_an_error_and_does_not_stop_the_service(rig, pair, capsys):
+    server, node, client = pair
+    server.create_service(SetBool, "~/set", answer)
+    client.wait_for_service(5)
+    key = data_key(node.context.get_domain_id(), "/server/set", SetBool.TYPE, type_hash(SetBool.TYPE))
+    random = np.random.default_rng(2)
+    ended = []
+    for length in (0, 1, 4, 33, 60):
+        node.context.session.get(
+            key,
+            zenoh.handlers.Callback(print, drop=lambda: ended.append(1), indirect=False),
+            payload=random.bytes(length),
+            attachment=random.bytes(length),
+        )
+    node.context.session.get(key, zenoh.handlers.Callback(print, drop=lambda: ended.append(1), indirect=False))
+    assert rig.spin(lambda: len(ended) == 6)
+    assert rig.result(client.call_async(SetBool.Request(data=True))).success
+    assert capsys.readouterr().err.count("/server/set: ignored") == 1
+
+
+def test_an_error_in_a_callback_ends_spinning_and_the_request(rig, pair):
+    server, _, client = pair
+
+    def fail(_request, _response):
+        raise LookupError("callback failed")
+
+    server.create_service(SetBool, "~/set", fail)
+    client.wait_for_service(5)
+    key = data_key(server.context.get_domain_id(), "/server/set", SetBool.TYPE, type_hash(SetBool.TYPE))
+    replies = []
+    rig.context().session.get(
+        key,
+        zenoh.handlers.Callback(replies.append, drop=lambda: replies.append(None), indirect=False),
+        payload=serialize(SetBool.Request()),
+        attachment=Attachment(1, 0, bytes(16)).pack(),
+    )
+    with pytest.raises(LookupError, match="callback failed") as caught:
+        rig.rest(5)
+    # Even while the traceback keeps everything alive.
+    assert rig.spin(lambda: replies == [None])
+    assert caught.value.args == ("callback failed",)

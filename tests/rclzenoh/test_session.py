@@ -1,0 +1,49 @@
+import pytest
+
+from rclzenoh import session
+from rclzenoh.exceptions import ConfigurationError, NoRouterError
+from rclzenoh.session import open_session
+from rclzenoh.session_config import environment_config
+
+
+def test_without_a_router_the_error_says_where_it_was_looked_for(environment, monkeypatch):
+    monkeypatch.setattr(session, "_PATIENCE_S", 0.2)
+    monkeypatch.setenv("ZENOH_CONFIG_OVERRIDE", 'connect/endpoints=["tcp/127.0.0.1:1"]')
+    with pytest.raises(NoRouterError, match=r"connecting to .*tcp/127.0.0.1:1") as caught:
+        open_session(environment_config())
+    assert caught.value.endpoints == '["tcp/127.0.0.1:1"]'
+    assert ".rs" not in caught.value.reason
+
+
+@pytest.mark.parametrize(
+    ("override", "match"),
+    [
+        ("mode", "has no '='"),
+        ('mode="nonsense"', r"mode cannot be \"nonsense\": unknown variant"),
+        ("no/such/key=1", "no/such/key cannot be 1: unknown key$"),
+    ],
+)
+def test_overrides_that_zenoh_does_not_understand_are_refused(environment, monkeypatch, override, match):
+    monkeypatch.setenv("ZENOH_CONFIG_OVERRIDE", override)
+    with pytest.raises(ConfigurationError, match=match):
+        open_session(environment_config())
+
+
+def test_a_configuration_file_replaces_the_defaults(environment, endpoint, monkeypatch, tmp_path):
+    path = tmp_path / "session.json5"
+    path.write_text(
+        f'{{mode: "peer", connect: {{endpoints: ["{endpoint}"]}}, scouting: {{multicast: {{enabled: false}}}}}}'
+    )
+    monkeypatch.setenv("ZENOH_SESSION_CONFIG_URI", str(path))
+    monkeypatch.setenv("ZENOH_CONFIG_OVERRIDE", 'listen/endpoints=["tcp/127.0.0.1:0"]; ')
+    opened = open_session(environment_config())
+    try:
+        assert len(list(opened.info.routers_zid())) == 1
+    finally:
+        opened.close()
+
+
+def test_a_configuration_file_that_is_none_is_refused(environment, monkeypatch, tmp_path):
+    monkeypatch.setenv("ZENOH_SESSION_CONFIG_URI", str(tmp_path / "absent.json5"))
+    with pytest.raises(ConfigurationError, match=r"ZENOH_SESSION_CONFIG_URI: .*absent.json5"):
+        open_session(environment_config())

@@ -1,0 +1,66 @@
+"""Where the environment says that the router of a run is."""
+
+import pytest
+
+from rclzenoh.exceptions import ConfigurationError, UnreadableKeyError
+from rclzenoh.session_config import (
+    CONFIG_FILE_VARIABLE,
+    OVERRIDE_VARIABLE,
+    Key,
+    client_config,
+    client_override,
+    connect_endpoint,
+)
+
+ENDPOINT = "tls/127.0.0.1:7447"
+
+
+@pytest.fixture(autouse=True)
+def _nothing_said(monkeypatch):
+    for variable in (CONFIG_FILE_VARIABLE, OVERRIDE_VARIABLE):
+        monkeypatch.delenv(variable, raising=False)
+
+
+@pytest.fixture
+def key(tmp_path):
+    made = Key(tmp_path / "key.pem", tmp_path / "certificate.pem")
+    for path in (made.private_key, made.certificate):
+        path.write_text("")
+    return made
+
+
+def test_an_environment_that_says_nothing_of_a_router_leads_to_none():
+    assert connect_endpoint() is None
+
+
+def test_the_router_is_the_one_that_the_environment_names(monkeypatch, key, tmp_path):
+    monkeypatch.setenv(OVERRIDE_VARIABLE, client_override(ENDPOINT, key))
+    assert connect_endpoint() == ENDPOINT
+    monkeypatch.delenv(OVERRIDE_VARIABLE)
+    (tmp_path / "session.json5").write_text('{mode: "client", connect: {endpoints: ["tcp/192.0.2.7:1"]}}')
+    monkeypatch.setenv(CONFIG_FILE_VARIABLE, str(tmp_path / "session.json5"))
+    assert connect_endpoint() == "tcp/192.0.2.7:1"
+
+
+def test_an_environment_with_no_router_at_all_leads_to_none(monkeypatch):
+    monkeypatch.setenv(OVERRIDE_VARIABLE, "connect/endpoints=[]")
+    assert connect_endpoint() is None
+
+
+def test_an_environment_that_is_malformed_is_refused(monkeypatch):
+    monkeypatch.setenv(OVERRIDE_VARIABLE, "connect/endpoints")
+    with pytest.raises(ConfigurationError, match="has no '='"):
+        connect_endpoint()
+
+
+def test_a_key_that_cannot_be_read_is_named(key):
+    key.certificate.unlink()
+    with pytest.raises(UnreadableKeyError, match="No such file") as caught:
+        client_config(ENDPOINT, key)
+    assert caught.value.path == key.certificate
+    client_config("tcp/127.0.0.1:7447", key)
+
+
+def test_an_endpoint_that_is_none_is_refused():
+    with pytest.raises(ConfigurationError, match="endpoint: connect/endpoints cannot be"):
+        client_config("nowhere")

@@ -1,0 +1,105 @@
+"""Publishers and subscriptions, through a real router."""
+
+import time
+
+import numpy as np
+import pytest
+import zenoh
+import zenoh.ext
+
+from rclzenoh.attachment import Attachment, unpack
+from rclzenoh.interfaces import get_message, serialize, type_hash
+from rclzenoh.keys import data_key
+from throwcollect.ros import DurabilityPolicy, HistoryPolicy, QoSProfile
+
+String = get_message("std_msgs/msg/String")
+JointState = get_message("sensor_msgs/msg/JointState")
+LATCHED = QoSProfile(depth=2, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+def test_the_wire_is_that_of_rmw_zenoh(rig):
+    node = rig.node("talker", namespace="/talos")
+    samples = []
+    key = data_key(node.context.get_domain_id(), "/talos/chatter", String.TYPE, type_hash(String.TYPE))
+    session = rig.context().session
+    handler = zenoh.handlers.Callback(samples.append, indirect=False)
+    session.declare_subscriber(key, handler)
+    publisher = node.create_publisher(String, "chatter", 10)
+    before = time.time_ns()
+    assert rig.spin(lambda: publisher.publish(String(data="x")) or len(samples) > 2)
+    first, second = (unpack(sample.attachment.to_bytes()) for sample in samples[:2])
+    assert second.sequence == first.sequence + 1
+    assert first.gid == second.gid == publisher.gid
+    assert before <= first.source_timestamp <= time.time_ns()
+    assert samples[0].payload.to_bytes() == serialize(String(data="x"))
+    # Advanced subscribers drop samples without a time stamp of the session.
+    assert samples[0].timestamp is not None
+
+
+@pytest.mark.parametrize("durability", list(DurabilityPolicy)[1:3])
+def test_an_advanced_subscriber_as_genuine_nodes_have_it_loses_nothing(rig, durability):
+    qos = QoSProfile(depth=2000, history=HistoryPolicy.KEEP_ALL, durability=durability)
+    node = rig.node("talker")
+    key = data_key(node.context.get_domain_id(), "/t", String.TYPE, type_hash(String.TYPE))
+    sequences = []
+    session = rig.context().session
+    handler = zenoh.handlers.Callback(
+        lambda s: sequences.append(unpack(s.attachment.to_bytes()).sequence), indirect=False
+    )
+    subscriber = zenoh.ext.declare_advanced_subscriber(session, key, handler)
+    publisher = node.create_publisher(String, "t", qos)
+    while not sequences:
+        publisher.publish(String(data="first"))
+        time.sleep(0.01)
+    for i in range(2000):
+        publisher.publish(String(data=str(i)))
+    assert rig.spin(lambda: sequences[-1] - sequences[0] > 1999)
+    assert np.all(np.diff(sequences) == 1)
+    subscriber.undeclare()
+
+
+def test_the_history_of_a_topic_is_announced_as_advanced_publishers_do(rig):
+    node = rig.node("talker")
+    node.create_publisher(String, "t", LATCHED)
+    key = data_key(node.context.get_domain_id(), "/t", String.TYPE, type_hash(String.TYPE))
+    session = rig.context().session
+    assert len(list(session.liveliness().get(f"{key}/@adv/pub/{node.context.session.zid()}/*/_"))) == 1
+
+
+def test_inputs_are_handled_in_order_of_arrival_across_topics(rig):
+    listener, talker = rig.node("listener"), rig.node("talker")
+    heard = []
+    names = ["a", "b", "c"]
+    for name in names:
+        listener.create_subscription(String, name, lambda m: heard.append(m.data), 1000)
+    publishers = [talker.create_publisher(String, name, 1000) for name in names]
+    assert rig.spin(lambda: all(publisher.get_subscription_count() for publisher in publishers))
+    order = [str(i) for i in range(300)]
+    for i, text in enumerate(order):
+        publishers[i * i % 3].publish(String(data=text))
+    assert rig.spin(lambda: len(heard) == 300)
+    assert heard == order
+
+
+def test_garbage_on_a_topic_is_logged_once_and_does_not_stop_the_node(rig, capsys):
+    node = rig.node("listener")
+    heard = []
+    node.create_subscription(JointState, "t", heard.append, 1000)
+    publisher = rig.node("talker").create_publisher(JointState, "t", 1000)
+    assert rig.spin(lambda: publisher.get_subscription_count() == 1)
+    session = rig.context().session
+    key = data_key(node.context.get_domain_id(), "/t", JointState.TYPE, type_hash(JointState.TYPE))
+    good, attachment = serialize(JointState(position=[1.0])), Attachment(1, 0, bytes(16)).pack()
+    random = np.random.default_rng(1)
+    for _ in range(100):
+        body = random.bytes(int(random.integers(0, 80)))
+        session.put(key, b"\x00\x01\x00\x00" + body, attachment=attachment)
+        session.put(key, body, attachment=attachment)
+        session.put(key, good, attachment=body)
+    session.put(key, good)
+    # From the same session, so that it cannot overtake the garbage.
+    last = serialize(JointState(position=[2.0]))
+    assert rig.spin(
+        lambda: session.put(key, last, attachment=attachment) or (heard and heard[-1].position.tolist() == [2.0])
+    )
+    assert capsys.readouterr().err.count("/t: ignored") == 1

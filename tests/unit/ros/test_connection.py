@@ -1,0 +1,71 @@
+"""One process in several runs at once."""
+
+import os
+
+import pytest
+from tests.contract.rig import names_of
+
+from rclzenoh.session_config import CONFIG_FILE_VARIABLE, OVERRIDE_VARIABLE
+from throwcollect import ros
+from throwcollect.errors import ConfigError
+from throwcollect.ros.connection import Connection
+from throwcollect.ros.middleware import VARIABLE, Middleware
+from throwcollect.ros.router import router
+from throwcollect.run_key import KEY_VARIABLE, RunKey
+
+
+@pytest.fixture
+def key(tmp_path):
+    made = RunKey(tmp_path / "key")
+    made.create()
+    return made
+
+
+def test_processes_are_told_all_of_it_by_their_environment_but_no_secret(key):
+    environment = Connection("tls/127.0.0.1:7447", key, 7).environment()
+    assert environment[VARIABLE] == "embedded"
+    assert (environment["ROS_DOMAIN_ID"], environment[KEY_VARIABLE]) == ("7", str(key.directory))
+    assert 'connect/endpoints=["tls/127.0.0.1:7447"]' in environment[OVERRIDE_VARIABLE]
+    assert str(key.private_key) in environment[OVERRIDE_VARIABLE]
+
+
+def test_contexts_of_one_process_are_in_different_runs_and_the_environment_has_no_part_in_it(key, monkeypatch):
+    for variable in (OVERRIDE_VARIABLE, CONFIG_FILE_VARIABLE, "ROS_DOMAIN_ID"):
+        monkeypatch.setenv(variable, "nonsense")
+    before = dict(os.environ)
+    with router("tls/127.0.0.1:0", key) as private, router("tcp/127.0.0.1:0") as public:
+        nodes = {}
+        ways = {"private": Connection(private, key, 3), "public": Connection(public, key, 3)}
+        try:
+            for name, way in [*ways.items(), ("elsewhere", Connection(private, key, 4))]:
+                context = ros.Context()
+                ros.init(context=context, connection=way)
+                nodes[name] = ros.Node(name, context=context)
+            assert [nodes[name].context.get_domain_id() for name in nodes] == [3, 3, 4]
+            for name, way in ways.items():
+                # Whoever comes later sees who is there already.
+                context = ros.Context()
+                ros.init(context=context, connection=way)
+                seen = names_of(ros.Node("late", context=context))
+                ros.shutdown(context=context)
+                assert seen == sorted([name, "late"])
+        finally:
+            for node in nodes.values():
+                ros.shutdown(context=node.context)
+    assert dict(os.environ) == before
+
+
+def test_a_run_on_other_middleware_is_not_joined(key):
+    way = Connection("udp/127.0.0.1:7447", key, 0, Middleware("rclpy", "rmw_fastrtps_cpp"))
+    with pytest.raises(ConfigError, match="7447 is on rmw_fastrtps_cpp, and this process on rmw_zenoh_cpp"):
+        ros.init(connection=way)
+
+
+def test_a_key_that_cannot_be_read_is_named(tmp_path):
+    with pytest.raises(ConfigError, match=r"the key of the run cannot be read: .*gone"):
+        ros.init(connection=Connection("tls/127.0.0.1:7447", RunKey(tmp_path / "gone")))
+
+
+def test_an_endpoint_that_is_none_is_refused(key):
+    with pytest.raises(ConfigError, match="endpoint: connect/endpoints cannot be"):
+        ros.init(connection=Connection("nowhere", key))
