@@ -20,13 +20,13 @@ from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
 from throwcollect.config.values import reason_not_sweepable, with_values
 from throwcollect.coordinator.prepare import feasibility_check
-from throwcollect.dataset.judging import judged
+from throwcollect.dataset.judging import judge_episode
 from throwcollect.dataset.throw import Throw
 from throwcollect.dataset.throws_table import ThrowsTable
 from throwcollect.episode.message import Episode
-from throwcollect.episode.record import EpisodeHeader
 from throwcollect.episode.trajectory_rows import trajectory_rows
 from throwcollect.errors import ConfigError, PlanError, Problem, WorkerError
+from throwcollect.files import StrPath
 from throwcollect.replay.throw import Replayer
 from throwcollect.sweep.plan import Trial, make_trials
 from throwcollect.sweep.points import Points
@@ -55,7 +55,7 @@ class Simulator:
         WorkerError: If the physics engine does not start.
     """
 
-    def __init__(self, config: str | os.PathLike[str], *, overrides: Sequence[str] = ()) -> None:
+    def __init__(self, config: StrPath, *, overrides: Sequence[str] = ()) -> None:
         self._source = os.fspath(config)
         self._overrides = tuple(overrides)
         self.config: Config = load(Path(config), self._overrides)
@@ -140,7 +140,7 @@ class Simulator:
         episode = self._replayer.run(trial)
         keys = tuple(trial.values)
         table = ThrowsTable(keys, tuple(self.config.task.end))
-        row = table.row(trial.number, trial.values, judged(with_values(self.config, trial.values), episode), None)
+        row = table.row(trial, judge_episode(with_values(self.config, trial.values), episode), None)
         row |= {"samples": episode.header.samples, "digest": episode.digest}
         return Throw(table.table([row]), 0, keys, _Simulated(episode), self._source)
 
@@ -159,11 +159,11 @@ class _Simulated:
     def samples(self) -> int:
         return self.episode.header.samples
 
-    def read_rows(self) -> NDArray[np.void]:
-        return trajectory_rows(self.episode.contents, self.samples)
+    def read(self) -> Episode:
+        return self.episode
 
-    def read_header(self) -> EpisodeHeader:
-        return self.episode.header
+    def read_rows(self) -> NDArray[np.void]:
+        return trajectory_rows(self.episode.state.contents, self.samples)
 
 
 _make: list[Callable[[], Simulator]] = []

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from rclzenoh.parameter import parameter_value_to_python
 from tests.integration.robot import (
     OWN,
     PLAYING,
@@ -19,7 +20,6 @@ from tests.integration.robot import (
     start_simulation,
 )
 from throwcollect.ros import Context
-from throwcollect.ros.embedded.parameter import parameter_value_to_python
 from throwcollect.ros.middleware import Middleware
 from throwcollect.ros.router import router
 

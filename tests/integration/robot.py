@@ -14,10 +14,11 @@ from typing import Any
 
 import pytest
 
+from rclzenoh.interfaces import Message
+from rclzenoh.session_config import CONFIG_FILE_VARIABLE, OVERRIDE_VARIABLE
 from throwcollect.config.schema import Config
-from throwcollect.interfaces import Message
 from throwcollect.robots.description import start_posture
-from throwcollect.robots.talos import CONTROLLERS
+from throwcollect.robots.talos import TALOS
 from throwcollect.ros import (
     ActionClient,
     Context,
@@ -32,9 +33,7 @@ from throwcollect.ros import (
     get_service,
     init,
 )
-from throwcollect.ros.backend import VARIABLE, uses_rclpy
-from throwcollect.ros.middleware import Middleware
-from throwcollect.ros.session_config import CONFIG_FILE_VARIABLE, OVERRIDE_VARIABLE
+from throwcollect.ros.middleware import VARIABLE, Middleware, uses_rclpy
 from throwcollect.run_key import Signer
 
 CONFIG = Config.model_validate({"name": "integration", "tool": {"cup_floor_radius_m": 0.006}})
@@ -145,7 +144,7 @@ def duration(seconds: float) -> Any:
 
 def trajectory(controller: str, seconds: float = 1.0, **ends: float) -> Any:
     """From the start posture to other angles of some joints [rad], and to rest there."""
-    joints = CONTROLLERS[controller]
+    joints = TALOS.controllers[controller]
     still = [0.0] * len(joints)
     postures = [[POSTURE[joint] for joint in joints], [ends.get(joint, POSTURE[joint]) for joint in joints]]
     points = [
@@ -244,12 +243,12 @@ class Robot:
 
     def joint(self, name: str) -> float:
         """Measured angle of a joint, by the state of its controller."""
-        controller = next(key for key, joints in CONTROLLERS.items() if name in joints)
+        controller = next(key for key, joints in TALOS.controllers.items() if name in joints)
         kind = "control_msgs/msg/JointTrajectoryControllerState"
         with self.listening(kind, f"{controller}/controller_state") as heard:
             # A request makes an idle simulation look around, and tell its state.
             self.wait_until(lambda: self.state() in (PLAYING, PAUSED) and bool(heard), "a controller state")
-        return float(heard[-1].feedback.positions[CONTROLLERS[controller].index(name)])
+        return float(heard[-1].feedback.positions[TALOS.controllers[controller].index(name)])
 
     @contextmanager
     def listening(

@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from rclzenoh.parameter import parameter_value_to_python
 from tests.integration.robot import (
     ARM,
     CONFIG,
@@ -24,9 +25,8 @@ from tests.integration.robot import (
     trajectory,
 )
 from throwcollect.config.controllers import ControllersConfig
-from throwcollect.robots.talos import CONTROLLERS, graph_name
+from throwcollect.robots.talos import TALOS
 from throwcollect.ros import Context, DurabilityPolicy, Parameter, QoSProfile, get_message
-from throwcollect.ros.embedded.parameter import parameter_value_to_python
 
 SUCCEEDED, CANCELED, ABORTED = 4, 5, 6
 STATE = "control_msgs/msg/JointTrajectoryControllerState"
@@ -66,10 +66,10 @@ def changed(robot: Robot, **parameters: Any) -> Iterator[None]:
 def test_controllers_are_listed_as_the_controller_manager_does(robot: Robot) -> None:
     service = "controller_manager/list_controllers"
     listed = robot.result(robot.ask("controller_manager_msgs/srv/ListControllers", service)).controller
-    assert [each.name for each in listed] == list(CONTROLLERS)
+    assert [each.name for each in listed] == list(TALOS.controllers)
     assert {(each.state, each.type, each.update_rate) for each in listed} == {("active", JTC, CONFIG.sim.physics_hz)}
     for each in listed:
-        positions = [f"{joint}/position" for joint in CONTROLLERS[each.name]]
+        positions = [f"{joint}/position" for joint in TALOS.controllers[each.name]]
         assert each.claimed_interfaces == each.required_command_interfaces == positions
         assert each.required_state_interfaces == positions
         assert (each.is_async, each.is_chainable, each.is_chained) == (False, False, False)
@@ -78,7 +78,7 @@ def test_controllers_are_listed_as_the_controller_manager_does(robot: Robot) -> 
 
 
 def test_parameters_have_the_values_of_the_real_robot(robot: Robot) -> None:
-    for controller, joints in CONTROLLERS.items():
+    for controller, joints in TALOS.controllers.items():
         found = values(robot, controller)
         assert found["joints"] == found["command_joints"] == list(joints)
         assert (found["command_interfaces"], found["state_interfaces"]) == (["position"], ["position"])
@@ -100,7 +100,7 @@ def test_tolerances_that_are_changed_hold_for_the_next_goal(robot: Robot) -> Non
     robot.reset()
     robot.put_into(PAUSED)
     first = robot.send(swing())
-    wide = {f"constraints__{joint}__goal": 9.0 for joint in CONTROLLERS[ARM]}
+    wide = {f"constraints__{joint}__goal": 9.0 for joint in TALOS.controllers[ARM]}
     with changed(robot, **wide):
         robot.put_into(PLAYING)
         assert robot.outcome(first)[:2] == (ABORTED, -5)
@@ -153,8 +153,8 @@ def test_a_trajectory_can_be_asked_for_its_state(robot: Robot) -> None:
     robot.step(10)
     middle, end = query(500_000_000), query(1_000_000_000)
     assert (middle.success, end.success, middle.message) == (True, False, "")
-    assert tuple(middle.name) == CONTROLLERS[ARM]
-    column = CONTROLLERS[ARM].index(ELBOW)
+    assert tuple(middle.name) == TALOS.controllers[ARM]
+    column = TALOS.controllers[ARM].index(ELBOW)
     assert middle.position[column] == pytest.approx((POSTURE[ELBOW] - 1.1) / 2)
     assert end.position[column] == pytest.approx(-1.1)
     assert middle.velocity[column] == pytest.approx((-1.1 - POSTURE[ELBOW]) * 1.875)
@@ -200,8 +200,8 @@ def test_after_a_reset_the_start_posture_is_held(robot: Robot) -> None:
     with robot.listening(STATE, f"{ARM}/controller_state") as heard:
         robot.step(1)
         robot.wait_until(lambda: bool(heard), "the state")
-    assert list(heard[-1].output.positions) == [POSTURE[joint] for joint in CONTROLLERS[ARM]]
-    assert heard[-1].feedback.positions[CONTROLLERS[ARM].index(ELBOW)] == pytest.approx(POSTURE[ELBOW], abs=1e-3)
+    assert list(heard[-1].output.positions) == [POSTURE[joint] for joint in TALOS.controllers[ARM]]
+    assert heard[-1].feedback.positions[TALOS.controllers[ARM].index(ELBOW)] == pytest.approx(POSTURE[ELBOW], abs=1e-3)
 
 
 def test_a_refused_goal_is_one_line_in_the_log_of_its_controller(robot: Robot) -> None:
@@ -228,7 +228,7 @@ def test_controllers_can_have_the_names_of_ros_1(other: Robot) -> None:
     def names() -> set[str]:
         return {name for name, namespace in other.node.get_node_names_and_namespaces() if namespace == "/sim_1"}
 
-    wanted = {graph_name(name, "ros1") for name in CONTROLLERS}
+    wanted = {TALOS.graph_name(name, "ros1") for name in TALOS.controllers}
     other.wait_until(lambda: wanted <= names(), "all controllers are discovered")
     assert not {ARM, "arm_left_controller"} & names()
 
@@ -236,7 +236,7 @@ def test_controllers_can_have_the_names_of_ros_1(other: Robot) -> None:
 def test_goals_that_are_refused_can_be_accepted_and_aborted_with_the_reason(other: Robot) -> None:
     other.reset()
     wish = goal(ARM)
-    wish.trajectory.joint_names = list(CONTROLLERS["arm_left_controller"])
+    wish.trajectory.joint_names = list(TALOS.controllers["arm_left_controller"])
     handle = other.send(wish, RIGHT_ARM)
     assert handle.accepted
     status, code, text = other.outcome(handle)
@@ -280,7 +280,7 @@ def test_joints_can_brake_when_a_goal_is_cancelled(other: Robot) -> None:
         assert other.outcome(handle) == (CANCELED, 0, "")
         other.step(200)
         other.wait_until(lambda: bool(heard) and stamp_ns(heard[-1].header.stamp) == 449 * STEP_NS, "the state")
-    column = CONTROLLERS[ARM].index(ELBOW)
+    column = TALOS.controllers[ARM].index(ELBOW)
     after = [message for message in heard if stamp_ns(message.header.stamp) >= 250 * STEP_NS]
     speeds = [message.reference.velocities[column] for message in after]
     assert speeds[0] > 2.0

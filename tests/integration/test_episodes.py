@@ -8,11 +8,11 @@ import pytest
 import zenoh
 from zenoh.ext import declare_advanced_subscriber
 
+from rclzenoh import attachment
+from rclzenoh.interfaces import type_hash
 from tests.integration.robot import ALL, ARM, CONFIG, Robot, goal, signer, swing
 from throwcollect.episode.message import unpack
-from throwcollect.interfaces import type_hash
 from throwcollect.ros import get_message
-from throwcollect.ros.embedded import attachment
 from throwcollect.ros.middleware import Middleware
 
 KIND = "std_msgs/msg/UInt8MultiArray"

@@ -7,11 +7,11 @@ from typing import Any
 import pinocchio
 import pytest
 
+from rclzenoh.keys import EntityKind, Token
 from tests.integration.robot import ARM, CONFIG, PAUSED, Robot
-from throwcollect.robots.talos import CONTROLLERS, JOINTS
+from throwcollect.robots.talos import TALOS
 from throwcollect.ros import DurabilityPolicy, QoSProfile, get_action_server_names_and_types_by_node
-from throwcollect.ros.backend import uses_rclpy
-from throwcollect.ros.embedded.keys import EntityKind, Token
+from throwcollect.ros.middleware import uses_rclpy
 
 LATE = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 ACTION = "control_msgs/action/FollowJointTrajectory"
@@ -51,7 +51,7 @@ PARAMETERS = [
     "SetParameters",
     "SetParametersAtomically",
 ]
-TABLE = Path(__file__).parents[1] / "unit" / "interfaces" / "official_hashes.txt"
+TABLE = Path(__file__).parents[1] / "rclzenoh" / "interfaces" / "official_hashes.txt"
 HASHES = dict(line.split() for line in TABLE.read_text(encoding="utf-8").splitlines())
 
 
@@ -88,7 +88,7 @@ def description(robot: Robot) -> str:
 
 def test_the_simulation_its_controllers_and_their_manager_are_nodes_of_its_namespace(robot: Robot) -> None:
     names = [name for name, namespace in robot.node.get_node_names_and_namespaces() if namespace == "/sim_0"]
-    assert sorted(names) == sorted(["sim_0", "controller_manager", *CONTROLLERS])
+    assert sorted(names) == sorted(["sim_0", "controller_manager", *TALOS.controllers])
 
 
 def test_exactly_the_documented_topics_are_published_and_none_is_subscribed_to(robot: Robot) -> None:
@@ -102,7 +102,7 @@ def test_exactly_the_documented_services_are_offered(robot: Robot) -> None:
     assert offered == control | services_of_every_node("/sim_0/sim_0")
 
 
-@pytest.mark.parametrize("name", CONTROLLERS)
+@pytest.mark.parametrize("name", TALOS.controllers)
 def test_a_controller_offers_what_it_offers_on_the_robot(name: str, robot: Robot) -> None:
     node = robot.node
     assert visible(node.get_publisher_names_and_types_by_node(name, "/sim_0")) == EVERY_NODE | {
@@ -121,7 +121,7 @@ def test_a_controller_offers_what_it_offers_on_the_robot(name: str, robot: Robot
 
 def test_the_controllers_are_named_as_on_the_robot() -> None:
     limbs = ("arm_left", "arm_right", "leg_left", "leg_right", "torso", "head", "gripper_left", "gripper_right")
-    assert set(CONTROLLERS) == {f"{limb}_controller" for limb in limbs}
+    assert set(TALOS.controllers) == {f"{limb}_controller" for limb in limbs}
 
 
 def test_every_type_is_announced_with_the_hash_of_the_official_generator(robot: Robot) -> None:
@@ -149,7 +149,7 @@ def test_the_qualities_of_service_are_those_of_genuine_nodes(robot: Robot) -> No
 def test_a_late_listener_gets_a_description_with_the_spoon_and_32_movable_joints(description: str) -> None:
     root = ET.fromstring(description)  # noqa: S314 - our own
     movable = {joint.get("name") for joint in root.iter("joint") if joint.get("type") in ("revolute", "prismatic")}
-    assert movable == set(JOINTS)
+    assert movable == set(TALOS.joints)
     assert len(movable) == 32
     assert "spoon_link" in {link.get("name") for link in root.iter("link")}
     assert pinocchio.buildModelFromXML(description).nq == 32

@@ -6,10 +6,11 @@ from typing import Any
 
 import pytest
 
+from rclzenoh.interfaces import deserialize, message_class
 from tests.integration.robot import ARM, CONFIG, ELBOW, PAUSED, POSTURE, STEP_NS, TORSO, Robot, goal, signer, swing
-from throwcollect.config.values import is_physics, sweepable_keys
+from throwcollect.config.key import Effect
+from throwcollect.config.values import sweepable_keys
 from throwcollect.episode.message import unpack
-from throwcollect.interfaces import deserialize, message_class
 from throwcollect.ros import Parameter
 
 OWN = ["trial.number", "trial.controllers", "trial.lease", "sim.real_time_factor"]
@@ -19,7 +20,7 @@ INTEGER, DOUBLE, STRING, STRINGS = 2, 3, 4, 9
 
 
 def test_trial_clock_and_swept_physics_are_parameters(robot: Robot) -> None:
-    physics = [key for key in sweepable_keys(CONFIG) if is_physics(key)]
+    physics = sweepable_keys(CONFIG, Effect.PHYSICS)
     assert "ball.mass_kg" in physics
     assert "task.start.arm_right_4_joint" in physics
     assert {"use_sim_time", *OWN, *physics} <= set(robot.parameters("list_parameters").result.names)

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from tests.integration.robot import CONFIG, JointTrajectory, JointTrajectoryPoint, Robot, duration, running_simulation
-from throwcollect.robots.talos import JOINTS
+from throwcollect.robots.talos import TALOS
 from throwcollect.ros import Context, DurabilityPolicy, QoSProfile, get_action
 
 FollowJointTrajectory: Any = get_action("control_msgs/action/FollowJointTrajectory")
@@ -117,7 +117,7 @@ def talos(endpoint: str, session: Context, tmp_path_factory: pytest.TempPathFact
 
 def test_joint_states_have_velocity_and_effort_of_every_joint(talos: Robot) -> None:
     states = PlayMotion(talos).joint_states()
-    assert set(states) == set(JOINTS)
+    assert set(states) == set(TALOS.joints)
     # The arm holds itself against gravity.
     assert abs(states["arm_right_2_joint"][2]) > 0.1
 

@@ -13,12 +13,12 @@ from typing import Any
 import pytest
 import zenoh
 
+from rclzenoh.attachment import Attachment
+from rclzenoh.interfaces import deserialize, message_class, serialize
+from rclzenoh.keys import EntityKind, Token, data_key
 from tests.integration.robot import ARM, OWN, PLAYING, Robot, connected, environment, goal, start_simulation, swing
-from throwcollect.interfaces import deserialize, message_class, serialize
 from throwcollect.ros import DurabilityPolicy, QoSProfile, get_message
-from throwcollect.ros.backend import uses_rclpy
-from throwcollect.ros.embedded.attachment import Attachment
-from throwcollect.ros.embedded.keys import EntityKind, Token, data_key
+from throwcollect.ros.middleware import uses_rclpy
 
 # How rclpy and its RMW take garbage is their business.
 embedded_alone = pytest.mark.skipif(
@@ -43,15 +43,17 @@ from throwcollect.ros import get_action
 from tests.integration.robot import swing
 
 ros.init()
-node = ros.create_node("vanishing")
+node = ros.Node("vanishing")
 kind = get_action("control_msgs/action/FollowJointTrajectory")
 client = ros.ActionClient(node, kind, sys.argv[1])
 assert client.wait_for_server(20)
 sent = client.send_goal_async(swing(float(sys.argv[2])))
-ros.spin_until_future_complete(node, sent)
+executor = ros.SingleThreadedExecutor()
+executor.add_node(node)
+executor.spin_until_future_complete(sent)
 sent.result().get_result_async()
 print("accepted", sent.result().accepted, flush=True)
-ros.spin(node)
+executor.spin()
 """
 
 

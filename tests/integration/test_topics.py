@@ -19,7 +19,7 @@ from tests.integration.robot import (
     stamp_ns,
     swing,
 )
-from throwcollect.robots.talos import CONTROLLERS, JOINTS
+from throwcollect.robots.talos import TALOS
 from throwcollect.ros import get_message
 
 KINDS = {
@@ -83,9 +83,9 @@ def test_joint_states_hold_all_joints_and_follow_a_motion(robot: Robot) -> None:
         robot.outcome(robot.send(goal(ARM, 0.5, arm_right_4_joint=-1.0)))
         robot.wait_until(lambda: bool(heard) and time_of(heard[-1]) >= 500_000_000, "samples of the whole motion")
     first, last = heard[0], heard[-1]
-    assert tuple(first.name) == JOINTS
+    assert tuple(first.name) == TALOS.joints
     assert len(first.position) == len(first.velocity) == len(first.effort) == 32
-    column = JOINTS.index(ELBOW)
+    column = TALOS.joints.index(ELBOW)
     assert first.position[column] == pytest.approx(POSTURE[ELBOW], abs=1e-3)
     assert last.position[column] == pytest.approx(-1.0, abs=0.005)
     assert max(message.velocity[column] for message in heard) > 1.0
@@ -118,8 +118,8 @@ def test_the_state_of_a_controller_comes_in_every_control_period_while_somebody_
     times = [time_of(message) for message in heard if time_of(message) > 0]
     assert times[:240] == [STEP_NS * number for number in range(1, 241)]
     last = heard[-1]
-    assert tuple(last.joint_names) == CONTROLLERS[ARM]
-    column = CONTROLLERS[ARM].index(ELBOW)
+    assert tuple(last.joint_names) == TALOS.controllers[ARM]
+    column = TALOS.controllers[ARM].index(ELBOW)
     assert last.reference.positions[column] == pytest.approx(-1.0, abs=1e-3)
     assert last.feedback.positions[column] == pytest.approx(-1.0, abs=0.01)
     assert last.output.positions[column] == pytest.approx(-1.0, abs=1e-3)

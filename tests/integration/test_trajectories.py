@@ -26,13 +26,13 @@ from tests.integration.robot import (
     swing,
     trajectory,
 )
-from throwcollect.robots.talos import CONTROLLERS
+from throwcollect.robots.talos import TALOS
 from throwcollect.ros import get_message, get_service
 
 SUCCEEDED, CANCELED, ABORTED = 4, 5, 6
 REACHED = (SUCCEEDED, 0, "Goal successfully reached!")
 PREEMPTED = (ABORTED, -1, "Current goal preempted by new incoming action.")
-START = [POSTURE[joint] for joint in CONTROLLERS[ARM]]
+START = [POSTURE[joint] for joint in TALOS.controllers[ARM]]
 UUID: Any = get_message("unique_identifier_msgs/msg/UUID")
 GoalInfo: Any = get_message("action_msgs/msg/GoalInfo")
 CancelGoal: Any = get_service("action_msgs/srv/CancelGoal").Response
@@ -69,7 +69,7 @@ def test_a_goal_is_reached_and_says_so(robot: Robot) -> None:
 
 def test_the_goals_of_all_eight_limbs_are_carried_out_at_once(robot: Robot) -> None:
     robot.put_into(PAUSED)
-    handles = [robot.send(goal(controller, 0.5), controller) for controller in CONTROLLERS]
+    handles = [robot.send(goal(controller, 0.5), controller) for controller in TALOS.controllers]
     robot.put_into(PLAYING)
     assert [robot.outcome(handle) for handle in handles] == [REACHED] * 8
 
@@ -91,8 +91,8 @@ def test_feedback_comes_at_20_hz_of_simulated_time_from_the_start_on(
     slack = 2 * SAMPLE_NS if factor else 0
     assert [stamp - time for stamp, time in zip(stamps, due, strict=True)] == pytest.approx([0] * len(due), abs=slack)
     middle = heard[len(heard) // 2].feedback
-    assert tuple(middle.joint_names) == CONTROLLERS[ARM]
-    column = CONTROLLERS[ARM].index(ELBOW)
+    assert tuple(middle.joint_names) == TALOS.controllers[ARM]
+    column = TALOS.controllers[ARM].index(ELBOW)
     assert middle.desired.positions[column] - middle.actual.positions[column] == middle.error.positions[column]
     assert POSTURE[ELBOW] < middle.actual.positions[column] < -1.7
     elapsed = [stamp_ns(message.feedback.desired.time_from_start) for message in heard]
@@ -123,7 +123,10 @@ def test_there_is_no_feedback_while_time_stands_still(robot: Robot) -> None:
 @pytest.mark.parametrize(
     ("wish", "reason"),
     [
-        (changed(goal(ARM), joint_names=list(CONTROLLERS["arm_left_controller"])), "Incoming joint arm_left_1_joint"),
+        (
+            changed(goal(ARM), joint_names=list(TALOS.controllers["arm_left_controller"])),
+            "Incoming joint arm_left_1_joint",
+        ),
         (partial(), "Joints on incoming trajectory don't match the controller joints"),
         (changed(goal(ARM), points=[]), "Empty trajectory received"),
         (changed(goal(ARM), joint_names=[], points=[]), "Joints on incoming trajectory don't match"),

@@ -8,21 +8,21 @@ import pytest
 
 from throwcollect.config.schema import Config
 from throwcollect.episode.record import EpisodeHeader
-from throwcollect.robots.clearance import GRIPPER
 from throwcollect.robots.description import joint_model, start_posture
-from throwcollect.robots.model import joint_limits
-from throwcollect.robots.spoon import way_out
-from throwcollect.robots.spoon_motion import SpoonMotion
+from throwcollect.robots.talos import TALOS
+from throwcollect.robots.tool_motion import ToolMotion
 from throwcollect.sim.world import World
-from throwcollect.tasks.throw import Outcome, judge
+from throwcollect.tasks.throw.judge import judge
+from throwcollect.tasks.throw.outcome import Outcome
 from throwcollect.tasks.trajectory import throw_trajectory
+from throwcollect.tools.tool import tool_of
 
 START = Config().task.start
 
 
 @cache
 def talos():
-    model = joint_model()
+    model = joint_model(TALOS)
     return model, model.createData()
 
 
@@ -33,7 +33,7 @@ def up_in_spoon(config):
     for joint, angle in start_posture(config).items():
         configuration[model.idx_qs[model.getJointId(joint)]] = angle
     pinocchio.framesForwardKinematics(model, data, configuration)
-    return data.oMf[model.getFrameId(GRIPPER, pinocchio.BODY)].rotation[2]
+    return data.oMf[model.getFrameId(TALOS.hand, pinocchio.BODY)].rotation[2]
 
 
 @pytest.mark.parametrize(
@@ -50,7 +50,7 @@ def test_ball_stays_while_the_way_out_climbs(turned, sections):
     for angle in np.arange(0.0, 1.5, 0.02):
         start = {**START, turned: START[turned] + angle}
         config = Config.model_validate({**sections, "task": {"start": start}, "sim": {"settle_s": 0.0}})
-        slope = way_out(config.tool, config.ball.radius_m, up_in_spoon(config))
+        slope = tool_of(config.tool).way_out(config.ball.radius_m, up_in_spoon(config))
         # Once just before the ball is lost, and once just after.
         side = "stays" if slope > 0 else "leaves"
         if side in seen or not (0.01 < slope < 0.04 or -0.08 < slope < -0.03):
@@ -68,7 +68,7 @@ def test_ball_stays_while_the_way_out_climbs(turned, sections):
 def test_spoon_is_where_the_physics_has_it():
     world = World(Config(sim={"settle_s": 0.0}))
     samples = world.samples()
-    place = SpoonMotion(Config()).place(samples.position[0])
+    place = ToolMotion(Config()).place(samples.position[0])
     assert place == pytest.approx(samples.ball_position[0], abs=1e-4)
     world.close()
 
@@ -81,6 +81,6 @@ def test_ball_of_a_spoon_that_does_not_hold_it_is_dropped(start, outcome, throwe
     one = thrower(task={"start": {**START, **start}})
     samples = one.throw()
     header = EpisodeHeader(0, int(samples.stamps_ns[0]), "landed", one.world.contacts(), (), len(samples))
-    result = judge(samples, header, config=one.config, trajectory=throw_trajectory(one.config), limits=joint_limits())
+    result = judge(samples, header, config=one.config, trajectory=throw_trajectory(one.config))
     assert result.outcome is outcome
     assert result.landing is not None

@@ -10,7 +10,8 @@ steps: with the centre, both throws would land 9 to 12 mm further.
 import numpy as np
 import pytest
 
-from throwcollect.robots.model import joint_limits
+from throwcollect.robots.limits import joint_limits
+from throwcollect.robots.talos import TALOS
 
 FINE = {"sim": {"physics_hz": 1000}, "record": {"rate_hz": 1000}}
 LONG = {"duration": 0.95, "arm_right_4_joint": -0.2, "arm_right_7_joint": 0.55}
@@ -46,7 +47,7 @@ def test_release(options, expected_s, velocity, thrower):
 def test_peak_effort_of_the_default_throw_is_within_limits(thrower):
     one = thrower(**FINE)
     effort = np.abs(one.throw().effort).max(axis=0)
-    assert (effort / joint_limits().effort).max() == pytest.approx(0.86, abs=0.01)
+    assert (effort / joint_limits(TALOS).effort).max() == pytest.approx(0.86, abs=0.01)
 
 
 def test_locking_joints_does_not_change_the_throw(thrower, landing):

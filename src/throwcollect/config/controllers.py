@@ -6,13 +6,14 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from throwcollect.config.key import Effect, Key
 from throwcollect.config.section import Section
 
 
 class ControllersConfig(Section):
     """The joint trajectory controllers; the defaults are what clients of PAL's robot and of ros2_controllers know."""
 
-    names: Literal["ros2", "ros1"] = "ros2"
+    names: Annotated[Literal["ros2", "ros1"], Key(Effect.APPEARANCE)] = "ros2"
     """Names of the controllers in the ROS graph: `arm_left_controller` as on Talos with ROS 2, or `left_arm_controller`
     as with ROS 1. Datasets have the former."""
     hold: Literal["measured", "command", "decelerate"] = "measured"

@@ -3,18 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated
+from typing import Annotated, Any
 
-from pydantic import AfterValidator, Field, WithJsonSchema
+from pydantic import AfterValidator, Field, GetJsonSchemaHandler, ValidationInfo
+from pydantic_core import CoreSchema
 
-_LIMBS = {"arm_left": 7, "arm_right": 7, "leg_left": 6, "leg_right": 6, "torso": 2, "head": 2}
-
-JOINT_NAMES = (
-    *(f"{limb}_{number}_joint" for limb, count in _LIMBS.items() for number in range(1, count + 1)),
-    "gripper_left_joint",
-    "gripper_right_joint",
-)
-"""Joints that a configuration may name: those of `robots.talos.JOINTS`, which this room must not import."""
+from throwcollect.members import load_member, names_of
 
 
 class ContradictionError(ValueError):
@@ -34,21 +28,38 @@ class UnknownJointError(ValueError):
 
     Args:
         name: The name that was given.
+        robot: Name of the robot in sentences.
+        joints: Names of its joints.
     """
 
-    def __init__(self, name: str) -> None:
-        self.name = name
-        super().__init__(f"Talos has no joint {name!r}")
+    def __init__(self, name: str, robot: str, joints: tuple[str, ...]) -> None:
+        self.name, self.robot, self.joints = name, robot, joints
+        super().__init__(f"{robot} has no joint {name!r}")
 
 
-def _known_joint(name: str) -> str:
-    if name not in JOINT_NAMES:
-        raise UnknownJointError(name)
+def all_joints() -> tuple[str, ...]:
+    """List the joints of all robots, each once."""
+    robots = [load_member("robots", name) for name in names_of("robots")]
+    return tuple(dict.fromkeys(joint for robot in robots for joint in robot.joints))
+
+
+def _require_joint(name: str, info: ValidationInfo) -> str:
+    # Which robot it is, is known of a whole file alone; a `Config` that is made in another way checks that itself.
+    if info.context is not None:
+        robot = load_member("robots", info.context)
+        if name not in robot.joints:
+            raise UnknownJointError(name, robot.title, robot.joints)
     return name
 
 
-Joint = Annotated[
-    str, AfterValidator(_known_joint), WithJsonSchema({"type": "string", "title": "Joint", "enum": list(JOINT_NAMES)})
-]
+class _JointSchema:
+    """Lists the joints in the JSON Schema; not before somebody asks for it, as that imports all robots."""
+
+    @staticmethod
+    def __get_pydantic_json_schema__(core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        return {"type": "string", "title": "Joint", "enum": list(all_joints())}
+
+
+Joint = Annotated[str, AfterValidator(_require_joint), _JointSchema]
 Angle = Annotated[float, Field(ge=-6.3, le=6.3, json_schema_extra={"unit": "rad"})]
 Name = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]*$", max_length=64)]

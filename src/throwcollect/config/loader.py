@@ -17,13 +17,15 @@ from throwcollect.config.problems import MOST_EXAMINED, Finding, Location, dotte
 from throwcollect.config.schema import Config, Range
 from throwcollect.config.values import reason_not_sweepable, with_values
 from throwcollect.errors import ConfigError
+from throwcollect.files import StrPath
+from throwcollect.members import names_of
 
 _PARAMETERS = ("sweep", "parameters")
 _PLAIN_WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_./-]*")
 _NOT_PLAIN = {"true", "false", "null", "yes", "no", "on", "off", "y", "n"}
 
 
-def load(path: Path, overrides: Sequence[str] = ()) -> Config:
+def load(path: StrPath, overrides: Sequence[str] = ()) -> Config:
     """Read a configuration file.
 
     Args:
@@ -37,7 +39,7 @@ def load(path: Path, overrides: Sequence[str] = ()) -> Config:
     Raises:
         ConfigError: If the file cannot be read or anything in it is wrong; it holds all problems, unknown keys first.
     """
-    with loaded(path, overrides) as config:
+    with loaded(Path(path), overrides) as config:
         return config
 
 
@@ -98,13 +100,14 @@ def _checked(values: dict[str, Any]) -> tuple[Config | None, list[Finding], int]
         The configuration, if there is any; what is wrong; and how much more is, if that is too much to be told.
     """
     values = deepcopy(values)
+    robot = _robot_of(values)
     found: list[Finding] = []
     replaced: set[Location] = set()
     config = None
     more = 0
     while config is None and len(found) < MOST_EXAMINED:
         try:
-            config = Config.model_validate(values, strict=True)
+            config = Config.model_validate(values, strict=True, context=robot)
             fresh = list(_sweep_findings(config))
         except ValidationError as error:
             fresh = findings(error, values)
@@ -113,9 +116,17 @@ def _checked(values: dict[str, Any]) -> tuple[Config | None, list[Finding], int]
         places = {finding.location[: 3 if finding.location[:2] == _PARAMETERS else 2] for finding in fresh}
         removed = {place for place in places if _remove(values, place)}
         replaced |= places
-        if not removed:
+        # With another robot than was meant, all joints would be wrong.
+        if not removed or robot is None:
             break
     return config, sorted(found, key=lambda finding: not finding.unknown), more
+
+
+def _robot_of(values: dict[str, Any]) -> str | None:
+    """Find the name of the robot whose joints the values may name; None if there is no such robot."""
+    section = values.get("robot")
+    name = section.get("name") if isinstance(section, dict) else None
+    return Config().robot.name if name is None else name if name in names_of("robots") else None
 
 
 def _about(finding: Finding, location: Location) -> bool:

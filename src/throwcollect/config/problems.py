@@ -11,7 +11,7 @@ from typing import Any
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from throwcollect.config.kinds import JOINT_NAMES, ContradictionError, UnknownJointError
+from throwcollect.config.kinds import ContradictionError, UnknownJointError
 from throwcollect.config.shape import Shape, shape_of
 
 _RANGE_ERRORS = ("greater_than", "greater_than_equal", "less_than", "less_than_equal")
@@ -106,6 +106,7 @@ def _findings(details: ErrorDetails, values: Any, above: Location) -> Iterator[F
     location, shape = _located(details, values, above)
     kind, value = details["type"], details["input"]
     cause = details.get("ctx", {}).get("error")
+    is_key = details["loc"][-1:] == ("[key]",)
     if kind == "extra_forbidden":
         section, name = _section(details, values, above), str(location[-1])
         yield Finding(location, section.refused.get(name) or unknown_key(name, list(section.keys)), unknown=True)
@@ -113,10 +114,10 @@ def _findings(details: ErrorDetails, values: Any, above: Location) -> Iterator[F
         for key, sentence in cause.sentences.items():
             yield Finding((*location, *_split(key)), sentence)
     elif isinstance(cause, UnknownJointError):
-        sentence = f"Talos has no joint {quoted(cause.name)}{_did_you_mean(cause.name, JOINT_NAMES)}"
-        yield Finding(location, sentence, unknown=details["loc"][-1:] == ("[key]",))
+        meant = _did_you_mean(cause.name, cause.joints)
+        yield Finding(location, f"{cause.robot} has no joint {quoted(cause.name)}{meant}", unknown=is_key)
     elif cause is not None:
-        yield Finding(location, str(cause), unknown=details["loc"][-1:] == ("[key]",))
+        yield Finding(location, str(cause), unknown=is_key)
     elif kind == "missing":
         yield Finding(location, f"missing; should be {shape}")
     elif kind == "union_tag_not_found" and isinstance(value, Mapping):

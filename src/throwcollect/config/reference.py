@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from throwcollect.config.kinds import JOINT_NAMES
+from throwcollect.config.kinds import all_joints
 from throwcollect.config.loader import value_as_yaml
 from throwcollect.config.schema import Config, DynamicMovementPrimitive
 from throwcollect.config.section import Section
@@ -126,7 +126,7 @@ def _swept() -> str:
     primitive = DynamicMovementPrimitive(family="dmp", basis_functions=2, weights=weights)
     learned: Section = config.task.model_copy(update={"trajectory": primitive})
     keys = [*sweepable_keys(config), *sweepable_keys(config.model_copy(update={"task": learned}))]
-    joints = "|".join(JOINT_NAMES)
+    joints = "|".join(all_joints())
     general = dict.fromkeys(re.sub(rf"({joints})(\.\d+)?", _general, key) for key in keys)
     return ", ".join(f"`{key}`" for key in general) + ".\nA joint must be in `task.end`."
 

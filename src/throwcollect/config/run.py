@@ -2,11 +2,26 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from collections.abc import Callable
+from importlib.metadata import entry_points
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, PositiveFloat
+from pydantic import Field, PositiveFloat, ValidationError, WrapValidator
 
 from throwcollect.config.section import Section
+
+RUNTIMES = "throwcollect.runtimes"
+"""Group of the entry points by which other packages add runtimes."""
+
+
+def _or_added(value: Any, validate: Callable[[Any], str]) -> str:
+    """A runtime of ours, or the name of one that another package adds; for anything else, ours are what is expected."""
+    try:
+        return validate(value)
+    except ValidationError:
+        if isinstance(value, str) and entry_points(group=RUNTIMES, name=value):
+            return value
+        raise
 
 
 class RunConfig(Section):
@@ -14,8 +29,10 @@ class RunConfig(Section):
 
     simulations: Annotated[int, Field(ge=1, le=256)] = 2
     """Number of simulations, unless `-n` says otherwise."""
-    runtime: Literal["auto", "local", "docker"] = "auto"
-    """Where the nodes run: in processes (`local`) or in containers; `auto` takes containers if an engine answers."""
+    runtime: Annotated[Literal["auto", "local", "docker", "inprocess"], WrapValidator(_or_added)] = "auto"
+    """Where the nodes run: in processes (`local`) or in containers; `auto` takes containers if an engine answers.
+
+    `inprocess` takes one simulation without nodes: for tests, breakpoints and Python programs."""
     router_port: Annotated[int, Field(ge=0, le=65535)] = 0
     """TCP port of the router on the loopback interface; 7447 is the one ROS nodes look for.
 

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Discriminator, Field, Tag, model_validator
 
+from throwcollect.config.key import Key
 from throwcollect.config.kinds import ContradictionError
 from throwcollect.config.section import Section
 
@@ -123,7 +124,7 @@ class SweepConfig(Section):
     """CSV or Parquet file with one row a trial and dotted keys as columns; for the sampler `list`.
 
     A relative path starts at the directory of the configuration file."""
-    target: TargetConfig | None = None
+    target: Annotated[TargetConfig | None, Key(later=True)] = None
     """Spreads throws over landing targets: trials are added to the plan where throws are few."""
 
     @model_validator(mode="after")

@@ -1,37 +1,24 @@
-"""Single values of a configuration by their dotted keys: read, replace, and which of them a sweep may vary."""
+"""Single values of a configuration by their dotted keys: read them, replace them, find those that a sweep may vary."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
+from throwcollect.config.key import Effect, Key, key_of_field
 from throwcollect.config.problems import Location, dotted, findings, unknown_key
 from throwcollect.config.schema import Config
 from throwcollect.config.section import Section
 from throwcollect.errors import ConfigError, Problem
 
-_SWEEPABLE = (
-    "task.start.",
-    "task.end.",
-    "task.duration_s",
-    "task.trajectory.",
-    "ball.",
-    "scene.",
-    "robot.position_gain_per_s",
-    "robot.velocity_gain",
-    "robot.effort_scale",
-    "sim.command_delay_s",
-    "sim.settle_s",
-)
-_FIXED = ("task.trajectory.basis_functions",)
-
 AnySection = TypeVar("AnySection", bound=Section)
 
 
 def with_values(config: Config, values: Mapping[str, float]) -> Config:
-    """The configuration with some of its values replaced, such as that of one trial.
+    """Make a configuration with some of its values replaced, such as that of one trial.
 
     Args:
         config: Configuration to start from; it stays as it is.
@@ -50,28 +37,55 @@ def with_values(config: Config, values: Mapping[str, float]) -> Config:
     return _changed(config, changes, ())
 
 
-def leaves(config: Config) -> Iterator[tuple[str, Any]]:
-    """Dotted key and value of everything in a configuration that holds nothing further.
+@dataclass(frozen=True)
+class Leaf:
+    """One value of a configuration that holds nothing further; empty dictionaries and lists are such values, too.
 
-    Empty dictionaries and lists count as values.
+    Attributes:
+        name: Dotted key.
+        value: What it is.
+        key: What holds for the key.
+        is_default: Whether the value is the default of the key.
     """
-    return _leaves(config, ())
+
+    name: str
+    value: Any
+    key: Key
+    is_default: bool
+
+
+def leaves(config: Config) -> Iterator[Leaf]:
+    """List all values of a configuration, in the order in which their keys are declared."""
+    return _leaves(config, (), Key(), Config())
+
+
+def values_by_key(config: Config) -> dict[str, Any]:
+    """Map the dotted key of everything in a configuration that holds nothing further to its value."""
+    return {leaf.name: leaf.value for leaf in leaves(config)}
 
 
 def differences(one: Config, other: Config) -> dict[str, tuple[Any, Any]]:
-    """Dotted keys in which two configurations differ, with both values; None where a key is absent."""
-    before, after = dict(leaves(one)), dict(leaves(other))
-    keys = [*before, *(key for key in after if key not in before)]
-    return {key: (before.get(key), after.get(key)) for key in keys if before.get(key) != after.get(key)}
+    """Find the dotted keys in which two configurations differ, with both values; None where a key is absent."""
+    before, after = values_by_key(one), values_by_key(other)
+    return {key: (before.get(key), after.get(key)) for key in before | after if before.get(key) != after.get(key)}
 
 
-def sweepable_keys(config: Config) -> list[str]:
-    """Dotted keys that a sweep of this configuration may vary."""
-    return [key for key, value in leaves(config) if _obstacle(config, key, value) is None]
+def sweepable_keys(config: Config, effect: Effect | None = None) -> list[str]:
+    """List the dotted keys that a sweep of this configuration may vary.
+
+    Args:
+        config: The configuration.
+        effect: What the keys have an effect on; None for all.
+    """
+    return [
+        leaf.name
+        for leaf in leaves(config)
+        if effect in (None, leaf.key.effect) and _find_obstacle(config, leaf) is None
+    ]
 
 
 def reason_not_sweepable(config: Config, key: str) -> str | None:
-    """Why a sweep may not vary a key, or None when it may.
+    """Say why a sweep may not vary a key; None when it may.
 
     Numbers of the task's motion, of the ball, the scene, the motors and their delay may vary from trial to trial; what
     the simulated world is built from, what is recorded and how may not.
@@ -80,36 +94,34 @@ def reason_not_sweepable(config: Config, key: str) -> str | None:
         config: Configuration that is swept.
         key: Dotted key.
     """
-    values = dict(leaves(config))
-    if key not in values:
-        return unknown_key(key, sweepable_keys(config))
-    return _obstacle(config, key, values[key])
+    leaf = next((leaf for leaf in leaves(config) if leaf.name == key), None)
+    return unknown_key(key, sweepable_keys(config)) if leaf is None else _find_obstacle(config, leaf)
 
 
-def _obstacle(config: Config, key: str, value: Any) -> str | None:
-    if not key.startswith(_SWEEPABLE) or key in _FIXED:
+def _find_obstacle(config: Config, leaf: Leaf) -> str | None:
+    if not leaf.key.swept:
         return "cannot vary from trial to trial"
-    if not isinstance(value, (int, float)):
+    if not isinstance(leaf.value, (int, float)):
         return "cannot be swept, as it is not a number"
-    joint = key.removeprefix("task.start.")
-    if joint != key and joint not in config.task.end:
+    joint = leaf.name.removeprefix("task.start.")
+    if joint != leaf.name and joint not in config.task.end:
         return f"cannot vary from trial to trial, as task.end does not name {joint}"
     return None
 
 
-def _leaves(value: Any, location: Location) -> Iterator[tuple[str, Any]]:
+def _leaves(value: Any, location: Location, key: Key, default: Any) -> Iterator[Leaf]:
     if isinstance(value, Section):
-        items: Any = value.__dict__.items()
-    elif isinstance(value, dict):
-        items = value.items()
+        for name, inner in value.__dict__.items():
+            own = key.inherited_by(key_of_field(type(value), name))
+            yield from _leaves(inner, (*location, name), own, getattr(default, name, None))
+    elif isinstance(value, dict) and value:
+        for name, inner in value.items():
+            yield from _leaves(inner, (*location, name), key, default.get(name) if isinstance(default, dict) else None)
+    elif isinstance(value, list) and value:
+        for index, inner in enumerate(value):
+            yield from _leaves(inner, (*location, index), key, None)
     else:
-        items = enumerate(value) if isinstance(value, list) else ()
-    found = False
-    for part, inner in items:
-        found = True
-        yield from _leaves(inner, (*location, part))
-    if not found:
-        yield dotted(location), value
+        yield Leaf(dotted(location), value, key, is_default=value == default)
 
 
 def _changed(section: AnySection, changes: Mapping[str, Any], location: Location) -> AnySection:
@@ -142,8 +154,3 @@ def _replaced(value: Any, change: Any, location: Location) -> Any:
 
 def _unknown(location: Location, known: list[str]) -> ConfigError:
     return ConfigError([Problem(unknown_key(str(location[-1]), known), dotted(location))])
-
-
-def is_physics(key: str) -> bool:
-    """Whether a sweepable key concerns the simulation, and not only the trajectory that it is sent."""
-    return not key.startswith("task.") or key.startswith("task.start.")

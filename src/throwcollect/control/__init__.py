@@ -15,7 +15,7 @@ from throwcollect.control.outcome import (
     Refusal,
     TrajectoryState,
 )
-from throwcollect.control.parameters import Constraints, ControllerParameters, JointConstraints, SpeedScaling
+from throwcollect.control.parameters import Constraints, ControllerParameters, JointConstraints
 
 __all__ = [
     "Constraints",
@@ -30,7 +30,6 @@ __all__ = [
     "JointTolerance",
     "JointTrajectoryController",
     "Refusal",
-    "SpeedScaling",
     "Trajectory",
     "TrajectoryGoal",
     "TrajectoryPoint",

@@ -15,7 +15,6 @@ from throwcollect.control.goal import Trajectory, TrajectoryGoal
 from throwcollect.control.log import repeated
 from throwcollect.control.outcome import (
     ControllerState,
-    ErrorCode,
     GoalResult,
     GoalStatus,
     JointState,
@@ -23,7 +22,7 @@ from throwcollect.control.outcome import (
     TrajectoryState,
 )
 from throwcollect.control.parameters import ControllerParameters
-from throwcollect.control.stopping import braked
+from throwcollect.control.stopping import brake
 from throwcollect.control.tolerances import Tolerances, default_tolerances, goal_tolerances
 from throwcollect.control.tracker import Tracker
 from throwcollect.control.validation import refusal
@@ -62,7 +61,6 @@ class JointTrajectoryController:
         self._deviations = deviations or Deviations()
         self._adopt(parameters)
         self._judge = self._judge_with(self._defaults)
-        self._active = False
         self._goal_id: Hashable | None = None
         self._results: list[GoalResult] = []
         self._holding = True
@@ -74,13 +72,7 @@ class JointTrajectoryController:
 
     @parameters.setter
     def parameters(self, parameters: ControllerParameters) -> None:
-        self._parameters.check_change(parameters, self.name)
         self._adopt(parameters)
-
-    @property
-    def active(self) -> bool:
-        """Whether the controller commands the joints."""
-        return self._active
 
     @property
     def goal_id(self) -> Hashable | None:
@@ -110,61 +102,27 @@ class JointTrajectoryController:
         Returns:
             Whether it is taken over; the log says why not.
         """
-        if len(self._parameters.command_interfaces) > 1:
-            problem = "Speed scaling is only supported for position interfaces - Ignoring it!"
-        elif not 0 <= factor <= _MOST_SPEED:
-            rule = "Scaling factor has to be greater or equal to 0.0 - Ignoring input!"
-            problem = f"{rule} (got {factor:g}; expected 0 to {_MOST_SPEED:g})"
-        else:
+        if 0 <= factor <= _MOST_SPEED:
             self._tracker.scaling = factor
             return True
+        rule = "Scaling factor has to be greater or equal to 0.0 - Ignoring input!"
+        problem = f"{rule} (got {factor:g}; expected 0 to {_MOST_SPEED:g})"
         self.logger.warning("%s: %s", self.name, problem, extra=repeated("speed"))
         return False
 
-    def activate(self, time_ns: int, measured: JointState, command: NDArray[np.float64] | None = None) -> None:
-        """Start to command the joints, holding them where they are.
-
-        Args:
-            time_ns: Current time [ns].
-            measured: Current state.
-            command: Positions that the joints are commanded already [rad], shape ``(n_joints,)``; unless a parameter
-                says otherwise they are held rather than the measured ones, if all are finite.
-
-        Raises:
-            ValueError: If the controller is active already, or the state lacks what the interfaces promise.
-        """
-        if self._active:
-            raise ValueError(f"{self.name}: cannot be activated, it is active")
-        take_command = self._parameters.set_last_command_interface_value_as_state_on_activation
-        if command is not None and take_command and np.isfinite(command).all():
-            measured = JointState(np.array(command, dtype=float), measured.velocities)
-        self._restart(time_ns, measured)
-        self._active = True
-
-    def deactivate(self) -> None:
-        """Stop to command the joints; a goal is aborted, the last positions stay.
-
-        Raises:
-            ValueError: If the controller is not active.
-        """
-        self._require_active()
-        self._finish(Decision.invalid("Current goal cancelled during deactivate transition."))
-        self._active = False
-        self._tracker.halt()
-
     def reset(self, time_ns: int, measured: JointState) -> None:
-        """Continue from a simulation that was reset: a goal is aborted, the measured positions are held.
+        """Begin, or begin anew after a reset of the simulation: a goal is aborted, the measured positions are held.
 
         Args:
-            time_ns: Time after the reset [ns].
-            measured: State after the reset.
+            time_ns: Time now [ns].
+            measured: State now.
 
         Raises:
-            ValueError: If the controller is not active, or the state lacks what the interfaces promise.
+            ValueError: If the state lacks what is to be measured.
         """
-        self._require_active()
         self._finish(Decision.invalid("simulation was reset"))
-        self._restart(time_ns, measured)
+        self._tracker.restart(time_ns, measured)
+        self._hold(Waypoints.single(self._tracker.command))
 
     def submit(self, goal_id: Hashable, goal: TrajectoryGoal, now_ns: int) -> Refusal | None:
         """Accept a goal, which aborts the one before, or refuse it.
@@ -177,12 +135,11 @@ class JointTrajectoryController:
         Returns:
             None if the goal is accepted; otherwise the reason of the refusal, which the log has too.
         """
-        if reason := self._refusal(goal.trajectory, now_ns, "action goals"):
+        if reason := self._refusal(goal.trajectory, now_ns):
             return reason
         self._finish(Decision.invalid("Current goal preempted by new incoming action."))
         self._goal_id = goal_id
-        joints, velocities = self._parameters.joints, self._tracker.velocities_count
-        tolerances = goal_tolerances(goal, self._defaults, joints, velocities=velocities, logger=self.logger)
+        tolerances = goal_tolerances(goal, self._defaults, self._parameters.joints, logger=self.logger)
         self._follow(goal.trajectory, self._judge_with(tolerances))
         return None
 
@@ -198,7 +155,7 @@ class JointTrajectoryController:
         Returns:
             None if the trajectory is accepted; otherwise the reason of the refusal, which the log has too.
         """
-        if reason := self._refusal(trajectory, now_ns, "trajectories"):
+        if reason := self._refusal(trajectory, now_ns):
             return reason
         if self._deviations.topic_aborts_goal:
             self._finish(Decision.invalid("Current goal preempted by a trajectory on the topic."))
@@ -240,12 +197,11 @@ class JointTrajectoryController:
             Positions to command [rad], shape ``(n_joints,)``, read-only.
 
         Raises:
-            ValueError: If the controller is not active, or the state lacks what the interfaces promise.
+            ValueError: If the controller was not begun (`reset`), or the state lacks what is to be measured.
         """
-        self._require_active()
         tracker = self._tracker
         first = tracker.advance(time_ns, period_ns, measured)
-        decision = None if self._holding else self._decided(first=first)
+        decision = None if self._holding else self._decide(first=first)
         if decision is None or decision.status is not GoalStatus.ABORTED:
             tracker.send()
         return tracker.command
@@ -256,11 +212,7 @@ class JointTrajectoryController:
         Returns:
             Most updates that `take` gives now; the one after them must be made with `update`. `sys.maxsize` if
             nothing is to be decided.
-
-        Raises:
-            ValueError: If the controller is not active.
         """
-        self._require_active()
         if self._holding:
             return sys.maxsize
         if self._tracker.incoming is not None:
@@ -278,7 +230,7 @@ class JointTrajectoryController:
             Their commands [rad], shape ``(n_updates, n_joints)``, read-only.
 
         Raises:
-            ValueError: If the controller is not active, or one of these updates needs the measured state.
+            ValueError: If one of these updates needs the measured state.
         """
         allowed = self.next_decision()
         if not 0 <= n_updates <= allowed:
@@ -296,7 +248,7 @@ class JointTrajectoryController:
             measured: State at the time of that update.
 
         Raises:
-            ValueError: If the state lacks what the interfaces promise.
+            ValueError: If the state lacks what is to be measured.
         """
         self._tracker.observe(measured)
 
@@ -326,14 +278,14 @@ class JointTrajectoryController:
             time_ns: Absolute time [ns].
 
         Returns:
-            Its state; with success if the controller is active and the time is between first update and end.
+            Its state; with success if the time is between first update and end.
 
         Raises:
             ValueError: If `take` was not followed by `observe`.
         """
-        return self._tracker.query(time_ns) if self._active else TrajectoryState(False, np.empty(0))
+        return self._tracker.query(time_ns)
 
-    def _decided(self, *, first: bool) -> Decision | None:
+    def _decide(self, *, first: bool) -> Decision | None:
         motion = self._tracker.motion
         if (decision := self._judge.decide(motion, self._tracker.measured, first=first)) is None:
             return None
@@ -342,8 +294,7 @@ class JointTrajectoryController:
             self.logger.warning("%s: %s%s", self.name, decision.text, holds)
             self._stop()
         elif self._goal_id is not None or self._judge.settled(motion):
-            end_ns = motion.curve.end_ns
-            self._hold(Waypoints.single(*motion.curve.state(end_ns), motion.curve.efforts(end_ns)))
+            self._hold(Waypoints.single(*motion.curve.state(motion.curve.end_ns)))
         self._finish(decision)
         return decision
 
@@ -355,10 +306,10 @@ class JointTrajectoryController:
 
     def _stop(self) -> None:
         tracker, measured = self._tracker, self._tracker.measured
-        if self._parameters.brakes and measured.velocities is not None:
+        if measured.velocities is not None:
             constraints = self._parameters.constraints
             hardest = np.array([constraints.of(joint).max_deceleration_on_cancel for joint in self._parameters.joints])
-            self._hold(braked(measured.positions, measured.velocities, hardest, tracker.period_ns))
+            self._hold(brake(measured.positions, measured.velocities, hardest, tracker.period_ns))
         else:
             self._hold(Waypoints.single(tracker.command if self._deviations.hold == "command" else measured.positions))
 
@@ -368,24 +319,18 @@ class JointTrajectoryController:
             self._results.append(GoalResult(self._goal_id, *end))
             self._goal_id = None
 
-    def _restart(self, time_ns: int, measured: JointState) -> None:
-        self._tracker.restart(time_ns, measured)
-        self._hold(Waypoints.single(self._tracker.command))
-
     def _adopt(self, parameters: ControllerParameters) -> None:
         self._parameters = parameters
-        velocities = self._tracker.velocities_count
-        self._defaults = default_tolerances(parameters.constraints, parameters.joints, velocities=velocities)
-        for warning in parameters.warnings():
-            self.logger.warning("%s: %s", self.name, warning, extra=repeated(warning.partition("(")[0]))
+        self._defaults = default_tolerances(parameters.constraints, parameters.joints)
+        if parameters.cmd_timeout and not parameters.timeout:
+            values = f"({parameters.cmd_timeout:g} vs. {parameters.constraints.goal_time:g})"
+            problem = f"Command timeout must be higher than goal_time tolerance {values}; it is off."
+            self.logger.warning("%s: %s", self.name, problem, extra=repeated("timeout"))
 
     def _judge_with(self, tolerances: Tolerances) -> Judge:
-        tracker, timeout_ns = self._tracker, round(self._parameters.timeout * 1e9)
-        return Judge(tolerances, timeout_ns, self._parameters.joints, tracker.velocities_count, tracker.continuous)
+        return Judge(tolerances, round(self._parameters.timeout * 1e9), self._parameters.joints)
 
-    def _refusal(self, trajectory: Trajectory, now_ns: int, what: str) -> Refusal | None:
-        if not self._active:
-            return self.refuse(Refusal(ErrorCode.INVALID_GOAL, f"Can't accept new {what}. Controller is not running."))
+    def _refusal(self, trajectory: Trajectory, now_ns: int) -> Refusal | None:
         if reason := refusal(trajectory, self._parameters, now_ns):
             return self.refuse(reason)
         ahead_ns = (trajectory.stamp_ns or now_ns) - now_ns
@@ -393,7 +338,3 @@ class JointTrajectoryController:
             doubt = "was it stamped by a clock that is not the simulation's?"
             self.logger.warning("%s: the trajectory starts %.0f s from now; %s", self.name, ahead_ns / 1e9, doubt)
         return None
-
-    def _require_active(self) -> None:
-        if not self._active:
-            raise ValueError(f"{self.name}: the controller is not active")

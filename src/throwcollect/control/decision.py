@@ -5,10 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
-from throwcollect.control.interpolation import shortest_turn
 from throwcollect.control.motion import Motion
 from throwcollect.control.outcome import ErrorCode, GoalStatus, JointState
 from throwcollect.control.tolerances import Limits, Tolerances, violations
@@ -39,42 +35,6 @@ CANCELED = Decision(GoalStatus.CANCELED, ErrorCode.SUCCESSFUL, "")
 
 
 @dataclass(frozen=True)
-class Errors:
-    """How far the joints are from where they should be.
-
-    Attributes:
-        position: Desired minus measured positions [rad], shape ``(n_joints,)``.
-        velocity: The same of velocities [rad/s]; None if they are not measured or do not count.
-    """
-
-    position: NDArray[np.float64]
-    velocity: NDArray[np.float64] | None
-
-
-def errors(
-    desired: JointState, measured: JointState, *, velocities: bool, continuous: NDArray[np.bool_] | None = None
-) -> Errors:
-    """Errors of one update.
-
-    Args:
-        desired: State that is due; its velocities are needed if they count.
-        measured: Measured state.
-        velocities: Whether velocities count.
-        continuous: Joints that turn without end, whose errors are the short way; None if there is none.
-
-    Returns:
-        The errors.
-    """
-    position = desired.positions - measured.positions
-    if continuous is not None:
-        position = np.where(continuous, shortest_turn(position), position)
-    velocity = None
-    if velocities and measured.velocities is not None and desired.velocities is not None:
-        velocity = desired.velocities - measured.velocities
-    return Errors(position, velocity)
-
-
-@dataclass(frozen=True)
 class Judge:
     """Judges the updates of one trajectory.
 
@@ -82,15 +42,11 @@ class Judge:
         tolerances: Those in force.
         timeout_ns: How long after the end the joints are stopped [ns]; 0 never.
         joints: Names of the joints.
-        velocities: Whether velocities count.
-        continuous: Joints that turn without end; None if there is none.
     """
 
     tolerances: Tolerances
     timeout_ns: int
     joints: Sequence[str]
-    velocities: bool
-    continuous: NDArray[np.bool_] | None
 
     def decide(self, motion: Motion, measured: JointState, *, first: bool) -> Decision | None:
         """Judge one update.
@@ -104,7 +60,7 @@ class Judge:
             The decision; None while the trajectory goes on, or its end waits for the joints.
         """
         past_end = motion.past_end
-        if self.tolerances.path.checked and (first or not past_end):
+        if self.tolerances.path.any() and (first or not past_end):
             broken = self._broken(motion, measured, self.tolerances.path)
             if broken:
                 text = f"Aborted due to path tolerance violation: {broken}"
@@ -116,7 +72,7 @@ class Judge:
             text = f"Aborted due to command timeout: {late_ns / 1e9:f} seconds after the end"
             return Decision(GoalStatus.ABORTED, ErrorCode.GOAL_TOLERANCE_VIOLATED, text)
         goal = self.tolerances.goal
-        broken = self._broken(motion, measured, goal) if goal.checked else ""
+        broken = self._broken(motion, measured, goal) if goal.any() else ""
         if not broken:
             return Decision(GoalStatus.SUCCEEDED, ErrorCode.SUCCESSFUL, "Goal successfully reached!")
         if 0 < self.tolerances.goal_time_ns < late_ns:
@@ -135,21 +91,19 @@ class Judge:
             Number of updates; None if there will never be anything.
         """
         tolerances = self.tolerances
-        if tolerances.path.checked and not motion.past_end:
+        if tolerances.path.any() and not motion.past_end:
             return 0
         if goal:
             return max(0, motion.updates_until_end())
-        limits = [self.timeout_ns, tolerances.goal_time_ns if tolerances.goal.checked else 0]
+        limits = [self.timeout_ns, tolerances.goal_time_ns if tolerances.goal.any() else 0]
         late = [motion.updates_until_late(limit_ns) for limit_ns in limits if limit_ns]
         return max(0, min(late)) if late else None
 
     def settled(self, motion: Motion) -> bool:
         """Whether an end that no goal waits for has been judged for the last time."""
         tolerances = self.tolerances
-        return tolerances.goal.checked and not self.timeout_ns and 0 < tolerances.goal_time_ns < motion.since_end_ns
+        waits = bool(tolerances.goal.any()) and not self.timeout_ns
+        return waits and 0 < tolerances.goal_time_ns < motion.since_end_ns
 
     def _broken(self, motion: Motion, measured: JointState, limits: Limits) -> str:
-        velocity = motion.curve.state(motion.clock_ns)[1] if self.velocities else None
-        desired = JointState(motion.desired, velocity)
-        error = errors(desired, measured, velocities=self.velocities, continuous=self.continuous)
-        return violations(error.position, error.velocity, limits, self.joints)
+        return violations(motion.desired - measured.positions, limits, self.joints)

@@ -1,22 +1,17 @@
 """Curves through the points of a trajectory, evaluated for many times at once.
 
 The degree of a segment follows from what both its ends have: positions give a line, velocities a cubic, accelerations
-a quintic. The first segment begins at the start state, which counts as having whatever the first point has. Efforts are
-always connected by lines.
+a quintic. The first segment begins at the start state, which counts as having whatever the first point has.
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.control.waypoints import CUBIC, LINE, QUINTIC, StartState, Waypoints
-
-_HALF_TURN_WIDTH = 1e-9
-"""Within which half a turn counts as such [rad]; that of ros2_controllers."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +28,6 @@ class Curve:
         position: Coefficients [rad].
         velocity: Coefficients [rad/s].
         acceleration: Coefficients [rad/s²].
-        effort: Coefficients [Nm]; None for none.
     """
 
     knots_ns: NDArray[np.int64]
@@ -41,7 +35,6 @@ class Curve:
     position: NDArray[np.float64]
     velocity: NDArray[np.float64]
     acceleration: NDArray[np.float64]
-    effort: NDArray[np.float64] | None = None
 
     @property
     def end_ns(self) -> int:
@@ -57,7 +50,7 @@ class Curve:
         Returns:
             [rad], shape ``(n, n_joints)``.
         """
-        return self._evaluated(self.position, times_ns)
+        return self._evaluate(self.position, times_ns)
 
     def state(self, time_ns: int) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Position, velocity and acceleration at one time.
@@ -70,26 +63,12 @@ class Curve:
         """
         times_ns = np.array([time_ns], dtype=np.int64)
         position, velocity, acceleration = (
-            self._evaluated(coefficients, times_ns)[0]
+            self._evaluate(coefficients, times_ns)[0]
             for coefficients in (self.position, self.velocity, self.acceleration)
         )
         return position, velocity, acceleration
 
-    def efforts(self, time_ns: int) -> NDArray[np.float64]:
-        """Efforts at one time.
-
-        Args:
-            time_ns: Time since the trajectory's start, not before the first knot [ns].
-
-        Returns:
-            [Nm], shape ``(n_joints,)``.
-        """
-        if self.effort is None:
-            return np.zeros(self.position.shape[2])
-        efforts: NDArray[np.float64] = self._evaluated(self.effort, np.array([time_ns], dtype=np.int64))[0]
-        return efforts
-
-    def _evaluated(self, coefficients: NDArray[np.float64], times_ns: NDArray[np.int64]) -> NDArray[np.float64]:
+    def _evaluate(self, coefficients: NDArray[np.float64], times_ns: NDArray[np.int64]) -> NDArray[np.float64]:
         segment = np.searchsorted(self.knots_ns, times_ns, side="right") - 1
         share = ((times_ns - self.knots_ns[segment]) / self.durations_ns[segment])[:, np.newaxis]
         value: NDArray[np.float64] = coefficients[-1][segment]
@@ -99,35 +78,23 @@ class Curve:
         return value
 
 
-def interpolated(
-    waypoints: Waypoints, start: StartState, *, splines: bool, continuous: NDArray[np.bool_] | None = None
-) -> Curve:
+def interpolate(waypoints: Waypoints, start: StartState) -> Curve:
     """Curve from a start state through the points.
 
     Args:
         waypoints: The points.
         start: Where to begin.
-        splines: Whether to connect the points; otherwise the next point is output from the time of each.
-        continuous: Joints that turn without end, shape ``(n_joints,)``: they go the short way to the first point. None
-            if there is no such joint.
 
     Returns:
         The curve; if the first point's time has come, it begins there and the start state is not used.
     """
-    leads_in = start.time_ns < waypoints.times_ns[0]
-    if leads_in:
-        waypoints = _led_in(waypoints, start, continuous)
+    if start.time_ns < waypoints.times_ns[0]:
+        waypoints = _lead_in(waypoints, start)
     durations_ns = np.append(np.diff(waypoints.times_ns), 1)
-    if splines and len(durations_ns) > 1:
+    if len(durations_ns) > 1:
         return _splines(waypoints, durations_ns)
-    rows = np.minimum(np.arange(len(durations_ns)) + 1, len(durations_ns) - 1)
-    if leads_in:
-        rows[0] = 0
-    p, v, a = (
-        value[np.newaxis, rows] for value in (waypoints.positions, waypoints.velocities, waypoints.accelerations)
-    )
-    effort = None if waypoints.effort is None else waypoints.effort[np.newaxis, rows]
-    return Curve(waypoints.times_ns, durations_ns, p, v, a, effort)
+    p, v, a = waypoints.positions, waypoints.velocities, waypoints.accelerations
+    return Curve(waypoints.times_ns, durations_ns, p[np.newaxis], v[np.newaxis], a[np.newaxis])
 
 
 def quintic(
@@ -158,28 +125,15 @@ def quintic(
     )
 
 
-def shortest_turn(angle: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Angles brought into the interval from -π to π by whole turns [rad]."""
-    return angle - 2 * math.pi * np.round(angle / (2 * math.pi))
-
-
-def _led_in(waypoints: Waypoints, start: StartState, continuous: NDArray[np.bool_] | None) -> Waypoints:
+def _lead_in(waypoints: Waypoints, start: StartState) -> Waypoints:
     still = np.zeros_like(start.positions)
-    position, target = start.positions, waypoints.positions[0]
-    if continuous is not None:
-        turn = shortest_turn(target - position)
-        # Half a turn goes either way: towards the greater angle if that is where the target is.
-        half = np.abs(np.abs(turn) - math.pi) < _HALF_TURN_WIDTH
-        turn = np.where(half, np.copysign(turn, target - position), turn)
-        position = np.where(continuous, target - turn, position)
     velocity, acceleration = (still if value is None else value for value in (start.velocities, start.accelerations))
     return Waypoints(
         np.concatenate(([start.time_ns], waypoints.times_ns)),
-        np.vstack((position, waypoints.positions)),
+        np.vstack((start.positions, waypoints.positions)),
         np.vstack((velocity, waypoints.velocities)),
         np.vstack((acceleration, waypoints.accelerations)),
         np.concatenate((waypoints.content[:1], waypoints.content)),
-        None if waypoints.effort is None else np.vstack((still, waypoints.effort)),
     )
 
 
@@ -203,10 +157,7 @@ def _splines(waypoints: Waypoints, durations_ns: NDArray[np.int64]) -> Curve:
     velocity = _derivative(position, seconds)
     acceleration = _derivative(velocity, seconds)
     velocity[0, -1], acceleration[0, -1] = waypoints.velocities[-1], waypoints.accelerations[-1]
-    effort = waypoints.effort
-    if effort is not None:
-        effort = np.stack((effort, np.vstack((np.diff(effort, axis=0), np.zeros_like(effort[:1])))))
-    return Curve(waypoints.times_ns, durations_ns, position, velocity, acceleration, effort)
+    return Curve(waypoints.times_ns, durations_ns, position, velocity, acceleration)
 
 
 def _derivative(coefficients: NDArray[np.float64], seconds: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -69,7 +69,7 @@ class JointState:
 
     Attributes:
         positions: [rad], shape ``(n_joints,)``.
-        velocities: [rad/s], shape ``(n_joints,)``; not used without a velocity state interface.
+        velocities: [rad/s], shape ``(n_joints,)``; used where joints brake when they are stopped.
     """
 
     positions: NDArray[np.float64]
@@ -87,7 +87,7 @@ class ControllerState:
         joint_names: Joints of the controller.
         desired: What was due (``reference`` of the state topic), timed by the trajectory's clock.
         actual: What was measured (``feedback`` of the state topic), timed by the time that has really passed.
-        error: Desired minus actual; velocities are 0 unless velocities or efforts are commanded.
+        error: Desired minus actual; velocities are 0, as positions alone are commanded.
         output: What is commanded.
         speed_scaling_factor: Speed of the trajectory's clock [-].
     """

@@ -29,7 +29,7 @@ class Grid:
         self.end_index = first_index_at(curve.end_ns - origin_ns, step_ns)
         self._block_start = 0
         self._block = np.empty((0, 0))
-        self._last = self._computed(self.end_index if step_ns else 0, 1)[0]
+        self._last = self._compute(self.end_index if step_ns else 0, 1)[0]
 
     def time_ns(self, index: int) -> int:
         """Time of a point, since the trajectory's start [ns]."""
@@ -56,7 +56,7 @@ class Grid:
             return np.broadcast_to(self._last, (count, len(self._last)))
         if not self._block_start <= first or moving_stop > self._block_start + len(self._block):
             self._block_start = first
-            self._block = self._computed(first, max(moving_stop, min(first + _BLOCK, self.end_index)) - first)
+            self._block = self._compute(first, max(moving_stop, min(first + _BLOCK, self.end_index)) - first)
         moving = self._block[first - self._block_start : moving_stop - self._block_start]
         if moving_stop == stop:
             return moving
@@ -64,7 +64,7 @@ class Grid:
         positions.setflags(write=False)
         return positions
 
-    def _computed(self, first: int, count: int) -> NDArray[np.float64]:
+    def _compute(self, first: int, count: int) -> NDArray[np.float64]:
         times_ns = self._origin_ns + np.arange(first, first + count, dtype=np.int64) * self._step_ns
         positions = self._curve.positions(times_ns)
         positions.setflags(write=False)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from throwcollect.control.waypoints import QUINTIC, Waypoints
 
 
-def braked(
+def brake(
     positions: NDArray[np.float64],
     velocities: NDArray[np.float64],
     deceleration: NDArray[np.float64],

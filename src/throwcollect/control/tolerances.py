@@ -1,8 +1,7 @@
 """Which tolerances are in force for a goal, and which joints break them.
 
-A tolerance of 0 is not in force, here as in the parameters. Those of velocities take effect in controllers that command
-velocities or efforts besides positions; those of accelerations never do, as accelerations are not measured. They are
-checked for being legal all the same.
+A tolerance of 0 is not in force, here as in the parameters. Those of velocities and accelerations never are, as in
+controllers of ros2_controllers that command positions alone; they are checked for being legal all the same.
 """
 
 from __future__ import annotations
@@ -21,22 +20,8 @@ _ERASE = -1.0
 _ERASE_WIDTH = float(np.finfo(np.float32).eps)
 
 
-@dataclass(frozen=True)
-class Limits:
-    """Largest errors of the joints; 0 is not checked.
-
-    Attributes:
-        position: [rad], shape ``(n_joints,)``.
-        velocity: [rad/s], shape ``(n_joints,)``.
-    """
-
-    position: NDArray[np.float64]
-    velocity: NDArray[np.float64]
-
-    @property
-    def checked(self) -> bool:
-        """Whether any error is checked."""
-        return bool(self.position.any() or self.velocity.any())
+Limits = NDArray[np.float64]
+"""Largest position errors of the joints [rad], shape ``(n_joints,)``; 0 is not checked."""
 
 
 @dataclass(frozen=True)
@@ -54,29 +39,26 @@ class Tolerances:
     goal_time_ns: int
 
 
-def default_tolerances(constraints: Constraints, joints: Sequence[str], *, velocities: bool) -> Tolerances:
+def default_tolerances(constraints: Constraints, joints: Sequence[str]) -> Tolerances:
     """Tolerances of trajectories that bring none of their own.
 
     Args:
         constraints: Those of the controller.
         joints: Joints of the controller, in order.
-        velocities: Whether there is a velocity error to be checked.
 
     Returns:
         The parameters as arrays.
     """
     limits = [constraints.of(joint) for joint in joints]
-    stopped = constraints.stopped_velocity_tolerance if velocities else 0.0
-    still = np.zeros(len(joints))
     return Tolerances(
-        path=Limits(np.array([limit.trajectory for limit in limits]), still),
-        goal=Limits(np.array([limit.goal for limit in limits]), np.full(len(joints), stopped)),
+        path=np.array([limit.trajectory for limit in limits]),
+        goal=np.array([limit.goal for limit in limits]),
         goal_time_ns=round(constraints.goal_time * 1e9),
     )
 
 
 def goal_tolerances(
-    goal: TrajectoryGoal, defaults: Tolerances, joints: Sequence[str], *, velocities: bool, logger: logging.Logger
+    goal: TrajectoryGoal, defaults: Tolerances, joints: Sequence[str], *, logger: logging.Logger
 ) -> Tolerances:
     """Tolerances of one goal: its own where it has any, the defaults elsewhere.
 
@@ -86,84 +68,68 @@ def goal_tolerances(
         goal: The goal.
         defaults: Tolerances of the controller.
         joints: Joints of the controller, in order.
-        velocities: Whether there is a velocity error to be checked.
         logger: Log of the controller.
 
     Returns:
         The tolerances to put in force.
     """
     try:
-        path = _merged(goal.path_tolerance, defaults.path, joints, "path_tolerance")
-        end = _merged(goal.goal_tolerance, defaults.goal, joints, "goal_tolerance")
-        goal_time_ns = _resolved_time(goal.goal_time_tolerance_ns, defaults.goal_time_ns)
+        path = _merge(goal.path_tolerance, defaults.path, joints, "path_tolerance")
+        end = _merge(goal.goal_tolerance, defaults.goal, joints, "goal_tolerance")
+        goal_time_ns = _resolve_time(goal.goal_time_tolerance_ns, defaults.goal_time_ns)
     except _IllegalToleranceError as error:
         logger.error("%s Using default tolerances.", error)
         return defaults
-    if not velocities:
-        path, end = (Limits(limits.position, np.zeros(len(joints))) for limits in (path, end))
     return Tolerances(path, end, goal_time_ns)
 
 
-def violations(
-    position: NDArray[np.float64], velocity: NDArray[np.float64] | None, limits: Limits, joints: Sequence[str]
-) -> str:
+def violations(error: NDArray[np.float64], limits: Limits, joints: Sequence[str]) -> str:
     """Joints whose error is above their tolerance.
 
     Args:
-        position: Position error [rad], shape ``(n_joints,)``.
-        velocity: Velocity error [rad/s], shape ``(n_joints,)``; None if there is none.
+        error: Position errors [rad], shape ``(n_joints,)``.
         limits: Largest errors.
         joints: Names of the joints.
 
     Returns:
         One phrase for each error that is too large; empty if there is none.
     """
-    phrases = _violations("position", "rad", position, limits.position, joints)
-    if velocity is not None:
-        phrases += _violations("velocity", "rad/s", velocity, limits.velocity, joints)
-    return "; ".join(phrases)
+    broken = np.flatnonzero((limits > 0) & (np.abs(error) > limits))
+    return "; ".join(
+        f"joint {joints[index]} has position {_describe(error[index], limits[index])}" for index in broken.tolist()
+    )
 
 
-def _violations(
-    what: str, unit: str, error: NDArray[np.float64], tolerance: NDArray[np.float64], joints: Sequence[str]
-) -> list[str]:
-    broken = np.flatnonzero((tolerance > 0) & (np.abs(error) > tolerance))
-    return [
-        f"joint {joints[index]} has {what} {_compared(error[index], tolerance[index], unit)}"
-        for index in broken.tolist()
-    ]
-
-
-def _compared(error: float, tolerance: float, unit: str) -> str:
+def _describe(error: float, tolerance: float) -> str:
     """An error that is above its tolerance, both with as many digits as it takes to see that."""
     digits = next((n for n in range(6, 17) if f"{abs(error):.{n}g}" != f"{tolerance:.{n}g}"), 17)
-    return f"error {error:.{digits}g} {unit}, tolerance {tolerance:.{digits}g} {unit}"
+    return f"error {error:.{digits}g} rad, tolerance {tolerance:.{digits}g} rad"
 
 
 class _IllegalToleranceError(Exception):
     """A goal's tolerance that has no meaning; never leaves this module."""
 
 
-def _merged(asked: Sequence[JointTolerance], defaults: Limits, joints: Sequence[str], field: str) -> Limits:
-    position, velocity = defaults.position.copy(), defaults.velocity.copy()
+def _merge(asked: Sequence[JointTolerance], defaults: Limits, joints: Sequence[str], field: str) -> Limits:
+    limits = defaults.copy()
     for tolerance in asked:
         if tolerance.name not in joints:
             raise _IllegalToleranceError(f"joint '{tolerance.name}' specified in goal.{field} does not exist.")
         index = joints.index(tolerance.name)
         where = f"joint '{tolerance.name}' specified in goal.{field} has a invalid"
-        position[index] = _resolved(tolerance.position, float(defaults.position[index]), f"{where} position tolerance")
-        velocity[index] = _resolved(tolerance.velocity, float(defaults.velocity[index]), f"{where} velocity tolerance")
-        _resolved(tolerance.acceleration, 0.0, f"{where} acceleration tolerance")
-    return Limits(position, velocity)
+        limits[index] = _resolve(tolerance.position, float(defaults[index]), f"{where} position tolerance")
+        _resolve(tolerance.velocity, 0.0, f"{where} velocity tolerance")
+        _resolve(tolerance.acceleration, 0.0, f"{where} acceleration tolerance")
+    return limits
 
 
-def _resolved_time(asked_ns: int, default_ns: int) -> int:
+def _resolve_time(asked_ns: int, default_ns: int) -> int:
     if not asked_ns:
         return default_ns
-    return round(_resolved(asked_ns / 1e9, 0.0, "Specified illegal goal_time_tolerance") * 1e9)
+    return round(_resolve(asked_ns / 1e9, 0.0, "Specified illegal goal_time_tolerance") * 1e9)
 
 
-def _resolved(asked: float, default: float, what: str) -> float:
+def _resolve(asked: float, default: float, what: str) -> float:
     if asked > 0:
         return asked
     if abs(asked - _ERASE) < _ERASE_WIDTH:

@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.control.decision import errors
 from throwcollect.control.goal import Trajectory, TrajectoryPoint
-from throwcollect.control.interpolation import interpolated
+from throwcollect.control.interpolation import interpolate
 from throwcollect.control.motion import Motion
 from throwcollect.control.outcome import ControllerState, JointState, TrajectoryState
 from throwcollect.control.parameters import ControllerParameters
-from throwcollect.control.waypoints import StartState, Waypoints, arranged
+from throwcollect.control.waypoints import StartState, Waypoints, arrange
 
 
 class Tracker:
@@ -37,17 +36,9 @@ class Tracker:
         """Last commanded positions [rad], shape ``(n_joints,)``, read-only."""
         self.incoming: Trajectory | Waypoints | None = None
         """What to follow from the next update on."""
-        self.velocities_count = len(parameters.command_interfaces) > 1 and "velocity" in parameters.state_interfaces
-        """Whether there is a velocity error."""
-        continuous = np.array([joint in parameters.continuous_joints for joint in parameters.joints])
-        self.continuous = continuous if continuous.any() else None
-        """Which joints turn without end; None if there is none."""
-        self._measures_velocity = "velocity" in parameters.state_interfaces
         self._motion: Motion | None = None
         self._measured: JointState | None = None
-        self._commanded: tuple[Motion, int] | None = None
-        self._scaling = parameters.speed_scaling.initial_scaling_factor
-        self._halted = False
+        self._scaling = 1.0
 
     @property
     def scaling(self) -> float:
@@ -84,26 +75,22 @@ class Tracker:
         return self._measured
 
     def restart(self, time_ns: int, measured: JointState) -> None:
-        """Begin anew, with the measured positions as the last command, at the initial speed."""
+        """Begin anew, with the measured positions as the last command, at full speed."""
         self.observe(measured)
         self.time_ns = time_ns
         self.command = self.measured.positions
-        self._motion = self._commanded = None
-        self._scaling = self._parameters.speed_scaling.initial_scaling_factor
-        self._halted = False
-
-    def halt(self) -> None:
-        """Follow nothing any more: the last positions stay commanded, velocities, accelerations and efforts are 0."""
-        self.incoming = self._motion = None
-        self._halted = True
+        self._motion = None
+        self._scaling = 1.0
 
     def observe(self, measured: JointState) -> None:
         """Tell the measured state of the last update.
 
         Raises:
-            ValueError: If it lacks what the interfaces promise.
+            ValueError: If it lacks what is to be measured.
         """
-        fields = [measured.positions, measured.velocities] if self._measures_velocity else [measured.positions]
+        fields = (
+            [measured.positions, measured.velocities] if self._parameters.measures_velocity else [measured.positions]
+        )
         copies = [np.array(field, dtype=float) for field in fields]
         for values in copies:
             if values.shape != self.command.shape:
@@ -123,21 +110,19 @@ class Tracker:
             Whether something new is followed from now on.
 
         Raises:
-            ValueError: If the state lacks what the interfaces promise.
+            ValueError: If the state lacks what is to be measured.
         """
         self.observe(measured)
-        previous_ns, self.time_ns = self.time_ns, time_ns
+        self.time_ns = time_ns
         if (incoming := self.incoming) is None:
             self.motion.advance(period_ns)
             return False
-        self._begin(incoming, self._start_state(previous_ns), time_ns)
+        self._begin(incoming, StartState(time_ns, self.measured.positions, self.measured.velocities), time_ns)
         return True
 
     def send(self) -> None:
         """Command what is due one period after this update."""
-        motion = self.motion
-        self.command = motion.command
-        self._commanded = (motion, motion.clock_ns + self.period_ns)
+        self.command = self.motion.command
 
     def take(self, n_updates: int) -> NDArray[np.float64]:
         """Make many updates at once that need no measured state.
@@ -162,7 +147,6 @@ class Tracker:
         self.time_ns += n_updates * self.period_ns
         self._measured = None
         self.command = commands[-1]
-        self._commanded = (self.motion, self.motion.clock_ns + self.period_ns)
         return commands
 
     def state(self, time_ns: int | None = None) -> ControllerState:
@@ -175,38 +159,15 @@ class Tracker:
         time_ns = self.time_ns if time_ns is None else time_ns
         clock_ns = motion.clock_ns + round((time_ns - self.time_ns) * self._scaling)
         position, velocity, acceleration = motion.curve.state(clock_ns)
-        desired = JointState(position, velocity)
-        error = errors(desired, measured, velocities=self.velocities_count, continuous=self.continuous)
         moving = () if measured.velocities is None else measured.velocities
         return ControllerState(
             stamp_ns=time_ns,
             joint_names=self._parameters.joints,
-            desired=TrajectoryPoint(clock_ns, position, velocity, acceleration, motion.curve.efforts(clock_ns)),
+            desired=TrajectoryPoint(clock_ns, position, velocity, acceleration, np.zeros(len(position))),
             actual=TrajectoryPoint(time_ns - motion.start_ns, measured.positions, moving),
-            error=TrajectoryPoint(
-                0, error.position, np.zeros(len(moving)) if error.velocity is None else error.velocity
-            ),
-            output=self.output(),
+            error=TrajectoryPoint(0, position - measured.positions, np.zeros(len(moving))),
+            output=TrajectoryPoint(0, self.command),
             speed_scaling_factor=self._scaling,
-        )
-
-    def output(self) -> TrajectoryPoint:
-        """What is commanded: positions, and whatever else there are interfaces for."""
-        commanded = self._parameters.command_interfaces[1:]
-        if not commanded:
-            return TrajectoryPoint(0, self.command)
-        still = np.zeros(len(self.command))
-        velocity = acceleration = effort = still
-        if self._commanded is not None and not self._halted:
-            motion, clock_ns = self._commanded
-            _, velocity, acceleration = motion.curve.state(clock_ns)
-            effort = motion.curve.efforts(clock_ns)
-        return TrajectoryPoint(
-            0,
-            self.command,
-            velocity if "velocity" in commanded else (),
-            acceleration if "acceleration" in commanded else (),
-            effort if "effort" in commanded else (),
         )
 
     def query(self, time_ns: int) -> TrajectoryState:
@@ -221,26 +182,14 @@ class Tracker:
         time_from_start_ns = time_ns - motion.start_ns
         return TrajectoryState(time_from_start_ns < motion.curve.end_ns, *motion.curve.state(time_from_start_ns))
 
-    def _start_state(self, previous_ns: int) -> StartState:
-        """Where the next trajectory begins, in absolute time."""
-        if not self._parameters.interpolate_from_desired_state:
-            return StartState(self.time_ns, self.measured.positions, self.measured.velocities)
-        if self._commanded is None:
-            return StartState(self.time_ns, self.command)
-        motion, clock_ns = self._commanded
-        _, velocity, acceleration = motion.curve.state(clock_ns)
-        # The clock may have been set back since.
-        return StartState(min(previous_ns, self.time_ns), self.command, velocity, acceleration)
-
     def _begin(self, incoming: Trajectory | Waypoints, state: StartState, time_ns: int) -> Motion:
         start_ns = time_ns
         if isinstance(incoming, Trajectory):
             start_ns = incoming.stamp_ns or start_ns
         start = StartState(state.time_ns - start_ns, state.positions, state.velocities, state.accelerations)
         if isinstance(incoming, Trajectory):
-            incoming = arranged(incoming, self._parameters.joints, self.command, start)
-        splines = self._parameters.interpolation_method == "splines"
-        curve = interpolated(incoming, start, splines=splines, continuous=self.continuous)
+            incoming = arrange(incoming, self._parameters.joints, self.command, start)
+        curve = interpolate(incoming, start)
         self.incoming = None
         self._motion = Motion(
             curve, start_ns=start_ns, first_ns=time_ns, period_ns=self.period_ns, scaling=self._scaling

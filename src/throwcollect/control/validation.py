@@ -39,10 +39,10 @@ def refusal(trajectory: Trajectory, parameters: ControllerParameters, now_ns: in
 def _too_few_joints(trajectory: Trajectory, parameters: ControllerParameters, _now_ns: int) -> str | None:
     names, joints = trajectory.joint_names, parameters.joints
     if not parameters.allow_partial_joints_goal and len(names) != len(joints):
-        counts = f"expected all {len(joints)} of {_listed(joints)}; got {len(names)}: {_listed(names)}"
+        counts = f"expected all {len(joints)} of {_join(joints)}; got {len(names)}: {_join(names)}"
         return f"Joints on incoming trajectory don't match the controller joints. ({counts})"
     if not len(names):
-        return f"Empty joint names on incoming trajectory. (expected some of {_listed(joints)})"
+        return f"Empty joint names on incoming trajectory. (expected some of {_join(joints)})"
     return None
 
 
@@ -54,10 +54,10 @@ def _wrong_joints(trajectory: Trajectory, parameters: ControllerParameters, _now
     names, joints = trajectory.joint_names, parameters.joints
     for name in names:
         if name not in joints:
-            return f"Incoming joint {name} doesn't match the controller's joints. (expected {_listed(joints)})"
+            return f"Incoming joint {name} doesn't match the controller's joints. (expected {_join(joints)})"
     for index, name in enumerate(names):
         if name in names[:index]:
-            return f"Joint {name} is named more than once on incoming trajectory. (got {_listed(names)})"
+            return f"Joint {name} is named more than once on incoming trajectory. (got {_join(names)})"
     return None
 
 
@@ -72,8 +72,6 @@ def _wrong_sizes(trajectory: Trajectory, parameters: ControllerParameters, _now_
         ]
         if integrates and not any(len(values) for _, values in fields):
             return f"The given trajectory has no position, velocity, or acceleration points. (point #{index})"
-        if "effort" in parameters.command_interfaces:
-            fields.append(("effort", point.effort))
         for field, values in fields:
             size = len(values)
             if size != expected and (size or (field == "positions" and not integrates)):
@@ -81,14 +79,12 @@ def _wrong_sizes(trajectory: Trajectory, parameters: ControllerParameters, _now_
     return None
 
 
-def _not_finite(trajectory: Trajectory, parameters: ControllerParameters, _now_ns: int) -> str | None:
+def _not_finite(trajectory: Trajectory, _parameters: ControllerParameters, _now_ns: int) -> str | None:
     fields: list[tuple[str, Callable[[int], Values]]] = [
         ("Position", lambda index: trajectory.points[index].positions),
         ("Velocity", lambda index: trajectory.points[index].velocities),
         ("Acceleration", lambda index: trajectory.points[index].accelerations),
     ]
-    if "effort" in parameters.command_interfaces:
-        fields.append(("Effort", lambda index: trajectory.points[index].effort))
     for field, values_of in fields:
         present = [index for index in range(len(trajectory.points)) if len(values_of(index))]
         values = np.array([values_of(index) for index in present], dtype=np.float64)
@@ -131,9 +127,7 @@ def _wrong_times(trajectory: Trajectory, _parameters: ControllerParameters, _now
     return None
 
 
-def _effort(trajectory: Trajectory, parameters: ControllerParameters, _now_ns: int) -> str | None:
-    if "effort" in parameters.command_interfaces:
-        return None
+def _effort(trajectory: Trajectory, _parameters: ControllerParameters, _now_ns: int) -> str | None:
     for index, point in enumerate(trajectory.points):
         if len(point.effort):
             rule = "Trajectories with effort fields are only supported for controllers using the 'effort' command"
@@ -141,7 +135,7 @@ def _effort(trajectory: Trajectory, parameters: ControllerParameters, _now_ns: i
     return None
 
 
-def _listed(names: Sequence[str]) -> str:
+def _join(names: Sequence[str]) -> str:
     return ", ".join(names) or "none"
 
 

@@ -24,7 +24,6 @@ class Waypoints:
         velocities: [rad/s], shape ``(n_points, n_joints)``; 0 where a point has none.
         accelerations: [rad/s²], shape ``(n_points, n_joints)``; 0 where a point has none.
         content: What a point has, shape ``(n_points,)``: `LINE`, `CUBIC` or `QUINTIC`.
-        effort: [Nm], shape ``(n_points, n_joints)``, 0 where a point has none; None if no point has any.
     """
 
     times_ns: NDArray[np.int64]
@@ -32,7 +31,6 @@ class Waypoints:
     velocities: NDArray[np.float64]
     accelerations: NDArray[np.float64]
     content: NDArray[np.int64]
-    effort: NDArray[np.float64] | None = None
 
     @classmethod
     def single(
@@ -40,7 +38,6 @@ class Waypoints:
         positions: NDArray[np.float64],
         velocities: NDArray[np.float64] | None = None,
         accelerations: NDArray[np.float64] | None = None,
-        effort: NDArray[np.float64] | None = None,
     ) -> Waypoints:
         """One point at the trajectory's start, to be held.
 
@@ -48,7 +45,6 @@ class Waypoints:
             positions: [rad], shape ``(n_joints,)``.
             velocities: [rad/s], shape ``(n_joints,)``; None for 0.
             accelerations: [rad/s²], shape ``(n_joints,)``; None for 0.
-            effort: [Nm], shape ``(n_joints,)``; None for none.
 
         Returns:
             The point.
@@ -56,9 +52,7 @@ class Waypoints:
         still = np.zeros(len(positions))
         rows = [still if row is None else row for row in (positions, velocities, accelerations)]
         p, v, a = (row[np.newaxis] for row in rows)
-        return cls(
-            np.zeros(1, np.int64), p, v, a, np.zeros(1, np.int64), None if effort is None else effort[np.newaxis]
-        )
+        return cls(np.zeros(1, np.int64), p, v, a, np.zeros(1, np.int64))
 
 
 @dataclass(frozen=True)
@@ -78,7 +72,7 @@ class StartState:
     accelerations: NDArray[np.float64] | None = None
 
 
-def arranged(
+def arrange(
     trajectory: Trajectory, joints: Sequence[str], command: NDArray[np.float64], start: StartState
 ) -> Waypoints:
     """Points of a valid trajectory in the controller's joint order.
@@ -101,12 +95,11 @@ def arranged(
         positions[np.ix_(placed, columns)] = [points[index].positions for index in placed]
     velocities, moving = _table([point.velocities for point in points], positions.shape, columns)
     accelerations, accelerating = _table([point.accelerations for point in points], positions.shape, columns)
-    effort, pushing = _table([point.effort for point in points], positions.shape, columns)
     content = np.zeros(len(points), np.int64)
     content[moving] = CUBIC
     content[[index for index in accelerating if content[index] == CUBIC]] = QUINTIC
-    waypoints = Waypoints(times_ns, positions, velocities, accelerations, content, effort if pushing else None)
-    return waypoints if len(placed) == len(points) else _integrated(waypoints, points, columns, start)
+    waypoints = Waypoints(times_ns, positions, velocities, accelerations, content)
+    return waypoints if len(placed) == len(points) else _integrate(waypoints, points, columns, start)
 
 
 def _table(
@@ -119,7 +112,7 @@ def _table(
     return table, present
 
 
-def _integrated(
+def _integrate(
     waypoints: Waypoints, points: Sequence[TrajectoryPoint], columns: list[int], start: StartState
 ) -> Waypoints:
     """Fill in positions, and velocities too where a point has accelerations alone, by the trapezoidal rule."""

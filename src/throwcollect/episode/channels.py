@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+from rclzenoh.interfaces import get_message, serialize
 from throwcollect.config.schema import Config
 from throwcollect.episode.frames import FrameTree, read_frames
 from throwcollect.episode.topics import (
@@ -18,8 +20,8 @@ from throwcollect.episode.topics import (
     transforms,
 )
 from throwcollect.errors import ConfigError, Problem
-from throwcollect.interfaces import get_message, serialize
-from throwcollect.robots.talos import CONTROLLERS, controller_of
+from throwcollect.robots.description import robot_of
+from throwcollect.robots.talos import JOINTS
 
 ROBOT_DESCRIPTION_ID = 1
 TF_STATIC_ID = 2
@@ -95,19 +97,25 @@ class Channel:
     qos: Qos
 
 
+SENSORS: list[tuple[Channel, ...]] = []
+"""Channels of the chunks that follow the state chunk of an episode, chunk by chunk; their messages begin with a
+std_msgs/Header. No sensor is simulated yet: a camera adds its channels here, with numbers that no other channel has."""
+
+
 class Channels:
     """What is recorded for a configuration.
 
     Attributes:
         latched: Channels with one message a file: ``/robot_description`` and ``/tf_static``.
         recorded: Channels with one message a sample, in the order of their numbers, and what fills them.
+        sensors: Channels of each chunk that follows the state chunk of an episode.
 
     Args:
         config: The configuration.
         urdf: URDF text of the robot.
 
     Raises:
-        ConfigError: If the text is not a URDF, or the task moves a joint that the robot does not have.
+        ConfigError: If the text is not a URDF, or the robot is not Talos.
     """
 
     latched = (
@@ -119,6 +127,7 @@ class Channels:
         self._urdf = urdf
         self._frames: FrameTree = read_frames(urdf, base_height=config.robot.base_height_m)
         topics = _topics(config, self._frames)
+        self.sensors = tuple(SENSORS)
         self.recorded: dict[Channel, Topic] = {
             Channel(number, topic.name, topic.type_name, _TRANSFORMS if number == _TF_ID else _SAMPLED): topic
             for number, topic in sorted(topics.items())
@@ -127,7 +136,25 @@ class Channels:
     @property
     def all(self) -> tuple[Channel, ...]:
         """All channels, by number."""
-        return (*self.latched, *self.recorded)
+        return (*self.latched, *self.recorded, *itertools.chain(*self.sensors))
+
+    @property
+    def numbers(self) -> tuple[tuple[int, ...], ...]:
+        """Numbers of the channels of each chunk of an episode."""
+        return tuple(tuple(channel.id for channel in chunk) for chunk in (self.recorded, *self.sensors))
+
+    def fit(self, numbers: tuple[tuple[int, ...], ...]) -> bool:
+        """Whether the chunks of an episode have the channels that they should have.
+
+        Args:
+            numbers: Numbers of the channels of each of its chunks; a sensor that had nothing to say has left some out.
+        """
+        state, *sensors = self.numbers
+        return (
+            len(numbers) == len(self.numbers)
+            and numbers[0] == state
+            and all(set(found) <= set(known) for found, known in zip(numbers[1:], sensors, strict=True))
+        )
 
     def latched_messages(self, stamp_ns: int) -> dict[Channel, bytes]:
         """CDR messages of the latched channels.
@@ -147,18 +174,18 @@ class Channels:
 
 
 def _topics(config: Config, frames: FrameTree) -> dict[int, Topic]:
-    chosen = config.record.topics
+    chosen, robot = config.record.topics, robot_of(config)
+    if robot.joints != JOINTS:
+        sentence = f"recordings have a place for the joints of Talos alone so far, and not for those of {robot.title}"
+        raise ConfigError([Problem(sentence, "robot.name")])
     topics = {JOINT_STATES_ID: joint_states(), BALL_ODOMETRY_ID: ball_odometry()}
     if "clock" in chosen:
         topics[_CLOCK_ID] = clock()
     if "tf" in chosen:
         topics[_TF_ID] = transforms(frames.moving)
     if "controller_state" in chosen:
-        try:
-            moved = {controller_of(joint) for joint in config.task.end}
-        except KeyError as error:
-            raise ConfigError([Problem(f"Talos has no joint {error}", "task.end")]) from error
-        for number, name in enumerate(CONTROLLERS, start=_FIRST_CONTROLLER_ID):
+        moved = {robot.controller_of(joint) for joint in config.task.end}
+        for number, name in enumerate(robot.controllers, start=_FIRST_CONTROLLER_ID):
             if name in moved:
                 topics[number] = controller_state(name)
     return topics

@@ -1,8 +1,7 @@
-"""Samples of one trial as the records of one MCAP chunk, and back.
+"""MCAP chunks: how samples of one trial are encoded into one, and how chunks are packed, indexed and read again.
 
-A chunk holds one Message record per channel and sample, samples in order of time and channels by number. As every
-message of a channel has the same size, a chunk is a table: one row a sample, at a constant place in each row the record
-of each channel (MCAP specification, records Message, Chunk and Message Index).
+The state chunk of an episode holds one Message record per channel and sample, samples in order of time and channels by
+number (MCAP specification, records Message, Chunk and Message Index); `message_table` reads it.
 """
 
 from __future__ import annotations
@@ -11,8 +10,7 @@ import struct
 import threading
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 import zstandard
@@ -22,10 +20,10 @@ from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 from numpy.typing import NDArray
 
-from throwcollect.episode.channels import BALL_ODOMETRY_ID, JOINT_STATES_ID, Channels
+from throwcollect.episode.channels import Channels
 from throwcollect.episode.layout import MessageLayout
 from throwcollect.episode.record import ControllerSamples, Samples
-from throwcollect.episode.topics import Recording, Rows, Topic, ball_odometry, joint_states, read_samples
+from throwcollect.episode.topics import Recording, Topic
 from throwcollect.errors import DatasetError
 
 _COMPRESSION = b"zstd"
@@ -38,21 +36,14 @@ CHUNK_MARK = struct.pack("<I4s", len(_COMPRESSION), _COMPRESSION)
 MOST_RATIO = 4096
 """Uncompressed bytes that one compressed byte may stand for. Each message has a stamp of its own, so recordings stay
 far below; zstd by itself reaches 30,000."""
-_PREFIX_BYTES = 9
-"""Opcode and length, which a record's length leaves out."""
-_MESSAGE_HEADER = struct.Struct("<BQHIQQ")
+RECORD_PREFIX_BYTES = 9
+"""Opcode and length of a record, which its length leaves out."""
+MESSAGE_HEADER = struct.Struct("<BQHIQQ")
 """Opcode, length, channel, sequence, log time, publish time."""
 _MESSAGE_INDEX_HEADER = struct.Struct("<BQHI")
 """Opcode, length, channel, size of the entries."""
-_MESSAGE_HEADERS = np.dtype(
-    {
-        "names": ["opcode", "length", "channel", "sequence", "log_time", "publish_time"],
-        "formats": ["u1", "<u8", "<u2", "<u4", "<u8", "<u8"],
-    }
-)
-"""`_MESSAGE_HEADER`, of many records at once."""
-_ALIKE_BYTES = 11
-"""Opcode, length and channel: what is the same at the start of all records of a channel."""
+_INDEX_ENTRY_BYTES = 16
+"""Log time and offset of one message in a message index."""
 
 
 class _OfEachThread(threading.local):
@@ -73,6 +64,26 @@ def encode_records(*parts: records.McapRecord) -> bytes:
     return bytes(builder.end())  # type: ignore[no-untyped-call]
 
 
+def encode_message_index(channel: int, log_times: NDArray[np.uint64], offsets: NDArray[np.integer[Any]]) -> bytes:
+    """The MCAP Message Index record of one channel.
+
+    Args:
+        channel: Number of the channel.
+        log_times: Times of its messages [ns], shape ``(n,)``.
+        offsets: Where their records begin in the uncompressed chunk [bytes], shape ``(n,)``.
+    """
+    entries = np.empty((len(log_times), 2), "<u8")
+    entries[:, 0] = log_times
+    entries[:, 1] = offsets
+    size = entries.nbytes
+    return _MESSAGE_INDEX_HEADER.pack(Opcode.MESSAGE_INDEX, 6 + size, channel, size) + entries.tobytes()
+
+
+def count_indexed(index: bytes) -> int:
+    """Number of messages that a Message Index record, as `encode_message_index` writes it, announces."""
+    return (len(index) - _MESSAGE_INDEX_HEADER.size) // _INDEX_ENTRY_BYTES
+
+
 @dataclass(frozen=True)
 class Chunk:
     """A compressed MCAP chunk.
@@ -91,6 +102,18 @@ class Chunk:
     start_ns: int
     end_ns: int
 
+    @classmethod
+    def of(cls, contents: bytes | bytearray | memoryview, data: bytes, *, start_ns: int, end_ns: int) -> Chunk:
+        """The chunk of some records.
+
+        Args:
+            contents: The records.
+            data: The same, compressed.
+            start_ns: Time of the first message [ns].
+            end_ns: Time of the last message [ns].
+        """
+        return cls(data, len(contents), crc32(contents), start_ns, end_ns)
+
     def record(self) -> bytes:
         """The MCAP Chunk record, with its opcode and length."""
         return self.record_header() + self.data
@@ -99,7 +122,7 @@ class Chunk:
         """Everything of the record that comes before the data."""
         return _CHUNK_HEADER.pack(
             Opcode.CHUNK,
-            self.record_size - _PREFIX_BYTES,
+            self.record_size - RECORD_PREFIX_BYTES,
             self.start_ns,
             self.end_ns,
             self.uncompressed_size,
@@ -125,9 +148,23 @@ class Chunk:
             return 0
         opcode, length, *_, name_length, name, stored = _CHUNK_HEADER.unpack(header)
         alike = (opcode, name_length, name, length) == (
-            Opcode.CHUNK, len(_COMPRESSION), _COMPRESSION, stored + _CHUNK_HEADER.size - _PREFIX_BYTES
+            Opcode.CHUNK, len(_COMPRESSION), _COMPRESSION, stored + _CHUNK_HEADER.size - RECORD_PREFIX_BYTES
         )  # fmt: skip
         return _CHUNK_HEADER.size + stored if alike else 0
+
+    @classmethod
+    def parse_all(cls, records: memoryview) -> list[Chunk]:
+        """Read MCAP Chunk records that follow each other, at least one.
+
+        Raises:
+            DatasetError: If the bytes are anything else; contents are not looked at.
+        """
+        chunks: list[Chunk] = []
+        while records or not chunks:
+            size = cls.announced_size(bytes(records[:CHUNK_HEADER_BYTES])) or len(records)
+            chunks.append(cls.parse(records[:size]))
+            records = records[size:]
+        return chunks
 
     @classmethod
     def parse(cls, record: bytes | memoryview) -> Chunk:
@@ -142,7 +179,7 @@ class Chunk:
         if opcode != Opcode.CHUNK or (name_length, name) != (len(_COMPRESSION), _COMPRESSION):
             raise DatasetError("chunk: not the record of a chunk compressed with zstd")
         data = record[_CHUNK_HEADER.size :]
-        if stored != len(data) or length != len(record) - _PREFIX_BYTES:
+        if stored != len(data) or length != len(record) - RECORD_PREFIX_BYTES:
             raise DatasetError(f"chunk: announces {stored} bytes of data; got {len(data)}")
         return cls(data, size, crc, start, end)
 
@@ -193,7 +230,7 @@ class ChunkEncoder:
         self._compressor = zstandard.ZstdCompressor(level=level)
         layouts = {channel.id: topic.layout for channel, topic in channels.recorded.items()}
         self._template = np.frombuffer(
-            b"".join(_MESSAGE_HEADER.pack(Opcode.MESSAGE, 22 + len(layout.template), number, 0, 0, 0) + layout.template
+            b"".join(MESSAGE_HEADER.pack(Opcode.MESSAGE, 22 + len(layout.template), number, 0, 0, 0) + layout.template
                      for number, layout in layouts.items()),
             dtype=np.uint8,
         )  # fmt: skip
@@ -218,33 +255,19 @@ class ChunkEncoder:
             column["sequence"] = np.arange(len(samples))
             column["log_time"] = column["publish_time"] = samples.stamps_ns
             topic.fill(column["message"], recording)
-        return Chunk(
-            data=self._compressor.compress(table.data),
-            uncompressed_size=table.nbytes,
-            crc=crc32(table.data),
-            start_ns=int(samples.stamps_ns[0]),
-            end_ns=int(samples.stamps_ns[-1]),
-        )
-
-    def message(
-        self, topic: str, samples: Samples, index: int, controllers: Mapping[str, ControllerSamples] | None = None
-    ) -> bytes:
-        """The message of one sample on one topic, byte for byte as `encode` writes it.
-
-        Args:
-            topic: Name of a recorded topic.
-            samples: Samples.
-            index: Number of the sample, counted from 0.
-            controllers: As for `encode`.
-
-        Raises:
-            KeyError: If the topic is not recorded, or its controller's set points are missing.
-        """
-        return encode_message(self._topics[topic], samples, index, controllers or {})
+        contents = table.data.cast("B")
+        start, end = int(samples.stamps_ns[0]), int(samples.stamps_ns[-1])
+        return Chunk.of(contents, self._compressor.compress(contents), start_ns=start, end_ns=end)
 
 
 def encode_message(topic: Topic, samples: Samples, index: int, controllers: Mapping[str, ControllerSamples]) -> bytes:
-    """The message of one sample on any topic; see `ChunkEncoder.message`.
+    """The message of one sample on a topic, byte for byte as `ChunkEncoder.encode` writes it.
+
+    Args:
+        topic: The topic, recorded or not.
+        samples: Samples.
+        index: Number of the sample, counted from 0.
+        controllers: Set points of the controllers, by name.
 
     Raises:
         KeyError: If the set points of the topic's controller are missing.
@@ -262,118 +285,10 @@ def _row_type(layouts: Mapping[str, MessageLayout]) -> np.dtype[np.void]:
             {
                 "names": ["sequence", "log_time", "publish_time", "message"],
                 "formats": ["<u4", "<u8", "<u8", layout.dtype],
-                "offsets": [11, 15, 23, _MESSAGE_HEADER.size],
-                "itemsize": _MESSAGE_HEADER.size + len(layout.template),
+                "offsets": [11, 15, 23, MESSAGE_HEADER.size],
+                "itemsize": MESSAGE_HEADER.size + len(layout.template),
             }
         )
         for layout in layouts.values()
     ]
     return np.dtype({"names": list(layouts), "formats": formats})
-
-
-class _Column(NamedTuple):
-    """Where the records of one channel lie in each row."""
-
-    offset: int
-    size: int
-
-
-class MessageTable:
-    """The records of a chunk seen as a table, without a copy.
-
-    Holding one guarantees that every row has the same channels at the same places.
-
-    Attributes:
-        columns: Place of each channel's record in a row, by the channel's number.
-        log_times: Time of each row's first record [ns], shape ``(n_samples,)``, uint64.
-
-    Args:
-        contents: Uncompressed records; what is seen of a bytearray can be written to.
-        samples: Number of samples.
-
-    Raises:
-        DatasetError: If the records are not such a table.
-    """
-
-    def __init__(self, contents: bytes | bytearray, samples: int) -> None:
-        if samples < 1 or len(contents) % samples or not contents:
-            raise DatasetError(f"chunk: {len(contents)} bytes are not the records of {samples} samples")
-        self._table: NDArray[np.uint8] = np.frombuffer(contents, np.uint8).reshape(samples, -1)
-        self.columns: dict[int, _Column] = {}
-        width, offset = self._table.shape[1], 0
-        while offset < width:
-            header = contents[offset : offset + _MESSAGE_HEADER.size]
-            if len(header) < _MESSAGE_HEADER.size:
-                raise DatasetError(f"chunk: a record is cut off at byte {offset}")
-            opcode, length, channel, *_ = _MESSAGE_HEADER.unpack(header)
-            column = _Column(offset, 9 + length)
-            offset += column.size
-            if opcode != Opcode.MESSAGE or length < 22 or offset > width or channel in self.columns:
-                raise DatasetError(f"chunk: not one message per channel and sample at byte {column.offset}")
-            self.columns[channel] = column
-            alike = self._table[:, column.offset : column.offset + _ALIKE_BYTES]
-            if alike.tobytes() != header[:_ALIKE_BYTES] * samples:
-                raise DatasetError(f"chunk: the records of channel {channel} are not alike")
-        self.log_times = self.headers(next(iter(self.columns)))["log_time"]
-
-    def __len__(self) -> int:
-        return len(self._table)
-
-    def headers(self, channel: int) -> Rows:
-        """Sequence numbers and times of one channel's records, shape ``(n_samples,)``; a view.
-
-        Raises:
-            KeyError: If the chunk has no such channel.
-        """
-        column = self.columns[channel]
-        return self._table[:, column.offset : column.offset + _MESSAGE_HEADERS.itemsize].view(_MESSAGE_HEADERS)[:, 0]
-
-    def are_timed_by(self, stamps_ns: NDArray[np.int64]) -> bool:
-        """Whether all records are numbered from 0 and logged and published at these times [ns], ``(n_samples,)``."""
-        return all(
-            np.array_equal(headers["sequence"], np.arange(len(self)))
-            and np.array_equal(headers["log_time"], stamps_ns)
-            and np.array_equal(headers["publish_time"], stamps_ns)
-            for headers in map(self.headers, self.columns)
-        )
-
-    def messages(self, channel: int) -> NDArray[np.uint8]:
-        """CDR messages of one channel, shape ``(n_samples, size)``.
-
-        Raises:
-            KeyError: If the chunk has no such channel.
-        """
-        column = self.columns[channel]
-        return self._table[:, column.offset + _MESSAGE_HEADER.size : column.offset + column.size]
-
-    def message_index(self, channel: int) -> bytes:
-        """The MCAP Message Index record of one channel: log time and offset in the chunk of each of its messages.
-
-        Raises:
-            KeyError: If the chunk has no such channel.
-        """
-        entries = np.empty((len(self), 2), "<u8")
-        entries[:, 0] = self.headers(channel)["log_time"]
-        entries[:, 1] = np.arange(self.columns[channel].offset, self._table.size, self._table.shape[1])
-        header = _MESSAGE_INDEX_HEADER.pack(Opcode.MESSAGE_INDEX, 6 + entries.nbytes, channel, entries.nbytes)
-        return header + entries.tobytes()
-
-    @cached_property
-    def samples(self) -> Samples:
-        """The samples; joint columns and the ball's pose are views of the records.
-
-        Raises:
-            DatasetError: If joint states or the ball's odometry are missing, or not laid out as they are written here.
-        """
-        topics = {JOINT_STATES_ID: joint_states(), BALL_ODOMETRY_ID: ball_odometry()}
-        return read_samples(*(self._read(channel, topic) for channel, topic in topics.items()))
-
-    def _read(self, channel: int, topic: Topic) -> Rows:
-        if channel not in self.columns:
-            raise DatasetError(f"chunk: no messages of {topic.name}")
-        rows = self.messages(channel)
-        if not topic.layout.describes(rows[:1]):
-            raise DatasetError(
-                f"chunk: the messages of {topic.name} have another layout than {topic.type_name} written here"
-            )
-        return rows.view(topic.layout.dtype)[:, 0]

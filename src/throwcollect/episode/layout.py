@@ -14,9 +14,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.interfaces import Message, serialize
-from throwcollect.interfaces.catalog import Field
-from throwcollect.interfaces.message import DTYPES
+from rclzenoh.interfaces import Message, serialize
+from rclzenoh.interfaces.catalog import Field
+from rclzenoh.interfaces.message import DTYPES
 
 _ENCAPSULATION_BYTES = 4
 
@@ -98,6 +98,18 @@ class MessageLayout:
         self._varies = np.zeros(len(self.template), bool)
         for place in places:
             self._varies[_ENCAPSULATION_BYTES + place.offset : _ENCAPSULATION_BYTES + place.end] = True
+        self._fixed_bits = int.from_bytes(np.where(self._varies, 0, 255).astype(np.uint8).tobytes(), "little")
+        self._fixed = int.from_bytes(self.template, "little") & self._fixed_bits
+
+    def describes_message(self, message: bytes) -> bool:
+        """The same as `describes` for one message, in a tenth of the time.
+
+        Args:
+            message: Its bytes.
+        """
+        # One operation on a number as long as the message is faster than a handful on arrays.
+        fixed = int.from_bytes(message, "little") & self._fixed_bits
+        return len(message) == len(self.template) and fixed == self._fixed
 
     def describes(self, rows: NDArray[np.uint8]) -> bool:
         """Whether messages differ from the template in nothing but the variable fields.

@@ -1,8 +1,8 @@
-"""The one message that carries an episode from a simulation to whoever collects: std_msgs/UInt8MultiArray.
+"""The one message that carries an episode from a simulation to the coordinator: std_msgs/UInt8MultiArray.
 
 Its layout names the parts of its data: ``header``, an `EpisodeHeader` in JSON; ``conditions``, what it was simulated
-with, in JSON; ``chunk``, an MCAP Chunk record; and ``signature``, that of everything before it. Whoever takes it in
-hashes the records, so no hash is ever believed, and none is computed twice.
+with, in JSON; ``chunk``, one MCAP Chunk record or several after each other; and ``signature``, that of everything
+before it. The receiver hashes the records itself, so it believes no hash, and none is computed twice.
 """
 
 from __future__ import annotations
@@ -11,21 +11,24 @@ import hashlib
 import itertools
 import re
 import struct
+from collections.abc import Sequence
 from functools import cache, cached_property
 from typing import NamedTuple
 
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
-from throwcollect.episode.chunk import Chunk, MessageTable
+from rclzenoh.interfaces import get_message
+from throwcollect.episode.chunk import Chunk
 from throwcollect.episode.layout import MessageLayout
+from throwcollect.episode.message_table import MessageTable
 from throwcollect.episode.record import EpisodeHeader, Samples
+from throwcollect.episode.recorded_chunk import RecordedChunk
 from throwcollect.errors import DatasetError
-from throwcollect.interfaces import get_message
 from throwcollect.run_key import Signer
 
 _PARTS = ("header", "conditions", "chunk", "signature")
-_SHA256 = re.compile(rb"[0-9a-f]{64}")
+_SHA256 = re.compile(r"[0-9a-f]{64}")
 _HEADER = TypeAdapter(EpisodeHeader)
 _LATEST_NS = 2**62
 _MOST_SAMPLES = 2**32
@@ -38,28 +41,44 @@ _COUNT = struct.Struct("<I")
 
 
 class Episode:
-    """What one trial yielded, as it travels and rests; decompressed when it is looked at.
+    """What one trial yielded, as it travels and rests: a list of chunks; each is decompressed when it is looked at.
+
+    The state chunk comes first and holds one message per channel and sample. Chunks of sensors may follow it, with
+    messages of any size at rates of their own. The digest covers header and state chunk alone, so a throw keeps its
+    digest whatever else is recorded of it; each chunk of a sensor has a hash of its own beside it.
 
     Attributes:
         header: What is known besides the samples.
-        chunk: The recorded messages, compressed.
-        said_sha256: SHA-256 of the uncompressed message records in hexadecimal, as it was written beside them; None if
-            nobody has said it yet.
+        state: The state chunk.
+        sensors: Chunks of sensors, in the order of the channels that they hold.
+
+    Args:
+        header: What is known besides the samples.
+        chunk: The state chunk.
+        said_sha256: SHA-256 of its records, as it was written beside them; None if it is not known yet.
+        sensors: Chunks of sensors.
     """
 
-    def __init__(self, header: EpisodeHeader, chunk: Chunk, said_sha256: str | None = None) -> None:
+    def __init__(
+        self,
+        header: EpisodeHeader,
+        chunk: Chunk,
+        said_sha256: str | None = None,
+        sensors: Sequence[RecordedChunk] = (),
+    ) -> None:
         self.header = header
-        self.chunk = chunk
-        self.said_sha256 = said_sha256
+        self.state = RecordedChunk(chunk, said_sha256)
+        self.sensors = tuple(sensors)
 
-    @cached_property
-    def records_sha256(self) -> str:
-        """SHA-256 of the uncompressed message records in hexadecimal: as it was said, or else worked out.
+    @property
+    def chunk(self) -> Chunk:
+        """The state chunk, compressed."""
+        return self.state.chunk
 
-        Raises:
-            DatasetError: If it has to be worked out and the chunk is damaged.
-        """
-        return self.said_sha256 or hashlib.sha256(self.contents).hexdigest()
+    @property
+    def chunks(self) -> tuple[RecordedChunk, ...]:
+        """All chunks in order, the state chunk first."""
+        return (self.state, *self.sensors)
 
     @cached_property
     def header_json(self) -> str:
@@ -67,22 +86,13 @@ class Episode:
         return header_to_json(self.header)
 
     @cached_property
-    def contents(self) -> bytes:
-        """The uncompressed message records.
-
-        Raises:
-            DatasetError: If the chunk is damaged.
-        """
-        return self.chunk.decompress()
-
-    @cached_property
     def table(self) -> MessageTable:
-        """The message records as a table.
+        """The message records of the state chunk as a table.
 
         Raises:
             DatasetError: If the chunk is damaged, or does not hold one message per channel and sample.
         """
-        return MessageTable(self.contents, self.header.samples)
+        return MessageTable(self.state.contents, self.header.samples)
 
     def samples(self) -> Samples:
         """The samples, as views of the records where possible.
@@ -94,18 +104,26 @@ class Episode:
 
     @cached_property
     def digest(self) -> str:
-        """SHA-256 over the header's JSON, one zero byte and `records_sha256` as 32 bytes, in hexadecimal."""
-        return hashlib.sha256(self.header_json.encode() + b"\0" + bytes.fromhex(self.records_sha256)).hexdigest()
+        """SHA-256 over the header's JSON, one zero byte and the hash of the state chunk as 32 bytes, in hexadecimal."""
+        records = bytes.fromhex(self.state.records_sha256)
+        return hashlib.sha256(self.header_json.encode() + b"\0" + records).hexdigest()
 
-    def check_records(self) -> None:
-        """Hash the message records again.
+    def channels(self) -> tuple[tuple[int, ...], ...]:
+        """Numbers of the channels of each chunk.
 
         Raises:
-            DatasetError: If the chunk is damaged, or `records_sha256` is not that of its records.
+            DatasetError: If a chunk is damaged.
         """
-        actual = hashlib.sha256(self.contents).hexdigest()
-        if actual != self.records_sha256:
-            raise DatasetError(f"chunk: SHA-256 of its records is {actual}", expected=self.records_sha256)
+        return (tuple(self.table.columns), *(sensor.messages.channels for sensor in self.sensors))
+
+    def check_records(self) -> None:
+        """Hash the message records of all chunks again.
+
+        Raises:
+            DatasetError: If a chunk is damaged, or its hash is not that of its records.
+        """
+        for chunk in self.chunks:
+            chunk.check_records()
 
 
 def header_to_json(header: EpisodeHeader) -> str:
@@ -167,7 +185,8 @@ class Delivery(NamedTuple):
 
 def pack(episode: Episode, conditions: str, signer: Signer) -> bytes:
     """The CDR bytes of the message that carries an episode."""
-    parts = [episode.header_json.encode(), conditions.encode(), episode.chunk.record()]
+    chunks = b"".join(each.chunk.record() for each in episode.chunks)
+    parts = [episode.header_json.encode(), conditions.encode(), chunks]
     signature = signer.sign(*parts).encode()
     return b"".join((_prefix([*map(len, parts), len(signature)]), *parts, signature))
 
@@ -203,22 +222,33 @@ def unpack(message: bytes, signer: Signer) -> Delivery:
         raise DatasetError(f"episode: {len(message) - length} bytes of data", expected=f"{sum(sizes)} as announced")
     whole = memoryview(message)
     ends = list(itertools.accumulate(sizes, initial=length))
-    header, conditions, chunk, signature = (whole[start:end] for start, end in itertools.pairwise(ends))
+    header, conditions, chunks, signature = (whole[start:end] for start, end in itertools.pairwise(ends))
     if not signer.has_signed(bytes(signature).decode(errors="replace"), whole[length : ends[-2]]):
         raise DatasetError("episode: is not signed with the key of this run")
     try:
         text = bytes(conditions).decode()
     except UnicodeDecodeError as error:
         raise DatasetError("episode: its conditions are no UTF-8 text") from error
-    return Delivery(Episode(header_from_json(bytes(header)), Chunk.parse(chunk)), text)
+    state, *sensors = Chunk.parse_all(chunks)
+    return Delivery(Episode(header_from_json(bytes(header)), state, sensors=[*map(RecordedChunk, sensors)]), text)
 
 
-def make_episode(header: bytes | str, records_sha256: bytes, chunk: Chunk) -> Episode:
-    """An episode from its parts as they travel and rest.
+def make_episode(header: bytes | str, hashes: Sequence[str], chunks: Sequence[Chunk]) -> Episode:
+    """An episode from its parts as they rest.
+
+    Args:
+        header: The header in JSON.
+        hashes: SHA-256 of the records of each chunk, in hexadecimal.
+        chunks: The chunks, the state chunk first.
 
     Raises:
-        DatasetError: If the header is not what `header_to_json` writes, or the hash not one in hexadecimal.
+        DatasetError: If the header is not what `header_to_json` writes, a hash not one in hexadecimal, or there are not
+            as many hashes as chunks.
     """
-    if not _SHA256.fullmatch(records_sha256):
-        raise DatasetError(f"episode: SHA-256 {records_sha256[:80]!r}", expected="64 hexadecimal digits")
-    return Episode(header_from_json(header), chunk, records_sha256.decode())
+    for said in hashes:
+        if not _SHA256.fullmatch(said):
+            raise DatasetError(f"episode: SHA-256 {said[:80]!r}", expected="64 hexadecimal digits")
+    if len(hashes) != len(chunks) or not chunks:
+        raise DatasetError(f"episode: {len(chunks)} chunks", expected=f"{len(hashes)}, as many as it has hashes of")
+    sensors = [RecordedChunk(chunk, said) for chunk, said in zip(chunks[1:], hashes[1:], strict=True)]
+    return Episode(header_from_json(header), chunks[0], hashes[0], sensors)

@@ -12,16 +12,16 @@ from dataclasses import replace
 
 import numpy as np
 import zstandard
-from isal.isal_zlib import crc32
 
 from throwcollect.config.schema import Config
 from throwcollect.episode.channels import Channels
-from throwcollect.episode.chunk import Chunk, MessageTable
+from throwcollect.episode.chunk import Chunk
 from throwcollect.episode.message import Episode
-from throwcollect.episode.record import EpisodeHeader
+from throwcollect.episode.message_table import MessageList, MessageTable
+from throwcollect.episode.record import NS_PER_S, EpisodeHeader
+from throwcollect.episode.recorded_chunk import RecordedChunk
 from throwcollect.errors import DatasetError
 
-_NS_PER_S = 1_000_000_000
 _SECONDS = ("stamp.sec", "clock.sec")
 """How paths of fields end that hold the seconds of a stamp; durations, such as `time_from_start`, stay as they are."""
 
@@ -49,7 +49,7 @@ class Restamper:
         }
         self._of_this_thread = _OfEachThread(config.record.zstd_level)
 
-    def restamped(self, episode: Episode, trial: int) -> Episode:
+    def restamp(self, episode: Episode, trial: int) -> Episode:
         """An episode as trial `trial` of the configuration would have yielded it.
 
         Args:
@@ -60,22 +60,27 @@ class Restamper:
             DatasetError: If the episode is damaged, or its messages are not those that the configuration records.
         """
         episode.check_records()
-        start_ns = self._config.trial_start_ns(trial)
-        by_ns = start_ns - episode.header.start_ns
-        contents = bytearray(episode.contents)
+        by_ns = self._config.trial_start_ns(trial) - episode.header.start_ns
+        contents = bytearray(episode.state.contents)
         table = MessageTable(contents, episode.header.samples)
         self._move(table, by_ns)
-        chunk = Chunk(
-            data=self._of_this_thread.compressor.compress(contents),
-            uncompressed_size=len(contents),
-            crc=crc32(contents),
-            start_ns=episode.chunk.start_ns + by_ns,
-            end_ns=episode.chunk.end_ns + by_ns,
-        )
-        moved = Episode(_moved(episode.header, trial, by_ns), chunk, hashlib.sha256(contents).hexdigest())
+        state = self._pack(contents, episode.state.chunk, by_ns)
+        sensors = [self._move_sensor(sensor, by_ns) for sensor in episode.sensors]
+        moved = Episode(_move_header(episode.header, trial, by_ns), state.chunk, state.said_sha256, sensors)
         # What has just been compressed need not be decompressed.
         moved.table = table
         return moved
+
+    def _move_sensor(self, sensor: RecordedChunk, by_ns: int) -> RecordedChunk:
+        contents = bytearray(sensor.contents)
+        MessageList(contents).move(by_ns)
+        return self._pack(contents, sensor.chunk, by_ns)
+
+    def _pack(self, contents: bytearray, like: Chunk, by_ns: int) -> RecordedChunk:
+        """The chunk of records that are `by_ns` later than those of another."""
+        data = self._of_this_thread.compressor.compress(contents)
+        chunk = Chunk.of(contents, data, start_ns=like.start_ns + by_ns, end_ns=like.end_ns + by_ns)
+        return RecordedChunk(chunk, hashlib.sha256(contents).hexdigest())
 
     def _move(self, table: MessageTable, by_ns: int) -> None:
         if list(table.columns) != list(self._topics):
@@ -90,11 +95,11 @@ class Restamper:
             rows = messages.view(topic.layout.dtype)[:, 0]
             for seconds in fields:
                 nanoseconds = seconds.removesuffix("sec") + "nanosec"
-                stamps = rows[seconds].astype(np.int64) * _NS_PER_S + rows[nanoseconds] + by_ns
-                rows[seconds], rows[nanoseconds] = np.divmod(stamps, _NS_PER_S)
+                stamps = rows[seconds].astype(np.int64) * NS_PER_S + rows[nanoseconds] + by_ns
+                rows[seconds], rows[nanoseconds] = np.divmod(stamps, NS_PER_S)
 
 
-def _moved(header: EpisodeHeader, trial: int, by_ns: int) -> EpisodeHeader:
+def _move_header(header: EpisodeHeader, trial: int, by_ns: int) -> EpisodeHeader:
     contacts = tuple(
         replace(
             contact,

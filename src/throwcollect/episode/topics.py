@@ -10,16 +10,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rclzenoh.interfaces import get_message
 from throwcollect.episode.frames import WORLD, MovingFrame
 from throwcollect.episode.layout import MessageLayout
-from throwcollect.episode.record import ControllerSamples, Samples
-from throwcollect.interfaces import get_message
+from throwcollect.episode.record import NS_PER_S, ControllerSamples, Samples
 from throwcollect.robots.talos import CONTROLLERS, JOINTS
 
 BALL = "ball"
 """Name of the ball's frame, fixed to the ball and at its centre."""
 
-_NS_PER_S = 1_000_000_000
 _STAMP = ("header.stamp.sec", "header.stamp.nanosec")
 
 Rows = NDArray[np.void]
@@ -57,7 +56,7 @@ class Topic:
 
 
 def _put_stamps(rows: Rows, prefix: str, stamps_ns: NDArray[np.int64]) -> None:
-    rows[f"{prefix}.sec"], rows[f"{prefix}.nanosec"] = np.divmod(stamps_ns, _NS_PER_S)
+    rows[f"{prefix}.sec"], rows[f"{prefix}.nanosec"] = np.divmod(stamps_ns, NS_PER_S)
 
 
 def rotate(quaternion_xyzw: NDArray[np.float64], *vectors: NDArray[np.float64], inverse: bool) -> NDArray[np.float64]:
@@ -148,7 +147,7 @@ def read_samples(joint_rows: Rows, ball_rows: Rows) -> Samples:
         orientation, ball_rows["twist.twist.linear"], ball_rows["twist.twist.angular"], inverse=False
     )
     return Samples(
-        stamps_ns=joint_rows["header.stamp.sec"].astype(np.int64) * _NS_PER_S + joint_rows["header.stamp.nanosec"],
+        stamps_ns=joint_rows["header.stamp.sec"].astype(np.int64) * NS_PER_S + joint_rows["header.stamp.nanosec"],
         position=joint_rows["position"],
         velocity=joint_rows["velocity"],
         effort=joint_rows["effort"],
@@ -214,7 +213,7 @@ def transform_message(
         rotation_xyzw: Unit quaternion, child to parent.
         stamp_ns: Stamp [ns].
     """
-    sec, nanosec = divmod(stamp_ns, _NS_PER_S)
+    sec, nanosec = divmod(stamp_ns, NS_PER_S)
     header = _header(parent)
     header.stamp = get_message("builtin_interfaces/msg/Time")(sec=sec, nanosec=nanosec)
     x, y, z = translation

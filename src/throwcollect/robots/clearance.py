@@ -1,30 +1,20 @@
-"""How close the links of Talos and the spoon come to each other."""
+"""How close the links of a robot and its tool come to each other."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio
 from numpy.typing import NDArray
 
-from throwcollect.config.schema import ToolConfig
 from throwcollect.errors import ConfigError
-from throwcollect.robots.model import share_directory, urdf_path
-from throwcollect.robots.spoon import boxes
+from throwcollect.pinocchio_library import pinocchio
+from throwcollect.robots.robot import Robot
+from throwcollect.tools.tool import Tool
 
 MARGIN_M = 0.002
 """Least distance between links. It covers how far the spoon, 1 m from the torso's axis, cuts into a body of the head's
 curvature on a path between two postures 0.02 rad apart."""
-
-GRIPPER = "gripper_right_base_link"
-"""Link that the spoon is fixed to."""
-
-SPOON = "spoon"
-"""Name of the spoon where links are named."""
-
-_HANDS = ("gripper_left_", "gripper_right_")
-_HOLDING = ("gripper_right_", "wrist_right_", "arm_right_5_", "arm_right_6_", "arm_right_7_")
 
 
 @dataclass(frozen=True)
@@ -32,7 +22,7 @@ class Approach:
     """Two links that come too close.
 
     Attributes:
-        links: Their names, ``spoon`` for the spoon.
+        links: Their names; the tool has its own name here.
         index: Row of the posture.
         distance_m: Distance [m]; negative when they overlap.
     """
@@ -42,49 +32,44 @@ class Approach:
     distance_m: float
 
 
-def spoon_mount(tool: ToolConfig) -> pinocchio.SE3:
-    """Pose of ``spoon_link`` in the gripper's base link."""
-    return pinocchio.SE3(np.eye(3), np.array([0.0, 0.0, -tool.mount_offset_m]))
-
-
 class Clearance:
-    """Checks postures for collisions of Talos with itself and with the spoon.
+    """Checks postures for collisions of a robot with itself and with its tool.
 
-    Shapes are the convex hulls of the collision meshes, as the physics loads them, and the boxes of the spoon. Pairs
+    Shapes are the convex hulls of the collision meshes, as the physics loads them, and the boxes of the tool. Pairs
     that the SRDF excludes are not checked, nor are links of one gripper (their mimic joints are rigid in the model),
-    nor the spoon with the hand and forearm that hold it, where the handle reaches into the fingers.
+    nor the tool with the hand and forearm that hold it, where the handle reaches into the fingers.
 
     Args:
-        model: Talos with all joints.
-        tool: Dimensions of the spoon.
+        robot: The robot.
+        model: The robot with all joints.
+        tool: What it holds.
 
     Raises:
         ConfigError: If the robot's meshes cannot be read.
     """
 
-    def __init__(self, model: pinocchio.Model, tool: ToolConfig) -> None:
-        self._model = model
+    def __init__(self, robot: Robot, model: pinocchio.Model, tool: Tool) -> None:
+        self._robot, self._model = robot, model
         self._data = model.createData()
         try:
             geometry = pinocchio.buildGeomFromUrdf(
-                model, str(urdf_path()), pinocchio.GeometryType.COLLISION, package_dirs=[str(share_directory())]
+                model, str(robot.urdf_path), pinocchio.GeometryType.COLLISION, package_dirs=[str(robot.share())]
             )
         except (ValueError, RuntimeError) as error:
-            raise ConfigError(f"{urdf_path()}: its meshes cannot be read: {error}") from error
+            raise ConfigError(f"{robot.urdf_path}: its meshes cannot be read: {error}") from error
         for shape in geometry.geometryObjects:
             if isinstance(shape.geometry, pinocchio.coal.BVHModelBase):
                 shape.geometry.buildConvexHull(True, "Qt")
                 shape.geometry = shape.geometry.convex
         geometry.addAllCollisionPairs()
-        srdf = urdf_path().parent.parent / "srdf" / "talos.srdf"
-        pinocchio.removeCollisionPairs(model, geometry, str(srdf), False)
+        pinocchio.removeCollisionPairs(model, geometry, str(robot.srdf_path), False)
         self.geometry = geometry
         self._links = [model.frames[shape.parentFrame].name for shape in geometry.geometryObjects]
         for pair in list(geometry.collisionPairs):
             names = self._links[pair.first], self._links[pair.second]
-            if any(all(name.startswith(hand) for name in names) for hand in _HANDS):
+            if any(all(name.startswith(group) for name in names) for group in robot.rigid):
                 geometry.removeCollisionPair(pair)
-        self._add_spoon(tool)
+        self._add_tool(tool)
         self._distances = geometry.createData()
         for request in self._distances.collisionRequests:
             request.security_margin = MARGIN_M
@@ -112,16 +97,16 @@ class Clearance:
                 )
         return None
 
-    def _add_spoon(self, tool: ToolConfig) -> None:
-        frame = self._model.getFrameId(GRIPPER, pinocchio.BODY)
-        gripper = self._model.frames[frame]
-        others = [number for number, name in enumerate(self._links) if not name.startswith(_HOLDING)]
-        for number, box in enumerate(boxes(tool)):
-            placement = gripper.placement * spoon_mount(tool) * box.placement
+    def _add_tool(self, tool: Tool) -> None:
+        frame = self._model.getFrameId(self._robot.hand, pinocchio.BODY)
+        hand = self._model.frames[frame]
+        others = [number for number, name in enumerate(self._links) if not name.startswith(self._robot.holding)]
+        for number, box in enumerate(tool.boxes):
+            placement = hand.placement * tool.mount * box.placement
             shape = pinocchio.GeometryObject(
-                f"{SPOON}_{number}", gripper.parentJoint, frame, placement, pinocchio.coal.Box(*box.size)
+                f"{tool.name}_{number}", hand.parentJoint, frame, placement, pinocchio.coal.Box(*box.size)
             )
             added = self.geometry.addGeometryObject(shape)
-            self._links.append(SPOON)
+            self._links.append(tool.name)
             for other in others:
                 self.geometry.addCollisionPair(pinocchio.CollisionPair(other, added))

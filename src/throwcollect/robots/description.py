@@ -1,4 +1,4 @@
-"""Talos' description in URDF, with the spoon: in full for onlookers, and reduced to what the physics has to move."""
+"""A robot's description in URDF, with its tool: in full for onlookers, and reduced to what the physics has to move."""
 
 from __future__ import annotations
 
@@ -9,18 +9,16 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
-import pinocchio
 
-from throwcollect.config.schema import Config, ToolConfig
+from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError, Problem
-from throwcollect.robots.model import half_sitting, joint_limits, share_directory, urdf_path
-from throwcollect.robots.spoon import boxes, inertia
-from throwcollect.robots.talos import JOINTS
+from throwcollect.extras import MissingExtraError, is_installed
+from throwcollect.members import load_member
+from throwcollect.pinocchio_library import pinocchio
+from throwcollect.robots.limits import joint_limits
+from throwcollect.robots.robot import Robot, read_xml
+from throwcollect.tools.tool import Tool, tool_of
 
-SPOON = "spoon_link"
-"""Link of the spoon."""
-
-_GRIPPER = "gripper_right_base_link"
 _PACKAGE = "package://"
 
 
@@ -30,7 +28,7 @@ class Description:
 
     Attributes:
         urdf: URDF text; mesh paths are absolute, every movable joint of it is in `moving`.
-        moving: Joints that are simulated, in the order of `talos.JOINTS`.
+        moving: Joints that are simulated, in the order of `Robot.joints`.
         locked: Angle [rad] at which each other joint is fixed.
     """
 
@@ -39,91 +37,112 @@ class Description:
     locked: Mapping[str, float]
 
 
-def start_posture(config: Config) -> Mapping[str, float]:
-    """Angle [rad] of each of the 32 joints at the start of a trial, in the order of `talos.JOINTS`.
+def robot_of(config: Config) -> Robot:
+    """Look up the robot that a configuration names."""
+    robot: Robot = load_member("robots", config.robot.name)
+    return robot
 
-    A joint's angle is that of ``task.start``, else of ``robot.posture``, else of the half-sitting posture.
+
+def is_available(config: Config) -> bool:
+    """Say whether the robot's files, and the library that computes with them, are installed."""
+    try:
+        robot_of(config).share()
+    except (ConfigError, MissingExtraError):
+        return False
+    return is_installed("pinocchio")
+
+
+def start_posture(config: Config) -> Mapping[str, float]:
+    """Find the angle [rad] of each joint at the start of a trial, in the order of `Robot.joints`.
+
+    A joint's angle is that of ``task.start``, else of ``robot.posture``, else of the robot's posture at rest.
 
     Args:
         config: The configuration of the trial.
 
     Raises:
-        ConfigError: If Talos' files cannot be read.
+        ConfigError: If the robot's files cannot be read.
     """
-    return MappingProxyType({**half_sitting(), **config.robot.posture, **config.task.start})
+    return MappingProxyType({**robot_of(config).rest_posture, **config.robot.posture, **config.task.start})
 
 
 def locked_joints(config: Config) -> Mapping[str, float]:
-    """Joints that are simulated as rigid and their angles [rad], in the order of `talos.JOINTS`.
+    """Find the joints that are simulated as rigid and their angles [rad], in the order of `Robot.joints`.
 
     Args:
         config: The configuration; of ``robot.locked``, ``auto`` locks what the task does not move.
 
     Raises:
-        ConfigError: If a joint that is to be locked is unknown or moved by the task, or Talos' files cannot be read.
+        ConfigError: If a joint that is to be locked is unknown or moved by the task, or the robot's files
+            cannot be read.
     """
+    robot = robot_of(config)
     posture = start_posture(config)
     moved = config.task.end
     choice = config.robot.locked
     if choice == "none":
         names: set[str] = set()
     elif choice == "auto":
-        names = set(JOINTS) - set(moved)
+        names = set(robot.joints) - set(moved)
     else:
         names = set(choice)
-    problems = [Problem(f"Talos has no joint {joint}", "robot.locked") for joint in sorted(names - set(JOINTS))]
+    problems = [
+        Problem(f"{robot.title} has no joint {joint}", "robot.locked") for joint in sorted(names - set(robot.joints))
+    ]
     problems += [
         Problem(f"{joint} cannot be locked, as task.end moves it", "robot.locked")
         for joint in sorted(names & set(moved))
     ]
     if problems:
         raise ConfigError(problems)
-    return MappingProxyType({joint: posture[joint] for joint in JOINTS if joint in names})
+    return MappingProxyType({joint: posture[joint] for joint in robot.joints if joint in names})
 
 
 def full_description(config: Config) -> str:
-    """URDF text of Talos with the spoon: all 32 joints, visual and collision shapes, ``package://`` mesh paths.
+    """Write the URDF text of the robot with its tool: all joints, visual and collision shapes, ``package://`` paths.
 
-    The right gripper has no collision shapes, as its fingers reach into the spoon's handle.
+    The hand has no collision shapes, as its fingers reach into the tool's handle.
 
     Args:
-        config: The configuration; only its section ``tool`` matters.
+        config: The configuration; its sections ``robot`` and ``tool`` matter.
 
     Raises:
-        ConfigError: If Talos' files cannot be read.
+        ConfigError: If the robot's files cannot be read.
     """
-    robot = _talos()
-    robot.append(_spoon_link(config.tool, visual=True))
-    robot.append(_spoon_joint(_GRIPPER, _mount(config.tool)))
-    return _text(robot)
+    robot, tool = robot_of(config), tool_of(config.tool)
+    description = _read_description(robot)
+    description.append(_tool_link(tool, visual=True))
+    description.append(_tool_joint(tool, robot.hand, tool.mount))
+    return _text(description)
 
 
-def touchable_bodies() -> frozenset[str]:
-    """Names under which contacts of the ball are recorded: ``spoon``, ``ground``, and the links of Talos.
+def touchable_bodies(config: Config) -> frozenset[str]:
+    """List the names under which contacts of the ball are recorded: the tool, ``ground``, and the robot's links.
 
     Raises:
-        ConfigError: If Talos' files cannot be read.
+        ConfigError: If the robot's files cannot be read.
     """
-    return frozenset({"spoon", "ground", *(link.get("name", "") for link in _talos().iter("link"))})
+    links = _read_description(robot_of(config)).iter("link")
+    return frozenset({tool_of(config.tool).name, "ground", *(link.get("name", "") for link in links)})
 
 
-def joint_model() -> pinocchio.Model:
-    """Talos without the spoon as a model of its 32 joints.
+def joint_model(robot: Robot) -> pinocchio.Model:
+    """Build a model of all joints of a robot, without a tool.
 
     Raises:
-        ConfigError: If Talos' files cannot be read, or lack something.
+        ConfigError: If the robot's files cannot be read, or lack something.
     """
     # What they lack is looked for before the URDF's parser prints it in its own words.
-    joint_limits()
-    half_sitting()
-    return _whole(_talos())
+    joint_limits(robot)
+    _ = robot.rest_posture
+    return _whole(robot, _read_description(robot))
 
 
 def physics_description(config: Config) -> Description:
-    """URDF of Talos with the spoon in which every fixed or locked joint is merged away, except the spoon's own.
+    """Write a URDF of the robot with its tool in which every fixed or locked joint is merged away, except the tool's.
 
-    A link carries the name of the link that its joint moves in Talos' URDF, and the mass, inertia and collision shapes
-    of everything that is rigidly attached to it. There are no visual shapes.
+    A link carries the name of the link that its joint moves in the robot's URDF, and the mass, inertia and collision
+    shapes of everything that is rigidly attached to it. There are no visual shapes.
 
     Args:
         config: The configuration; of it ``robot``, ``tool`` and ``task`` matter.
@@ -132,62 +151,62 @@ def physics_description(config: Config) -> Description:
         The same text, byte for byte, for the same configuration.
 
     Raises:
-        ConfigError: If the choice of locked joints is wrong, or Talos' files cannot be read.
+        ConfigError: If the choice of locked joints is wrong, or the robot's files cannot be read.
     """
+    robot, tool = robot_of(config), tool_of(config.tool)
     locked = locked_joints(config)
-    source = _talos()
-    model = _reduced(source, locked)
+    source = _read_description(robot)
+    model = _reduced(robot, source, locked)
     joints = {joint.get("name"): joint for joint in source.iter("joint")}
     names = [_root_link(source), *(_child(joints[name]) for name in model.names[1:])]
 
-    robot = ElementTree.Element("robot", name=source.get("name", "talos"))
+    description = ElementTree.Element("robot", name=source.get("name", robot.name))
     for number, name in enumerate(names):
-        robot.append(_link(name, model.inertias[number], _shapes(source, model, number)))
+        description.append(_link(name, model.inertias[number], _shapes(robot, source, model, number)))
     for number in range(1, model.njoints):
-        joint = ElementTree.SubElement(robot, "joint", name=model.names[number], type="revolute")
+        joint = ElementTree.SubElement(description, "joint", name=model.names[number], type="revolute")
         ElementTree.SubElement(joint, "parent", link=names[model.parents[number]])
         ElementTree.SubElement(joint, "child", link=names[number])
         joint.append(_origin(model.jointPlacements[number]))
         for tag in ("axis", "limit", "dynamics"):
             joint.extend(joints[model.names[number]].findall(tag))
-    gripper = model.frames[model.getFrameId(_GRIPPER, pinocchio.BODY)]
-    robot.append(_spoon_link(config.tool, visual=False))
-    robot.append(_spoon_joint(names[gripper.parentJoint], gripper.placement * _mount(config.tool)))
-    moving = tuple(joint for joint in JOINTS if joint not in locked)
-    return Description(urdf=_text(robot), moving=moving, locked=locked)
+    hand = model.frames[model.getFrameId(robot.hand, pinocchio.BODY)]
+    description.append(_tool_link(tool, visual=False))
+    description.append(_tool_joint(tool, names[hand.parentJoint], hand.placement * tool.mount))
+    moving = tuple(joint for joint in robot.joints if joint not in locked)
+    return Description(urdf=_text(description), moving=moving, locked=locked)
 
 
-def _talos() -> ElementTree.Element:
-    """Links and joints of Talos' URDF, without the collision shapes of the right gripper."""
-    path = urdf_path()
-    try:
-        source = ElementTree.parse(path).getroot()  # noqa: S314 - a file of an installed package
-    except (OSError, ElementTree.ParseError) as error:
-        raise ConfigError(f"{path}: cannot be read as robot description: {error}") from error
-    robot = ElementTree.Element("robot", name=source.get("name", "talos"))
+def _read_description(robot: Robot) -> ElementTree.Element:
+    """Read the links and joints of the robot's URDF, without the collision shapes of the hand that holds the tool."""
+    path = robot.urdf_path
+    source = read_xml(path)
+    description = ElementTree.Element("robot", name=source.get("name", robot.name))
     for kind in ("material", "link", "joint"):
-        robot.extend(source.findall(kind))
-    for link in robot.iter("link"):
-        if link.get("name", "").startswith("gripper_right_"):
+        description.extend(source.findall(kind))
+    for link in description.iter("link"):
+        if robot.open_hand and link.get("name", "").startswith(robot.open_hand):
             for shape in link.findall("collision"):
                 link.remove(shape)
-    if robot.find(f"link[@name='{_GRIPPER}']") is None:
-        raise ConfigError(f"{path}: link {_GRIPPER} is missing")
-    return robot
+    if description.find(f"link[@name='{robot.hand}']") is None:
+        raise ConfigError(f"{path}: link {robot.hand} is missing")
+    return description
 
 
-def _whole(source: ElementTree.Element) -> pinocchio.Model:
+def _whole(robot: Robot, source: ElementTree.Element) -> pinocchio.Model:
     try:
         model = pinocchio.buildModelFromXML(ElementTree.tostring(source, encoding="unicode"))
     except (ValueError, RuntimeError) as error:
-        raise ConfigError(f"{urdf_path()}: cannot be read as robot description: {error}") from error
-    if missing := set(JOINTS) ^ set(model.names[1:]):
-        raise ConfigError(f"{urdf_path()}: has other movable joints than Talos: {', '.join(sorted(missing))}")
+        raise ConfigError(f"{robot.urdf_path}: cannot be read as robot description: {error}") from error
+    if missing := set(robot.joints) ^ set(model.names[1:]):
+        raise ConfigError(
+            f"{robot.urdf_path}: has other movable joints than {robot.title}: {', '.join(sorted(missing))}"
+        )
     return model
 
 
-def _reduced(source: ElementTree.Element, locked: Mapping[str, float]) -> pinocchio.Model:
-    model = _whole(source)
+def _reduced(robot: Robot, source: ElementTree.Element, locked: Mapping[str, float]) -> pinocchio.Model:
+    model = _whole(robot, source)
     configuration = pinocchio.neutral(model)
     numbers = [model.getJointId(joint) for joint in locked]
     for number, angle in zip(numbers, locked.values(), strict=True):
@@ -195,7 +214,7 @@ def _reduced(source: ElementTree.Element, locked: Mapping[str, float]) -> pinocc
     return pinocchio.buildReducedModel(model, numbers, configuration)
 
 
-def _shapes(source: ElementTree.Element, model: pinocchio.Model, joint: int) -> list[ElementTree.Element]:
+def _shapes(robot: Robot, source: ElementTree.Element, model: pinocchio.Model, joint: int) -> list[ElementTree.Element]:
     """Collision shapes of all links that move with a joint, placed in its frame."""
     shapes = []
     for link in source.iter("link"):
@@ -209,7 +228,7 @@ def _shapes(source: ElementTree.Element, model: pinocchio.Model, joint: int) -> 
             geometry.extend(copy.deepcopy(list(original.iterfind("geometry/*"))))
             for mesh in geometry.iter("mesh"):
                 relative = mesh.get("filename", "").removeprefix(_PACKAGE)
-                mesh.set("filename", str(share_directory() / relative))
+                mesh.set("filename", str(robot.share() / relative))
             shapes.append(shape)
     return shapes
 
@@ -225,28 +244,24 @@ def _link(name: str, body: pinocchio.Inertia, shapes: list[ElementTree.Element])
     return link
 
 
-def _spoon_link(tool: ToolConfig, *, visual: bool) -> ElementTree.Element:
+def _tool_link(tool: Tool, *, visual: bool) -> ElementTree.Element:
     shapes = []
     for kind in ("visual", "collision") if visual else ("collision",):
-        for box in boxes(tool):
+        for box in tool.boxes:
             shape = ElementTree.Element(kind)
             shape.append(_origin(box.placement))
             geometry = ElementTree.SubElement(shape, "geometry")
             ElementTree.SubElement(geometry, "box", size=" ".join(map(_number, box.size)))
             shapes.append(shape)
-    return _link(SPOON, inertia(tool), shapes)
+    return _link(tool.link, tool.inertia, shapes)
 
 
-def _spoon_joint(parent: str, placement: pinocchio.SE3) -> ElementTree.Element:
-    joint = ElementTree.Element("joint", name="spoon_joint", type="fixed")
+def _tool_joint(tool: Tool, parent: str, placement: pinocchio.SE3) -> ElementTree.Element:
+    joint = ElementTree.Element("joint", name=f"{tool.name}_joint", type="fixed")
     ElementTree.SubElement(joint, "parent", link=parent)
-    ElementTree.SubElement(joint, "child", link=SPOON)
+    ElementTree.SubElement(joint, "child", link=tool.link)
     joint.append(_origin(placement))
     return joint
-
-
-def _mount(tool: ToolConfig) -> pinocchio.SE3:
-    return pinocchio.SE3(np.eye(3), np.array([0.0, 0.0, -tool.mount_offset_m]))
 
 
 def _child(joint: ElementTree.Element) -> str:

@@ -1,21 +1,21 @@
-"""Whether Talos can throw with a joint trajectory: limits, collisions with itself, and a spoon that holds the ball."""
+"""Whether a robot can throw with a joint trajectory: limits, collisions with itself, and a tool that holds the ball."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
-import pinocchio
 from numpy.typing import NDArray
 
-from throwcollect.config.schema import Config, ToolConfig
-from throwcollect.robots.clearance import GRIPPER, MARGIN_M, Clearance, spoon_mount
-from throwcollect.robots.description import joint_model, locked_joints, start_posture
-from throwcollect.robots.model import joint_limits
+from throwcollect.config.schema import Config
+from throwcollect.pinocchio_library import pinocchio
+from throwcollect.robots.clearance import MARGIN_M, Clearance
+from throwcollect.robots.description import joint_model, locked_joints, robot_of, start_posture
+from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.quintic_curve import sample_quintic
-from throwcollect.robots.spoon import ball_seat, inertia, way_out
-from throwcollect.robots.talos import JOINTS
 from throwcollect.robots.trajectory import JointTrajectory
+from throwcollect.tools.tool import Tool, tool_of
 
 _CHECKED_HZ = 100
 _CHECKED_LEAST = 100
@@ -28,41 +28,42 @@ Motion = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
 
 
 class Feasibility:
-    """Checks joint trajectories against the limits of Talos.
+    """Checks joint trajectories against the limits of a robot.
 
     One object serves all trials of a collection: what a trial changes (posture, masses, gravity, limits) is set per
-    check, and only other dimensions of the spoon cost the time to rebuild its shapes.
+    check, and only another tool costs the time to rebuild its shapes.
 
     Args:
         config: Configuration of the collection.
 
     Raises:
-        ConfigError: If Talos' files cannot be read, or lack something.
+        ConfigError: If the robot's files cannot be read, or lack something.
     """
 
     def __init__(self, config: Config) -> None:
-        self._model = joint_model()
+        self._robot = robot_of(config)
+        self._model = joint_model(self._robot)
         self._data = self._model.createData()
-        self._columns = np.array([self._model.idx_qs[self._model.getJointId(joint)] for joint in JOINTS])
-        gripper = self._model.frames[self._model.getFrameId(GRIPPER, pinocchio.BODY)]
-        self._hand = gripper.parentJoint
-        self._gripper_placement = gripper.placement
+        self._columns = np.array([self._model.idx_qs[self._model.getJointId(joint)] for joint in self._robot.joints])
+        hand = self._model.frames[self._model.getFrameId(self._robot.hand, pinocchio.BODY)]
+        self._hand = hand.parentJoint
+        self._hand_placement = hand.placement
         chain = list(self._model.supports[self._hand])[1:]
-        self._carrying = [JOINTS.index(self._model.names[joint]) for joint in chain]
+        self._carrying = [self._robot.joints.index(self._model.names[joint]) for joint in chain]
         self._bare_hand = self._model.inertias[self._hand].copy()
-        self._limits = joint_limits()
-        self._tool = config.tool
-        self._clearance = Clearance(self._model, config.tool)
+        self._limits = joint_limits(self._robot)
+        self._tool_config, self._tool = config.tool, tool_of(config.tool)
+        self._clearance = Clearance(self._robot, self._model, self._tool)
 
     def check(self, config: Config, trajectory: JointTrajectory) -> str | None:
         """Reason why the robot cannot throw with a trajectory, if there is one.
 
         The curve between the points is checked at 100 Hz and at 100 instants at least, for collisions whenever a joint
         has gone on by 0.02 rad. Joints that the trajectory does not move rest at the trial's start posture. Torques are
-        those of inverse dynamics plus viscous friction; the spoon and the ball count as part of the hand throughout,
+        those of inverse dynamics plus viscous friction; the tool and the ball count as part of the hand throughout,
         also after the ball has left. The effort of locked joints is not limited, as they are simulated as rigid.
-        Collisions are those of the robot and the spoon; what the ball hits is for the judge of the throw. The spoon
-        has to move, and to hold the ball in the start posture (see `spoon.way_out`).
+        Collisions are those of the robot and the tool; what the ball hits is for the judge of the throw. The tool
+        has to move, and to hold the ball in the start posture (see `Tool.way_out`).
 
         Args:
             config: Configuration of the trial.
@@ -70,17 +71,34 @@ class Feasibility:
 
         Returns:
             None if it is feasible, else one sentence with joint or links, instant, value and limit: of the first kind
-            that is violated, in the order position, velocity, effort, collision, spoon that rests, ball that does
+            that is violated, in the order position, velocity, effort, collision, tool that rests, ball that does
             not. Of limits, it tells the worst violation; of collisions, the first.
 
         Raises:
-            ConfigError: If the posture or the choice of locked joints is wrong, or the ball does not fit the spoon.
+            ConfigError: If the posture or the choice of locked joints is wrong, or the ball does not fit the tool.
         """
         posture = np.array(list(start_posture(config).values()))
-        locked = locked_joints(config)
+        joints, tool = self._robot.joints, self._tool_of(config)
         instants = max(_CHECKED_LEAST, math.ceil(trajectory.times[-1] * _CHECKED_HZ)) + 1
         times = np.linspace(0.0, trajectory.times[-1], instants)
-        motion = _whole_body(trajectory, times, posture)
+        motion = _whole_body(joints, trajectory, times, posture)
+        if violation := self._find_violation(config, times, motion):
+            return violation
+        positions = motion[0]
+        rows = _spread(positions)
+        if approach := self._clearance.first_approach(self._model_order(positions[rows])):
+            return (
+                f"{' and '.join(approach.links)} {_gap(approach.distance_m)} at {times[rows[approach.index]]:.3f} s; "
+                f"they must stay {MARGIN_M * 1000:.3g} mm apart"
+            )
+        if np.ptp(positions[:, self._carrying], axis=0).max() <= _POSITION_SLACK_RAD:
+            carrying = ", ".join(joints[column] for column in self._carrying)
+            return f"task.end moves no joint that carries the {tool.name}; these do: {carrying}"
+        return self._loss(config, posture)
+
+    def _find_violation(self, config: Config, times: NDArray[np.float64], motion: Motion) -> str | None:
+        """Find the first kind of limit that a motion violates, and the worst violation of it."""
+        joints, locked = self._robot.joints, locked_joints(config)
         positions, velocities, _ = motion
         limits = self._limits
         middle, half = (limits.upper + limits.lower) / 2, (limits.upper - limits.lower) / 2
@@ -88,68 +106,59 @@ class Feasibility:
             row, joint = worst
             side, limit = ("upper", limits.upper) if positions[worst] > middle[joint] else ("lower", limits.lower)
             return (
-                f"{JOINTS[joint]} is at {positions[worst]:.4g} rad at {times[row]:.3f} s; "
+                f"{joints[joint]} is at {positions[worst]:.4g} rad at {times[row]:.3f} s; "
                 f"its {side} limit is {limit[joint]:.4g} rad"
             )
         if worst := _worst(velocities, limits.velocity):
             row, joint = worst
             return (
-                f"{JOINTS[joint]} moves at {abs(velocities[worst]):.4g} rad/s at {times[row]:.3f} s; "
+                f"{joints[joint]} moves at {abs(velocities[worst]):.4g} rad/s at {times[row]:.3f} s; "
                 f"its limit is {limits.velocity[joint]:.4g} rad/s"
             )
         efforts = self.efforts(config, motion)
-        limit = limits.effort * np.where([joint in locked for joint in JOINTS], np.inf, config.robot.effort_scale)
+        limit = limits.effort * np.where([joint in locked for joint in joints], np.inf, config.robot.effort_scale)
         if worst := _worst(efforts, limit):
             row, joint = worst
             return (
-                f"{JOINTS[joint]} needs {abs(efforts[worst]):.4g} Nm at {times[row]:.3f} s; "
+                f"{joints[joint]} needs {abs(efforts[worst]):.4g} Nm at {times[row]:.3f} s; "
                 f"its limit is {limit[joint]:.4g} Nm"
             )
-        rows = _spread(positions)
-        if approach := self._clearance_of(config.tool).first_approach(self._model_order(positions[rows])):
-            return (
-                f"{' and '.join(approach.links)} {_gap(approach.distance_m)} at {times[rows[approach.index]]:.3f} s; "
-                f"they must stay {MARGIN_M * 1000:.3g} mm apart"
-            )
-        if np.ptp(positions[:, self._carrying], axis=0).max() <= _POSITION_SLACK_RAD:
-            carrying = ", ".join(JOINTS[column] for column in self._carrying)
-            return f"task.end moves no joint that carries the spoon; these do: {carrying}"
-        return self._loss(config, posture)
+        return None
 
     def _loss(self, config: Config, posture: NDArray[np.float64]) -> str | None:
-        """Reason why the ball does not stay in the spoon of the still robot, if there is one."""
+        """Reason why the ball does not stay in the tool of the still robot, if there is one."""
         pinocchio.forwardKinematics(self._model, self._data, self._model_order(posture))
-        spoon = self._data.oMi[self._hand] * self._gripper_placement * spoon_mount(config.tool)
-        up = spoon.rotation[2]
-        tool, radius = config.tool, config.ball.radius_m
-        slope = way_out(tool, radius, up)
+        tool, radius = self._tool_of(config), config.ball.radius_m
+        up = (self._data.oMi[self._hand] * self._hand_placement * tool.mount).rotation[2]
+        slope = tool.way_out(radius, up)
         if slope >= _LOWEST_WAY_OUT_RAD:
             return None
         tilt = math.acos(max(-1.0, min(1.0, float(up[0]))))
-        safe = way_out(tool, radius, np.array([1.0, 0.0, 0.0]))
+        safe = tool.way_out(radius, np.array([1.0, 0.0, 0.0]))
         return (
-            f"task.start does not hold the ball: it tilts the spoon by {tilt:.3g} rad, so that the ball rolls out, "
-            f"{-slope:.3g} rad downwards; up to {safe:.3g} rad, a tilt in any direction is safe"
+            f"task.start does not hold the ball: it tilts the {tool.name} by {tilt:.3g} rad, so that the ball rolls "
+            f"out, {-slope:.3g} rad downwards; up to {safe:.3g} rad, a tilt in any direction is safe"
         )
 
     def efforts(self, config: Config, motion: Motion) -> NDArray[np.float64]:
-        """Torques that a motion needs, with spoon and ball in the hand.
+        """Torques that a motion needs, with tool and ball in the hand.
 
         Args:
             config: Configuration of the trial.
-            motion: Positions [rad], velocities [rad/s] and accelerations [rad/s²], each of shape ``(n, 32)`` in the
-                order of `talos.JOINTS`.
+            motion: Positions [rad], velocities [rad/s] and accelerations [rad/s²], each of shape ``(n, n_joints)``
+                in the order of `Robot.joints`.
 
         Returns:
-            [Nm], shape ``(n, 32)``, in the order of `talos.JOINTS`.
+            [Nm], shape ``(n, n_joints)``, in the order of `Robot.joints`.
 
         Raises:
             ConfigError: If the ball does not fit the spoon.
         """
-        seat = np.array(ball_seat(config.tool, config.ball.radius_m))
+        tool = self._tool_of(config)
+        seat = np.array(tool.ball_seat(config.ball.radius_m))
         ball = pinocchio.Inertia.FromSphere(config.ball.mass_kg, config.ball.radius_m)
-        load = inertia(config.tool) + pinocchio.SE3(np.eye(3), seat).act(ball)
-        placement = self._gripper_placement * spoon_mount(config.tool)
+        load = tool.inertia + pinocchio.SE3(np.eye(3), seat).act(ball)
+        placement = self._hand_placement * tool.mount
         self._model.inertias[self._hand] = self._bare_hand + placement.act(load)
         self._model.gravity.linear = np.array([0.0, 0.0, -config.scene.gravity_mps2])
         rows = zip(*map(self._model_order, motion), strict=True)
@@ -157,11 +166,12 @@ class Feasibility:
         needed: NDArray[np.float64] = torques[:, self._columns] + self._limits.damping * motion[1]
         return needed
 
-    def _clearance_of(self, tool: ToolConfig) -> Clearance:
-        if tool != self._tool:
-            self._clearance = Clearance(self._model, tool)
-            self._tool = tool
-        return self._clearance
+    def _tool_of(self, config: Config) -> Tool:
+        """Return the tool of a trial, and see that `_clearance` has it, too."""
+        if config.tool != self._tool_config:
+            self._tool_config, self._tool = config.tool, tool_of(config.tool)
+            self._clearance = Clearance(self._robot, self._model, self._tool)
+        return self._tool
 
     def _model_order(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values of joints in the order of the model; the last axis is that of the joints."""
@@ -170,9 +180,11 @@ class Feasibility:
         return ordered
 
 
-def _whole_body(trajectory: JointTrajectory, times: NDArray[np.float64], posture: NDArray[np.float64]) -> Motion:
-    """Motion of all joints, each array of shape ``(n, 32)``, in the order of `talos.JOINTS`."""
-    columns = [JOINTS.index(joint) for joint in trajectory.joints]
+def _whole_body(
+    joints: Sequence[str], trajectory: JointTrajectory, times: NDArray[np.float64], posture: NDArray[np.float64]
+) -> Motion:
+    """Motion of all joints, each array of shape ``(n, n_joints)``, in the order of `Robot.joints`."""
+    columns = [joints.index(joint) for joint in trajectory.joints]
     whole = tuple(np.tile(rest, (len(times), 1)) for rest in (posture, np.zeros_like(posture), np.zeros_like(posture)))
     for array, sampled in zip(whole, sample_quintic(trajectory, times), strict=True):
         array[:, columns] = sampled

@@ -1,71 +1,74 @@
-"""Talos of PAL Robotics: its actuated joints and the controllers that command them.
+"""Talos of PAL Robotics, as example-robot-data describes it.
 
-Names and order are those of PAL's ROS 2 controller configuration (talos_controller_configuration, humble-devel 2.0).
+Names and order of joints and controllers are those of PAL's ROS 2 controller configuration
+(talos_controller_configuration, humble-devel 2.0).
 """
 
 from __future__ import annotations
 
+from importlib.metadata import PackageNotFoundError, distribution
+from pathlib import Path
 from types import MappingProxyType
 
+from throwcollect.errors import ConfigError
+from throwcollect.extras import MissingExtraError
+from throwcollect.robots.robot import Robot
 
-def _numbered(limb: str, count: int) -> tuple[str, ...]:
+_DATA = "example-robot-data/robots/talos_data"
+
+
+def _number_joints(limb: str, count: int) -> tuple[str, ...]:
     return tuple(f"{limb}_{number}_joint" for number in range(1, count + 1))
 
 
-CONTROLLERS = MappingProxyType(
-    {
-        "arm_left_controller": _numbered("arm_left", 7),
-        "arm_right_controller": _numbered("arm_right", 7),
-        "leg_left_controller": _numbered("leg_left", 6),
-        "leg_right_controller": _numbered("leg_right", 6),
-        "torso_controller": _numbered("torso", 2),
-        "head_controller": _numbered("head", 2),
-        "gripper_left_controller": ("gripper_left_joint",),
-        "gripper_right_controller": ("gripper_right_joint",),
-    }
+def _find_share() -> Path:
+    try:
+        share = Path(str(distribution("example-robot-data").locate_file("cmeel.prefix/share")))
+    except PackageNotFoundError as error:
+        raise MissingExtraError("example-robot-data", "collect") from error
+    if not (share / _DATA).is_dir():
+        raise ConfigError(f"{share / _DATA}: the robot's description is missing", hint="reinstall example-robot-data")
+    return share
+
+
+TALOS = Robot(
+    name="talos",
+    title="Talos",
+    controllers=MappingProxyType(
+        {
+            "arm_left_controller": _number_joints("arm_left", 7),
+            "arm_right_controller": _number_joints("arm_right", 7),
+            "leg_left_controller": _number_joints("leg_left", 6),
+            "leg_right_controller": _number_joints("leg_right", 6),
+            "torso_controller": _number_joints("torso", 2),
+            "head_controller": _number_joints("head", 2),
+            "gripper_left_controller": ("gripper_left_joint",),
+            "gripper_right_controller": ("gripper_right_joint",),
+        }
+    ),
+    ros1_names=MappingProxyType(
+        {
+            "arm_left_controller": "left_arm_controller",
+            "arm_right_controller": "right_arm_controller",
+            "leg_left_controller": "left_leg_controller",
+            "leg_right_controller": "right_leg_controller",
+            "gripper_left_controller": "left_gripper_controller",
+            "gripper_right_controller": "right_gripper_controller",
+        }
+    ),
+    share=_find_share,
+    urdf=f"{_DATA}/robots/talos_reduced.urdf",
+    srdf=f"{_DATA}/srdf/talos.srdf",
+    rest="half_sitting",
+    hand="gripper_right_base_link",
+    # The fingers of the right gripper reach into the handle of the tool.
+    open_hand="gripper_right_",
+    holding=("gripper_right_", "wrist_right_", "arm_right_5_", "arm_right_6_", "arm_right_7_"),
+    rigid=("gripper_left_", "gripper_right_"),
 )
-"""Joint trajectory controller of each limb and its joints, in order."""
+"""The humanoid with its 32 actuated joints; the hand is the right gripper."""
 
-_ROS1_NAMES = MappingProxyType(
-    {
-        "arm_left_controller": "left_arm_controller",
-        "arm_right_controller": "right_arm_controller",
-        "leg_left_controller": "left_leg_controller",
-        "leg_right_controller": "right_leg_controller",
-        "torso_controller": "torso_controller",
-        "head_controller": "head_controller",
-        "gripper_left_controller": "left_gripper_controller",
-        "gripper_right_controller": "right_gripper_controller",
-    }
-)
-
-JOINTS = tuple(joint for joints in CONTROLLERS.values() for joint in joints)
-"""The 32 actuated joints, in the order of every joint state and joint array."""
-
-
-def controller_of(joint: str) -> str:
-    """Controller that commands a joint.
-
-    Args:
-        joint: Name of one of `JOINTS`.
-
-    Returns:
-        Name of its controller.
-
-    Raises:
-        KeyError: If Talos has no such joint.
-    """
-    for controller, joints in CONTROLLERS.items():
-        if joint in joints:
-            return controller
-    raise KeyError(joint)
-
-
-def graph_name(controller: str, naming: str) -> str:
-    """Name of a controller in the ROS graph.
-
-    Args:
-        controller: Name of one of `CONTROLLERS`.
-        naming: ``ros2`` or ``ros1``: of which of PAL's controller configurations.
-    """
-    return _ROS1_NAMES[controller] if naming == "ros1" else controller
+JOINTS = TALOS.joints
+"""Its joints, which are those of every recording so far."""
+CONTROLLERS = TALOS.controllers
+"""Its controllers and their joints."""

@@ -1,3 +1,1 @@
-"""The simulation: a physics world, its controllers and the ROS 2 node around them."""
-
-import throwcollect.sim.silence  # noqa: F401 - before any other module of this room imports Bullet
+"""The simulation: the rules of a trial on any physics engine, its controllers, and the ROS 2 node around them."""

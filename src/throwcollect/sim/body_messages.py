@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from throwcollect.ros import get_message
+from throwcollect.engines.engine import BodyState
+from throwcollect.ros.msg import EntityState, Pose, Twist
 from throwcollect.sim.entities import WORLD_FRAME
-from throwcollect.sim.recording import BodyState
-
-EntityState: Any = get_message("simulation_interfaces/msg/EntityState")
 
 
-def body_state(pose: Any, twist: Any | None = None) -> BodyState:
+def body_state(pose: Pose, twist: Twist | None = None) -> BodyState:
     """State that is given as messages.
 
     Args:
@@ -27,7 +23,7 @@ def body_state(pose: Any, twist: Any | None = None) -> BodyState:
     return BodyState(place, turn, (linear.x, linear.y, linear.z), (angular.x, angular.y, angular.z))
 
 
-def entity_state(state: BodyState, now_ns: int) -> Any:
+def entity_state(state: BodyState, now_ns: int) -> EntityState:
     """simulation_interfaces/msg/EntityState of a state in the world; accelerations are not measured.
 
     Args:

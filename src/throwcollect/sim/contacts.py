@@ -2,23 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Set
+from collections.abc import Callable, Collection, Set
 
 from throwcollect.episode.record import Contact
 
-Surface = tuple[int, int]
-"""Body and link number in the physics engine."""
-
 
 class ContactLog:
-    """Intervals, counted in physics steps, in which bodies press on the ball.
+    """Intervals, counted in physics steps, in which bodies press on the ball."""
 
-    Args:
-        names: Name of the body that each surface belongs to.
-    """
-
-    def __init__(self, names: Mapping[Surface, str]) -> None:
-        self._names = names
+    def __init__(self) -> None:
         self._open: dict[str, int] = {}
         self._closed: list[tuple[int, str, int]] = []
 
@@ -27,14 +19,13 @@ class ContactLog:
         """Names of the bodies that press on the ball now."""
         return self._open.keys()
 
-    def update(self, pressing: Set[Surface], step: int) -> None:
+    def update(self, bodies: Set[str], step: int) -> None:
         """Take note of what presses on the ball since a step.
 
         Args:
-            pressing: All surfaces that pressed on the ball.
+            bodies: Names of all bodies that pressed on the ball.
             step: Number of the step; later than that of the call before.
         """
-        bodies = {self._names[surface] for surface in pressing}
         for body in self._open.keys() - bodies:
             self._closed.append((self._open.pop(body), body, step))
         for body in bodies - self._open.keys():

@@ -7,7 +7,8 @@ from typing import Any
 
 from throwcollect.control import ControllerState, GoalResult, GoalStatus, Refusal
 from throwcollect.ros import ActionServer, CancelResponse, Future, GoalResponse, Node
-from throwcollect.sim.controller_messages import FollowJointTrajectory, feedback_message, read_goal
+from throwcollect.ros.action import FollowJointTrajectory
+from throwcollect.sim.controller_messages import feedback_message, read_goal
 from throwcollect.sim.simulation import Simulation
 
 _RESULT_TIMEOUT_S = 10
@@ -85,7 +86,7 @@ class ControllerAction:
             if not self._results[key].done():
                 waiting.append(feedback)
 
-    def _consider(self, request: Any) -> GoalResponse:
+    def _consider(self, request: FollowJointTrajectory.Goal) -> GoalResponse:
         # The controller takes the goal here, as it alone can tell whether it is acceptable. Its handle follows in the
         # same order, but perhaps after the next goal, after time has passed, or after its own end.
         refusal = self._simulation.submit(self._controller, self._count + 1, read_goal(request))
@@ -118,7 +119,7 @@ class ControllerAction:
         cancelled = key is not None and self._simulation.cancel(self._controller, key)
         return CancelResponse.ACCEPT if cancelled else CancelResponse.REJECT
 
-    async def _execute(self, handle: Any) -> Any:
+    async def _execute(self, handle: Any) -> FollowJointTrajectory.Result:
         key = self._keys[_uuid(handle)]
         result: GoalResult = await self._results[key]
         del self._keys[_uuid(handle)], self._results[key]

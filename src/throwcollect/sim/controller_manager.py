@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from throwcollect.ros import Node, get_message, get_service
+from throwcollect.ros import Node
+from throwcollect.ros.msg import ControllerState
+from throwcollect.ros.srv import ListControllers
+from throwcollect.sim.controller_parameters import COMMAND_INTERFACES, state_interfaces
 from throwcollect.sim.limb_controller import LimbController
 from throwcollect.sim.simulation import Simulation
-
-ListControllers: Any = get_service("controller_manager_msgs/srv/ListControllers")
-ControllerState: Any = get_message("controller_manager_msgs/msg/ControllerState")
 
 _TYPE = "joint_trajectory_controller/JointTrajectoryController"
 
@@ -28,16 +26,16 @@ class ControllerManager(Node):
         self._controllers = [_described(limb, hz) for limb in simulation.limbs.values()]
         self.create_service(ListControllers, "~/list_controllers", self._list)
 
-    def _list(self, _request: Any, response: Any) -> Any:
+    def _list(self, _request: ListControllers.Request, response: ListControllers.Response) -> ListControllers.Response:
         response.controller = self._controllers
         return response
 
 
-def _described(limb: LimbController, hz: int) -> Any:
+def _described(limb: LimbController, hz: int) -> ControllerState:
     parameters = limb.controller.parameters
     commands, states = (
         [f"{joint}/{interface}" for joint in parameters.joints for interface in interfaces]
-        for interfaces in (parameters.command_interfaces, parameters.state_interfaces)
+        for interfaces in (COMMAND_INTERFACES, state_interfaces(parameters))
     )
     return ControllerState(
         name=limb.name,

@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from throwcollect.control import ControllerState, JointTolerance, Trajectory, TrajectoryGoal, TrajectoryPoint
-from throwcollect.ros import get_action, get_message
-
-FollowJointTrajectory: Any = get_action("control_msgs/action/FollowJointTrajectory")
-JointTrajectory: Any = get_message("trajectory_msgs/msg/JointTrajectory")
-JointTrajectoryPoint: Any = get_message("trajectory_msgs/msg/JointTrajectoryPoint")
-JointTrajectoryControllerState: Any = get_message("control_msgs/msg/JointTrajectoryControllerState")
+from throwcollect.ros.action import FollowJointTrajectory
+from throwcollect.ros.msg import Duration, JointTrajectory, JointTrajectoryControllerState, JointTrajectoryPoint, Time
+from throwcollect.ros.msg import JointTolerance as JointToleranceMessage
 
 _NS = 10**9
 
 
-def nanoseconds(time: Any) -> int:
+def nanoseconds(time: Time | Duration) -> int:
     """A builtin_interfaces Time or Duration in nanoseconds."""
     return int(time.sec) * _NS + int(time.nanosec)
 
 
-def read_trajectory(message: Any) -> Trajectory:
+def read_trajectory(message: JointTrajectory) -> Trajectory:
     """Contents of a trajectory_msgs/msg/JointTrajectory."""
     stamp_ns = nanoseconds(message.header.stamp)
     return Trajectory(
@@ -40,7 +35,7 @@ def read_trajectory(message: Any) -> Trajectory:
     )
 
 
-def read_goal(message: Any) -> TrajectoryGoal:
+def read_goal(message: FollowJointTrajectory.Goal) -> TrajectoryGoal:
     """Contents of a FollowJointTrajectory goal; those that ros2_controllers ignores are ignored here too."""
     return TrajectoryGoal(
         trajectory=read_trajectory(message.trajectory),
@@ -50,7 +45,7 @@ def read_goal(message: Any) -> TrajectoryGoal:
     )
 
 
-def state_message(state: ControllerState) -> Any:
+def state_message(state: ControllerState) -> JointTrajectoryControllerState:
     """A control_msgs/msg/JointTrajectoryControllerState."""
     message = JointTrajectoryControllerState(
         joint_names=list(state.joint_names),
@@ -64,7 +59,7 @@ def state_message(state: ControllerState) -> Any:
     return message
 
 
-def feedback_message(state: ControllerState) -> Any:
+def feedback_message(state: ControllerState) -> FollowJointTrajectory.Feedback:
     """Feedback of FollowJointTrajectory."""
     message = FollowJointTrajectory.Feedback(
         joint_names=list(state.joint_names),
@@ -76,13 +71,13 @@ def feedback_message(state: ControllerState) -> Any:
     return message
 
 
-def _read_tolerances(messages: Any) -> tuple[JointTolerance, ...]:
+def _read_tolerances(messages: list[JointToleranceMessage]) -> tuple[JointTolerance, ...]:
     return tuple(
         JointTolerance(message.name, message.position, message.velocity, message.acceleration) for message in messages
     )
 
 
-def _point_message(point: TrajectoryPoint) -> Any:
+def _point_message(point: TrajectoryPoint) -> JointTrajectoryPoint:
     message = JointTrajectoryPoint(
         positions=point.positions,
         velocities=point.velocities,

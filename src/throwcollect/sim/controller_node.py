@@ -5,33 +5,27 @@ from __future__ import annotations
 import logging
 import math
 import time
-from typing import Any
 
-from throwcollect.control import GoalResult
+from throwcollect.control import ControllerState, GoalResult
 from throwcollect.control.log import REPEATED
 from throwcollect.ros import (
     DurabilityPolicy,
     Node,
     QoSProfile,
     Time,
-    get_message,
-    get_service,
     pass_on_log,
     provide_time,
 )
+from throwcollect.ros.msg import JointTrajectory, JointTrajectoryControllerState, SpeedScalingFactor
+from throwcollect.ros.srv import QueryTrajectoryState
 from throwcollect.sim.controller_action import ControllerAction
 from throwcollect.sim.controller_messages import (
-    JointTrajectory,
-    JointTrajectoryControllerState,
     nanoseconds,
     read_trajectory,
     state_message,
 )
 from throwcollect.sim.controller_parameters import ParameterFace
 from throwcollect.sim.simulation import Simulation
-
-QueryTrajectoryState: Any = get_service("control_msgs/srv/QueryTrajectoryState")
-SpeedScalingFactor: Any = get_message("control_msgs/msg/SpeedScalingFactor")
 
 _SPEED = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _STATES = QoSProfile(depth=100)
@@ -92,11 +86,11 @@ class ControllerNode(Node):
             return
         if self.wants_states and not (states or self._simulation.running):
             # Time stands still, but whoever has just come wants to know.
-            states = [self._simulation.controller_state(self.controller)]
+            states = [self._present_state()]
         for state in states:
             self._states.publish(state_message(state))
         if self._action.owes_feedback:
-            self._action.publish_feedback(self._simulation.controller_state(self.controller))
+            self._action.publish_feedback(self._present_state())
 
     def set_time(self, time: Time) -> None:
         """Set the node's clock."""
@@ -107,18 +101,23 @@ class ControllerNode(Node):
         self._limb.controller.logger.removeHandler(self._log)
         super().destroy_node()
 
-    def _follow(self, message: Any) -> None:
+    def _present_state(self) -> ControllerState:
+        return self._simulation.observed(self.controller).state(self._simulation.now_ns)
+
+    def _follow(self, message: JointTrajectory) -> None:
         self._simulation.follow(self.controller, read_trajectory(message))
 
-    def _scale_speed(self, message: Any) -> None:
+    def _scale_speed(self, message: SpeedScalingFactor) -> None:
         if self._simulation.trial.leased:
             refusal = f"the speed is not scaled: {self._simulation.trial.lease_in_words}"
             self.get_logger().warning(refusal, throttle_duration_sec=_REPEATED_S)
             return
         self._limb.controller.scale_speed(message.factor)
 
-    def _query(self, request: Any, response: Any) -> Any:
-        state = self._simulation.query(self.controller, nanoseconds(request.time))
+    def _query(
+        self, request: QueryTrajectoryState.Request, response: QueryTrajectoryState.Response
+    ) -> QueryTrajectoryState.Response:
+        state = self._simulation.observed(self.controller).query(nanoseconds(request.time))
         response.success = state.success
         response.name = list(self._limb.controller.parameters.joints)
         response.position = state.positions

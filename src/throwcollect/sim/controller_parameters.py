@@ -7,28 +7,23 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from throwcollect.control import ControllerParameters
-from throwcollect.control.parameters import least
 from throwcollect.errors import ConfigError
 from throwcollect.ros import Node, Parameter, ParameterDescriptor, SetParametersResult
 from throwcollect.sim.descriptors import floating_range
 from throwcollect.sim.limb_controller import LimbController
 from throwcollect.sim.present_trial import PresentTrial
 
-_READ_ONLY = {
-    "joints": "Joint names of the system",
-    "command_interfaces": "What is commanded to all joints",
-    "state_interfaces": "What is measured of all joints",
-    "interpolation_method": "How points are connected",
-    "interpolate_from_desired_state": "Whether trajectories begin at the last command",
-    "action_monitor_rate": "Feedback messages of a goal per simulated second",
-}
+COMMAND_INTERFACES = ("position",)
+"""What is commanded to all joints."""
+
 _CHANGEABLE = {
     "allow_partial_joints_goal": "Whether goals may leave joints out",
     "allow_integration_in_goal_trajectories": "Whether points may lack positions, which are then integrated",
     "allow_nonzero_velocity_at_trajectory_end": "Whether the last point may have a velocity",
-    "set_last_command_interface_value_as_state_on_activation": "Whether activation holds the last command",
     "cmd_timeout": "How long after the end of a trajectory the joints are stopped [s]; 0 never",
 }
+_LEAST = {"action_monitor_rate": 0.1}
+"""The least value of parameters for which that is not 0."""
 
 
 class ParameterFace:
@@ -49,12 +44,12 @@ class ParameterFace:
         for name, value, description, read_only in _declared(limb.controller.parameters):
             descriptor = ParameterDescriptor(description=description, read_only=read_only)
             if isinstance(value, float):
-                descriptor.floating_point_range = [floating_range(least(name), None)]
+                descriptor.floating_point_range = [floating_range(_LEAST.get(name, 0.0), None)]
             node.declare_parameter(name, value, descriptor)
         node.add_on_set_parameters_callback(self._check)
         node.add_post_set_parameters_callback(self._apply)
 
-    def _check(self, parameters: list[Parameter]) -> Any:
+    def _check(self, parameters: list[Parameter]) -> SetParametersResult:
         if self._trial.leased:
             return SetParametersResult(successful=False, reason=self._trial.lease_in_words)
         try:
@@ -72,16 +67,28 @@ def _values(parameters: list[Parameter]) -> dict[str, Any]:
     return {parameter.name: parameter.value for parameter in parameters}
 
 
+def state_interfaces(parameters: ControllerParameters) -> tuple[str, ...]:
+    """What is measured of all joints of a controller."""
+    return ("position", "velocity") if parameters.measures_velocity else ("position",)
+
+
 def _declared(parameters: ControllerParameters) -> Iterator[tuple[str, Any, str, bool]]:
     """Name, value and description of each parameter, and whether it is read-only."""
-    for names, read_only in ((_READ_ONLY, True), (_CHANGEABLE, False)):
-        for name, description in names.items():
-            value = getattr(parameters, name)
-            yield name, list(value) if isinstance(value, tuple) else value, description, read_only
-    constraints, scaling = parameters.constraints, parameters.speed_scaling
+    # Clients of ros2_controllers look for all of these, also for those that have one value here, or no effect.
+    yield "joints", list(parameters.joints), "Joint names of the system", True
+    yield "command_interfaces", list(COMMAND_INTERFACES), "What is commanded to all joints", True
+    yield "state_interfaces", list(state_interfaces(parameters)), "What is measured of all joints", True
+    yield "interpolation_method", "splines", "How points are connected", True
+    yield "interpolate_from_desired_state", False, "Whether trajectories begin at the last command", True
+    yield "action_monitor_rate", 20.0, "Feedback messages of a goal per simulated second", True
+    for name, description in _CHANGEABLE.items():
+        yield name, getattr(parameters, name), description, False
+    activation = "Whether activation holds the last command"
+    yield "set_last_command_interface_value_as_state_on_activation", True, activation, False
+    constraints = parameters.constraints
     yield "command_joints", list(parameters.joints), "Joint names to control", True
-    yield "open_loop_control", parameters.interpolate_from_desired_state, "Old name", True
-    yield "speed_scaling.initial_scaling_factor", scaling.initial_scaling_factor, "Speed at the start", True
+    yield "open_loop_control", False, "Old name", True
+    yield "speed_scaling.initial_scaling_factor", 1.0, "Speed at the start", True
     yield "speed_scaling.state_interface", "", "Where the hardware tells its speed", True
     yield "speed_scaling.command_interface", "", "Where the hardware is told its speed", True
     yield "constraints.goal_time", constraints.goal_time, "How late a goal may be reached [s]; 0 for any time", False

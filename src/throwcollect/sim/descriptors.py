@@ -17,14 +17,14 @@ _LARGEST = sys.float_info.max
 _LARGEST_INTEGER = 2**63 - 1
 
 
-def floating_range(low: float | None, high: float | None) -> Any:
+def floating_range(low: float | None, high: float | None) -> FloatingPointRange:
     """A rcl_interfaces/msg/FloatingPointRange; without a bound it goes as far as finite numbers do."""
     return FloatingPointRange(
         from_value=-_LARGEST if low is None else float(low), to_value=_LARGEST if high is None else float(high)
     )
 
 
-def integer_range(low: int | None, high: int | None) -> Any:
+def integer_range(low: int | None, high: int | None) -> IntegerRange:
     """A rcl_interfaces/msg/IntegerRange; without a bound it goes as far as 64 bits do."""
     return IntegerRange(
         from_value=-_LARGEST_INTEGER - 1 if low is None else low,
@@ -33,7 +33,7 @@ def integer_range(low: int | None, high: int | None) -> Any:
     )
 
 
-def of_key(key: str, value: object, *, read_only: bool = False) -> Any:
+def of_key(key: str, value: object, *, read_only: bool = False) -> ParameterDescriptor:
     """Descriptor of the parameter that shows a key of the configuration.
 
     Args:

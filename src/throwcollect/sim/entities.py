@@ -6,12 +6,8 @@ import math
 from dataclasses import dataclass
 from enum import IntEnum
 
-import pybullet
-
+from throwcollect.engines.engine import BodyModel, BodyState, Box, Quaternion, Vector
 from throwcollect.errors import RequestError
-from throwcollect.sim.bullet import Box
-from throwcollect.sim.recording import BodyState, Vector
-from throwcollect.sim.urdf import Model
 from throwcollect.sim.world import World
 
 BALL = "ball"
@@ -70,7 +66,7 @@ class Entities:
     @property
     def names(self) -> tuple[str, ...]:
         """Names of all entities: ball, robot, then what was spawned, in order."""
-        return (BALL, self._robot, *self._world.spawned.entities)
+        return (BALL, self._robot, *self._world.spawned.names)
 
     def forget_infos(self) -> None:
         """Go back to what is said about ball and robot at the start; forget what was said about what is gone."""
@@ -114,7 +110,7 @@ class Entities:
             return self._world.ball
         if name == self._robot:
             return self._world.robot_base
-        return self._world.spawned.state(name)
+        return self._world.spawned.engine_bodies(name).state(name)
 
     def place(self, name: str, state: BodyState, *, frame: str, accelerates: bool) -> None:
         """Put an entity somewhere.
@@ -142,7 +138,7 @@ class Entities:
             return
         if self._world.spawned.model(name).is_fixed and (any(speeds) or accelerates):
             raise RequestError("RESULT_OPERATION_FAILED", f"{name} is fixed and can have no twist or acceleration")
-        self._world.spawned.place(name, state)
+        self._world.spawned.engine_bodies(name).place(name, state)
 
     def in_world(self, state: BodyState, frame: str) -> BodyState:
         """A state that is given in some frame.
@@ -164,14 +160,11 @@ class Entities:
                 raise RequestError("INVALID_POSE", f"no frame {frame!r:.80}", expected=known)
             base = self.state(frame)
             turn = base.orientation_xyzw
-            position, orientation = pybullet.multiplyTransforms(
-                base.position, turn, state.position, state.orientation_xyzw
-            )
             state = BodyState(
-                position,
-                orientation,
-                pybullet.rotateVector(turn, state.linear_velocity),
-                pybullet.rotateVector(turn, state.angular_velocity),
+                _add(base.position, _rotate(turn, state.position)),
+                _multiply(turn, state.orientation_xyzw),
+                _rotate(turn, state.linear_velocity),
+                _rotate(turn, state.angular_velocity),
             )
         if not all(abs(value) <= _LARGEST_COORDINATE_M for value in state.position):
             expected = f"within {_LARGEST_COORDINATE_M:g} m of the world's origin"
@@ -186,10 +179,10 @@ class Entities:
         """
         self._require(name)
         if name == BALL:
-            return self._world.ball_boxes()
+            return self._world.engine.ball_boxes()
         if name == self._robot:
-            return self._world.robot_boxes()
-        return self._world.spawned.boxes(name)
+            return self._world.engine.robot_boxes()
+        return self._world.spawned.engine_bodies(name).boxes(name)
 
     def bounds(self, name: str) -> Box | None:
         """Box along the axes of an entity's own frame that encloses it; None if it has no shape.
@@ -198,13 +191,13 @@ class Entities:
             RequestError: ``RESULT_NOT_FOUND`` if there is none of that name.
         """
         if name in self._world.spawned:
-            return _union(self._world.spawned.bounds(name))
+            return _unite(self._world.spawned.engine_bodies(name).bounds(name))
         # The robot's axes are those of the world, and the ball looks the same from everywhere.
-        box = _union(self.boxes(name))
+        box = _unite(self.boxes(name))
         origin = self.state(name).position
-        return box and (_minus(box[0], origin), _minus(box[1], origin))
+        return box and (_subtract(box[0], origin), _subtract(box[1], origin))
 
-    def add(self, name: str, model: Model, start: BodyState, description: str) -> None:
+    def add(self, name: str, model: BodyModel, start: BodyState, description: str) -> None:
         """Put a new entity into the world.
 
         Args:
@@ -242,7 +235,7 @@ class Entities:
             raise RequestError("RESULT_NOT_FOUND", f"no entity {name!r:.80}; known: {known:.1000}")
 
 
-def _union(boxes: list[Box]) -> Box | None:
+def _unite(boxes: list[Box]) -> Box | None:
     if not boxes:
         return None
     lows, highs = zip(*boxes, strict=True)
@@ -251,5 +244,27 @@ def _union(boxes: list[Box]) -> Box | None:
     return lowest, highest
 
 
-def _minus(point: Vector, origin: Vector) -> Vector:
+def _add(point: Vector, other: Vector) -> Vector:
+    return (point[0] + other[0], point[1] + other[1], point[2] + other[2])
+
+
+def _subtract(point: Vector, origin: Vector) -> Vector:
     return (point[0] - origin[0], point[1] - origin[1], point[2] - origin[2])
+
+
+def _multiply(turn: Quaternion, other: Quaternion) -> Quaternion:
+    """The quaternion (xyzw) that turns first by `other`, then by `turn`."""
+    x, y, z, w = turn
+    a, b, c, d = other
+    return (
+        w * a + x * d + y * c - z * b,
+        w * b - x * c + y * d + z * a,
+        w * c + x * b - y * a + z * d,
+        w * d - x * a - y * b - z * c,
+    )
+
+
+def _rotate(turn: Quaternion, vector: Vector) -> Vector:
+    x, y, z, w = turn
+    rotated = _multiply(_multiply(turn, (*vector, 0.0)), (-x, -y, -z, w))
+    return rotated[:3]

@@ -8,10 +8,9 @@ from typing import Any
 
 import re2
 
+from throwcollect.engines.engine import Box, Vector
 from throwcollect.errors import RequestError
-from throwcollect.sim.bullet import Box
 from throwcollect.sim.entities import Entities
-from throwcollect.sim.recording import Vector
 
 _LONGEST_EXPRESSION = 256
 

@@ -2,27 +2,24 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from throwcollect.errors import RequestError
-from throwcollect.ros import Node, get_message, get_service
+from throwcollect.ros import Node
+from throwcollect.ros.msg import Bounds, EntityFilters, EntityState, TagsFilter, Vector3
+from throwcollect.ros.srv import (
+    DeleteEntity,
+    GetEntities,
+    GetEntitiesStates,
+    GetEntityBounds,
+    GetEntityInfo,
+    GetEntityState,
+    SetEntityInfo,
+    SetEntityState,
+)
 from throwcollect.sim.body_messages import body_state, entity_state
 from throwcollect.sim.entities import EntityInfo
 from throwcollect.sim.entity_filter import BoxRegion, EntityFilter, SphereRegion
 from throwcollect.sim.service_results import answering
 from throwcollect.sim.simulation import Simulation
-
-GetEntities: Any = get_service("simulation_interfaces/srv/GetEntities")
-GetEntitiesStates: Any = get_service("simulation_interfaces/srv/GetEntitiesStates")
-GetEntityState: Any = get_service("simulation_interfaces/srv/GetEntityState")
-SetEntityState: Any = get_service("simulation_interfaces/srv/SetEntityState")
-GetEntityInfo: Any = get_service("simulation_interfaces/srv/GetEntityInfo")
-SetEntityInfo: Any = get_service("simulation_interfaces/srv/SetEntityInfo")
-GetEntityBounds: Any = get_service("simulation_interfaces/srv/GetEntityBounds")
-DeleteEntity: Any = get_service("simulation_interfaces/srv/DeleteEntity")
-Bounds: Any = get_message("simulation_interfaces/msg/Bounds")
-TagsFilter: Any = get_message("simulation_interfaces/msg/TagsFilter")
-Vector3: Any = get_message("geometry_msgs/msg/Vector3")
 
 _CORNERS = 2
 _MOST_WANTED = 1000
@@ -52,20 +49,20 @@ class EntityServices:
         ):
             node.create_service(service, name, answering(service, fill))
 
-    def _list(self, request: Any, response: Any) -> None:
+    def _list(self, request: GetEntities.Request, response: GetEntities.Response) -> None:
         response.entities = _filter(request.filters).select(self._entities)
 
-    def _list_states(self, request: Any, response: Any) -> None:
+    def _list_states(self, request: GetEntitiesStates.Request, response: GetEntitiesStates.Response) -> None:
         response.entities = _filter(request.filters).select(self._entities)
         response.states = [self._state(name) for name in response.entities]
 
-    def _get_state(self, request: Any, response: Any) -> None:
+    def _get_state(self, request: GetEntityState.Request, response: GetEntityState.Response) -> None:
         response.state = self._state(request.entity)
 
-    def _state(self, name: str) -> Any:
+    def _state(self, name: str) -> EntityState:
         return entity_state(self._entities.state(name), self._simulation.now_ns)
 
-    def _set_state(self, request: Any, response: Any) -> None:
+    def _set_state(self, request: SetEntityState.Request, response: SetEntityState.Response) -> None:
         del response
         self._simulation.trial.require_free()
         state, acceleration = request.state, request.state.acceleration
@@ -77,32 +74,32 @@ class EntityServices:
             accelerates=any((vector.x, vector.y, vector.z) != (0.0, 0.0, 0.0) for vector in accelerations),
         )
 
-    def _get_info(self, request: Any, response: Any) -> None:
+    def _get_info(self, request: GetEntityInfo.Request, response: GetEntityInfo.Response) -> None:
         info = self._entities.info(request.entity)
         response.info.category.category = info.category
         response.info.description = info.description
         response.info.tags = list(info.tags)
 
-    def _set_info(self, request: Any, response: Any) -> None:
+    def _set_info(self, request: SetEntityInfo.Request, response: SetEntityInfo.Response) -> None:
         del response
         info = request.info
         self._entities.set_info(
             request.entity, EntityInfo(int(info.category.category), info.description, tuple(info.tags))
         )
 
-    def _get_bounds(self, request: Any, response: Any) -> None:
+    def _get_bounds(self, request: GetEntityBounds.Request, response: GetEntityBounds.Response) -> None:
         box = self._entities.bounds(request.entity)
         if box is not None:
             response.bounds.type = Bounds.TYPE_BOX
             response.bounds.points = [Vector3(x=x, y=y, z=z) for x, y, z in reversed(box)]
 
-    def _delete(self, request: Any, response: Any) -> None:
+    def _delete(self, request: DeleteEntity.Request, response: DeleteEntity.Response) -> None:
         del response
         self._simulation.trial.require_free()
         self._entities.remove(request.entity)
 
 
-def _filter(filters: Any) -> EntityFilter:
+def _filter(filters: EntityFilters) -> EntityFilter:
     """What simulation_interfaces/msg/EntityFilters means.
 
     Raises:
@@ -123,7 +120,7 @@ def _filter(filters: Any) -> EntityFilter:
     )
 
 
-def _region(bounds: Any) -> BoxRegion | SphereRegion | None:
+def _region(bounds: Bounds) -> BoxRegion | SphereRegion | None:
     if bounds.type == Bounds.TYPE_EMPTY:
         return None
     if bounds.type not in (Bounds.TYPE_BOX, Bounds.TYPE_SPHERE):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +18,8 @@ from throwcollect.control import (
     JointTrajectoryController,
     Refusal,
     Trajectory,
-    TrajectoryGoal,
 )
 from throwcollect.episode.record import ControllerSamples
-from throwcollect.robots.talos import graph_name
 
 _LOCKED_TOLERANCE_RAD = 1e-6
 
@@ -32,7 +30,7 @@ class LimbController:
     Joints that are locked are measured where they are locked, and goals that would move them are refused.
 
     Args:
-        name: Name of the controller.
+        name: Name of the controller in the ROS graph.
         joints: Its joints, in order.
         moving: The world's moving joints, in order.
         period_ns: Control period [ns].
@@ -42,7 +40,7 @@ class LimbController:
     def __init__(
         self, name: str, joints: Sequence[str], *, moving: Sequence[str], period_ns: int, config: ControllersConfig
     ) -> None:
-        self.name = graph_name(name, config.names)
+        self.name = name
         """Name of the controller in the ROS graph."""
         brakes = config.hold == "decelerate"
         self._configured = ControllerParameters.talos(
@@ -56,8 +54,6 @@ class LimbController:
                 hold="command" if config.hold == "command" else "measured", topic_aborts_goal=config.topic_aborts_goal
             ),
         )
-        self.measures_velocity = brakes
-        """Whether `measured` needs velocities."""
         self.watched = False
         """Whether the state of every update is kept for `pop_states`."""
         self._states: list[ControllerState] = []
@@ -111,32 +107,33 @@ class LimbController:
         states, self._states = self._states, []
         return states
 
-    def submit(self, goal_id: Hashable, goal: TrajectoryGoal, now_ns: int) -> Refusal | None:
-        """Give the controller a goal.
+    def refuse_locked(self, trajectory: Trajectory) -> Refusal | None:
+        """Refuse a trajectory that would move joints which are locked.
 
         Returns:
-            None if it is accepted, else the reason of the refusal.
+            None if it moves no such joint, else the reason of the refusal.
         """
-        return self._locked_refusal(goal.trajectory) or self.controller.submit(goal_id, goal, now_ns)
+        for column, joint in enumerate(trajectory.joint_names):
+            if joint not in self._joints or self._joints.index(joint) in self._own:
+                continue
+            held = self._posture[self._joints.index(joint)]
+            for point in trajectory.points:
+                wanted = point.positions[column] if column < len(point.positions) else held
+                if not abs(wanted - held) <= _LOCKED_TOLERANCE_RAD:
+                    text = f"{joint} is locked at {held:.6g} rad (robot.locked) and cannot go to {wanted:.6g} rad"
+                    return self._controller.refuse(Refusal(ErrorCode.INVALID_GOAL, text))
+        return None
 
-    def follow(self, trajectory: Trajectory, now_ns: int) -> Refusal | None:
-        """Let the controller follow a trajectory that is no goal.
-
-        Returns:
-            None if it is accepted, else the reason of the refusal.
-        """
-        return self._locked_refusal(trajectory) or self.controller.replace(trajectory, now_ns)
-
-    def measured(self, positions: Sequence[float], velocities: Sequence[float] | None) -> JointState:
+    def measured(self, positions: Sequence[float], velocities: Sequence[float]) -> JointState:
         """State of this limb's joints.
 
         Args:
             positions: Position of each of the world's moving joints [rad].
-            velocities: Their velocities [rad/s]; None if nobody measures them.
+            velocities: Their velocities [rad/s].
         """
         state = self._posture.copy()
         state[self._own] = [positions[index] for index in self._worlds]
-        if not self.measures_velocity or velocities is None:
+        if not self._configured.measures_velocity:
             return JointState(state)
         speeds = np.zeros(len(state))
         speeds[self._own] = [velocities[index] for index in self._worlds]
@@ -178,27 +175,12 @@ class LimbController:
         elapsed = np.array(self._elapsed_ns, dtype=np.int64)
         return ControllerSamples(elapsed, table[:, 0], table[:, 1], table[:, 2], table[:, 3])
 
-    def _locked_refusal(self, trajectory: Trajectory) -> Refusal | None:
-        for column, joint in enumerate(trajectory.joint_names):
-            if joint not in self._joints or self._joints.index(joint) in self._own:
-                continue
-            held = self._posture[self._joints.index(joint)]
-            for point in trajectory.points:
-                wanted = point.positions[column] if column < len(point.positions) else held
-                if not abs(wanted - held) <= _LOCKED_TOLERANCE_RAD:
-                    text = f"{joint} is locked at {held:.6g} rad (robot.locked) and cannot go to {wanted:.6g} rad"
-                    return self._controller.refuse(Refusal(ErrorCode.INVALID_GOAL, text))
-        return None
-
     def _wake(self) -> None:
         start_ns, self._start_ns = self._start_ns, None
         if start_ns is None:
             return
-        still = np.zeros(len(self._joints)) if self.measures_velocity else None
+        still = np.zeros(len(self._joints)) if self._configured.measures_velocity else None
         measured = JointState(self._posture.copy(), still)
-        if self._controller.active:
-            self._controller.reset(start_ns, measured)
-        else:
-            self._controller.activate(start_ns, measured)
+        self._controller.reset(start_ns, measured)
         # Begins the hold, so that an idle limb need not be driven.
         self._controller.update(start_ns, 0, measured)

@@ -9,7 +9,8 @@ from types import FrameType
 
 from throwcollect import ros
 from throwcollect.config.loader import load
-from throwcollect.heartbeat import Heartbeat
+from throwcollect.errors import ConfigError
+from throwcollect.heartbeat import Heartbeat, ready_line
 from throwcollect.interruption import stop_signals
 from throwcollect.ros.self_check import check_answers
 from throwcollect.sim.node import SimulationNode
@@ -34,7 +35,10 @@ def run(config: Path, *, name: str, namespace: str | None = None) -> None:
     if namespace is None and simulation.config.run.root_namespace:
         namespace = "/"
     ros.init()
-    node = SimulationNode(name, simulation, namespace=namespace)
+    try:
+        node = SimulationNode(name, simulation, namespace=namespace)
+    except ros.NameValidationException as error:
+        raise ConfigError(str(error)) from error
     executor = ros.SingleThreadedExecutor()
     for each in (node, *node.companions):
         executor.add_node(each)
@@ -50,7 +54,7 @@ def run(config: Path, *, name: str, namespace: str | None = None) -> None:
     # What is here now stays until the end; the garbage collector need not go through it again and again.
     gc.freeze()
     heartbeat = Heartbeat()
-    print(f"{name} is ready", flush=True)
+    print(ready_line(name), flush=True)
     try:
         while not stopped and not node.quitting:
             heartbeat.beat()

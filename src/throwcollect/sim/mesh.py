@@ -73,18 +73,6 @@ def check_mesh(path: Path) -> None:
         raise RequestError("UNSUPPORTED_ASSETS", f"{path}: {size} bytes; at most {_LARGEST_FILE}")
 
 
-def write_stl(path: Path, triangles: Triangles) -> None:
-    """Write a binary STL file.
-
-    Args:
-        path: The file.
-        triangles: Its triangles.
-    """
-    records = np.zeros(len(triangles), _STL)
-    records["corners"] = triangles
-    path.write_bytes(bytes(_HEADER - 4) + len(triangles).to_bytes(4, "little") + records.tobytes())
-
-
 def _read_stl(content: bytes) -> Triangles:
     count = int.from_bytes(content[_HEADER - 4 : _HEADER], "little")
     if len(content) >= _HEADER and len(content) == _HEADER + count * _RECORD:

@@ -7,8 +7,9 @@ import time
 from collections.abc import Mapping
 from typing import Any
 
+from throwcollect.config.key import Effect
 from throwcollect.config.schema import Config
-from throwcollect.config.values import is_physics, leaves, sweepable_keys, with_values
+from throwcollect.config.values import leaves, sweepable_keys, with_values
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.chunk import ChunkEncoder, encode_message
 from throwcollect.episode.message import Episode, pack
@@ -29,6 +30,7 @@ from throwcollect.ros import (
     graph_changes,
     provide_time,
 )
+from throwcollect.ros.msg import SetParametersResult, UInt8MultiArray
 from throwcollect.run_key import Signer
 from throwcollect.sim import descriptors
 from throwcollect.sim.controller_manager import ControllerManager
@@ -38,10 +40,8 @@ from throwcollect.sim.simulation import Simulation, State
 from throwcollect.sim.simulation_control import SimulationControl
 from throwcollect.trial.lease import CONTROLLERS, LEASE, NUMBER, Lease
 
-SetParametersResult: Any = get_message("rcl_interfaces/msg/SetParametersResult")
 _CLOCK = "rosgraph_msgs/msg/Clock"
 Clock: Any = get_message(_CLOCK)
-UInt8MultiArray: Any = get_message("std_msgs/msg/UInt8MultiArray")
 
 _EPISODE = "episode"
 _LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -57,8 +57,8 @@ _REPEAT_S = 0.02
 
 _FACTOR = "sim.real_time_factor"
 _NO_LIMIT = 0.0
-_SHOWN = ("robot.", "tool.", "sim.", "controllers.", "task.", "record.")
-"""Sections of the configuration that can be read as parameters, besides the physics, which can be set."""
+_HIDDEN = (Effect.PLAN, Effect.RUN)
+"""What keys have an effect on that are no parameters, as they say nothing of a simulation."""
 
 _MOST_TRIALS = 10_000_000
 """As many as a configuration may ask for; all of them start at times that fit into a stamp."""
@@ -214,8 +214,9 @@ class SimulationNode(Node):
             self._latched.append(publisher)
 
     def _declare_parameters(self, config: Config) -> None:
-        values = dict(leaves(config))
-        self._physics = {key: float(values[key]) for key in sweepable_keys(config) if is_physics(key)}
+        physics = set(sweepable_keys(config, Effect.PHYSICS))
+        shown = {leaf.name: leaf.value for leaf in leaves(config) if leaf.key.effect not in _HIDDEN}
+        self._physics = {key: float(value) for key, value in shown.items() if key in physics}
         setup = self._simulation.trial.setup
         numbers = [descriptors.integer_range(-1, _MOST_TRIALS - 1)]
         about_number = "Number of the trial that the next reset begins, from 0; -1 for none, which also ends a lease."
@@ -232,13 +233,13 @@ class SimulationNode(Node):
         self.declare_parameter(_FACTOR, factor, about_factor)
         for key, value in self._physics.items():
             self.declare_parameter(key, value, descriptors.of_key(key, value))
-        for key, value in values.items():
-            if isinstance(value, str | int | float) and key.startswith(_SHOWN) and not self.has_parameter(key):
+        for key, value in shown.items():
+            if isinstance(value, str | int | float) and not self.has_parameter(key):
                 self.declare_parameter(key, value, descriptors.of_key(key, value, read_only=True))
         self.add_on_set_parameters_callback(self._set_up)
         self.add_post_set_parameters_callback(self._restore_physics)
 
-    def _set_up(self, parameters: Any) -> Any:
+    def _set_up(self, parameters: list[Parameter]) -> SetParametersResult:
         """Take over parameters: a lease begins its trial at once, others take effect with the next reset."""
         values = {parameter.name: parameter.value for parameter in parameters}
         try:
@@ -293,7 +294,7 @@ class SimulationNode(Node):
         if not 0 <= factor < math.inf:
             raise ConfigError(f"{_FACTOR}: should be a finite number, 0 for no limit, got {factor}")
 
-    def _restore_physics(self, parameters: Any) -> None:
+    def _restore_physics(self, parameters: list[Parameter]) -> None:
         """Have parameters that a lease leaves as configured show that, should somebody have set them before."""
         given = {parameter.name for parameter in parameters}
         if LEASE not in given or not self._simulation.trial.leased:

@@ -11,10 +11,11 @@ from urllib.parse import quote, unquote, urlsplit
 
 import numpy as np
 
+from throwcollect.engines.engine import BodyModel
 from throwcollect.errors import RequestError
-from throwcollect.robots.model import share_directory
+from throwcollect.robots.talos import TALOS
 from throwcollect.sim.mesh import Triangles, check_mesh, read_mesh
-from throwcollect.sim.urdf import Model, read_model
+from throwcollect.sim.urdf import read_model
 
 _LARGEST_FILE = 4 * 2**20
 _MOST_ENTRIES = 20_000
@@ -34,7 +35,7 @@ class Resource:
     name: str
 
 
-def load_model(uri: str, text: str) -> Model:
+def load_model(uri: str, text: str) -> BodyModel:
     """Read the description that a client means.
 
     Args:
@@ -89,7 +90,7 @@ def find_resources(sources: Sequence[str]) -> tuple[list[Resource], list[str]]:
 
 @cache
 def _installed() -> tuple[Resource, ...]:
-    share = share_directory()
+    share = TALOS.share()
     return tuple(_search(share / _DATA, lambda path: f"package://{quote(path.relative_to(share).as_posix())}"))
 
 
@@ -148,9 +149,9 @@ def _path(uri: str, *, missing: str) -> Path:
     if parts.scheme == "package":
         # With three slashes the package is the first part of the path.
         package, *rest = unquote(parts.netloc + parts.path).lstrip("/").split("/")
-        if not package or not (share_directory() / package).is_dir():
+        if not package or not (TALOS.share() / package).is_dir():
             raise RequestError(missing, f"{uri!r:.255}: no such package", expected=f"package://{_DATA}/...")
-        return share_directory().joinpath(package, *rest)
+        return TALOS.share().joinpath(package, *rest)
     raise RequestError(
         "UNSUPPORTED_FORMAT", f"{uri!r:.255}: unknown kind of URI", expected="file:///... or package://..."
     )

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 from throwcollect.errors import ConfigError, RequestError
-from throwcollect.ros import get_message
-
-Result: Any = get_message("simulation_interfaces/msg/Result")
+from throwcollect.ros.msg import Result
 
 Fill = Callable[[Any, Any], None]
 """Fills a response: gets request and response."""
@@ -35,7 +33,14 @@ def answering(service: Any, fill: Fill) -> Callable[[Any, Any], Any]:
     return answer
 
 
-def refusal(response_type: Any, error: RequestError) -> Any:
+class _WithResult(Protocol):
+    result: Result
+
+
+_R = TypeVar("_R", bound=_WithResult)
+
+
+def refusal(response_type: type[_R], error: RequestError) -> _R:
     """Response, or any other message with a ``result``, that says why something cannot be done.
 
     Args:

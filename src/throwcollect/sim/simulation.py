@@ -13,18 +13,10 @@ from enum import IntEnum, IntFlag
 import numpy as np
 
 from throwcollect.config.schema import Config
-from throwcollect.control import (
-    ControllerState,
-    GoalResult,
-    Refusal,
-    Trajectory,
-    TrajectoryGoal,
-    TrajectoryState,
-)
+from throwcollect.control import GoalResult, JointTrajectoryController, Refusal, Trajectory, TrajectoryGoal
 from throwcollect.episode.record import ControllerSamples, EpisodeHeader, Samples
 from throwcollect.errors import RequestError
-from throwcollect.robots.description import start_posture
-from throwcollect.robots.talos import CONTROLLERS
+from throwcollect.robots.description import robot_of, start_posture
 from throwcollect.sim.entities import Entities
 from throwcollect.sim.limb_controller import LimbController
 from throwcollect.sim.pace import Pace, longest_steps, slice_steps
@@ -77,11 +69,17 @@ class Simulation:
         self._steps: StepRequest | None = None
         self._period_ns = period_ns = round(10**9 / config.sim.physics_hz)
         self._stride = config.sim.physics_hz // config.record.rate_hz
+        robot, answers = robot_of(config), config.controllers
         self.limbs = {
-            name: LimbController(name, joints, moving=self.world.moving, period_ns=period_ns, config=config.controllers)
-            for name, joints in CONTROLLERS.items()
+            name: LimbController(
+                robot.graph_name(name, answers.names),
+                joints,
+                moving=self.world.moving,
+                period_ns=period_ns,
+                config=answers,
+            )
+            for name, joints in robot.controllers.items()
         }
-        self._measures_velocity = any(limb.measures_velocity for limb in self.limbs.values())
         self._watched: list[LimbController] = []
         self._keeps_states = "controller_state" in config.record.topics
         self._pace = Pace()
@@ -176,7 +174,8 @@ class Simulation:
         """
         if (leased := self.trial.refusal(controller, goal=True)) is not None:
             return leased
-        refusal = self.limbs[controller].submit(goal_id, goal, self.now_ns)
+        limb = self.limbs[controller]
+        refusal = limb.refuse_locked(goal.trajectory) or limb.controller.submit(goal_id, goal, self.now_ns)
         self._collect_results()
         if refusal is None:
             self.trial.note_goal(controller, goal)
@@ -192,7 +191,7 @@ class Simulation:
         if self.trial.refusal(controller, goal=False) is not None:
             return False
         self.trial.note_other_input(controller)
-        cancelled = self._observed(controller).controller.cancel(goal_id)
+        cancelled = self.observed(controller).cancel(goal_id)
         self._collect_results()
         return cancelled
 
@@ -204,7 +203,8 @@ class Simulation:
         """
         if (leased := self.trial.refusal(controller, goal=False)) is not None:
             return leased
-        refusal = self.limbs[controller].follow(trajectory, self.now_ns)
+        limb = self.limbs[controller]
+        refusal = limb.refuse_locked(trajectory) or limb.controller.replace(trajectory, self.now_ns)
         self._collect_results()
         if refusal is None:
             self.trial.note_other_input(controller)
@@ -320,13 +320,11 @@ class Simulation:
             states = {name: limb.kept_states() for name, limb in self.limbs.items()}
         return header, samples, states
 
-    def controller_state(self, controller: str) -> ControllerState:
-        """What a controller has done last, and sees now."""
-        return self._observed(controller).controller.state(self.now_ns)
-
-    def query(self, controller: str, time_ns: int) -> TrajectoryState:
-        """What a controller's trajectory is at a given time [ns]."""
-        return self._observed(controller).controller.query(time_ns)
+    def observed(self, controller: str) -> JointTrajectoryController:
+        """A controller, once it has seen the present state of its joints, which its `state` and `query` need."""
+        limb = self.limbs[controller]
+        limb.controller.observe(limb.measured(*self.world.joints()))
+        return limb.controller
 
     def watch(self, controllers: Iterable[str]) -> None:
         """Keep the states of these controllers, in every control period, for `LimbController.pop_states`."""
@@ -377,21 +375,12 @@ class Simulation:
 
     def _look(self, limbs: Iterable[LimbController]) -> None:
         """Let controllers see the measured state, for one control period."""
-        positions, velocities = self._joint_readings()
+        positions, velocities = self.world.joints()
         keeps = self._keeps_states and self.world.steps % self._stride == 0
         for limb in limbs:
             limb.update(self.now_ns, self._period_ns, limb.measured(positions, velocities), self._command)
             if keeps:
                 limb.keep_state()
-
-    def _observed(self, controller: str) -> LimbController:
-        """A limb whose controller knows the state of its joints."""
-        limb = self.limbs[controller]
-        limb.controller.observe(limb.measured(*self._joint_readings()))
-        return limb
-
-    def _joint_readings(self) -> tuple[list[float], list[float] | None]:
-        return self.world.joint_positions(), self.world.joint_velocities() if self._measures_velocity else None
 
     def _collect_results(self) -> None:
         for name, limb in self.limbs.items():

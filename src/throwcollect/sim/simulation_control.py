@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from throwcollect.errors import ConfigError, RequestError
-from throwcollect.ros import Node, get_message, get_service
+from throwcollect.ros import Node
+from throwcollect.ros.msg import SimulatorFeatures as Features
+from throwcollect.ros.srv import GetSimulationState, GetSimulatorFeatures, ResetSimulation, SetSimulationState
 from throwcollect.sim.entity_services import EntityServices
 from throwcollect.sim.service_results import answering
 from throwcollect.sim.simulation import Scope, Simulation, State
 from throwcollect.sim.spawn_services import SpawnServices
 from throwcollect.sim.stepping import Stepping
 from throwcollect.version import __version__
-
-GetSimulatorFeatures: Any = get_service("simulation_interfaces/srv/GetSimulatorFeatures")
-GetSimulationState: Any = get_service("simulation_interfaces/srv/GetSimulationState")
-SetSimulationState: Any = get_service("simulation_interfaces/srv/SetSimulationState")
-ResetSimulation: Any = get_service("simulation_interfaces/srv/ResetSimulation")
-Features: Any = get_message("simulation_interfaces/msg/SimulatorFeatures")
 
 _FEATURES = (
     "SPAWNING",
@@ -44,6 +38,9 @@ _FEATURES = (
     "STEP_SIMULATION_ACTION",
     "SPAWNING_ENTITIES",
 )
+_OF_BODIES = frozenset({"SPAWNING", "DELETING", "SPAWNING_RESOURCE_STRING", "SPAWNABLES", "SPAWNING_ENTITIES"})
+"""Features of engines that take further bodies."""
+
 _FORMATS = ("urdf",)
 _WHOLE_SCOPES = (ResetSimulation.Request.SCOPE_DEFAULT, ResetSimulation.Request.SCOPE_ALL)
 
@@ -74,19 +71,23 @@ class SimulationControl:
         """Tell those who wait for steps how far it has come; call it after each slice."""
         self._stepping.follow_up()
 
-    def _get_features(self, _request: Any, response: Any) -> Any:
-        response.features.features = [getattr(Features, name) for name in _FEATURES]
-        response.features.spawn_formats = list(_FORMATS)
+    def _get_features(
+        self, _request: GetSimulatorFeatures.Request, response: GetSimulatorFeatures.Response
+    ) -> GetSimulatorFeatures.Response:
+        takes_bodies = self._simulation.world.engine.bodies is not None
+        names = [name for name in _FEATURES if takes_bodies or name not in _OF_BODIES]
+        response.features.features = [getattr(Features, name) for name in names]
+        response.features.spawn_formats = list(_FORMATS) if takes_bodies else []
         response.features.custom_info = (
             f"throwcollect {__version__}; one step is one physics step of "
             f"{1.0 / self._simulation.config.sim.physics_hz:g} s; the clock runs while a trial runs"
         )
         return response
 
-    def _get_state(self, _request: Any, response: Any) -> None:
+    def _get_state(self, _request: GetSimulationState.Request, response: GetSimulationState.Response) -> None:
         response.state.state = int(self._simulation.state)
 
-    def _set_state(self, request: Any, response: Any) -> None:
+    def _set_state(self, request: SetSimulationState.Request, response: SetSimulationState.Response) -> None:
         del response
         wanted = request.state.state
         if wanted not in list(State):
@@ -98,7 +99,7 @@ class SimulationControl:
         except ConfigError as error:
             raise RequestError("STATE_TRANSITION_ERROR", str(error)) from error
 
-    def _reset(self, request: Any, response: Any) -> None:
+    def _reset(self, request: ResetSimulation.Request, response: ResetSimulation.Response) -> None:
         del response
         self._simulation.trial.require_free()
         if request.scope in _WHOLE_SCOPES:

@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from throwcollect.errors import RequestError
-from throwcollect.ros import Node, get_message, get_service
+from throwcollect.ros import Node
+from throwcollect.ros.msg import Resource, Result, Spawnable, SpawnResult
+from throwcollect.ros.msg import SpawnEntity as SpawnWish
+from throwcollect.ros.srv import GetSpawnables, SpawnEntities, SpawnEntity
 from throwcollect.sim.body_messages import body_state
 from throwcollect.sim.resources import find_resources
-from throwcollect.sim.service_results import Result, answering, refusal
+from throwcollect.sim.service_results import answering, refusal
 from throwcollect.sim.simulation import Simulation
 from throwcollect.sim.spawning import SpawnRequest, spawn
-
-SpawnEntity: Any = get_service("simulation_interfaces/srv/SpawnEntity")
-SpawnEntities: Any = get_service("simulation_interfaces/srv/SpawnEntities")
-GetSpawnables: Any = get_service("simulation_interfaces/srv/GetSpawnables")
-SpawnResult: Any = get_message("simulation_interfaces/msg/SpawnResult")
-Spawnable: Any = get_message("simulation_interfaces/msg/Spawnable")
 
 _MOST_REQUESTS = 200
 _MOST_SOURCES = 100
@@ -40,11 +35,11 @@ class SpawnServices:
         ):
             node.create_service(service, name, answering(service, fill))
 
-    def _spawn_one(self, request: Any, response: Any) -> None:
+    def _spawn_one(self, request: SpawnEntity.Request, response: SpawnEntity.Response) -> None:
         self._simulation.trial.require_free()
         response.entity_name = self._spawn(request, request)
 
-    def _spawn_all(self, request: Any, response: Any) -> None:
+    def _spawn_all(self, request: SpawnEntities.Request, response: SpawnEntities.Response) -> None:
         self._simulation.trial.require_free()
         if len(request.spawn_requests) > _MOST_REQUESTS:
             message = f"{len(request.spawn_requests)} requests in one call; at most {_MOST_REQUESTS}"
@@ -63,7 +58,7 @@ class SpawnServices:
             response.result.result = SpawnEntities.Response.ENTITIES_SPAWN_FAILED
             response.result.error_message = f"{failed} of {len(results)} entities were not spawned; see their results"
 
-    def _spawn(self, wish: Any, resource: Any) -> str:
+    def _spawn(self, wish: SpawnWish | SpawnEntity.Request, resource: Resource | SpawnEntity.Request) -> str:
         pose = wish.initial_pose
         return spawn(
             self._entities,
@@ -78,7 +73,7 @@ class SpawnServices:
             ),
         )
 
-    def _list_spawnables(self, request: Any, response: Any) -> None:
+    def _list_spawnables(self, request: GetSpawnables.Request, response: GetSpawnables.Response) -> None:
         if len(request.sources) > _MOST_SOURCES:
             message = f"{len(request.sources)} sources in one call; at most {_MOST_SOURCES}"
             raise RequestError("RESULT_OPERATION_FAILED", message)

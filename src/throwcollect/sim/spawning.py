@@ -6,9 +6,9 @@ import re
 from dataclasses import dataclass
 from itertools import count
 
+from throwcollect.engines.engine import BodyState
 from throwcollect.errors import RequestError
 from throwcollect.sim.entities import WORLD_FRAME, Entities
-from throwcollect.sim.recording import BodyState
 from throwcollect.sim.resources import load_model
 
 _LONGEST_NAME = 100

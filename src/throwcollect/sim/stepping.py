@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 from throwcollect.errors import RequestError
-from throwcollect.ros import ActionServer, CancelResponse, Future, Node, get_action, get_service
-from throwcollect.sim.service_results import Result, refusal
+from throwcollect.ros import ActionServer, CancelResponse, Future, Node
+from throwcollect.ros.action import SimulateSteps
+from throwcollect.ros.msg import Result
+from throwcollect.ros.srv import StepSimulation
+from throwcollect.sim.service_results import refusal
 from throwcollect.sim.simulation import Simulation
 from throwcollect.sim.step_request import StepRequest
-
-StepSimulation: Any = get_service("simulation_interfaces/srv/StepSimulation")
-SimulateSteps: Any = get_action("simulation_interfaces/action/SimulateSteps")
 
 _ACTION = "simulate_steps"
 _MOST_STEPS = 100_000
@@ -55,7 +55,9 @@ class Stepping:
                 self._awaited.remove(awaited)
                 future.set_result(None)
 
-    async def _step(self, request: Any, response: Any) -> Any:
+    async def _step(
+        self, request: StepSimulation.Request, response: StepSimulation.Response
+    ) -> StepSimulation.Response:
         try:
             if request.steps > _MOST_STEPS:
                 message = f"{request.steps} steps in one call; at most {_MOST_STEPS}"
@@ -66,7 +68,7 @@ class Stepping:
         response.result.result = Result.RESULT_OK
         return response
 
-    async def _execute(self, handle: Any) -> Any:
+    async def _execute(self, handle: Any) -> SimulateSteps.Result:
         try:
             await self._take(handle.request.steps, handle)
         except RequestError as error:

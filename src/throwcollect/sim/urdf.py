@@ -9,11 +9,11 @@ from __future__ import annotations
 import math
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from throwcollect.engines.engine import BodyModel
 from throwcollect.errors import RequestError
 from throwcollect.sim.mesh import Triangles
 from throwcollect.sim.urdf_tree import Joint, check_tree, rigid_root
@@ -39,31 +39,7 @@ _SIZES = {"box": ("size",), "sphere": ("radius",), "cylinder": ("radius", "lengt
 _OTHER_FORMATS = {"sdf": "SDFormat", "mujoco": "MJCF", "COLLADA": "COLLADA", "usd": "USD"}
 
 
-@dataclass(frozen=True)
-class Model:
-    """What can be put into a world.
-
-    Attributes:
-        name: Name that the description gives itself.
-        urdf: URDF text for the physics engine; its meshes are called ``0.stl``, ``1.stl`` …
-        meshes: The triangles of these meshes.
-        joints: Number of joints that can move.
-        is_fixed: Whether it is attached to the world: its root is called ``world`` or has no mass.
-    """
-
-    name: str
-    urdf: str
-    meshes: tuple[Triangles, ...]
-    joints: int
-    is_fixed: bool
-
-    @property
-    def is_static(self) -> bool:
-        """Whether no part of it ever moves on its own."""
-        return self.is_fixed and not self.joints
-
-
-def read_model(content: str | bytes, read_mesh: Callable[[str], Triangles]) -> Model:
+def read_model(content: str | bytes, read_mesh: Callable[[str], Triangles]) -> BodyModel:
     """Read and check a description.
 
     Args:
@@ -114,7 +90,7 @@ class _Reader:
         self._meshes: dict[str, int] = {}
         self._triangles: list[Triangles] = []
 
-    def read(self) -> Model:
+    def read(self) -> BodyModel:
         masses = {}
         robot = ElementTree.Element("robot", name="entity")
         for link in self._root.findall("link"):
@@ -136,7 +112,7 @@ class _Reader:
         ElementTree.indent(robot)
         text = ElementTree.tostring(robot, encoding="unicode") + "\n"
         own_name = self._root.get("name", "")
-        return Model(own_name, text, tuple(self._triangles), joints=len(movable), is_fixed=is_fixed)
+        return BodyModel(own_name, text, tuple(self._triangles), joints=len(movable), is_fixed=is_fixed)
 
     def _mass(self, link: ElementTree.Element) -> float:
         mass = link.find("inertial/mass")

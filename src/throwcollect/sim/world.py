@@ -1,41 +1,32 @@
-"""The physics of a trial: one robot with a spoon, one ball, from the start state to the end."""
+"""The rules of a trial, on any physics engine: one robot with a spoon, one ball, from the start state to the end."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
-import pybullet
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
+from throwcollect.engines.engine import BALL_NUMBERS, BodyState, Engine, Observer, Sample, State, Steps, ball_of
 from throwcollect.episode.record import Contact, EndReason, Samples
-from throwcollect.robots.description import locked_joints, physics_description, start_posture
-from throwcollect.robots.spoon import ball_seat
-from throwcollect.sim.bullet import BASE, Box, boxes, connect, load_ball, load_scenery, renew_pairs, set_physics
-from throwcollect.sim.contacts import ContactLog, Surface
+from throwcollect.members import load_member
+from throwcollect.robots.description import Description, locked_joints, physics_description, robot_of, start_posture
+from throwcollect.sim.contacts import ContactLog
 from throwcollect.sim.motors import Motors
-from throwcollect.sim.recording import (
-    BALL_HEIGHT,
-    BALL_LINEAR_VELOCITY,
-    BodyState,
-    Row,
-    Sample,
-    to_sample,
-    to_samples,
-)
+from throwcollect.sim.recording import BALL_HEIGHT, BALL_LINEAR_VELOCITY, to_samples
+from throwcollect.sim.scene import drag_of, physics_of, scene_of
 from throwcollect.sim.spawned import SpawnedBodies
+from throwcollect.tools.tool import tool_of
 
 _NS_PER_S = 1_000_000_000
 _REST_S = 0.5
 _REST_SPEED = 0.01
-_ANY_BODY, _ANY_LINK = -1, -2
 
 
-class World:
-    """One Bullet world in this process, used for one trial after the other.
+class World(Observer):
+    """The world of one simulation, used for one trial after the other.
 
     `reset` puts it into the start state of a trial, which is a pure function of the trial's configuration, bit for bit.
     `run` then takes physics steps until the trial ends:
@@ -44,44 +35,47 @@ class World:
     - ``rest``: the arm has moved and stands still, and the ball has been lying on something for half a second;
     - ``timeout``: the longest duration is over.
 
-    A trial ends with a sample, so that the recorded samples enclose the crossing. On a landing plane at height zero the
-    trial ends before the ground could stop the ball; the ground is there for planes above it.
+    A trial ends with a sample, so that the recorded samples enclose the crossing.
 
     Args:
-        config: Configuration of the first trial.
+        config: Configuration of the first trial; of all trials, the engine is that of this one.
+
+    Attributes:
+        engine: What simulates.
+        spawned: What clients have put into the world.
 
     Raises:
         ConfigError: If the configuration does not describe a world (see `reset`).
-        WorkerError: If Bullet refuses to start another world in this process.
+        WorkerError: If the physics engine does not start.
     """
 
-    _ball: int
+    _tool: str
     _steps: int
     _contacts: ContactLog
     _end_reason: EndReason | None
-    _settled: Row
-    _settled_pressing: set[Surface]
-    _pressing: set[Surface]
+    _start: Sequence[float]
+    _settled: State
+    _touching: frozenset[str]
+    _targets: NDArray[np.float64]
     _sampled_target: Sequence[float]
     _rows: list[Sample]
     _forgotten: int
 
     def __init__(self, config: Config) -> None:
-        self._client = connect()
-        self._names: dict[Surface, str] = {}
-        self.spawned = SpawnedBodies(self._client, self._names)
-        self._scenery_key: object = None
+        self.engine: Engine = load_member("engines", config.sim.engine)()
+        self.spawned = SpawnedBodies(self.engine)
+        self._joints = robot_of(config).joints
+        self._described: tuple[object, Description] | None = None
         self._start_key: object = None
-        self._radius = math.nan
         self.reset(config)
 
     def close(self) -> None:
         """Free the world; it cannot be used afterwards."""
-        pybullet.disconnect(self._client)
+        self.engine.close()
 
     @property
     def moving(self) -> tuple[str, ...]:
-        """Names of the joints that are simulated and commanded, in the order of `talos.JOINTS`."""
+        """Names of the joints that are simulated and commanded, in the order of `Robot.joints`."""
         return self._moving
 
     @property
@@ -114,26 +108,21 @@ class World:
                 the robot's files cannot be read.
         """
         key = (trial.robot, trial.tool, trial.ball, trial.scene, trial.sim, trial.task.start, tuple(trial.task.end))
-        self.spawned.friction = trial.scene.spoon_friction
-        if key != self._start_key or self.spawned.leaves_traces:
+        if key != self._start_key or not self.engine.is_as_loaded:
             self._start_key = None
-            try:
-                self._load(trial)
-                self._settle(trial)
-            finally:
-                self.spawned.load()
+            self._settle(trial)
             self._start_key = key
-        self._place(self._settled)
+        self.engine.reset(self._settled)
         sim, ball = trial.sim, trial.ball
         self._base_height = trial.robot.base_height_m
         self._hz = sim.physics_hz
         self._stride = sim.physics_hz // trial.record.rate_hz
         self._last_step = math.ceil(sim.max_trial_s * sim.physics_hz)
         self._landing_height = trial.scene.landing_height_m + ball.radius_m
-        self._drag = ball.drag_coefficient * trial.scene.air_density_kgpm3 * math.pi * ball.radius_m**2 / 2
+        self._drag = drag_of(trial)
         self._motors = self._make_motors(trial)
-        self._pressing = self._settled_pressing
-        self._begin(start_ns, self._settled.joints)
+        self._touching = self._settled.touching
+        self._begin(start_ns, self._settled.sample)
 
     def restart_clock(self, start_ns: int) -> None:
         """Count time, steps, samples and contacts anew from the present state, which stays as it is.
@@ -141,9 +130,10 @@ class World:
         Args:
             start_ns: Simulated time of the present state [ns].
         """
-        # Drop contacts with bodies that were removed since the last step.
-        self._pressing = {surface for surface in self._pressing if surface in self._names}
-        self._begin(start_ns, self._joint_states())
+        now = self.engine.state
+        # Without bodies that were removed since the last step.
+        self._touching = now.touching
+        self._begin(start_ns, now.sample)
 
     @property
     def end_reason(self) -> EndReason | None:
@@ -163,32 +153,32 @@ class World:
         """
         if stop_at_end and self._end_reason is not None:
             return 0
-        # Local names, arguments by position and one loop: what stands here is paid for in every step.
-        client, ball, rows = self._client, self._ball, self._rows
-        aim, take_step, points_on = self._motors.aim, pybullet.stepSimulation, pybullet.getContactPoints
-        first = step = self._steps
-        stride = self._stride
-        for before, velocity, target in self._motors.plan(commands):
-            aim(before, velocity)
-            if self._drag:
-                self._apply_drag()
-            take_step(client)
-            step += 1
-            # Bullet also lists points that are merely close; those have no normal force (field 9).
-            points = points_on(ball, _ANY_BODY, _ANY_LINK, _ANY_LINK, client)
-            pressing = {(point[2], point[4]) for point in points if point[9] > 0}
-            if pressing != self._pressing:
-                self._pressing = pressing
-                self._contacts.update(pressing, step)
-            if step % stride == 0:
-                self._steps = step
-                rows.append(to_sample(self._read()))
-                self._end_reason = self._end_reason or self._judge(target)
-                if stop_at_end and self._end_reason is not None:
-                    break
-        self._steps = step
-        self._motors.advance(step - first)
-        return step - first
+        first, self._first_step = self._steps, self._steps
+        self._stops_at_end = stop_at_end
+        self._targets, velocities = self._motors.plan(commands)
+        steps = Steps(
+            self._targets,
+            velocities,
+            first_sample=self._stride - first % self._stride,
+            stride=self._stride,
+            drag_kgpm=self._drag,
+        )
+        taken = self.engine.run(steps, self)
+        self._steps = first + taken
+        self._motors.advance(taken)
+        return taken
+
+    def on_touch(self, step: int, bodies: frozenset[str]) -> None:
+        """Take note of what presses on the ball since a step of the present `run`."""
+        self._touching = bodies
+        self._contacts.update(bodies, self._first_step + step)
+
+    def on_sample(self, step: int, sample: Sample) -> bool:
+        """Record a sample after a step of the present `run`, and tell whether the run is over."""
+        self._steps = self._first_step + step
+        self._rows.append(sample)
+        self._end_reason = self._end_reason or self._judge(self._targets[step].tolist())
+        return self._stops_at_end and self._end_reason is not None
 
     def samples(self, first: int = 0, last: int | None = None) -> Samples:
         """Recorded samples as arrays.
@@ -201,7 +191,7 @@ class World:
         steps = np.arange(numbers.start, numbers.stop, dtype=np.int64) * self._stride
         stamps = self._start_ns + steps * _NS_PER_S // self._hz
         rows = self._rows[numbers.start - self._forgotten : numbers.stop - self._forgotten]
-        return to_samples(rows, stamps, self._moving, self._locked)
+        return to_samples(rows, stamps, self._joints, self._moving, self._locked)
 
     def forget_samples(self) -> None:
         """Drop the recorded samples but the last two, so that a world can go on for ever; numbers go on counting."""
@@ -212,134 +202,80 @@ class World:
         """All intervals in which something pressed on the ball, by start time."""
         return self._contacts.intervals(self._stamp_ns)
 
-    def joint_positions(self) -> list[float]:
-        """Position of each moving joint now [rad]."""
-        return [state[0] for state in self._joint_states()]
-
-    def joint_velocities(self) -> list[float]:
-        """Velocity of each moving joint now [rad/s]."""
-        return [state[1] for state in self._joint_states()]
+    def joints(self) -> tuple[Sample, Sample]:
+        """Position [rad] and velocity [rad/s] of each moving joint now."""
+        count, sample = len(self._moving), self.engine.state.sample
+        return sample[:count], sample[count : 2 * count]
 
     def posture(self) -> Mapping[str, float]:
         """Position of each of the 32 joints now [rad]."""
-        return {**self._locked, **dict(zip(self._moving, self.joint_positions(), strict=True))}
+        return {**self._locked, **dict(zip(self._moving, self.joints()[0], strict=True))}
 
     @property
     def robot_base(self) -> BodyState:
         """The base of the robot, which never moves."""
         return BodyState((0.0, 0.0, self._base_height))
 
-    def ball_boxes(self) -> list[Box]:
-        """A box along the axes of the world around the ball."""
-        return boxes(self._client, self._ball)
-
-    def robot_boxes(self) -> list[Box]:
-        """Boxes along the axes of the world around the links of the robot."""
-        return boxes(self._client, self._scenery.robot)
-
     @property
     def ball(self) -> BodyState:
         """The ball now; when set before the first step, the start state is recorded anew."""
-        row = self._read()
-        return BodyState(*row.pose, *row.twist)
+        return ball_of(self.engine.state.sample)
 
     @ball.setter
     def ball(self, state: BodyState) -> None:
-        pybullet.resetBasePositionAndOrientation(
-            self._ball, state.position, state.orientation_xyzw, physicsClientId=self._client
-        )
-        pybullet.resetBaseVelocity(
-            self._ball, state.linear_velocity, state.angular_velocity, physicsClientId=self._client
-        )
+        self.engine.place_ball(state)
         if self._steps == 0:
             self._record_start()
 
-    def _begin(self, start_ns: int, joints: Sequence[tuple[Any, ...]]) -> None:
-        """Begin to count from the present state, whose joints are recorded as given."""
+    def _begin(self, start_ns: int, present: Sample) -> None:
+        """Begin to count from the present state."""
         self._start_ns = start_ns
         self._steps = 0
-        self._start_joints = joints
+        self._first_step = 0
+        self._start_joints = present[:-BALL_NUMBERS]
         self._record_start()
-        self._contacts = ContactLog(self._names)
-        self._contacts.update(self._pressing, 0)
+        self._contacts = ContactLog()
+        self._contacts.update(self._touching, 0)
         self._sampled_target = self._motors.target
         self._has_moved = False
         self._resting_since = 0
         self._end_reason = None
 
-    def _load(self, trial: Config) -> None:
-        """Load what differs from the trial before in shape: ground, robot and ball, or the ball alone."""
-        solid_ground = trial.scene.landing_height_m > 0
-        key = (trial.robot.base_height_m, trial.tool, locked_joints(trial), solid_ground)
-        if key != self._scenery_key or self.spawned.leaves_traces:
-            self._scenery_key = None
-            self._radius = math.nan
-            description = physics_description(trial)
-            self.spawned.forget()
-            self._scenery = load_scenery(
-                self._client, description, base_height=trial.robot.base_height_m, solid_ground=solid_ground
-            )
-            self._moving, self._locked = description.moving, description.locked
-            self._names.clear()
-            self._names.update(self._scenery.names)
-            self._scenery_key = key
-        if self._radius != trial.ball.radius_m:
-            if not math.isnan(self._radius):
-                pybullet.removeBody(self._ball, physicsClientId=self._client)
-            self._ball = load_ball(self._client, trial.ball.radius_m)
-            self._radius = trial.ball.radius_m
-
     def _settle(self, trial: Config) -> None:
-        """Find the state in which the ball has come to rest in the spoon of the still robot."""
-        client, scenery = self._client, self._scenery
-        seat = ball_seat(trial.tool, trial.ball.radius_m)
-        posture = start_posture(trial)
-        self._start = [posture[joint] for joint in self._moving]
-        set_physics(client, scenery, self._ball, trial)
-        for joint, angle in zip(scenery.joints, self._start, strict=True):
-            pybullet.resetJointState(scenery.robot, joint, angle, physicsClientId=client)
-        spoon = pybullet.getLinkState(
-            scenery.robot, scenery.spoon, computeForwardKinematics=True, physicsClientId=client
-        )
-        centre, _ = pybullet.multiplyTransforms(spoon[4], spoon[5], seat, [0, 0, 0, 1])
-        at_rest = BodyState(position=centre)
-        self._place(
-            Row(
-                joints=[(angle, 0.0) for angle in self._start],
-                pose=(at_rest.position, at_rest.orientation_xyzw),
-                twist=(at_rest.linear_velocity, at_rest.angular_velocity),
-            )
-        )
-        motors = self._make_motors(trial)
-        # At least one step, as contact forces and motor torques are those of the last one.
-        settling = np.tile(self._start, (max(1, round(trial.sim.settle_s * trial.sim.physics_hz)), 1))
-        for position, velocity, _ in motors.plan(settling):
-            motors.aim(position, velocity)
-            pybullet.stepSimulation(physicsClientId=client)
-        self._settled = self._read()
-        points = pybullet.getContactPoints(self._ball, physicsClientId=client)
-        self._settled_pressing = {point[2:5:2] for point in points if point[9] > 0}
+        """Find the state in which the ball has come to rest in the tool of the still robot."""
+        description = self._description(trial)
+        try:
+            self.engine.load(scene_of(trial, description))
+            self._moving, self._locked = description.moving, description.locked
+            posture = start_posture(trial)
+            self._start = [posture[joint] for joint in self._moving]
+            tool = tool_of(trial.tool)
+            self._tool = tool.name
+            seat = tool.ball_seat(trial.ball.radius_m)
+            self.engine.configure(physics_of(trial, self._moving))
+            self.engine.rest(self._start, seat)
+            # At least one step, as contact forces and motor torques are those of the last one.
+            steps = max(1, round(trial.sim.settle_s * trial.sim.physics_hz))
+            targets, velocities = self._make_motors(trial).plan(np.tile(self._start, (steps, 1)))
+            self.engine.run(Steps(targets, velocities, first_sample=steps + 1, stride=1), Observer())
+            self._settled = self.engine.state
+        finally:
+            self.spawned.load()
 
-    def _place(self, row: Row) -> None:
-        """Put robot and ball into a state, leaving nothing behind of what went on before.
-
-        Bullet's own snapshots do not achieve that: they keep pairs of shapes that once came close, and with them the
-        order in which contacts are solved. `renew_pairs` forgets those.
-        """
-        for joint, state in zip(self._scenery.joints, row.joints, strict=True):
-            pybullet.resetJointState(self._scenery.robot, joint, state[0], state[1], physicsClientId=self._client)
-        renew_pairs(self._client, self._ball)
-        pybullet.resetBasePositionAndOrientation(self._ball, *row.pose, physicsClientId=self._client)
-        pybullet.resetBaseVelocity(self._ball, *row.twist, physicsClientId=self._client)
-
-    def _record_start(self) -> None:
-        # After a reset with the motor torques of the settled state: Bullet has none before the first step.
-        self._rows = [to_sample(self._read()._replace(joints=self._start_joints))]
-        self._forgotten = 0
+    def _description(self, trial: Config) -> Description:
+        """The robot as the trial needs it; the one of the trial before if it is the same."""
+        key = (trial.tool, locked_joints(trial))
+        if self._described is None or self._described[0] != key:
+            self._described = key, physics_description(trial)
+        return self._described[1]
 
     def _make_motors(self, trial: Config) -> Motors:
-        scenery = self._scenery
-        return Motors(self._client, scenery.robot, scenery.joints, moving=self._moving, start=self._start, config=trial)
+        return Motors(self._start, hz=trial.sim.physics_hz, delay_s=trial.sim.command_delay_s)
+
+    def _record_start(self) -> None:
+        # After a reset with the motor torques of the settled state: engines have none before the first step.
+        self._rows = [(*self._start_joints, *self.engine.state.sample[-BALL_NUMBERS:])]
+        self._forgotten = 0
 
     def _stamp_ns(self, step: int) -> int:
         return self._start_ns + step * _NS_PER_S // self._hz
@@ -347,37 +283,14 @@ class World:
     def _judge(self, target: Sequence[float]) -> EndReason | None:
         """Whether the trial ends with the sample just recorded, and why."""
         before, now = self._rows[-2:]
-        if now[BALL_HEIGHT] < self._landing_height <= before[BALL_HEIGHT] and "spoon" not in self._contacts.bodies:
+        if now[BALL_HEIGHT] < self._landing_height <= before[BALL_HEIGHT] and self._tool not in self._contacts.bodies:
             return "landed"
         stands_still = target == self._sampled_target
         self._sampled_target = target
         self._has_moved |= not stands_still
-        lies = stands_still and self._pressing and self._has_moved
+        lies = stands_still and self._touching and self._has_moved
         if not (lies and math.hypot(*now[BALL_LINEAR_VELOCITY]) < _REST_SPEED):
             self._resting_since = self._steps
         elif self._steps - self._resting_since >= _REST_S * self._hz:
             return "rest"
         return "timeout" if self._steps >= self._last_step else None
-
-    def _apply_drag(self) -> None:
-        position, _ = pybullet.getBasePositionAndOrientation(self._ball, physicsClientId=self._client)
-        velocity, _ = pybullet.getBaseVelocity(self._ball, physicsClientId=self._client)
-        factor = -self._drag * math.hypot(*velocity)
-        force = [factor * component for component in velocity]
-        pybullet.applyExternalForce(
-            self._ball, BASE, force, position, pybullet.WORLD_FRAME, physicsClientId=self._client
-        )
-
-    def _joint_states(self) -> Sequence[tuple[Any, ...]]:
-        states: Sequence[tuple[Any, ...]] = pybullet.getJointStates(
-            self._scenery.robot, self._scenery.joints, self._client
-        )
-        return states
-
-    def _read(self) -> Row:
-        client, ball = self._client, self._ball
-        return Row(
-            self._joint_states(),
-            pybullet.getBasePositionAndOrientation(ball, client),
-            pybullet.getBaseVelocity(ball, client),
-        )

@@ -5,51 +5,40 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterator, Sequence
-from functools import reduce
-from operator import getitem
+from typing import Any
 
-from throwcollect.config.controllers import ControllersConfig
+from throwcollect.config.key import Effect, key_of_field
 from throwcollect.config.schema import Config
+from throwcollect.config.section import Section
 from throwcollect.config.values import leaves
 from throwcollect.sweep.points import Points
 
 _FORMAT = "throwcollect trial 1"
 
-# What does not change the samples of a trial: names and numbers of trials, how and where they are run, how fast they
-# are shown, and how samples are packed into files. The root seed acts through the values and the seed of each trial.
-_RUN = frozenset({"run", "containers"})
-_WITHOUT_EFFECT = _RUN | {"name", "trials", "until", "sweep"}
-_WITHOUT_EFFECT_INSIDE = frozenset(
-    {"sim.real_time_factor", "record.zstd_level", "record.trials_per_shard", "controllers.names"}
-)
-
-# Keys that came later count where they differ from their defaults, so that older digests hold.
-_LATER_KEYS: dict[str, object] = {
-    "controllers": ControllersConfig().model_dump(mode="json"),
-    "until": None,
-    "sweep.target": None,
-}
-_LATER = {f"controllers.{key}": value for key, value in ControllersConfig().model_dump(mode="json").items()}
-
 
 def config_digest(config: Config) -> str:
-    """SHA-256 in hex over a configuration; its sections `run` and `containers`, and their keys, do not count."""
-    sections = config.model_dump(mode="json", exclude=set(_RUN))
-    for key, default in _LATER_KEYS.items():
-        *above, last = key.split(".")
-        holder = reduce(getitem, above, sections)
-        if holder[last] == default:
-            del holder[last]
+    """Hash a configuration, SHA-256 in hex; how and where it is run does not count.
+
+    Keys that came later count where they differ from their defaults, so that older digests hold.
+    """
+    sections = config.model_dump(mode="json", exclude=_uncounted(config))
     return hashlib.sha256(json.dumps(sections).encode()).hexdigest()
 
 
-def determines_samples(key: str) -> bool:
-    """Whether the value of a dotted configuration key may change the samples of a trial."""
-    return key.partition(".")[0] not in _WITHOUT_EFFECT and key not in _WITHOUT_EFFECT_INSIDE
+def _uncounted(section: Section) -> dict[str, Any]:
+    """Name the fields of a section, and of those in it, that do not count, as pydantic wants to have them named."""
+    uncounted: dict[str, Any] = {}
+    for name, value in section.__dict__.items():
+        key = key_of_field(type(section), name)
+        if key.effect is Effect.RUN or (key.later and value == type(section).model_fields[name].get_default()):
+            uncounted[name] = True
+        elif isinstance(value, Section) and (inside := _uncounted(value)):
+            uncounted[name] = inside
+    return uncounted
 
 
 def trial_digests(config: Config, points: Points, seeds: Sequence[int]) -> Iterator[str]:
-    """SHA-256 in hex over everything that determines the samples of each trial.
+    """Hash everything that determines the samples of each trial, SHA-256 in hex.
 
     The hashed text has one line ``key=value`` for each effective key of the trial's configuration, sorted by key, so
     it does not matter whether a value was swept or fixed.
@@ -60,10 +49,12 @@ def trial_digests(config: Config, points: Points, seeds: Sequence[int]) -> Itera
         seeds: Seeds of the trials.
     """
     lines = {
-        key: _line(key, value)
-        for key, value in sorted(leaves(config))
-        if determines_samples(key) and not (key in _LATER and value == _LATER[key])
+        leaf.name: _line(leaf.name, leaf.value)
+        for leaf in leaves(config)
+        if leaf.key.determines_samples and not (leaf.key.later and leaf.is_default)
     }
+    lines["seed"] = ""
+    lines = dict(sorted(lines.items()))
     for seed, row in zip(seeds, points.values.tolist(), strict=True):
         lines["seed"] = _line("seed", seed)
         for key, value in zip(points.keys, row, strict=True):

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
+from throwcollect.extras import lazily
 from throwcollect.reproducible_math import matmul, solve
+
+spatial = lazily("scipy.spatial")
 
 _BASES = 8
 """Landed throws near a goal from which a way to it is looked for."""
@@ -47,9 +51,9 @@ class InverseModel:
         self._success = landed.astype(np.float64)
         self._parameters = tried[landed]
         self._places = places
-        self._by_all_parameters = cKDTree(tried)
-        self._by_parameters = cKDTree(self._parameters)
-        self._by_place = cKDTree(places)
+        self._by_all_parameters = spatial.cKDTree(tried)
+        self._by_parameters = spatial.cKDTree(self._parameters)
+        self._by_place = spatial.cKDTree(places)
 
     @staticmethod
     def enough(landed: int, parameters: int) -> bool:
@@ -124,7 +128,7 @@ class InverseModel:
         return slopes, np.swapaxes(solve(damped, slopes), 1, 2)
 
 
-def _nearest(tree: cKDTree, points: NDArray[np.float64], count: int) -> NDArray[np.int64]:
+def _nearest(tree: Any, points: NDArray[np.float64], count: int) -> NDArray[np.int64]:
     """Indices of the nearest members of a tree, nearest first, shape ``(n_points, count)`` or as many as there are."""
     found: NDArray[np.int64] = tree.query(points, range(1, min(count, tree.n) + 1))[1]
     return found

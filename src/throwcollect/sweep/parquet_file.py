@@ -1,7 +1,8 @@
-"""Reads Parquet files that may be damaged, or made to do harm."""
+"""Parquet files of a dataset: written so that equal tables give equal bytes, read as what may be made to do harm."""
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,15 @@ from throwcollect.files import open_regular, unreadable
 _OPENED = "/proc/self/fd/{}"
 _MOST_ROWS = 20_000_000
 _MOST_VALUES = 2_000_000_000
+
+
+def encode_table(table: Any) -> bytes:
+    """Parquet bytes of an Arrow table; equal tables give equal bytes."""
+    import pyarrow.parquet as pq
+
+    buffer = io.BytesIO()
+    pq.write_table(table.combine_chunks(), buffer, compression="zstd", write_page_checksum=True)
+    return buffer.getvalue()
 
 
 def read_parquet(path: Path) -> Any:
@@ -25,9 +35,9 @@ def read_parquet(path: Path) -> Any:
     try:
         descriptor = open_regular(path)
     except FileNotFoundError as error:
-        raise DatasetError(f"{path}: is missing") from error
+        raise DatasetError("is missing", path=path) from error
     except PermissionError as error:
-        raise DatasetError(f"{path}: may not be read", hint="check who may read it") from error
+        raise DatasetError("may not be read", path=path, hint="check who may read it") from error
     except OSError as error:
         raise unreadable(path, error) from error
     try:
@@ -39,12 +49,12 @@ def read_parquet(path: Path) -> Any:
         ):
             rows, columns = file.metadata.num_rows, file.metadata.num_columns
             if not 0 <= rows <= _MOST_ROWS or rows * columns > _MOST_VALUES:
-                raise DatasetError(f"{path}: is damaged: announces {rows} rows of {columns} columns")
+                raise DatasetError(f"is damaged: announces {rows} rows of {columns} columns", path=path)
             table = file.read()
         table.validate(full=True)
     except (OSError, ValueError, MemoryError, pa.ArrowException) as error:
         # Whatever the bytes of a name or a text are not valid as ends as one of these, at the latest when validated.
-        raise DatasetError(f"{path}: is damaged: {_first_line(error)}") from error
+        raise DatasetError(f"is damaged: {_first_line(error)}", path=path) from error
     return table
 
 

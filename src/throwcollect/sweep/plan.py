@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import io
-import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -17,10 +15,10 @@ from throwcollect.config.values import reason_not_sweepable, with_values
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError, PlanError, Problem
 from throwcollect.files import write_file
 from throwcollect.sweep.digest import config_digest, trial_digests
-from throwcollect.sweep.parquet_file import read_parquet
+from throwcollect.sweep.parquet_file import encode_table, read_parquet
 from throwcollect.sweep.points import Points
 from throwcollect.sweep.samplers import draw_points
-from throwcollect.wording import counted
+from throwcollect.wording import blank_numbers, counted
 
 _FORMAT = "1"
 _FORMAT_KEY = b"throwcollect.plan_format"
@@ -34,8 +32,6 @@ FIRST_TRIALS = 2 * ROUND_TRIALS
 
 Check = Callable[[Config], str | None]
 """Says of the configuration of a trial why it cannot be run, or None when it can."""
-
-_NUMBER = re.compile(r"(?<![\w.])-?\d[\d.]*(?:e[-+]?\d+)?")
 
 
 @dataclass(frozen=True)
@@ -88,7 +84,6 @@ class Plan:
             DatasetError: If the file cannot be written.
         """
         import pyarrow as pa
-        import pyarrow.parquet as pq
 
         columns: list[Any] = [
             [trial.number for trial in self.trials],
@@ -99,9 +94,7 @@ class Plan:
         ]
         schema = _schema(self.keys).with_metadata({_FORMAT_KEY: _FORMAT, _CONFIG_KEY: config_digest(self.config)})
         table = pa.table([pa.array(column, kind) for column, kind in zip(columns, schema.types, strict=True)], schema)
-        buffer = io.BytesIO()
-        pq.write_table(table, buffer, compression="zstd", write_page_checksum=True)
-        write_file(path, buffer.getvalue())
+        write_file(path, encode_table(table))
 
     @classmethod
     def read(cls, path: Path, config: Config) -> Plan:
@@ -121,18 +114,19 @@ class Plan:
         found = metadata.get(_FORMAT_KEY, b"none").decode(errors="replace")
         if found != _FORMAT or not table.schema.equals(_schema(keys)) or not table.num_rows:
             raise DatasetError(
-                f"{path}: not a plan that this version reads",
+                "not a plan that this version reads",
+                path=path,
                 expected=f"plan format {_FORMAT}",
                 evidence=f"got {found}",
             )
         if metadata.get(_CONFIG_KEY, b"") != config_digest(config).encode():
-            raise ForeignPlanError(f"{path}: the plan belongs to another configuration")
+            raise ForeignPlanError("the plan belongs to another configuration", path=path)
         for key in keys:
             if reason := reason_not_sweepable(config, key):
-                raise DatasetError(f"{path}: is damaged: column {key!r}: {reason}")
+                raise DatasetError(f"is damaged: column {key!r}: {reason}", path=path)
         numbers, digests, seeds, refused, *values = (column.to_pylist() for column in table.columns)
         if numbers != list(range(len(numbers))):
-            raise DatasetError(f"{path}: the trials are not numbered from 0 without gaps")
+            raise DatasetError("the trials are not numbered from 0 without gaps", path=path)
         rows = zip(numbers, zip(*values, strict=True), seeds, digests, refused, strict=True)
         return cls(config, tuple(Trial(n, dict(zip(keys, row, strict=True)), *rest) for n, row, *rest in rows))
 
@@ -197,7 +191,7 @@ def _check_some_left(reasons: list[str], trials: int) -> None:
     if len(reasons) < trials:
         return
     # Reasons that differ only in their numbers are one; the first of them speaks for all.
-    kinds = [_NUMBER.sub("#", reason) for reason in reasons]
+    kinds = [blank_numbers(reason) for reason in reasons]
     examples = dict(zip(reversed(kinds), reversed(reasons), strict=True))
     listed = [f"{count} × {examples[kind]}" for kind, count in Counter(kinds).most_common(_MOST_REASONS)]
     raise PlanError(

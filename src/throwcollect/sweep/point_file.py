@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import io
 import math
 import re
 from collections.abc import Iterator
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 from throwcollect.config.schema import Config
 from throwcollect.config.values import reason_not_sweepable, with_values
 from throwcollect.errors import ConfigError, Problem
+from throwcollect.sweep.parquet_file import encode_table
 from throwcollect.sweep.points import Points
 
 _MOST_PROBLEMS = 20
@@ -62,12 +62,8 @@ def read_points(path: Path, config: Config) -> Points:
 def encode_points(points: Points) -> bytes:
     """Parquet bytes that `read_points` reads; equal points give equal bytes."""
     import pyarrow as pa
-    import pyarrow.parquet as pq
 
-    buffer = io.BytesIO()
-    table = pa.table({key: points.values[:, column] for column, key in enumerate(points.keys)})
-    pq.write_table(table, buffer, compression="zstd", write_page_checksum=True)
-    return buffer.getvalue()
+    return encode_table(pa.table({key: points.values[:, column] for column, key in enumerate(points.keys)}))
 
 
 def _read_csv(path: Path, config: Config) -> _Rows:

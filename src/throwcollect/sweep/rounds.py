@@ -18,7 +18,7 @@ from throwcollect.config.schema import Config
 from throwcollect.sweep.plan import FIRST_TRIALS, ROUND_TRIALS, Trial
 from throwcollect.sweep.points import Points
 from throwcollect.sweep.samplers import draw_points
-from throwcollect.tasks.outcome import Outcome, ThrowResult
+from throwcollect.tasks.throw.outcome import Outcome, ThrowResult
 
 if TYPE_CHECKING:
     from throwcollect.sweep.target import TargetSampler

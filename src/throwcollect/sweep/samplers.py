@@ -12,9 +12,13 @@ from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config, Parameter, Range, Values
 from throwcollect.errors import PlanError, Problem
+from throwcollect.extras import lazily
 from throwcollect.reproducible_math import exp, log
 from throwcollect.sweep.point_file import read_points
 from throwcollect.sweep.points import Points
+
+# Importing it takes about a second, so only those who draw with it do.
+qmc = lazily("scipy.stats.qmc")
 
 _MOST_TRIALS = 10_000_000
 _TRIALS_PER_LANDED = 10
@@ -65,16 +69,11 @@ def _uniform(count: int, dimensions: int, randomness: np.random.Generator) -> ND
 
 
 def _latin_hypercube(count: int, dimensions: int, randomness: np.random.Generator) -> NDArray[np.float64]:
-    # Importing scipy.stats takes about a second, so only those who draw with it do.
-    from scipy.stats import qmc
-
     points: NDArray[np.float64] = qmc.LatinHypercube(dimensions, seed=randomness).random(count)
     return points
 
 
 def _sobol(count: int, dimensions: int, randomness: np.random.Generator) -> NDArray[np.float64]:
-    from scipy.stats import qmc
-
     # The sequence is drawn up to a power of two, as scipy warns of other lengths; its first points stay the same.
     engine = qmc.Sobol(dimensions, scramble=True, seed=randomness)
     points: NDArray[np.float64] = engine.random_base2(math.ceil(math.log2(count)))[:count]
@@ -105,11 +104,12 @@ def places(parameter: Parameter, values: NDArray[np.float64]) -> NDArray[np.floa
         nearest = np.argmin(np.abs(np.subtract.outer(values, parameter.values)), axis=1)
         return np.asarray((nearest + 0.5) / len(parameter.values))
     low, high = parameter.min, parameter.max
-    if low == high:
-        return np.zeros(len(values))
     if parameter.scale == "log":
         values, low, high = log(values), math.log(low), math.log(high)
-    return (values - low) / (high - low)
+    # Neighbouring numbers can have the same logarithm.
+    if low == high:
+        return np.zeros(len(values))
+    return np.clip((values - low) / (high - low), 0, 1)
 
 
 def _grid(parameters: dict[str, Parameter], trials: int | None) -> Points:

@@ -13,7 +13,7 @@ from throwcollect.sweep.inverse import InverseModel
 from throwcollect.sweep.plan import ROUND_TRIALS, Trial
 from throwcollect.sweep.samplers import places, spread
 from throwcollect.sweep.target_cells import NOWHERE, Cells, Thinness
-from throwcollect.tasks.outcome import Outcome, ThrowResult
+from throwcollect.tasks.throw.outcome import Outcome, ThrowResult
 
 _RANDOMNESS = 0
 """First number of the spawn keys of rounds; those of trials have one number alone."""

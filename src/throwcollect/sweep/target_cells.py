@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from throwcollect.config.sweep import LANDING_HEIGHT, TargetConfig
 from throwcollect.sweep.plan import Trial
-from throwcollect.tasks.outcome import ThrowResult
+from throwcollect.tasks.throw.outcome import ThrowResult
 
 NOWHERE = -1
 """In the place of a cell: none."""

@@ -22,7 +22,7 @@ from itertools import accumulate
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.config.schema import DynamicMovementPrimitive
+from throwcollect.config.motion import DynamicMovementPrimitive
 from throwcollect.errors import ConfigError
 from throwcollect.reproducible_math import exp, matmul
 from throwcollect.robots.trajectory import JointTrajectory

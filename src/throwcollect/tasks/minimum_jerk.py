@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.config.schema import MinimumJerk
+from throwcollect.config.motion import MinimumJerk
 from throwcollect.reproducible_math import power
 from throwcollect.robots.trajectory import JointTrajectory
 

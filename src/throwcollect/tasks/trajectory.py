@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from throwcollect.config.schema import Config, MinimumJerk
-from throwcollect.robots.talos import JOINTS
+from throwcollect.config.motion import MinimumJerk
+from throwcollect.config.schema import Config
+from throwcollect.robots.description import robot_of
 from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.tasks.dmp import dmp_trajectory
 from throwcollect.tasks.minimum_jerk import minimum_jerk_trajectory
@@ -16,14 +17,14 @@ def throw_trajectory(config: Config) -> JointTrajectory:
         config: Configuration of one trial.
 
     Returns:
-        Points over the joints of `task.end`, in the order of `talos.JOINTS`; the first one is at time 0 and at
+        Points over the joints of `task.end`, in the order of `Robot.joints`; the first one is at time 0 and at
         `task.start`, the last one at rest and exactly at `task.end`.
 
     Raises:
         ConfigError: If the trajectory family has no usable motion for these parameters: a DMP that does not settle.
     """
     task = config.task
-    end = {joint: task.end[joint] for joint in JOINTS if joint in task.end}
+    end = {joint: task.end[joint] for joint in robot_of(config).joints if joint in task.end}
     family = task.trajectory
     if isinstance(family, MinimumJerk):
         return minimum_jerk_trajectory(

@@ -14,13 +14,12 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
+from throwcollect.config.key import Effect
 from throwcollect.config.schema import Config
-from throwcollect.config.values import is_physics, leaves, sweepable_keys
+from throwcollect.config.values import leaves, sweepable_keys
 from throwcollect.errors import DatasetError
-from throwcollect.sweep.digest import determines_samples
 
-_TASK = "task."
-_TASK_END = "task.end."
+_HEEDED = (Effect.PHYSICS, Effect.ENCODING)
 
 
 @dataclass(frozen=True)
@@ -97,9 +96,13 @@ class Settings:
     """
 
     def __init__(self, config: Config) -> None:
-        values = dict(leaves(config))
-        self._physics = [(key, key.split("."), values[key]) for key in sweepable_keys(config) if is_physics(key)]
-        lines = [f"{key}={json.dumps(value)}" for key, value in sorted(_concerning(values).items())]
+        found = list(leaves(config))
+        physics = set(sweepable_keys(config, Effect.PHYSICS))
+        self._physics = [(leaf.name, leaf.name.split("."), leaf.value) for leaf in found if leaf.name in physics]
+        heeded = {leaf.name: leaf.value for leaf in found if leaf.key.effect in _HEEDED}
+        # Which joints move decides which are simulated as rigid; where they go, the goals say.
+        heeded["task.end"] = sorted(config.task.end)
+        lines = [f"{key}={json.dumps(value)}" for key, value in sorted(heeded.items())]
         self.digest = hashlib.sha256("\n".join(lines).encode()).hexdigest()
 
     def replaced_by(self, trial: Config) -> dict[str, float]:
@@ -118,13 +121,3 @@ def _value(config: Config, path: Sequence[str]) -> Any:
     for part in path:
         holder = holder[part] if isinstance(holder, dict) else getattr(holder, part)
     return holder
-
-
-def _concerning(values: Mapping[str, object]) -> dict[str, object]:
-    """Keys that simulations heed, with their values; of the task, that is what moves and where it starts."""
-    return {
-        key: None if key.startswith(_TASK_END) else value
-        for key, value in values.items()
-        if (determines_samples(key) and key != "seed") or key == "record.zstd_level"
-        if not key.startswith(_TASK) or key.startswith(_TASK_END) or is_physics(key)
-    }

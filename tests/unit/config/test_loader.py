@@ -14,10 +14,10 @@ from throwcollect.config.schema import (
     MinimumJerk,
     Range,
     SweepConfig,
-    ThrowConfig,
     Values,
 )
 from throwcollect.errors import ConfigError, PlanError, Problem
+from throwcollect.tasks.throw.config import ThrowConfig
 
 CONFIGS = Path(__file__).parents[3] / "configs"
 KNOWN_IN_RUN = (

@@ -1,7 +1,8 @@
 import pytest
 from pydantic import ValidationError
 
-from throwcollect.config.schema import Config, Range, SweepConfig, ThrowConfig, Values
+from throwcollect.config.schema import Config, Range, SweepConfig, Values
+from throwcollect.tasks.throw.config import ThrowConfig
 
 
 def test_every_key_has_a_default_so_that_an_empty_configuration_is_one():

@@ -4,9 +4,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from throwcollect.config.loader import load, resolved_yaml
-from throwcollect.config.schema import Config, DynamicMovementPrimitive, ThrowConfig
-from throwcollect.config.values import leaves, reason_not_sweepable, sweepable_keys, with_values
+from throwcollect.config.schema import Config, DynamicMovementPrimitive
+from throwcollect.config.values import reason_not_sweepable, sweepable_keys, values_by_key, with_values
 from throwcollect.errors import ConfigError
+from throwcollect.tasks.throw.config import ThrowConfig
 
 LEARNED = Config(
     task=ThrowConfig(
@@ -75,7 +76,7 @@ def test_values_that_do_not_fit_are_named(values, message):
 
 
 def test_leaves_are_what_holds_nothing_further():
-    found = dict(leaves(LEARNED))
+    found = values_by_key(LEARNED)
     assert found["ball.mass_kg"] == 0.045
     assert found["task.trajectory.weights.arm_right_4_joint.1"] == 2.0
     assert found["robot.posture"] == {}

@@ -26,13 +26,13 @@ from throwcollect.control.parameters import Constraints
 JOINTS = ("j1", "j2", "j3")
 START = (1.1, 2.1, 3.1)
 PERIOD_NS = 10_000_000
-SHIPPED = ControllerParameters(JOINTS, state_interfaces=("position", "velocity"))
+SHIPPED = ControllerParameters(JOINTS)
 
 
 def constrained(goal: float = 0.0, goal_time: float = 0.0, trajectory: float = 0.0) -> ControllerParameters:
     limits = {joint: JointConstraints(trajectory=trajectory, goal=goal) for joint in JOINTS}
     constraints = Constraints(goal_time=goal_time, joints=limits)
-    return ControllerParameters(JOINTS, state_interfaces=("position", "velocity"), constraints=constraints)
+    return ControllerParameters(JOINTS, constraints=constraints)
 
 
 TALOS = constrained(goal=0.02, goal_time=0.6)
@@ -98,7 +98,7 @@ class Bench:
         self.plant = plant or Plant()
         self.controller = JointTrajectoryController("c", parameters, period_ns=PERIOD_NS, deviations=deviations)
         self.now_ns = seconds(now_s)
-        self.controller.activate(self.now_ns, self.plant.measured(), self.plant.position)
+        self.controller.reset(self.now_ns, self.plant.measured())
         self.k = 0
         self.commands: dict[int, np.ndarray] = {}
         self.results: list[tuple[int, GoalResult]] = []

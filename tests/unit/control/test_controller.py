@@ -17,7 +17,6 @@ from throwcollect.control import (
     JointState,
     JointTolerance,
     JointTrajectoryController,
-    SpeedScaling,
     Trajectory,
     TrajectoryGoal,
     TrajectoryPoint,
@@ -58,19 +57,13 @@ def parameter_sets(draw: st.DrawFn) -> ControllerParameters:
     }
     return ControllerParameters(
         JOINTS,
-        command_interfaces=draw(st.sampled_from([("position",), ("position",), ("position", "velocity")])),
-        state_interfaces=draw(st.sampled_from([("position",), ("position", "velocity")])),
         allow_partial_joints_goal=True,
         allow_integration_in_goal_trajectories=True,
         allow_nonzero_velocity_at_trajectory_end=True,
-        interpolation_method=draw(st.sampled_from(["splines", "splines", "none"])),
-        interpolate_from_desired_state=draw(st.booleans()),
         cmd_timeout=draw(st.sampled_from([0.0, 0.15])),
-        speed_scaling=SpeedScaling(draw(st.sampled_from([1.0, 1.0, 0.3]))),
         constraints=Constraints(
             goal_time=draw(st.sampled_from([0.0, 0.1])), decelerate_on_cancel=draw(st.booleans()), joints=limits
         ),
-        continuous_joints=draw(st.sampled_from([(), (), ("j2",)])),
     )
 
 
@@ -275,20 +268,17 @@ def test_misuse_is_told() -> None:
         JointTrajectoryController("c", SHIPPED, period_ns=0)
     controller = JointTrajectoryController("c", SHIPPED, period_ns=PERIOD_NS)
     measured = JointState(np.zeros(3), np.zeros(3))
-    with pytest.raises(ValueError, match="c: the controller is not active"):
+    with pytest.raises(ValueError, match="c: there was no update yet"):
         controller.update(0, PERIOD_NS, measured)
     with pytest.raises(ValueError, match=r"c: measured shape \(2,\); expected \(3,\)"):
-        controller.activate(0, JointState(np.zeros(3), np.zeros(2)))
+        controller.reset(0, JointState(np.zeros(2)))
+    braking = dataclasses.replace(SHIPPED, constraints=Constraints(decelerate_on_cancel=True))
+    controller = JointTrajectoryController("c", braking, period_ns=PERIOD_NS)
     with pytest.raises(ValueError, match=r"c: measured shape \(\); expected \(3,\)"):
-        controller.activate(0, JointState(np.zeros(3)))
-    assert not controller.active
-    controller.activate(0, measured)
+        controller.reset(0, JointState(np.zeros(3)))
+    controller.reset(0, measured)
     with pytest.raises(ValueError, match="c: there was no update yet"):
         controller.state()
-    with pytest.raises(ValueError, match="c: cannot be activated, it is active"):
-        controller.activate(0, measured)
-    with pytest.raises(ValueError, match="c: parameter interpolation_method is read-only"):
-        controller.parameters = dataclasses.replace(SHIPPED, interpolation_method="none")
 
 
 def test_refusals_and_stops_are_logged(caplog: pytest.LogCaptureFixture) -> None:

@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from throwcollect.control.goal import Trajectory, TrajectoryPoint
-from throwcollect.control.interpolation import Curve, interpolated
-from throwcollect.control.waypoints import StartState, Waypoints, arranged
+from throwcollect.control.interpolation import Curve, interpolate
+from throwcollect.control.waypoints import StartState, Waypoints, arrange
 
 from .bench import seconds
 
@@ -31,9 +31,9 @@ def trajectories(draw: st.DrawFn) -> Trajectory:
     return Trajectory(JOINTS, points)
 
 
-def curve_of(trajectory: Trajectory, start=(0.5, -0.5), velocity=(0.2, -0.2), *, splines=True) -> Curve:
+def curve_of(trajectory: Trajectory, start=(0.5, -0.5), velocity=(0.2, -0.2)) -> Curve:
     state = StartState(0, np.array(start), np.array(velocity))
-    return interpolated(arranged(trajectory, JOINTS, np.zeros(2), state), state, splines=splines)
+    return interpolate(arrange(trajectory, JOINTS, np.zeros(2), state), state)
 
 
 @settings(max_examples=200, deadline=None)
@@ -65,8 +65,8 @@ def test_segments_meet_the_conditions_of_both_ends(trajectory: Trajectory) -> No
 
 
 @settings(max_examples=50, deadline=None)
-@given(trajectory=trajectories(), splines=st.booleans())
-def test_joints_do_not_depend_on_their_order(trajectory: Trajectory, splines: bool) -> None:
+@given(trajectory=trajectories())
+def test_joints_do_not_depend_on_their_order(trajectory: Trajectory) -> None:
     mirrored = Trajectory(
         ("b", "a"),
         [
@@ -75,14 +75,14 @@ def test_joints_do_not_depend_on_their_order(trajectory: Trajectory, splines: bo
         ],
     )
     times_ns = np.linspace(0, trajectory.points[-1].time_from_start_ns * 1.1, 50).astype(np.int64)
-    one, other = curve_of(trajectory, splines=splines), curve_of(mirrored, splines=splines)
+    one, other = curve_of(trajectory), curve_of(mirrored)
     assert np.array_equal(one.positions(times_ns), other.positions(times_ns))
 
 
 @settings(max_examples=50, deadline=None)
-@given(trajectory=trajectories(), splines=st.booleans())
-def test_many_times_at_once_equal_single_times(trajectory: Trajectory, splines: bool) -> None:
-    curve = curve_of(trajectory, splines=splines)
+@given(trajectory=trajectories())
+def test_many_times_at_once_equal_single_times(trajectory: Trajectory) -> None:
+    curve = curve_of(trajectory)
     times_ns = np.linspace(0, trajectory.points[-1].time_from_start_ns * 1.1, 50).astype(np.int64)
     singly = [curve.state(int(time_ns))[0] for time_ns in times_ns]
     assert np.array_equal(curve.positions(times_ns), singly)
@@ -124,19 +124,19 @@ def test_accelerations_without_velocities_make_no_curve() -> None:
 def test_points_that_are_over_are_not_blended() -> None:
     state = StartState(seconds(0.5), np.array((9.0, 9.0)))
     trajectory = Trajectory(JOINTS, [TrajectoryPoint(0, (1, 1)), TrajectoryPoint(seconds(1), (2, 2))])
-    curve = interpolated(arranged(trajectory, JOINTS, np.zeros(2), state), state, splines=True)
+    curve = interpolate(arrange(trajectory, JOINTS, np.zeros(2), state), state)
     assert curve.positions(np.array([seconds(0.5), seconds(0.75)]))[:, 0] == pytest.approx([1.5, 1.75])
 
 
 def test_a_single_point_is_held_from_the_start() -> None:
-    curve = interpolated(Waypoints.single(np.array((1.0, 2.0))), StartState(0, np.array((9.0, 9.0))), splines=True)
+    curve = interpolate(Waypoints.single(np.array((1.0, 2.0))), StartState(0, np.array((9.0, 9.0))))
     assert curve.end_ns == 0
     assert curve.positions(np.array([0, 10**18])).tolist() == [[1, 2], [1, 2]]
 
 
 def test_joints_that_are_left_out_keep_their_command() -> None:
     trajectory = Trajectory(("b",), [TrajectoryPoint(1, (5,), (6,), (7,)), TrajectoryPoint(2, (8,))])
-    waypoints = arranged(trajectory, JOINTS, np.array((0.25, 9.0)), StartState(0, np.array((0.25, 9.0))))
+    waypoints = arrange(trajectory, JOINTS, np.array((0.25, 9.0)), StartState(0, np.array((0.25, 9.0))))
     assert waypoints.positions.tolist() == [[0.25, 5], [0.25, 8]]
     assert waypoints.velocities.tolist() == [[0, 6], [0, 0]]
     assert waypoints.accelerations.tolist() == [[0, 7], [0, 0]]

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from throwcollect.control.goal import Trajectory, TrajectoryPoint
-from throwcollect.control.interpolation import interpolated
+from throwcollect.control.interpolation import interpolate
 from throwcollect.control.motion import Motion
-from throwcollect.control.waypoints import StartState, arranged
+from throwcollect.control.waypoints import StartState, arrange
 
 PERIOD_NS = 10
 
@@ -17,7 +17,7 @@ def motion(end_ns: int = 100, first_ns: int = 1000) -> Motion:
     """One joint that goes from 0 at one radian per nanosecond."""
     trajectory = Trajectory(("j",), [TrajectoryPoint(end_ns, (end_ns,))])
     start = StartState(first_ns - 1000, np.zeros(1))
-    curve = interpolated(arranged(trajectory, ("j",), np.zeros(1), start), start, splines=True)
+    curve = interpolate(arrange(trajectory, ("j",), np.zeros(1), start), start)
     return Motion(curve, start_ns=1000, first_ns=first_ns, period_ns=PERIOD_NS)
 
 

@@ -9,26 +9,19 @@ import pytest
 
 from throwcollect.control.goal import JointTolerance, Trajectory, TrajectoryGoal
 from throwcollect.control.parameters import Constraints, JointConstraints
-from throwcollect.control.tolerances import Limits, Tolerances, default_tolerances, goal_tolerances, violations
+from throwcollect.control.tolerances import default_tolerances, goal_tolerances, violations
 
 from .bench import JOINTS, seconds
 
 LIMITS = JointConstraints(trajectory=0.1, goal=0.1)
 CONSTRAINTS = Constraints(goal_time=0.1, stopped_velocity_tolerance=0.1, joints=dict.fromkeys(JOINTS, LIMITS))
 LOGGER = logging.getLogger("c")
-STILL = np.zeros(3)
-
-
-def tolerances(path=(), goal=(), late_ns: int = 0, *, velocities: bool = False) -> Tolerances:
-    asked = TrajectoryGoal(Trajectory((), ()), path, goal, late_ns)
-    defaults = default_tolerances(CONSTRAINTS, JOINTS, velocities=velocities)
-    return goal_tolerances(asked, defaults, JOINTS, velocities=velocities, logger=LOGGER)
 
 
 def resolved(path=(), goal=(), late_ns: int = 0) -> tuple[list[float], list[float], int]:
-    found = tolerances(path, goal, late_ns)
-    assert not np.any((found.path.velocity, found.goal.velocity))
-    return found.path.position.tolist(), found.goal.position.tolist(), found.goal_time_ns
+    asked = TrajectoryGoal(Trajectory((), ()), path, goal, late_ns)
+    found = goal_tolerances(asked, default_tolerances(CONSTRAINTS, JOINTS), JOINTS, logger=LOGGER)
+    return found.path.tolist(), found.goal.tolist(), found.goal_time_ns
 
 
 UNCHANGED = ([0.1, 0.1, 0.1], [0.1, 0.1, 0.1], seconds(0.1))
@@ -69,39 +62,25 @@ def test_one_illegal_number_or_joint_brings_all_defaults_back(path, goal, late_n
 
 
 def test_joints_without_constraints_are_not_checked() -> None:
-    found = default_tolerances(Constraints(joints={"j2": JointConstraints(goal=0.5)}), JOINTS, velocities=False)
-    assert (found.path.checked, found.goal.checked) == (False, True)
-    assert found.goal.position.tolist() == [0, 0.5, 0]
-
-
-def test_velocity_tolerances_count_where_there_is_a_velocity_error() -> None:
-    found = tolerances([JointTolerance("j1", 0, 0.3)], [JointTolerance("j2", 0, 0.7), JointTolerance("j3", 0, -1)])
-    assert (found.path.velocity.tolist(), found.goal.velocity.tolist()) == ([0, 0, 0], [0, 0, 0])
-    found = tolerances(
-        [JointTolerance("j1", 0, 0.3)], [JointTolerance("j2", 0, 0.7), JointTolerance("j3", 0, -1)], velocities=True
-    )
-    assert (found.path.velocity.tolist(), found.goal.velocity.tolist()) == ([0.3, 0, 0], [0.1, 0.7, 0])
+    found = default_tolerances(Constraints(joints={"j2": JointConstraints(goal=0.5)}), JOINTS)
+    assert (found.path.tolist(), found.goal.tolist()) == ([0, 0, 0], [0, 0.5, 0])
 
 
 def test_an_error_equal_to_the_tolerance_is_within_it() -> None:
     error = np.array((0.5, -0.5000001, 7.0))
-    assert violations(error, None, Limits(np.array((0.5, 0.5, 0.0)), STILL), JOINTS) == (
+    assert violations(error, np.array((0.5, 0.5, 0.0)), JOINTS) == (
         "joint j2 has position error -0.5000001 rad, tolerance 0.5 rad"
     )
-    assert violations(error, STILL, Limits(np.full(3, 8.0), np.ones(3)), JOINTS) == ""
+    assert violations(error, np.full(3, 8.0), JOINTS) == ""
 
 
 def test_tiny_tolerances_can_be_read() -> None:
-    limits = Limits(np.array((1e-9, 0.0, 0.0)), STILL)
-    text = violations(np.array((2.5e-7, 0.0, 0.0)), None, limits, JOINTS)
+    text = violations(np.array((2.5e-7, 0.0, 0.0)), np.array((1e-9, 0.0, 0.0)), JOINTS)
     assert text == "joint j1 has position error 2.5e-07 rad, tolerance 1e-09 rad"
 
 
 def test_all_joints_outside_are_named() -> None:
-    limits = Limits(np.full(3, 0.25), np.array((0.0, 0.125, 0.0)))
-    text = violations(np.array((1.0, 0.0, -2.0)), np.ones(3), limits, JOINTS)
+    text = violations(np.array((1.0, 0.0, -2.0)), np.full(3, 0.25), JOINTS)
     assert text == (
-        "joint j1 has position error 1 rad, tolerance 0.25 rad; "
-        "joint j3 has position error -2 rad, tolerance 0.25 rad; "
-        "joint j2 has velocity error 1 rad/s, tolerance 0.125 rad/s"
+        "joint j1 has position error 1 rad, tolerance 0.25 rad; joint j3 has position error -2 rad, tolerance 0.25 rad"
     )

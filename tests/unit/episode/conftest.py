@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from throwcollect.episode.record import Contact, ControllerSamples, EpisodeHeader, GoalOutcome, Samples
-from throwcollect.robots.talos import CONTROLLERS, JOINTS
+from throwcollect.robots.talos import TALOS
 
 MakeSamples = Callable[..., Samples]
 
@@ -17,7 +17,7 @@ def random_samples(count: int = 50, *, seed: int = 0, start_ns: int = 10**10) ->
     random = np.random.default_rng(seed)
     quaternion = random.normal(size=(count, 4))
     quaternion /= np.linalg.norm(quaternion, axis=1)[:, np.newaxis]
-    joints = [random.normal(size=(count, len(JOINTS))) for _ in range(3)]
+    joints = [random.normal(size=(count, len(TALOS.joints))) for _ in range(3)]
     position, linear, angular = (random.normal(size=(count, 3)) for _ in range(3))
     stamps = start_ns + 4_000_000 * np.arange(count, dtype=np.int64)
     return Samples(stamps, *joints, position, quaternion, linear, angular)
@@ -25,7 +25,7 @@ def random_samples(count: int = 50, *, seed: int = 0, start_ns: int = 10**10) ->
 
 def random_set_points(controller: str, count: int, *, seed: int = 1) -> ControllerSamples:
     random = np.random.default_rng(seed)
-    shape = (count, len(CONTROLLERS[controller]))
+    shape = (count, len(TALOS.controllers[controller]))
     elapsed = 4_000_000 * np.arange(count, dtype=np.int64)
     return ControllerSamples(elapsed, *(random.normal(size=shape) for _ in range(4)))
 

@@ -5,10 +5,10 @@ from typing import Any
 import pytest
 from ruamel.yaml import YAML
 
+from rclzenoh.interfaces import deserialize, get_message
 from throwcollect.config.schema import Config
 from throwcollect.episode.channels import Channels, Qos
 from throwcollect.errors import ConfigError
-from throwcollect.interfaces import deserialize, get_message
 from throwcollect.robots.description import full_description
 
 URDF = full_description(Config())

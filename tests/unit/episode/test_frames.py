@@ -8,7 +8,7 @@ from throwcollect.config.schema import Config
 from throwcollect.episode.frames import read_frames
 from throwcollect.errors import ConfigError
 from throwcollect.robots.description import full_description
-from throwcollect.robots.talos import JOINTS
+from throwcollect.robots.talos import TALOS
 
 URDF = full_description(Config())
 
@@ -20,10 +20,10 @@ def transform(translation: tuple[float, float, float], quaternion: np.ndarray) -
 
 def test_every_frame_of_talos_is_where_pinocchio_puts_it() -> None:
     tree = read_frames(URDF, base_height=0.0)
-    assert {frame.joint for frame in tree.moving} == set(JOINTS)
+    assert {frame.joint for frame in tree.moving} == set(TALOS.joints)
     model = pinocchio.buildModelFromXML(URDF)
     data = model.createData()
-    angles = dict(zip(JOINTS, np.random.default_rng(0).uniform(-1, 1, len(JOINTS)), strict=True))
+    angles = dict(zip(TALOS.joints, np.random.default_rng(0).uniform(-1, 1, len(TALOS.joints)), strict=True))
     configuration = pinocchio.neutral(model)
     for joint, angle in angles.items():
         configuration[model.idx_qs[model.getJointId(joint)]] = angle

@@ -9,11 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
+from rclzenoh.interfaces import get_message, message_definition
 from throwcollect.episode.layout import MessageLayout
 from throwcollect.episode.record import ControllerSamples, Samples
 from throwcollect.episode.topics import Recording, Topic, ball_odometry, controller_state, joint_states, transforms
-from throwcollect.interfaces import get_message, message_definition
-from throwcollect.robots.talos import CONTROLLERS, JOINTS
+from throwcollect.robots.talos import TALOS
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 STATE = "control_msgs/msg/JointTrajectoryControllerState"
@@ -58,7 +58,7 @@ def test_joint_states_are_the_bytes_that_rosbags_writes(count: int) -> None:
         assert message == by_rosbags(
             topic.type_name,
             header=stamped(int(stamps[row]), ""),
-            name=list(JOINTS),
+            name=list(TALOS.joints),
             position=columns[0][row],
             velocity=columns[1][row],
             effort=columns[2][row],
@@ -84,13 +84,13 @@ def test_odometry_is_the_bytes_that_rosbags_writes(sec: int, nanosec: int, numbe
     )
 
 
-@pytest.mark.parametrize("controller", CONTROLLERS)
+@pytest.mark.parametrize("controller", TALOS.controllers)
 def test_controller_states_can_be_read_by_rosbags(controller: str, make_samples: Any, make_set_points: Any) -> None:
     topic, samples, targets = controller_state(controller), make_samples(3), make_set_points(controller, 3)
-    columns = [JOINTS.index(joint) for joint in CONTROLLERS[controller]]
+    columns = [TALOS.joints.index(joint) for joint in TALOS.controllers[controller]]
     for row, message in enumerate(messages_of(topic, samples, {controller: targets})):
         state: Any = STORE.deserialize_cdr(message, STATE)
-        assert state.joint_names == list(CONTROLLERS[controller])
+        assert state.joint_names == list(TALOS.controllers[controller])
         assert state.reference.accelerations.tolist() == targets.acceleration[row].tolist()
         assert state.feedback.positions.tolist() == samples.position[row, columns].tolist()
         assert state.error.velocities.tolist() == (targets.velocity - samples.velocity[:, columns])[row].tolist()

@@ -8,13 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rclzenoh.interfaces import deserialize, get_message
 from throwcollect.config.schema import Config
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.chunk import ChunkEncoder
 from throwcollect.episode.message import Episode, header_from_json, header_to_json, make_episode, pack, unpack
 from throwcollect.episode.record import EpisodeHeader
 from throwcollect.errors import DatasetError
-from throwcollect.interfaces import deserialize, get_message
 from throwcollect.robots.description import full_description
 from throwcollect.run_key import Signer
 
@@ -35,7 +35,8 @@ def sent(encoder: ChunkEncoder, header: EpisodeHeader, make_samples: Any) -> Epi
 def test_an_episode_arrives_as_it_was_sent(sent: Episode, make_samples: Any) -> None:
     episode, conditions = unpack(pack(sent, CONDITIONS, SIGNER), SIGNER)
     assert conditions == CONDITIONS
-    assert vars(episode) == {"header": sent.header, "chunk": sent.chunk, "said_sha256": None}
+    assert (episode.header, episode.chunk, episode.sensors) == (sent.header, sent.chunk, ())
+    assert episode.state.said_sha256 is None
     assert episode.digest == sent.digest
     assert episode.samples().ball_position.tolist() == make_samples(50).ball_position.tolist()
 
@@ -63,9 +64,9 @@ def test_the_digest_covers_header_and_messages_but_not_their_packing(
     assert packed_more.chunk.data != sent.chunk.data
     assert packed_more.digest == sent.digest
     others = [
-        Episode(replace(header, end_reason="rest"), sent.chunk, sent.records_sha256),
-        Episode(replace(header, contacts=header.contacts[:1]), sent.chunk, sent.records_sha256),
-        Episode(replace(header, goals=()), sent.chunk, sent.records_sha256),
+        Episode(replace(header, end_reason="rest"), sent.chunk, sent.state.records_sha256),
+        Episode(replace(header, contacts=header.contacts[:1]), sent.chunk, sent.state.records_sha256),
+        Episode(replace(header, goals=()), sent.chunk, sent.state.records_sha256),
         Episode(header, encoder.encode(make_samples(50, seed=1))),
     ]
     assert len({sent.digest, *(other.digest for other in others)}) == 5
@@ -77,10 +78,10 @@ def test_a_hash_that_is_not_that_of_the_records_is_found(sent: Episode) -> None:
         Episode(sent.header, sent.chunk, "0" * 64).check_records()
 
 
-@pytest.mark.parametrize("sha256", [b"", b"0" * 63, b"0" * 65, b"G" * 64, b"\xff" * 64, b"A" * 64])
-def test_what_is_no_hash_is_refused(sent: Episode, sha256: bytes) -> None:
+@pytest.mark.parametrize("sha256", ["", "0" * 63, "0" * 65, "G" * 64, "\xff" * 64, "A" * 64])
+def test_what_is_no_hash_is_refused(sent: Episode, sha256: str) -> None:
     with pytest.raises(DatasetError, match="64 hexadecimal digits"):
-        make_episode(sent.header_json, sha256, sent.chunk)
+        make_episode(sent.header_json, [sha256], [sent.chunk])
 
 
 def test_the_header_is_one_text(header: EpisodeHeader) -> None:
@@ -113,7 +114,7 @@ def test_a_wrong_header_is_refused(header: EpisodeHeader, old: str, new: str) ->
 
 
 def test_more_samples_than_there_are_is_an_error(sent: Episode) -> None:
-    claim = Episode(replace(sent.header, samples=51), sent.chunk, sent.records_sha256)
+    claim = Episode(replace(sent.header, samples=51), sent.chunk, sent.state.records_sha256)
     with pytest.raises(DatasetError, match="are not the records of 51 samples"):
         unpack(pack(claim, "", SIGNER), SIGNER).episode.samples()
 

@@ -10,7 +10,7 @@ from throwcollect.episode.record import Contact, ControllerSamples
 from throwcollect.episode.restamp import Restamper
 from throwcollect.errors import DatasetError
 from throwcollect.robots.description import full_description
-from throwcollect.robots.talos import CONTROLLERS
+from throwcollect.robots.talos import TALOS
 
 EVERYTHING = ["joint_states", "ball/odometry", "controller_state", "tf", "clock"]
 
@@ -25,7 +25,9 @@ def recorded(collection: Collection, *, as_trial: int) -> Episode:
     )
     elapsed = samples.stamps_ns - header.start_ns
     targets = {
-        name: ControllerSamples(elapsed, *(np.full((len(samples), len(CONTROLLERS[name])), 0.5) for _ in range(4)))
+        name: ControllerSamples(
+            elapsed, *(np.full((len(samples), len(TALOS.controllers[name])), 0.5) for _ in range(4))
+        )
         for name in ("arm_right_controller", "torso_controller")
     }
     header = replace(header, trial=as_trial, start_ns=header.start_ns + by_ns, contacts=contacts)
@@ -48,7 +50,7 @@ def test_an_episode_under_another_number_is_what_would_have_been_recorded_there(
     number: int, collection: Collection, restamper: Restamper
 ) -> None:
     moved, expected = (
-        restamper.restamped(recorded(collection, as_trial=4), number),
+        restamper.restamp(recorded(collection, as_trial=4), number),
         recorded(collection, as_trial=number),
     )
     assert moved.header == expected.header
@@ -60,8 +62,8 @@ def test_an_episode_under_another_number_is_what_would_have_been_recorded_there(
 
 def test_the_episode_itself_stays_as_it_is(collection: Collection, restamper: Restamper) -> None:
     episode, untouched = recorded(collection, as_trial=4), recorded(collection, as_trial=4)
-    restamper.restamped(episode, 0)
-    assert episode.contents == untouched.contents
+    restamper.restamp(episode, 0)
+    assert episode.state.contents == untouched.state.contents
     assert episode.header == untouched.header
 
 
@@ -71,9 +73,9 @@ def test_an_episode_whose_records_are_not_what_was_hashed_is_refused(
     episode = recorded(collection, as_trial=4)
     forged = Episode(episode.header, episode.chunk, "0" * 64)
     with pytest.raises(DatasetError, match="SHA-256 of its records"):
-        restamper.restamped(forged, 0)
+        restamper.restamp(forged, 0)
 
 
 def test_an_episode_of_other_topics_is_refused(restamper: Restamper) -> None:
     with pytest.raises(DatasetError, match="has the channels"):
-        restamper.restamped(Collection().episode(4), 0)
+        restamper.restamp(Collection().episode(4), 0)

@@ -1,4 +1,5 @@
 import xml.etree.ElementTree as ElementTree
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +10,9 @@ from throwcollect.config.schema import Config, RobotConfig
 from throwcollect.errors import ConfigError
 from throwcollect.robots import description
 from throwcollect.robots.description import full_description, locked_joints, physics_description, start_posture
-from throwcollect.robots.model import half_sitting, share_directory
-from throwcollect.robots.talos import JOINTS
+from throwcollect.robots.talos import TALOS
+
+JOINTS = TALOS.joints
 
 CONFIG = Config()
 MOVED = tuple(CONFIG.task.end)
@@ -32,7 +34,7 @@ def collision_shapes(urdf, posture):
     """Mesh names or primitive types with their places in the world, for a posture."""
     model = pinocchio.buildModelFromXML(urdf)
     geometry = pinocchio.buildGeomFromUrdfString(
-        model, urdf, pinocchio.GeometryType.COLLISION, package_dirs=[str(share_directory())]
+        model, urdf, pinocchio.GeometryType.COLLISION, package_dirs=[str(TALOS.share())]
     )
     data, places = model.createData(), geometry.createData()
     pinocchio.updateGeometryPlacements(model, data, geometry, places, configuration(model, posture))
@@ -81,7 +83,7 @@ def test_the_task_decides_a_joints_start_before_the_posture_and_half_sitting():
     posture = start_posture(with_robot(posture={"arm_right_4_joint": -1.0, "head_1_joint": 0.3}))
     assert posture["arm_right_4_joint"] == CONFIG.task.start["arm_right_4_joint"]
     assert posture["head_1_joint"] == 0.3
-    assert posture["leg_left_4_joint"] == half_sitting()["leg_left_4_joint"] != 0
+    assert posture["leg_left_4_joint"] == TALOS.rest_posture["leg_left_4_joint"] != 0
     assert tuple(posture) == JOINTS
 
 
@@ -89,7 +91,8 @@ def test_the_task_decides_a_joints_start_before_the_posture_and_half_sitting():
 def test_files_that_cannot_be_used_are_named(text, tmp_path, monkeypatch):
     path = tmp_path / "broken.urdf"
     path.write_text(text, encoding="utf-8")
-    monkeypatch.setattr(description, "urdf_path", lambda: path)
+    broken = replace(TALOS, share=lambda: tmp_path, urdf=path.name, srdf=str(TALOS.srdf_path))
+    monkeypatch.setattr(description, "load_member", lambda *_: broken)
     with pytest.raises(ConfigError, match=r"broken\.urdf: "):
         physics_description(CONFIG)
 

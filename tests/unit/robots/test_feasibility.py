@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 import re
-from importlib.metadata import PathDistribution
+from dataclasses import replace
 
 import numpy as np
 import pinocchio
@@ -9,16 +9,15 @@ import pytest
 
 from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError
-from throwcollect.robots import model
-from throwcollect.robots.clearance import MARGIN_M, Clearance, spoon_mount
+from throwcollect.robots.clearance import MARGIN_M, Clearance
 from throwcollect.robots.feasibility import Feasibility
-from throwcollect.robots.model import half_sitting, joint_limits, share_directory, urdf_path
+from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.quintic_curve import sample_quintic
-from throwcollect.robots.spoon import ball_seat
-from throwcollect.robots.talos import JOINTS
+from throwcollect.robots.talos import TALOS
 from throwcollect.tasks.trajectory import throw_trajectory
+from throwcollect.tools.tool import tool_of
 
-TALOS = "example-robot-data/robots/talos_data"
+JOINTS = TALOS.joints
 TASK = Config().task
 
 
@@ -52,12 +51,12 @@ def shares(feasibility, config):
     times = np.linspace(0, config.task.duration_s, 501)
     trajectory = throw_trajectory(config)
     columns = [JOINTS.index(joint) for joint in trajectory.joints]
-    posture = np.array([{**half_sitting(), **config.robot.posture, **config.task.start}[joint] for joint in JOINTS])
+    posture = np.array([{**TALOS.rest_posture, **config.robot.posture, **config.task.start}[joint] for joint in JOINTS])
     motion = tuple(np.tile(rest, (501, 1)) for rest in (posture, 0 * posture, 0 * posture))
     for array, sampled in zip(motion, sample_quintic(trajectory, times), strict=True):
         array[:, columns] = sampled
-    efforts = np.abs(feasibility.efforts(config, motion)) / joint_limits().effort
-    return efforts[:, columns].max(), (np.abs(motion[1]) / joint_limits().velocity).max()
+    efforts = np.abs(feasibility.efforts(config, motion)) / joint_limits(TALOS).effort
+    return efforts[:, columns].max(), (np.abs(motion[1]) / joint_limits(TALOS).velocity).max()
 
 
 def test_default_throw_needs_the_effort_and_speed_that_the_physics_showed(feasibility, reason):
@@ -92,7 +91,7 @@ def test_held_posture_beyond_its_limit_is_refused(reason):
 
 
 def test_joint_may_start_at_the_very_end_of_its_range(reason):
-    limit = float(joint_limits().upper[JOINTS.index("arm_right_7_joint")])
+    limit = float(joint_limits(TALOS).upper[JOINTS.index("arm_right_7_joint")])
     assert reason(throw({"arm_right_7_joint": limit}, duration_s=1.2)) is None
 
 
@@ -128,11 +127,11 @@ def test_effort_of_held_joints_is_limited_only_where_they_are_simulated(reason):
 def test_static_torque_is_the_weight_times_its_lever(feasibility):
     """Lifting one more kilogram in the cup by a joint's small turn takes the work that the torque gives."""
     heavy = Config(ball={"mass_kg": 1.045})
-    posture = np.array([{**half_sitting(), **TASK.start}[joint] for joint in JOINTS])[None]
+    posture = np.array([{**TALOS.rest_posture, **TASK.start}[joint] for joint in JOINTS])[None]
     still = np.zeros_like(posture)
     extra = [feasibility.efforts(config, (posture, still, still))[0] for config in (heavy, Config())]
     column = JOINTS.index("arm_right_4_joint")
-    model = pinocchio.buildModelFromUrdf(str(urdf_path()))
+    model = pinocchio.buildModelFromUrdf(str(TALOS.urdf_path))
     data = model.createData()
 
     def height(turn):
@@ -142,21 +141,22 @@ def test_static_torque_is_the_weight_times_its_lever(feasibility):
         q[model.idx_qs[model.getJointId("arm_right_4_joint")]] += turn
         pinocchio.framesForwardKinematics(model, data, q)
         gripper = data.oMf[model.getFrameId("gripper_right_base_link")]
-        return gripper.act(spoon_mount(heavy.tool)).act(np.array(ball_seat(heavy.tool, heavy.ball.radius_m)))[2]
+        tool = tool_of(heavy.tool)
+        return gripper.act(tool.mount).act(np.array(tool.ball_seat(heavy.ball.radius_m)))[2]
 
     lever = (height(1e-5) - height(-1e-5)) / 2e-5
     assert (extra[0] - extra[1])[column] == pytest.approx(9.81 * lever, abs=1e-6)
 
 
 def test_damping_and_inertia_show_in_the_torque(feasibility):
-    posture = np.array([{**half_sitting(), **TASK.start}[joint] for joint in JOINTS])[None]
+    posture = np.array([{**TALOS.rest_posture, **TASK.start}[joint] for joint in JOINTS])[None]
     still, turning = np.zeros_like(posture), np.zeros_like(posture)
     column = JOINTS.index("torso_1_joint")
     turning[0, column] = 2.0
     rest = feasibility.efforts(Config(), (posture, still, still))[0, column]
     # Turning steadily about the vertical torso axis takes friction alone.
     steady = feasibility.efforts(Config(), (posture, turning, still))[0, column]
-    assert steady - rest == pytest.approx(2.0 * joint_limits().damping[column], abs=1e-9)
+    assert steady - rest == pytest.approx(2.0 * joint_limits(TALOS).damping[column], abs=1e-9)
     faster = feasibility.efforts(Config(), (posture, still, turning))[0, column]
     assert faster - rest > 1.0
 
@@ -171,7 +171,7 @@ def test_arm_against_the_head_is_refused(reason):
 
 
 def test_spoon_against_the_leg_is_refused_until_it_is_short_enough(reason):
-    start = {joint: angle for joint, angle in half_sitting().items() if joint.startswith("arm_right_")}
+    start = {joint: angle for joint, angle in TALOS.rest_posture.items() if joint.startswith("arm_right_")}
     task = {"start": start, "end": {**start, "arm_right_1_joint": 0.7, "arm_right_6_joint": 1.0}, "duration_s": 6.0}
     refusal = reason(Config(task=task))
     assert refusal.startswith("leg_left_3_link and spoon overlap at 5.")
@@ -225,11 +225,11 @@ def test_unsettled_choice_of_joints_is_an_error(feasibility):
 
 def test_broad_phase_finds_what_all_distances_find():
     """Every pair's distance, one by one, is the reference for the pruned check."""
-    model = pinocchio.buildModelFromUrdf(str(urdf_path()))
-    clearance = Clearance(model, Config().tool)
+    model = pinocchio.buildModelFromUrdf(str(TALOS.urdf_path))
+    clearance = Clearance(TALOS, model, tool_of(Config().tool))
     geometry = clearance.geometry
     data, shapes = model.createData(), geometry.createData()
-    draw, limits = np.random.default_rng(1), joint_limits()
+    draw, limits = np.random.default_rng(1), joint_limits(TALOS)
     found = 0
     for _ in range(120):
         configuration = pinocchio.neutral(model)
@@ -249,47 +249,43 @@ def test_broad_phase_finds_what_all_distances_find():
 
 @pytest.fixture
 def talos(tmp_path, monkeypatch):
-    """Talos' directory with copies of its descriptions, and its own meshes."""
-    real = share_directory() / TALOS
-    fake = tmp_path / "cmeel.prefix" / "share" / TALOS
-    for part in ("robots/talos_reduced.urdf", "srdf/talos.srdf"):
-        (fake / part).parent.mkdir(parents=True)
-        (fake / part).write_text((real / part).read_text())
-    (fake / "meshes").symlink_to(real / "meshes")
-    monkeypatch.setattr(model, "distribution", lambda _: PathDistribution(tmp_path / "example_robot_data.dist-info"))
-    joint_limits.cache_clear()
-    half_sitting.cache_clear()
-    yield fake
-    joint_limits.cache_clear()
-    half_sitting.cache_clear()
+    """Talos with copies of its descriptions, and its own meshes."""
+    for part in (TALOS.urdf, TALOS.srdf):
+        (tmp_path / part).parent.mkdir(parents=True)
+        (tmp_path / part).write_text((TALOS.share() / part).read_text())
+    meshes = TALOS.urdf.replace("robots/talos_reduced.urdf", "meshes")
+    (tmp_path / meshes).symlink_to(TALOS.share() / meshes)
+    copied = replace(TALOS, share=lambda: tmp_path)
+    monkeypatch.setattr("throwcollect.robots.description.load_member", lambda *_: copied)
+    return copied
 
 
 @pytest.mark.parametrize(
     ("file", "text", "instead", "message"),
     [
         (
-            "talos_reduced.urdf",
+            "urdf",
             'joint name="arm_left_3_joint"',
             'joint name="elbow"',
             "joint arm_left_3_joint is missing",
         ),
         (
-            "talos_reduced.urdf",
+            "urdf",
             'joint name="arm_left_3_joint" type="revolute"',
             'joint name="arm_left_3_joint" type="fixed"',
             "has other movable joints than Talos: arm_left_3_joint",
         ),
-        ("talos_reduced.urdf", "gripper_right_base_link", "hand", "link gripper_right_base_link is missing"),
-        ("talos_reduced.urdf", 'parent link="base_link"', "parent", "cannot be read as robot description"),
-        ("talos_reduced.urdf", "talos_data/meshes/torso/base_link", "x", "its meshes cannot be read"),
-        ("talos.srdf", "</robot>", "", "cannot be read as robot description"),
-        ("talos.srdf", 'name="half_sitting"', 'name="sitting"', "no group_state half_sitting"),
-        ("talos.srdf", 'value="-0.0002"', 'value="?"', "group_state half_sitting is not readable: .*'\\?'"),
-        ("talos.srdf", None, None, "cannot be read as robot description"),
+        ("urdf", "gripper_right_base_link", "hand", "link gripper_right_base_link is missing"),
+        ("urdf", 'parent link="base_link"', "parent", "cannot be read as robot description"),
+        ("urdf", "talos_data/meshes/torso/base_link", "x", "its meshes cannot be read"),
+        ("srdf", "</robot>", "", "cannot be read as robot description"),
+        ("srdf", 'name="half_sitting"', 'name="sitting"', "no group_state half_sitting"),
+        ("srdf", 'value="-0.0002"', 'value="?"', "group_state half_sitting is not readable: .*'\\?'"),
+        ("srdf", None, None, "cannot be read as robot description"),
     ],
 )
 def test_a_description_that_lacks_something_is_named(talos, file, text, instead, message):
-    (path,) = talos.glob(f"*/{file}")
+    path = talos.urdf_path if file == "urdf" else talos.srdf_path
     if text is None:
         path.unlink()
     else:

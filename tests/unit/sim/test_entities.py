@@ -5,11 +5,11 @@ import pytest
 from tests.unit.sim.bodies import box, pendulum
 
 from throwcollect.config.schema import Config
+from throwcollect.engines.engine import BodyState
 from throwcollect.errors import ConfigError, RequestError
 from throwcollect.robots.description import start_posture
 from throwcollect.sim.entities import Category, Entities, EntityInfo
 from throwcollect.sim.entity_filter import BoxRegion, EntityFilter, SphereRegion
-from throwcollect.sim.recording import BodyState
 from throwcollect.sim.urdf import read_model
 from throwcollect.sim.world import World
 

@@ -6,12 +6,12 @@ import pytest
 from throwcollect.config.schema import Config
 from throwcollect.control import GoalStatus, Trajectory, TrajectoryGoal, TrajectoryPoint
 from throwcollect.robots.description import start_posture
-from throwcollect.robots.talos import CONTROLLERS, graph_name
+from throwcollect.robots.talos import TALOS
 from throwcollect.sim.simulation import Simulation
 
 ARM, HEAD = "arm_right_controller", "head_controller"
 POSTURE = start_posture(Config())
-ELBOW = CONTROLLERS[ARM].index("arm_right_4_joint")
+ELBOW = TALOS.controllers[ARM].index("arm_right_4_joint")
 
 
 def simulation(**options: object) -> Simulation:
@@ -19,9 +19,9 @@ def simulation(**options: object) -> Simulation:
 
 
 def goal(seconds: float, elbow: float = -1.0) -> TrajectoryGoal:
-    positions = [POSTURE[joint] for joint in CONTROLLERS[ARM]]
+    positions = [POSTURE[joint] for joint in TALOS.controllers[ARM]]
     positions[ELBOW] = elbow
-    return TrajectoryGoal(Trajectory(CONTROLLERS[ARM], [TrajectoryPoint(round(seconds * 1e9), positions)]))
+    return TrajectoryGoal(Trajectory(TALOS.controllers[ARM], [TrajectoryPoint(round(seconds * 1e9), positions)]))
 
 
 def test_controllers_have_the_names_of_either_ros() -> None:
@@ -36,7 +36,7 @@ def test_controllers_have_the_names_of_either_ros() -> None:
         "left_gripper_controller",
         "right_gripper_controller",
     ]
-    assert [graph_name(name, "ros2") for name in CONTROLLERS] == list(CONTROLLERS)
+    assert [TALOS.graph_name(name, "ros2") for name in TALOS.controllers] == list(TALOS.controllers)
 
 
 @pytest.mark.parametrize("seconds", [0.1, 0.7])
@@ -84,7 +84,7 @@ def test_watching_changes_nothing() -> None:
         world.watch(watched)
         world.submit(ARM, 1, goal(0.5))
         world.step(400)
-        positions.append(world.world.joint_positions())
+        positions.append(world.world.joints()[0])
     assert positions[0] == positions[1]
 
 
@@ -93,10 +93,10 @@ def stopped(**options: object) -> tuple[np.ndarray, np.ndarray]:
     world = Simulation(Config.model_validate({"controllers": options, "robot": {"effort_scale": 0.2}}))
     world.submit(ARM, 1, goal(0.4, elbow=-0.3))
     world.step(150)
-    before = world.controller_state(ARM)
+    before = world.observed(ARM).state(world.now_ns)
     assert world.cancel(ARM, 1)
     world.step(1)
-    after = world.controller_state(ARM)
+    after = world.observed(ARM).state(world.now_ns)
     return np.array([[each.output.positions[ELBOW], each.actual.positions[ELBOW]] for each in (before, after)])
 
 
@@ -112,11 +112,11 @@ def test_joints_can_brake_when_a_goal_is_cancelled() -> None:
     world = simulation(hold="decelerate", max_deceleration_radps2=5.0)
     world.submit(ARM, 1, goal(0.5, elbow=-1.4))
     world.step(150)
-    speed = world.controller_state(ARM).actual.velocities[ELBOW]
+    speed = world.observed(ARM).state(world.now_ns).actual.velocities[ELBOW]
     assert speed == pytest.approx(1.0, abs=0.05)
-    position = world.controller_state(ARM).actual.positions[ELBOW]
+    position = world.observed(ARM).state(world.now_ns).actual.positions[ELBOW]
     world.cancel(ARM, 1)
     world.step(300)
-    state = world.controller_state(ARM)
+    state = world.observed(ARM).state(world.now_ns)
     assert state.output.positions[ELBOW] == pytest.approx(position + speed**2 / 2 / 5.0, abs=1e-6)
     assert state.actual.positions[ELBOW] == pytest.approx(state.output.positions[ELBOW], abs=0.005)

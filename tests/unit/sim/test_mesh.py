@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from throwcollect.errors import RequestError
-from throwcollect.sim.mesh import read_mesh, write_stl
+from throwcollect.sim.mesh import read_mesh
 
 CORNERS = np.array([[[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 0, 1], [1, 0, 1], [0, 1, 2.5]]], np.float32)
 ASCII = "solid x\n" + "".join(
@@ -11,8 +11,9 @@ ASCII = "solid x\n" + "".join(
 )
 
 
-def test_what_was_written_is_read_again(tmp_path):
-    write_stl(tmp_path / "mesh.STL", CORNERS)
+def test_binary_stl_is_read(tmp_path):
+    facets = b"".join(bytes(12) + corners.tobytes() + bytes(2) for corners in CORNERS)
+    (tmp_path / "mesh.STL").write_bytes(bytes(80) + len(CORNERS).to_bytes(4, "little") + facets)
     assert read_mesh(tmp_path / "mesh.STL").tolist() == CORNERS.tolist()
 
 

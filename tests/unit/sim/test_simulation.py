@@ -8,7 +8,7 @@ from throwcollect.config.schema import Config
 from throwcollect.control import GoalStatus, Trajectory, TrajectoryGoal, TrajectoryPoint
 from throwcollect.errors import RequestError
 from throwcollect.robots.description import start_posture
-from throwcollect.robots.talos import CONTROLLERS
+from throwcollect.robots.talos import TALOS
 from throwcollect.sim.present_trial import TrialSetup
 from throwcollect.sim.simulation import Scope, Simulation, State
 
@@ -18,7 +18,7 @@ ARM, TORSO, HEAD = "arm_right_controller", "torso_controller", "head_controller"
 
 
 def goal(controller: str, duration_s: float = 1.0, **ends: float) -> TrajectoryGoal:
-    joints = CONTROLLERS[controller]
+    joints = TALOS.controllers[controller]
     still = [0.0] * len(joints)
     start = [POSTURE[joint] for joint in joints]
     end = [ends.get(joint, POSTURE[joint]) for joint in joints]
@@ -120,12 +120,12 @@ def test_joints_are_at_the_trajectory_when_their_sample_is_taken(simulation: Sim
 def test_what_a_controller_desires_and_measures_is_of_the_same_instant(simulation: Simulation) -> None:
     simulation.submit(ARM, 1, goal(ARM, 2.0, arm_right_4_joint=-0.5))
     simulation.step(500)
-    state, now_ns = simulation.controller_state(ARM), simulation.now_ns
-    elbow = CONTROLLERS[ARM].index("arm_right_4_joint")
+    state, now_ns = simulation.observed(ARM).state(simulation.now_ns), simulation.now_ns
+    elbow = TALOS.controllers[ARM].index("arm_right_4_joint")
     assert state.stamp_ns == state.desired.time_from_start_ns == state.actual.time_from_start_ns == now_ns
     assert abs(state.desired.velocities[elbow]) > 0.5
-    assert state.error.positions == pytest.approx(np.zeros(len(CONTROLLERS[ARM])), abs=1e-4)
-    assert simulation.controller_state(HEAD).stamp_ns == now_ns
+    assert state.error.positions == pytest.approx(np.zeros(len(TALOS.controllers[ARM])), abs=1e-4)
+    assert simulation.observed(HEAD).state(simulation.now_ns).stamp_ns == now_ns
 
 
 def test_a_goal_that_moves_a_locked_joint_is_refused_by_name(simulation: Simulation) -> None:
@@ -176,7 +176,7 @@ def test_a_cancelled_goal_stops_where_it_is(simulation: Simulation) -> None:
         simulation.advance(watched=True)
     assert simulation.cancel(ARM, 1)
     run(simulation)
-    positions = simulation.world.joint_positions()
+    positions = simulation.world.joints()[0]
     elbow = positions[simulation.world.moving.index("arm_right_4_joint")]
     assert -1.3 < elbow < -1.1
     assert [result.status for _, result in simulation.pop_results()] == [GoalStatus.CANCELED]
@@ -264,14 +264,14 @@ def test_a_reset_of_time_leaves_the_robot_where_it_is(simulation: Simulation) ->
     assert simulation.submit(ARM, 1, swing()) is None
     simulation.step(250)
     simulation.reset(Scope.TIME)
-    before = simulation.world.joint_positions()
+    before = simulation.world.joints()[0]
     ball = simulation.world.ball
     assert simulation.now_ns == 0
     assert simulation.world.recorded == 1
     assert simulation.world.samples().ball_position[0].tolist() == list(ball.position)
     # Stopped at full speed, joints whose effort is limited give way for a moment.
     simulation.step(500)
-    assert simulation.world.joint_positions() == pytest.approx(before, abs=2e-3)
+    assert simulation.world.joints()[0] == pytest.approx(before, abs=2e-3)
 
 
 def test_set_points_are_kept_with_each_sample_when_they_are_recorded() -> None:
@@ -283,7 +283,7 @@ def test_set_points_are_kept_with_each_sample_when_they_are_recorded() -> None:
     assert kept is not None
     header, samples, states = kept
     assert len(states[ARM].position) == header.samples
-    elbow = CONTROLLERS[ARM].index("arm_right_4_joint")
+    elbow = TALOS.controllers[ARM].index("arm_right_4_joint")
     assert np.abs(states[ARM].position[:, elbow] - samples.position[:, 10]).max() < 1e-4
     assert states[ARM].elapsed_ns[5] == samples.stamps_ns[5] - samples.stamps_ns[0]
     simulation.world.close()

@@ -11,7 +11,7 @@ from throwcollect.errors import PlanError
 from throwcollect.sweep.plan import Trial, make_plan, make_trials
 from throwcollect.sweep.rounds import Rounds
 from throwcollect.sweep.samplers import draw_points
-from throwcollect.tasks.outcome import Outcome, ThrowResult
+from throwcollect.tasks.throw.outcome import Outcome, ThrowResult
 
 LANDED = throw(make_plan(configuration()).trials[0])
 FAILED = ThrowResult(Outcome.RECAUGHT)

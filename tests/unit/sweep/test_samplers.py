@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from throwcollect.config.schema import Config, Range, SweepConfig, Values
@@ -159,6 +159,7 @@ def test_scipy_is_imported_by_those_who_draw_with_it_alone():
 
 @settings(deadline=None, max_examples=50)
 @given(parameters, st.floats(0, 1, exclude_max=True))
+@example(Range(min=1e-6, max=1.0000000000000002e-6, scale="log"), 0.0)
 def test_places_are_where_values_are_spread_from(parameter, place):
     found = places(parameter, spread(parameter, np.array([place])))[0]
     if isinstance(parameter, Values):

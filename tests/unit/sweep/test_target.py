@@ -14,7 +14,7 @@ from tests.unit.sweep.thrower import DISTANCE, HIT_ANGLE, PARAMETERS, TARGET, co
 from throwcollect.config.sweep import TargetConfig
 from throwcollect.sweep.plan import Trial, make_plan
 from throwcollect.sweep.target_cells import Cells, Thinness
-from throwcollect.tasks.outcome import BallState, Outcome, ThrowResult
+from throwcollect.tasks.throw.outcome import BallState, Outcome, ThrowResult
 
 TRIALS = 960
 

@@ -9,7 +9,7 @@ from typing import Any
 from throwcollect.config.schema import Config
 from throwcollect.sweep.plan import Trial, make_plan, make_trials
 from throwcollect.sweep.rounds import Rounds
-from throwcollect.tasks.outcome import BallState, Outcome, ThrowResult
+from throwcollect.tasks.throw.outcome import BallState, Outcome, ThrowResult
 
 PARAMETERS = {
     "task.duration_s": {"min": 0.5, "max": 2.0},

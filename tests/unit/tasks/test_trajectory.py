@@ -4,14 +4,14 @@ import pytest
 
 from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError
-from throwcollect.robots.talos import JOINTS
+from throwcollect.robots.talos import TALOS
 from throwcollect.tasks.trajectory import throw_trajectory
 
 
 def test_joints_are_the_moving_ones_in_the_order_of_the_robot():
     points = throw_trajectory(Config())
     assert set(points.joints) == set(Config().task.end)
-    assert list(points.joints) == [joint for joint in JOINTS if joint in points.joints]
+    assert list(points.joints) == [joint for joint in TALOS.joints if joint in points.joints]
     assert points.positions.shape == points.velocities.shape == points.accelerations.shape == (26, 5)
 
 

@@ -3,8 +3,9 @@ from dataclasses import replace
 import pytest
 
 from throwcollect.build import build_digest
+from throwcollect.config.key import Effect
 from throwcollect.config.schema import Config
-from throwcollect.config.values import is_physics, leaves, sweepable_keys, with_values
+from throwcollect.config.values import sweepable_keys, values_by_key, with_values
 from throwcollect.errors import DatasetError
 from throwcollect.trial.conditions import Conditions, Settings, conditions_from_json
 
@@ -85,14 +86,14 @@ def test_settings_leave_out_what_simulations_do_not_heed(key: str) -> None:
     ],
 )
 def test_settings_cover_what_simulations_heed(key: str, value: object) -> None:
-    before = dict(leaves(CONFIG))
+    before = values_by_key(CONFIG)
     assert before.get(key) != value
     assert Settings(changed(key, value)).digest != Settings(CONFIG).digest
 
 
 def test_what_a_trial_replaces_is_named_key_by_key() -> None:
     settings = Settings(CONFIG)
-    physics = [key for key in sweepable_keys(CONFIG) if is_physics(key)]
+    physics = sweepable_keys(CONFIG, Effect.PHYSICS)
     assert settings.replaced_by(CONFIG) == {}
     trial = with_values(CONFIG, {"ball.mass_kg": 0.06, "task.start.arm_right_4_joint": -1.8, "task.duration_s": 1.3})
     assert {"ball.mass_kg", "task.start.arm_right_4_joint"} <= set(physics)

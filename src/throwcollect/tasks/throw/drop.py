@@ -9,8 +9,9 @@ import numpy as np
 
 from throwcollect.config.schema import Config
 from throwcollect.episode.record import EpisodeHeader, Samples
-from throwcollect.robots.spoon_motion import SpoonMotion
-from throwcollect.tasks.outcome import BallState
+from throwcollect.robots.tool_motion import ToolMotion
+from throwcollect.tasks.throw.outcome import BallState
+from throwcollect.tools.tool import tool_of
 
 _NS_PER_S = 1_000_000_000
 
@@ -40,8 +41,8 @@ def lost_before_start(samples: Samples, header: EpisodeHeader, *, config: Config
     """
     held = [contact.start_ns for contact in header.contacts if contact.body == "spoon"]
     if held and min(held) > header.start_ns:
-        seat = SpoonMotion(config).place(samples.position[0])
-        if math.dist(samples.ball_position[0], seat) > config.tool.cup_rim_radius_m:
+        seat = ToolMotion(config).place(samples.position[0])
+        if math.dist(samples.ball_position[0], seat) > tool_of(config.tool).rim_radius_m:
             held = []
     if held:
         return None
@@ -63,11 +64,11 @@ def drop(samples: Samples, header: EpisodeHeader, release: BallState, *, config:
     """
     speed = math.hypot(*release.velocity)
     direction = [part / (speed or 1.0) for part in release.velocity]
-    least = _LEAST_SHARE * math.sqrt(2 * config.scene.gravity_mps2 * config.tool.cup_depth_m)
+    least = _LEAST_SHARE * math.sqrt(2 * config.scene.gravity_mps2 * tool_of(config.tool).depth_m)
     release_ns = header.start_ns + round(release.time_s * _NS_PER_S)
-    since_ns = release_ns - (config.tool.cup_rim_radius_m / speed * _NS_PER_S if speed else math.inf)
+    since_ns = release_ns - (tool_of(config.tool).rim_radius_m / speed * _NS_PER_S if speed else math.inf)
     last = min(int(np.searchsorted(samples.stamps_ns, release_ns)), len(samples) - 1)
-    spoon = SpoonMotion(config)
+    spoon = ToolMotion(config)
     fastest = -math.inf
     for row in range(last, -1, -1):
         velocity = spoon.velocity(samples.position[row], samples.velocity[row]).tolist()

@@ -3,12 +3,17 @@ import pytest
 
 from throwcollect.config.schema import Config
 from throwcollect.robots.description import start_posture
-from throwcollect.robots.model import joint_limits
-from throwcollect.robots.spoon_motion import SpoonMotion
+from throwcollect.robots.limits import joint_limits
+from throwcollect.robots.talos import TALOS
+from throwcollect.robots.tool_motion import ToolMotion
 
 
 def test_velocity_is_the_change_of_place():
-    draw, limits, spoon = np.random.default_rng(3), joint_limits(), SpoonMotion(Config(tool={"mount_offset_m": 0.2}))
+    draw, limits, spoon = (
+        np.random.default_rng(3),
+        joint_limits(TALOS),
+        ToolMotion(Config(tool={"mount_offset_m": 0.2})),
+    )
     for _ in range(5):
         position, velocity = draw.uniform(limits.lower, limits.upper), draw.uniform(-1, 1, 32)
         before, after = (spoon.place(position + sign * 1e-6 * velocity) for sign in (-1, 1))
@@ -17,5 +22,5 @@ def test_velocity_is_the_change_of_place():
 
 def test_place_has_the_height_of_the_base():
     posture = np.array(list(start_posture(Config()).values()))
-    low, high = (SpoonMotion(Config(robot={"base_height_m": height})).place(posture) for height in (0.6, 1.1))
+    low, high = (ToolMotion(Config(robot={"base_height_m": height})).place(posture) for height in (0.6, 1.1))
     assert high - low == pytest.approx([0, 0, 0.5])

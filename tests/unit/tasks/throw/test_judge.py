@@ -10,24 +10,25 @@ from hypothesis import strategies as st
 
 from throwcollect.config.schema import Config
 from throwcollect.episode.record import Contact, GoalOutcome
-from throwcollect.robots.model import joint_limits
-from throwcollect.robots.spoon_motion import SpoonMotion
-from throwcollect.robots.talos import JOINTS
-from throwcollect.tasks.flight import ballistic_positions
-from throwcollect.tasks.throw import Outcome, judge
+from throwcollect.robots.limits import joint_limits
+from throwcollect.robots.talos import TALOS
+from throwcollect.robots.tool_motion import ToolMotion
+from throwcollect.tasks.throw.flight import ballistic_positions
+from throwcollect.tasks.throw.judge import judge
+from throwcollect.tasks.throw.outcome import Outcome
 from throwcollect.tasks.trajectory import throw_trajectory
 
 from .episodes import GRAVITY, ORIGIN, RELEASE_S, VELOCITY, episode, landing_time, parabola
 
 HELD = ("spoon", 0.0, RELEASE_S)
-ELBOW = JOINTS.index("arm_right_4_joint")
-GRIPPER = JOINTS.index("gripper_left_joint")
+ELBOW = TALOS.joints.index("arm_right_4_joint")
+GRIPPER = TALOS.joints.index("gripper_left_joint")
 RADIUS = Config().ball.radius_m
 
 
 def judged(samples, header, config=None):
     config = config or Config()
-    return judge(samples, header, config=config, trajectory=throw_trajectory(config), limits=joint_limits())
+    return judge(samples, header, config=config, trajectory=throw_trajectory(config))
 
 
 def test_landed_throw_has_all_its_numbers():
@@ -118,7 +119,7 @@ def test_ball_that_had_left_the_spoon_before_the_start_is_dropped_even_if_the_sp
 
 def test_ball_on_a_bounce_at_the_start_is_in_the_spoon():
     samples, header = episode(contacts=(("spoon", 0.01, RELEASE_S),))
-    samples.ball_position[0] = SpoonMotion(Config()).place(samples.position[0])
+    samples.ball_position[0] = ToolMotion(Config()).place(samples.position[0])
     samples.ball_position[0, 2] += 0.01
     assert judged(samples, header).outcome is Outcome.LANDED
 
@@ -167,7 +168,7 @@ def test_ball_that_is_thrown_downwards_is_thrown():
     config = Config(task={"start": {**start, **end}, "end": {joint: start[joint] for joint in end}})
     samples, header = episode(config)
     row = int(RELEASE_S * 250)
-    down = SpoonMotion(config).velocity(samples.position[row], samples.velocity[row])
+    down = ToolMotion(config).velocity(samples.position[row], samples.velocity[row])
     assert down[2] < -0.3
     samples, header = episode(config, velocity=down, origin=ORIGIN - [0.0, 0.0, 0.4])
     samples.ball_position[0] = ORIGIN
@@ -251,7 +252,7 @@ def test_crossing_upwards_is_no_landing():
 
 def test_saturated_effort_violates_a_limit_but_keeps_the_landing():
     samples, header = episode()
-    samples.effort[100:110, ELBOW] = -joint_limits().effort[ELBOW]
+    samples.effort[100:110, ELBOW] = -joint_limits(TALOS).effort[ELBOW]
     result = judged(samples, header)
     assert result.outcome is Outcome.LIMIT_VIOLATED
     assert "arm_right_4_joint reached 1.000 of its effort limit" in result.reason
@@ -261,7 +262,7 @@ def test_saturated_effort_violates_a_limit_but_keeps_the_landing():
 
 def test_effort_limits_scale_with_the_robot():
     samples, header = episode()
-    samples.effort[100, ELBOW] = joint_limits().effort[ELBOW]
+    samples.effort[100, ELBOW] = joint_limits(TALOS).effort[ELBOW]
     result = judged(samples, header, Config(robot={"effort_scale": 2.0}))
     assert result.outcome is Outcome.LANDED
     assert (result.effort_peak.joint, result.effort_peak.share) == ("arm_right_4_joint", pytest.approx(0.5))

@@ -6,9 +6,8 @@ import numpy as np
 
 from throwcollect.config.schema import Config
 from throwcollect.episode.record import Contact, EpisodeHeader, GoalOutcome, Samples
-from throwcollect.robots.model import half_sitting
 from throwcollect.robots.quintic_curve import sample_quintic
-from throwcollect.robots.talos import JOINTS
+from throwcollect.robots.talos import TALOS
 from throwcollect.tasks.trajectory import throw_trajectory
 
 START_NS = 7_000_000_000
@@ -46,9 +45,9 @@ def episode(
     stamps = START_NS + np.arange(count) * (1_000_000_000 // rate_hz)
     times = (stamps - START_NS) / 1e9
     trajectory = throw_trajectory(config)
-    position = np.tile([{**half_sitting(), **config.task.start}[joint] for joint in JOINTS], (count, 1))
+    position = np.tile([{**TALOS.rest_posture, **config.task.start}[joint] for joint in TALOS.joints], (count, 1))
     velocity = np.zeros((count, 32))
-    columns = [JOINTS.index(joint) for joint in trajectory.joints]
+    columns = [TALOS.joints.index(joint) for joint in trajectory.joints]
     position[:, columns], velocity[:, columns], _ = sample_quintic(trajectory, times)
     ball_position, ball_velocity = parabola(times, **ball)
     samples = Samples(

@@ -1,7 +1,7 @@
-"""What is in a Bullet world, and how it is set up: ground, robot with spoon, ball.
+"""What is in a Bullet world, and how it is set up: ground, robot with its tool, ball.
 
-Only the ball collides, with everything, as long as nothing is spawned. Talos' shapes overlap each other at rest, and
-with fewer pairs the order in which Bullet solves contacts cannot come to depend on what happened before.
+Only the ball collides, with everything, as long as nothing is added. Shapes of a robot may overlap each other at rest,
+and with fewer pairs the order in which Bullet solves contacts cannot come to depend on what happened before.
 """
 
 from __future__ import annotations
@@ -11,20 +11,17 @@ from dataclasses import dataclass
 
 import pybullet
 
-from throwcollect.config.schema import Config
+from throwcollect.engines.engine import GROUND, Box, Physics, Scene
 from throwcollect.errors import ConfigError, WorkerError
-from throwcollect.robots.description import SPOON, Description
-from throwcollect.sim.contacts import Surface
-from throwcollect.sim.recording import Vector
+
+Surface = tuple[int, int]
+"""Body and link number in Bullet."""
 
 BASE = -1
 """Link number of the first link of a body."""
 
-Box = tuple[Vector, Vector]
-"""Lowest and highest corner [m]."""
-
-_GROUND_GROUP, _ROBOT_GROUP, _BALL_GROUP, _SPAWNED_GROUP, _FLOOR_GROUP = 1, 2, 4, 8, 16
-"""Bullet lets a pair collide if either side wants to: spawned bodies collide with all, the floor with them alone."""
+_GROUND_GROUP, _ROBOT_GROUP, _BALL_GROUP, _ADDED_GROUP, _FLOOR_GROUP = 1, 2, 4, 8, 16
+"""Bullet lets a pair collide if either side wants to: added bodies collide with all, the floor with them alone."""
 
 
 @dataclass(frozen=True)
@@ -33,14 +30,14 @@ class Scenery:
 
     Attributes:
         robot: Body number of the robot.
-        joints: Joint numbers of the moving joints, in the order of the description.
-        spoon: Link number of the spoon.
-        names: Name of each surface that can press on the ball: ``ground``, ``spoon`` or a link of the robot.
+        joints: Joint numbers of the moving joints, in the order of the scene.
+        tool: Link number of the tool.
+        names: Name of each surface that can press on the ball: the ground, the tool or a link of the robot.
     """
 
     robot: int
     joints: list[int]
-    spoon: int
+    tool: int
     names: dict[Surface, str]
 
 
@@ -59,14 +56,12 @@ def connect() -> int:
     return client
 
 
-def load_scenery(client: int, description: Description, *, base_height: float, solid_ground: bool) -> Scenery:
+def load_scenery(client: int, scene: Scene) -> Scenery:
     """Empty the world and load ground and robot into it.
 
     Args:
         client: Physics client.
-        description: The robot.
-        base_height: Height of its fixed base [m].
-        solid_ground: Whether the ground stops the ball.
+        scene: What the world is made of.
 
     Raises:
         ConfigError: If Bullet cannot load the description.
@@ -74,33 +69,33 @@ def load_scenery(client: int, description: Description, *, base_height: float, s
     pybullet.resetSimulation(physicsClientId=client)
     plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, planeNormal=[0, 0, 1], physicsClientId=client)
     ground = pybullet.createMultiBody(0, plane, physicsClientId=client)
-    robot = _load_robot(client, description.urdf, base_height)
+    robot = _load_robot(client, scene)
     root = pybullet.getBodyInfo(robot, physicsClientId=client)[0].decode()
     joints = {}
-    names = {(ground, BASE): "ground", (robot, BASE): root}
+    names = {(ground, BASE): GROUND, (robot, BASE): root}
     for number in links(client, robot)[1:]:
         info = pybullet.getJointInfo(robot, number, physicsClientId=client)
         joints[info[1].decode()] = number
         names[robot, number] = info[12].decode()
-    spoon = next(link for (_, link), name in names.items() if name == SPOON)
-    names[robot, spoon] = "spoon"
+    tool = next(link for (_, link), name in names.items() if name == scene.tool.link)
+    names[robot, tool] = scene.tool.name
     for body, link in names:
         group, mask = _ROBOT_GROUP, _BALL_GROUP
         if body == ground:
-            group, mask = (_GROUND_GROUP, _BALL_GROUP) if solid_ground else (_FLOOR_GROUP, _SPAWNED_GROUP)
+            group, mask = (_GROUND_GROUP, _BALL_GROUP) if scene.ground_is_solid else (_FLOOR_GROUP, _ADDED_GROUP)
         pybullet.setCollisionFilterGroupMask(body, link, group, mask, physicsClientId=client)
-    return Scenery(robot=robot, joints=[joints[joint] for joint in description.moving], spoon=spoon, names=names)
+    return Scenery(robot=robot, joints=[joints[joint] for joint in scene.moving], tool=tool, names=names)
 
 
-def _load_robot(client: int, urdf: str, base_height: float) -> int:
+def _load_robot(client: int, scene: Scene) -> int:
     with tempfile.NamedTemporaryFile("w", prefix="throwcollect-", suffix=".urdf", encoding="utf-8") as file:
-        file.write(urdf)
+        file.write(scene.urdf)
         file.flush()
         try:
             return int(
                 pybullet.loadURDF(
                     file.name,
-                    basePosition=[0, 0, base_height],
+                    basePosition=[0, 0, scene.base_height_m],
                     useFixedBase=True,
                     flags=pybullet.URDF_USE_INERTIA_FROM_FILE,
                     physicsClientId=client,
@@ -137,15 +132,15 @@ def renew_pairs(client: int, ball: int) -> None:
 
 
 def collide_with_everything(client: int, body: int) -> None:
-    """Let a spawned body collide with ground, robot, ball and other spawned bodies.
+    """Let an added body collide with ground, robot, ball and other added bodies.
 
     Args:
         client: Physics client.
         body: Its body number.
     """
-    mask = _GROUND_GROUP | _ROBOT_GROUP | _BALL_GROUP | _SPAWNED_GROUP | _FLOOR_GROUP
+    mask = _GROUND_GROUP | _ROBOT_GROUP | _BALL_GROUP | _ADDED_GROUP | _FLOOR_GROUP
     for link in links(client, body):
-        pybullet.setCollisionFilterGroupMask(body, link, _SPAWNED_GROUP, mask, physicsClientId=client)
+        pybullet.setCollisionFilterGroupMask(body, link, _ADDED_GROUP, mask, physicsClientId=client)
 
 
 def links(client: int, body: int) -> range:
@@ -162,31 +157,31 @@ def boxes(client: int, body: int) -> list[Box]:
     ]
 
 
-def set_physics(client: int, scenery: Scenery, ball: int, config: Config) -> None:
+def set_physics(client: int, scenery: Scenery, ball: int, physics: Physics) -> None:
     """Set time step, solver, gravity, masses and surfaces; all of them, so that nothing of the trial before remains.
 
     Args:
         client: Physics client.
         scenery: Ground and robot.
         ball: Body number of the ball.
-        config: Of it, ``ball``, ``scene`` and ``sim`` matter.
+        physics: The numbers.
     """
     pybullet.setPhysicsEngineParameter(
-        fixedTimeStep=1 / config.sim.physics_hz,
-        numSolverIterations=config.sim.solver_iterations,
+        fixedTimeStep=1 / physics.hz,
+        numSolverIterations=physics.solver_iterations,
         enableConeFriction=0,
         deterministicOverlappingPairs=1,
         physicsClientId=client,
     )
-    pybullet.setGravity(0, 0, -config.scene.gravity_mps2, physicsClientId=client)
+    pybullet.setGravity(0, 0, -physics.gravity_mps2, physicsClientId=client)
     # Bullet's default damping of 0.04/s is no physics and would shorten a throw by 6 cm.
     undamped = {"linearDamping": 0, "angularDamping": 0}
     pybullet.changeDynamics(
         ball,
         BASE,
-        mass=config.ball.mass_kg,
-        lateralFriction=config.ball.friction,
-        restitution=config.ball.restitution,
+        mass=physics.ball_mass_kg,
+        lateralFriction=physics.ball_friction,
+        restitution=physics.ball_restitution,
         physicsClientId=client,
         **undamped,
     )
@@ -195,7 +190,7 @@ def set_physics(client: int, scenery: Scenery, ball: int, config: Config) -> Non
         pybullet.changeDynamics(
             body,
             link,
-            lateralFriction=config.scene.spoon_friction,
+            lateralFriction=physics.surface_friction,
             restitution=1,
             physicsClientId=client,
             **undamped,

@@ -10,20 +10,20 @@ from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
 from throwcollect.episode.record import Contact, EpisodeHeader, Samples
-from throwcollect.robots.model import JointLimits
+from throwcollect.robots.description import robot_of
+from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.quintic_curve import sample_positions
-from throwcollect.robots.talos import JOINTS
 from throwcollect.robots.trajectory import JointTrajectory
-from throwcollect.tasks.drop import drop, lost_before_start
-from throwcollect.tasks.flight import NS_PER_S, Flight, flight_after, release_of, without_impact
-from throwcollect.tasks.outcome import BallState, Outcome, Peak, ThrowResult
+from throwcollect.tasks.throw.config import throw_section
+from throwcollect.tasks.throw.drop import drop, lost_before_start
+from throwcollect.tasks.throw.flight import NS_PER_S, Flight, flight_after, release_of, without_impact
+from throwcollect.tasks.throw.outcome import BallState, Outcome, Peak, ThrowResult
 
 __all__ = ["BallState", "Outcome", "Peak", "ThrowResult", "judge"]
 
 _SLACK = 1e-3
 _AT_LIMIT = 1 - _SLACK
 _FAILED_GOALS = {5: "canceled", 6: "aborted"}
-_COLUMNS = {joint: column for column, joint in enumerate(JOINTS)}
 
 
 def judge(
@@ -32,9 +32,8 @@ def judge(
     *,
     config: Config,
     trajectory: JointTrajectory,
-    limits: JointLimits,
 ) -> ThrowResult:
-    """Outcome and numbers of one trial.
+    """Find the outcome and the numbers of one trial.
 
     The first of these that holds is the outcome; whatever can be measured is measured all the same, so that a throw
     that landed keeps its landing under any outcome:
@@ -60,12 +59,11 @@ def judge(
         header: Contacts, goals and start of the trial; the trajectory starts at its `start_ns`.
         config: Configuration of the trial.
         trajectory: What the controllers were sent, followed as quintic curve and then held at its end.
-        limits: Limits of the robot's description; `robot.effort_scale` is applied here.
     """
-    result = _joint_measures(samples, header.start_ns, config=config, trajectory=trajectory, limits=limits)
+    result = _joint_measures(samples, header.start_ns, config=config, trajectory=trajectory)
     if not (result and math.isfinite(samples.ball_position.sum() + samples.ball_linear_velocity.sum())):
         return ThrowResult(Outcome.TRACKING_FAILED, reason="the samples hold numbers that are not finite")
-    release_ns = release_of(header.contacts, gap_s=config.task.recatch_gap_s)
+    release_ns = release_of(header.contacts, gap_s=throw_section(config.task).recatch_gap_s)
     touched: list[Contact] | None = None
     if release_ns is not None and release_ns <= samples.stamps_ns[-1]:
         flight = flight_after(samples, start_ns=header.start_ns, release_ns=release_ns)
@@ -154,15 +152,17 @@ def _direction(ball: BallState) -> tuple[float, float]:
 
 
 def _joint_measures(
-    samples: Samples, start_ns: int, *, config: Config, trajectory: JointTrajectory, limits: JointLimits
+    samples: Samples, start_ns: int, *, config: Config, trajectory: JointTrajectory
 ) -> ThrowResult | None:
     """Result with the joints' measures alone, its outcome yet to be decided; None if they are not finite."""
+    robot = robot_of(config)
+    limits = joint_limits(robot)
     effort_limits = limits.effort * config.robot.effort_scale
-    velocity_peak = _peak(np.abs(samples.velocity).max(axis=0) / limits.velocity, JOINTS)
-    effort_peak = _peak(np.abs(samples.effort).max(axis=0) / effort_limits, JOINTS)
+    velocity_peak = _peak(np.abs(samples.velocity).max(axis=0) / limits.velocity, robot.joints)
+    effort_peak = _peak(np.abs(samples.effort).max(axis=0) / effort_limits, robot.joints)
     if not math.isfinite(velocity_peak.share + effort_peak.share + samples.position.sum()):
         return None
-    moving = [_COLUMNS[joint] for joint in trajectory.joints]
+    moving = [robot.joints.index(joint) for joint in trajectory.joints]
     middle = (limits.lower[moving] + limits.upper[moving]) / 2
     # A row a joint, so that arithmetic runs along memory.
     measured = samples.position.T[moving]

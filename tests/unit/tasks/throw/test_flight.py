@@ -8,7 +8,7 @@ import pytest
 
 from throwcollect.config.schema import Config
 from throwcollect.episode.record import Contact
-from throwcollect.tasks.flight import ballistic_positions, flight_residual
+from throwcollect.tasks.throw.flight import ballistic_positions, flight_residual
 
 from .episodes import RELEASE_S, episode
 

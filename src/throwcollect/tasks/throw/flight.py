@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
 from throwcollect.episode.record import Contact, EpisodeHeader, Samples
-from throwcollect.tasks.outcome import BallState
+from throwcollect.tasks.throw.config import throw_section
+from throwcollect.tasks.throw.outcome import BallState
 
 NS_PER_S = 1_000_000_000
 BALLISTIC_TOLERANCE_M = 1e-9
@@ -180,11 +181,11 @@ def flight_residual(samples: Samples, header: EpisodeHeader, *, config: Config) 
     Returns:
         The largest distance [m]; None without a release, or with fewer than two such samples.
     """
-    release_ns = release_of(header.contacts, gap_s=config.task.recatch_gap_s)
+    release_ns = release_of(header.contacts, gap_s=throw_section(config.task).recatch_gap_s)
     if release_ns is None:
         return None
     later = [contact.start_ns for contact in header.contacts if contact.start_ns >= release_ns]
-    free_ns = release_ns + round(config.task.recatch_gap_s * NS_PER_S)
+    free_ns = release_ns + round(throw_section(config.task).recatch_gap_s * NS_PER_S)
     first = int(np.searchsorted(samples.stamps_ns, free_ns))
     # A contact acts in the physics step that ends at its start, so what comes before that instant is untouched.
     stop = int(np.searchsorted(samples.stamps_ns, min(later))) if later else len(samples.stamps_ns)

@@ -1,0 +1,59 @@
+"""Keys of the families of motions: how joints go from a start to an end."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, Discriminator, Field, PositiveFloat, Tag, model_validator
+
+from throwcollect.config.key import Key
+from throwcollect.config.kinds import ContradictionError, Joint
+from throwcollect.config.section import Section
+
+
+class MinimumJerk(Section):
+    """q(t) = q0 + (q1 - q0) s((t/T)^gamma), s(x) = 10x³ - 15x⁴ + 6x⁵."""
+
+    family: Literal["minimum_jerk"] = "minimum_jerk"
+    """Trajectory family."""
+    gamma: Annotated[float, Field(ge=0.67, le=3)] = 1.2
+    """Time warp [-]: above 1 the speed peak comes later."""
+
+
+class DynamicMovementPrimitive(Section):
+    """Joint-space discrete DMP: tau z' = alpha_z (beta_z (g - y) - z) + f(x), tau y' = z, tau x' = -alpha_x x."""
+
+    family: Literal["dmp"]
+    """Trajectory family."""
+    basis_functions: Annotated[int, Field(ge=2, le=500), Key(swept=False)] = 20
+    """Number of Gaussian basis functions of each joint."""
+    weights: dict[Joint, list[float]] = {}
+    """Weights of the forcing term of each moving joint; a joint that is absent has zero weights [rad]."""
+    alpha_z: PositiveFloat = 48.0
+    """Stiffness constant of the transformation system [-]; beta_z is alpha_z / 4 (critically damped)."""
+    alpha_x: PositiveFloat = 2.0
+    """Decay constant of the phase [-]."""
+
+    @model_validator(mode="after")
+    def _weights_fit(self) -> DynamicMovementPrimitive:
+        wrong = {
+            f"weights.{joint}": f"should be basis_functions = {self.basis_functions} numbers, got {len(weights)}"
+            for joint, weights in self.weights.items()
+            if len(weights) != self.basis_functions
+        }
+        if wrong:
+            raise ContradictionError(wrong)
+        return self
+
+
+def _family(value: Any) -> str | None:
+    if isinstance(value, BaseModel):
+        return type(value).__name__
+    family = value.get("family", "minimum_jerk") if isinstance(value, dict) else None
+    return {"minimum_jerk": "MinimumJerk", "dmp": "DynamicMovementPrimitive"}.get(str(family))
+
+
+Trajectory = Annotated[
+    Annotated[MinimumJerk, Tag("MinimumJerk")] | Annotated[DynamicMovementPrimitive, Tag("DynamicMovementPrimitive")],
+    Discriminator(_family),
+]

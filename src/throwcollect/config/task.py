@@ -1,0 +1,44 @@
+"""What the sections of all tasks have in common: a motion of some joints from a start to an end."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field, model_validator
+
+from throwcollect.config.key import Effect, Key
+from throwcollect.config.kinds import Angle, ContradictionError, Joint
+from throwcollect.config.motion import DynamicMovementPrimitive, MinimumJerk, Trajectory
+from throwcollect.config.section import Section
+
+
+class TaskConfig(Section):
+    """Base of the sections of tasks; a member of the family ``tasks`` is a class that is derived from it."""
+
+    name: str
+    """Task."""
+    start: Annotated[dict[Joint, Angle], Key(Effect.PHYSICS, swept=True)]
+    """Joint angles at the start of each trial."""
+    end: Annotated[dict[Joint, Angle], Key(swept=True)]
+    """Joint angles at the end of the motion. The joints named here are the moving ones, even if end equals start."""
+    duration_s: Annotated[float, Field(ge=0.1, le=10), Key(swept=True)] = 1.0
+    """Duration of the motion (tau of a DMP)."""
+    trajectory: Annotated[Trajectory, Key(swept=True)] = MinimumJerk()
+    """How the joints go from start to end."""
+    points_hz: Annotated[float, Field(ge=5, le=1000)] = 25.0
+    """Points per second of the joint trajectories that are sent to the controllers (quintic between them)."""
+
+    @model_validator(mode="after")
+    def _moving_joints_start_somewhere(self) -> TaskConfig:
+        wrong = {f"end.{joint}": "start should name this joint, too" for joint in self.end if joint not in self.start}
+        if not self.end:
+            wrong["end"] = "names no joint, so nothing would move"
+        if isinstance(self.trajectory, DynamicMovementPrimitive):
+            wrong |= {
+                f"trajectory.weights.{joint}": "end does not name this joint, so it does not move"
+                for joint in self.trajectory.weights
+                if joint not in self.end
+            }
+        if wrong:
+            raise ContradictionError(wrong)
+        return self

@@ -1,0 +1,21 @@
+"""What the sections of all tools have in common."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from throwcollect.config.section import Section
+
+
+class ToolConfig(Section):
+    """Base of the sections of tools; a member of the family ``tools`` is a class that is derived from it.
+
+    Attributes:
+        implementation: The tool itself, ``module:class``: a `Tool` that is made of a section of this class. It is
+            imported where it is needed, so that reading a configuration stays cheap.
+    """
+
+    implementation: ClassVar[str]
+
+    name: str
+    """Tool model."""

@@ -1,0 +1,1 @@
+"""Physics engines: what one is (`engine`) and those that come with the product."""

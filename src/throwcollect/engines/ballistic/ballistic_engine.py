@@ -1,0 +1,178 @@
+"""One world without contacts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from throwcollect.engines.ballistic.tool_path import Array, ToolPath
+from throwcollect.engines.engine import (
+    GROUND,
+    BodyState,
+    Box,
+    Engine,
+    Observer,
+    Physics,
+    Sample,
+    Scene,
+    State,
+    Steps,
+    Vector,
+    ball_of,
+)
+from throwcollect.reproducible_math import matmul
+
+_FREE: frozenset[str] = frozenset()
+_ON_GROUND = frozenset({GROUND})
+
+_Moment = tuple[Vector, Vector, frozenset[str]]
+"""Position and velocity of the ball after a step, and what touches it."""
+
+
+class BallisticEngine(Engine):
+    """A world of kinematics: quick and simple, and not what a robot does.
+
+    - The arm is where it is told to be at the end of each step, at the velocity that led there. Motors have no torques,
+      and no limits.
+    - The ball goes with its seat in the tool as long as the tool pushes it. In the first step in which the tool would
+      have to pull the ball back along its opening, the ball is free, and goes on with the velocity that it had.
+    - A free ball takes on its acceleration by gravity and drag in each step, then moves on at its new velocity, as in
+      Bullet. It touches nothing but solid ground, where it stays.
+    - The ball never spins. There are no other bodies, and nobody touches the robot.
+    """
+
+    _scene: Scene
+    _physics: Physics
+    _joints: Array
+    _velocities: Array
+    _position: Vector
+    _velocity: Vector
+
+    def __init__(self) -> None:
+        self._touching = self._told = _FREE
+        self._orientation = (0.0, 0.0, 0.0, 1.0)
+        self._seat = np.zeros((3, 1))
+
+    def close(self) -> None:
+        """There is nothing to free."""
+
+    @property
+    def is_as_loaded(self) -> bool:
+        """Nothing can be added."""
+        return True
+
+    def load(self, scene: Scene) -> None:
+        """Make the world of a scene.
+
+        Raises:
+            ConfigError: If the robot has joints between base and tool that do not turn.
+        """
+        self._tool_path = ToolPath(scene)
+        self._opening = np.array(scene.tool.opening).reshape(3, 1)
+        self._carried_by = frozenset({scene.tool.name})
+        self._scene = scene
+
+    def configure(self, physics: Physics) -> None:
+        """Set the numbers of the physics; of these, rate, gravity and the ball's mass matter."""
+        self._physics = physics
+
+    def rest(self, joints: Sequence[float], seat: Vector) -> None:
+        """Put the joints somewhere and the ball into the tool, all at rest."""
+        place, turn = self._tool_path.along(np.array([joints]))
+        centre = (place + matmul(turn, np.array(seat).reshape(3, 1))).ravel().tolist()
+        still = (0.0,) * len(joints)
+        ball = (*centre, 0.0, 0.0, 0.0, 1.0, *(0.0,) * 6)
+        self.reset(State((*joints, *still, *still, *ball), self._carried_by))
+
+    def reset(self, state: State) -> None:
+        """Put robot and ball into a state; a ball that touches the tool has its seat where it is."""
+        count = len(self._scene.moving)
+        self._joints, self._velocities = np.array(state.sample[: 2 * count]).reshape(2, count)
+        self.place_ball(ball_of(state.sample))
+        self._touching = self._told = state.touching
+        place, turn = self._tool_path.along(self._joints[np.newaxis])
+        away = np.array(self._position).reshape(3, 1) - place[0]
+        self._seat = matmul(turn[0].T, away)
+
+    @property
+    def state(self) -> State:
+        """Robot and ball now."""
+        return State(self._sample(), self._touching)
+
+    def run(self, steps: Steps, observer: Observer) -> int:
+        """Take steps until the observer stops them."""
+        number, due = 0, steps.first_sample
+        for number, (position, velocity, touching) in enumerate(self._path(steps), start=1):
+            self._joints, self._velocities = steps.targets[number], steps.velocities[number - 1]
+            self._position, self._velocity, self._touching = position, velocity, touching
+            if touching != self._told:
+                self._told = touching
+                observer.on_touch(number, touching)
+            if number == due:
+                due += steps.stride
+                if observer.on_sample(number, self._sample()):
+                    break
+        return number
+
+    def place_ball(self, ball: BodyState) -> None:
+        """Put the ball somewhere, where it is free; it does not spin."""
+        self._position, self._velocity = ball.position, ball.linear_velocity
+        self._orientation = ball.orientation_xyzw
+        self._touching = _FREE
+
+    def ball_boxes(self) -> list[Box]:
+        """A box along the axes of the world around the ball."""
+        radius, (x, y, z) = self._scene.ball_radius_m, self._position
+        return [((x - radius, y - radius, z - radius), (x + radius, y + radius, z + radius))]
+
+    def robot_boxes(self) -> list[Box]:
+        """None, as no shapes are known."""
+        return []
+
+    def _sample(self) -> Sample:
+        torques = (0.0,) * len(self._joints)
+        ball = (*self._position, *self._orientation, *self._velocity, 0.0, 0.0, 0.0)
+        return (*self._joints.tolist(), *self._velocities.tolist(), *torques, *ball)
+
+    def _path(self, steps: Steps) -> Iterator[_Moment]:
+        """The ball after each step."""
+        moment = self._position, self._velocity, self._touching
+        left = len(steps.velocities)
+        if self._touching == self._carried_by:
+            for moment in self._carried(steps):
+                left -= 1
+                yield moment
+        for _ in range(left):
+            if moment[2] != _ON_GROUND:
+                moment = self._flown(moment[0], moment[1], steps.drag_kgpm / self._physics.ball_mass_kg)
+            yield moment
+
+    def _carried(self, steps: Steps) -> Iterator[_Moment]:
+        """The ball in its seat, up to the step in which the tool would have to pull it."""
+        place, turn = self._tool_path.along(steps.targets[1:])
+        hz = self._physics.hz
+        path = np.vstack((self._position, (place + matmul(turn, self._seat))[:, :, 0]))
+        velocities = np.vstack((self._velocity, np.diff(path, axis=0) * hz))
+        push = np.diff(velocities, axis=0) * hz
+        push[:, 2] += self._physics.gravity_mps2
+        x, y, z = (push * matmul(turn, self._opening)[:, :, 0]).T
+        pulled = np.flatnonzero(x + y + z <= 0)
+        last = int(pulled[0]) if len(pulled) else len(push)
+        for position, velocity in zip(path[1 : last + 1].tolist(), velocities[1 : last + 1].tolist(), strict=True):
+            yield tuple(position), tuple(velocity), self._carried_by
+
+    def _flown(self, position: Vector, velocity: Vector, drag_per_m: float) -> _Moment:
+        """The ball one step of free flight later, or on the ground if that stops it."""
+        dt = 1 / self._physics.hz
+        (x, y, z), (vx, vy, vz) = position, velocity
+        braking = drag_per_m * math.sqrt(vx * vx + vy * vy + vz * vz)
+        vx -= braking * vx * dt
+        vy -= braking * vy * dt
+        vz -= (self._physics.gravity_mps2 + braking * vz) * dt
+        x, y, z = x + vx * dt, y + vy * dt, z + vz * dt
+        radius = self._scene.ball_radius_m
+        if self._scene.ground_is_solid and z < radius:
+            return (x, y, radius), (0.0, 0.0, 0.0), _ON_GROUND
+        return (x, y, z), (vx, vy, vz), _FREE

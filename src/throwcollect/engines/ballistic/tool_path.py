@@ -1,0 +1,110 @@
+"""Where a tool goes when the joints of its robot move, by the robot's description alone."""
+
+from __future__ import annotations
+
+import math
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from throwcollect.engines.engine import Scene, Vector
+from throwcollect.errors import ConfigError
+from throwcollect.reproducible_math import cos, matmul, sin
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class _Joint:
+    """One joint between base and tool.
+
+    Attributes:
+        turn: Orientation of its frame in that of the link before, shape ``(3, 3)``.
+        place: Origin of its frame there [m], shape ``(3, 1)``.
+        axis: Unit vector that it turns about, in its frame.
+        column: Column of commands that it follows; None if it is fixed.
+    """
+
+    turn: Array
+    place: Array
+    axis: Sequence[float]
+    column: int | None
+
+
+class ToolPath:
+    """The way from a robot's base to its tool.
+
+    Args:
+        scene: Of it, all that concerns the robot matters.
+
+    Raises:
+        ConfigError: If a joint on the way is of a kind that is not known here.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        # The scene's description can be trusted.
+        joints = ElementTree.fromstring(scene.urdf.encode()).findall("joint")  # noqa: S314
+        above = {_link(joint, "child"): joint for joint in joints}
+        chain = []
+        link = scene.tool.link
+        while (joint := above.get(link)) is not None:
+            chain.append(_read(joint, scene.moving))
+            link = _link(joint, "parent")
+        self._chain = chain[::-1]
+        self._base = np.array([[0.0], [0.0], [scene.base_height_m]])
+
+    def along(self, positions: Array) -> tuple[Array, Array]:
+        """Frames of the tool's link in world.
+
+        Args:
+            positions: Positions of the moving joints [rad], shape ``(n, n_moving)``.
+
+        Returns:
+            Origins [m], shape ``(n, 3, 1)``, and orientations, shape ``(n, 3, 3)``.
+        """
+        place = np.broadcast_to(self._base, (len(positions), 3, 1))
+        turn = np.broadcast_to(np.eye(3), (len(positions), 3, 3))
+        for joint in self._chain:
+            place = place + matmul(turn, joint.place)
+            turn = matmul(turn, joint.turn)
+            if joint.column is not None:
+                turn = matmul(turn, _rotations(joint.axis, positions[:, joint.column]))
+        return place, turn
+
+
+def _read(joint: ElementTree.Element, moving: Sequence[str]) -> _Joint:
+    name, kind = joint.get("name", ""), joint.get("type")
+    if kind not in ("fixed", "revolute", "continuous"):
+        raise ConfigError(f"joint {name}: the engine ballistic knows no {kind} joints between base and tool")
+    place = _numbers(joint, "origin", "xyz", (0.0, 0.0, 0.0))
+    angles = _numbers(joint, "origin", "rpy", (0.0, 0.0, 0.0))
+    turn = np.eye(3)
+    for axis, angle in zip(((0, 0, 1), (0, 1, 0), (1, 0, 0)), angles[::-1], strict=True):
+        turn = matmul(turn, _rotations(axis, np.array([angle]))[0])
+    x, y, z = _numbers(joint, "axis", "xyz", (1.0, 0.0, 0.0))
+    length = math.hypot(x, y, z)
+    column = None if kind == "fixed" else moving.index(name)
+    return _Joint(turn, np.array(place).reshape(3, 1), (x / length, y / length, z / length), column)
+
+
+def _link(joint: ElementTree.Element, end: str) -> str:
+    element = joint.find(end)
+    return "" if element is None else element.get("link", "")
+
+
+def _numbers(joint: ElementTree.Element, tag: str, key: str, default: Vector) -> Sequence[float]:
+    element = joint.find(tag)
+    text = None if element is None else element.get(key)
+    return default if text is None else [float(word) for word in text.split()]
+
+
+def _rotations(axis: Sequence[float], angles: Array) -> Array:
+    """Rotations about a unit vector, by Rodrigues' formula, shape ``(n, 3, 3)``."""
+    x, y, z = axis
+    across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    sines, cosines = (values[:, np.newaxis, np.newaxis] for values in (sin(angles), cos(angles)))
+    rotations: Array = np.eye(3) + sines * across + (1.0 - cosines) * matmul(across, across)
+    return rotations

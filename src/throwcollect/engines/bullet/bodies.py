@@ -1,0 +1,153 @@
+"""Bodies that are added to a Bullet world: obstacles, tables, other robots."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pybullet
+
+from throwcollect.engines.bullet.scenery import BASE, Surface, boxes, collide_with_everything, connect, links
+from throwcollect.engines.engine import Bodies, BodyModel, BodyState, Box, Quaternion, Vector
+from throwcollect.errors import RequestError
+
+_JOINT_TYPE, _LARGEST_EFFORT, _LINK_NAME = 2, 10, 12
+_INERTIAL_POSITION, _INERTIAL_ORIENTATION = 3, 4
+_STL = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+_STL_TITLE = bytes(80)
+
+
+class BulletBodies(Bodies):
+    """The bodies of one world. Their joints are braked, with the efforts of their limits.
+
+    Args:
+        client: Physics client.
+        names: Name of each surface that can press on the ball; those of the bodies are kept in it.
+    """
+
+    def __init__(self, client: int, names: dict[Surface, str]) -> None:
+        self._client = client
+        self._names = names
+        self._bodies: dict[str, tuple[int, BodyModel]] = {}
+        self.friction = 0.0
+        """Friction of bodies that are added from now on."""
+        self.leave_traces = False
+        """Whether a body has been in the world since it was loaded; Bullet cannot forget that."""
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._bodies
+
+    def forget(self) -> None:
+        """Take note that the world was emptied."""
+        self._bodies.clear()
+        self.leave_traces = False
+
+    def add(self, name: str, model: BodyModel, start: BodyState) -> None:
+        """Put a body into the world; see `Bodies.add`."""
+        client = self._client
+        self.leave_traces = True
+        body = _load(client, model, start)
+        self._bodies[name] = body, model
+        collide_with_everything(client, body)
+        root = pybullet.getBodyInfo(body, physicsClientId=client)[0].decode()
+        self._names[body, BASE] = f"{name}/{root}"
+        for link in links(client, body):
+            # The ball alone decides how it bounces off what stands still; what moves does not bounce.
+            pybullet.changeDynamics(
+                body,
+                link,
+                lateralFriction=self.friction,
+                restitution=float(model.is_static),
+                linearDamping=0,
+                angularDamping=0,
+                physicsClientId=client,
+            )
+            if link != BASE:
+                info = pybullet.getJointInfo(body, link, physicsClientId=client)
+                self._names[body, link] = f"{name}/{info[_LINK_NAME].decode()}"
+                if info[_JOINT_TYPE] != pybullet.JOINT_FIXED:
+                    pybullet.setJointMotorControl2(
+                        body, link, pybullet.VELOCITY_CONTROL, force=info[_LARGEST_EFFORT], physicsClientId=client
+                    )
+
+    def remove(self, name: str) -> None:
+        """Take a body out of the world."""
+        body, _ = self._bodies.pop(name)
+        pybullet.removeBody(body, physicsClientId=self._client)
+        for surface in [surface for surface in self._names if surface[0] == body]:
+            del self._names[surface]
+
+    def state(self, name: str) -> BodyState:
+        """Where the root link of a body is and how it moves."""
+        body, _ = self._bodies[name]
+        centre, turn = pybullet.getBasePositionAndOrientation(body, self._client)
+        linear, angular = pybullet.getBaseVelocity(body, self._client)
+        inward = pybullet.invertTransform(*self._inertial_frame(body))
+        position, orientation = pybullet.multiplyTransforms(centre, turn, *inward)
+        return BodyState(position, orientation, _velocity_at(linear, angular, centre, position), angular)
+
+    def place(self, name: str, state: BodyState) -> None:
+        """Put the root link of a body somewhere; its joints stay as they are."""
+        body, _ = self._bodies[name]
+        centre, turn = pybullet.multiplyTransforms(state.position, state.orientation_xyzw, *self._inertial_frame(body))
+        linear = _velocity_at(state.linear_velocity, state.angular_velocity, state.position, centre)
+        pybullet.resetBasePositionAndOrientation(body, centre, turn, physicsClientId=self._client)
+        pybullet.resetBaseVelocity(body, linear, state.angular_velocity, physicsClientId=self._client)
+
+    def boxes(self, name: str) -> list[Box]:
+        """Boxes along the axes of the world around the links of a body."""
+        return boxes(self._client, self._bodies[name][0])
+
+    def bounds(self, name: str) -> list[Box]:
+        """Boxes along the axes of the root link around the links of a body."""
+        body, model = self._bodies[name]
+        angles = [pybullet.getJointState(body, joint, self._client)[0] for joint in links(self._client, body)[1:]]
+        aside = connect()
+        try:
+            # Without the given inertia the engine's own axes, along which it measures, are those of the link.
+            copy = _load(aside, model, BodyState((0.0, 0.0, 0.0)), flags=0)
+            for joint, angle in enumerate(angles):
+                pybullet.resetJointState(copy, joint, angle, physicsClientId=aside)
+            return boxes(aside, copy)
+        finally:
+            pybullet.disconnect(aside)
+
+    def _inertial_frame(self, body: int) -> tuple[Vector, Quaternion]:
+        """Centre of mass and principal axes in the root link, by which the engine locates a body."""
+        info: Sequence[tuple[float, ...]] = pybullet.getDynamicsInfo(body, BASE, physicsClientId=self._client)
+        position: Vector = tuple(info[_INERTIAL_POSITION])  # type: ignore[assignment]
+        orientation: Quaternion = tuple(info[_INERTIAL_ORIENTATION])  # type: ignore[assignment]
+        return position, orientation
+
+
+def _load(client: int, model: BodyModel, start: BodyState, *, flags: int = pybullet.URDF_USE_INERTIA_FROM_FILE) -> int:
+    with tempfile.TemporaryDirectory(prefix="throwcollect-") as directory:
+        path = Path(directory, "entity.urdf")
+        path.write_text(model.urdf, encoding="utf-8")
+        for number, triangles in enumerate(model.meshes):
+            records = np.zeros(len(triangles), _STL)
+            records["corners"] = triangles
+            count = len(triangles).to_bytes(4, "little")
+            path.with_name(f"{number}.stl").write_bytes(_STL_TITLE + count + records.tobytes())
+        try:
+            return int(
+                pybullet.loadURDF(
+                    str(path),
+                    basePosition=start.position,
+                    baseOrientation=start.orientation_xyzw,
+                    useFixedBase=model.is_fixed,
+                    flags=flags,
+                    physicsClientId=client,
+                )
+            )
+        except pybullet.error as error:
+            raise RequestError("RESOURCE_PARSE_ERROR", f"the physics engine cannot load it: {error}") from error
+
+
+def _velocity_at(linear: Vector, angular: Vector, origin: Vector, other: Vector) -> Vector:
+    """Find the velocity of another point of a body that turns."""
+    x, y, z = (b - a for a, b in zip(origin, other, strict=True))
+    u, v, w = angular
+    return (linear[0] + v * z - w * y, linear[1] + w * x - u * z, linear[2] + u * y - v * x)

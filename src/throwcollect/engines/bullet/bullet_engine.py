@@ -1,0 +1,200 @@
+"""One Bullet world."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+
+import pybullet
+
+from throwcollect.engines.bullet.bodies import BulletBodies
+from throwcollect.engines.bullet.scenery import (
+    BASE,
+    Scenery,
+    Surface,
+    boxes,
+    connect,
+    load_ball,
+    load_scenery,
+    renew_pairs,
+    set_physics,
+)
+from throwcollect.engines.engine import (
+    BodyState,
+    Box,
+    Engine,
+    Observer,
+    Physics,
+    Sample,
+    Scene,
+    State,
+    Steps,
+    Vector,
+    ball_of,
+)
+
+_ANY_BODY, _ANY_LINK = -1, -2
+_UPRIGHT = (0.0, 0.0, 0.0, 1.0)
+
+
+class BulletEngine(Engine):
+    """A Bullet world in this process.
+
+    Raises:
+        WorkerError: If Bullet refuses to start another world in this process.
+    """
+
+    _scenery: Scenery
+    _ball: int
+    _forces: list[float]
+    _position_gains: list[float]
+    _velocity_gains: list[float]
+
+    def __init__(self) -> None:
+        self._client = connect()
+        self._names: dict[Surface, str] = {}
+        self.bodies: BulletBodies = BulletBodies(self._client, self._names)
+        self._scene: Scene | None = None
+        self._touching: frozenset[str] = frozenset()
+        # What pressed on the ball in the last step; None if there was none since the last reset.
+        self._pressing: set[Surface] | None = None
+
+    def close(self) -> None:
+        """Free the world; it cannot be used afterwards."""
+        pybullet.disconnect(self._client)
+
+    @property
+    def is_as_loaded(self) -> bool:
+        """Whether nothing was added since the world was loaded."""
+        return not self.bodies.leave_traces
+
+    def load(self, scene: Scene) -> None:
+        """Make the world of a scene; if nothing but the ball differs, the ball alone is made anew."""
+        kept, self._scene = self._scene, None
+        if (
+            kept is None
+            or not self.is_as_loaded
+            or dataclasses.replace(kept, ball_radius_m=scene.ball_radius_m) != scene
+        ):
+            self.bodies.forget()
+            self._scenery = load_scenery(self._client, scene)
+            self._names.clear()
+            self._names.update(self._scenery.names)
+            self._ball = load_ball(self._client, scene.ball_radius_m)
+        elif kept.ball_radius_m != scene.ball_radius_m:
+            pybullet.removeBody(self._ball, physicsClientId=self._client)
+            self._ball = load_ball(self._client, scene.ball_radius_m)
+        self._scene = scene
+
+    def configure(self, physics: Physics) -> None:
+        """Set all numbers of the physics."""
+        set_physics(self._client, self._scenery, self._ball, physics)
+        self.bodies.friction = physics.surface_friction
+        self._forces = list(physics.efforts)
+        self._position_gains = [physics.position_gain_per_s / physics.hz] * len(physics.efforts)
+        self._velocity_gains = [physics.velocity_gain] * len(physics.efforts)
+
+    def rest(self, joints: Sequence[float], seat: Vector) -> None:
+        """Put the joints somewhere and the ball into the tool, all at rest."""
+        client, scenery = self._client, self._scenery
+        for joint, angle in zip(scenery.joints, joints, strict=True):
+            pybullet.resetJointState(scenery.robot, joint, angle, physicsClientId=client)
+        tool = pybullet.getLinkState(scenery.robot, scenery.tool, computeForwardKinematics=True, physicsClientId=client)
+        centre, _ = pybullet.multiplyTransforms(tool[4], tool[5], seat, _UPRIGHT)
+        still = (0.0,) * len(joints)
+        self.reset(State((*joints, *still, *still, *centre, *_UPRIGHT, *(0.0,) * 6), frozenset()))
+
+    def reset(self, state: State) -> None:
+        """Put robot and ball into a state, leaving nothing behind of what went on before.
+
+        Bullet's own snapshots do not achieve that: they keep pairs of shapes that once came close, and with them the
+        order in which contacts are solved. `renew_pairs` forgets those.
+        """
+        client, joints = self._client, self._scenery.joints
+        positions, velocities = state.sample[: len(joints)], state.sample[len(joints) :]
+        for joint, position, velocity in zip(joints, positions, velocities, strict=False):
+            pybullet.resetJointState(self._scenery.robot, joint, position, velocity, physicsClientId=client)
+        renew_pairs(client, self._ball)
+        self.place_ball(ball_of(state.sample))
+        self._touching, self._pressing = state.touching, None
+
+    @property
+    def state(self) -> State:
+        """Robot and ball now; right after `reset` without torques, as Bullet has none before a step."""
+        if self._pressing is None:
+            return State(self._sample(), self._touching)
+        # Bodies that were removed since the last step have no names any more.
+        return State(self._sample(), frozenset(self._names[each] for each in self._pressing if each in self._names))
+
+    def run(self, steps: Steps, observer: Observer) -> int:
+        """Take steps until the observer stops them."""
+        # Local names, arguments by position and one loop: what stands here is paid for in every step.
+        client, ball, robot, joints = self._client, self._ball, self._scenery.robot, self._scenery.joints
+        forces, position_gains, velocity_gains = self._forces, self._position_gains, self._velocity_gains
+        aim, mode = pybullet.setJointMotorControlArray, pybullet.POSITION_CONTROL
+        take_step, points_on = pybullet.stepSimulation, pybullet.getContactPoints
+        drag, due, stride = steps.drag_kgpm, steps.first_sample, steps.stride
+        last_pressing = self._pressing
+        number = 0
+        # Lists, as Bullet reads them twice as fast as arrays.
+        for position, velocity in zip(steps.targets[:-1].tolist(), steps.velocities.tolist(), strict=True):
+            # A motor is told to be where it should be at the beginning of the step and to have the speed that leads
+            # from there to the target, so that it follows without lag.
+            aim(robot, joints, mode, position, velocity, forces, position_gains, velocity_gains, client)
+            if drag:
+                self._apply_drag(drag)
+            take_step(client)
+            number += 1
+            # Bullet also lists points that are merely close; those have no normal force (field 9).
+            points = points_on(ball, _ANY_BODY, _ANY_LINK, _ANY_LINK, client)
+            pressing = {(point[2], point[4]) for point in points if point[9] > 0}
+            if pressing != last_pressing:
+                self._pressing = last_pressing = pressing
+                self._tell_touch(number, observer)
+            if number == due:
+                due += stride
+                if observer.on_sample(number, self._sample()):
+                    break
+        return number
+
+    def place_ball(self, ball: BodyState) -> None:
+        """Put the ball somewhere."""
+        pybullet.resetBasePositionAndOrientation(
+            self._ball, ball.position, ball.orientation_xyzw, physicsClientId=self._client
+        )
+        pybullet.resetBaseVelocity(
+            self._ball, ball.linear_velocity, ball.angular_velocity, physicsClientId=self._client
+        )
+
+    def ball_boxes(self) -> list[Box]:
+        """A box along the axes of the world around the ball."""
+        return boxes(self._client, self._ball)
+
+    def robot_boxes(self) -> list[Box]:
+        """Boxes along the axes of the world around the links of the robot."""
+        return boxes(self._client, self._scenery.robot)
+
+    def _tell_touch(self, step: int, observer: Observer) -> None:
+        """Tell of what presses now, unless those are only other surfaces of the same names."""
+        touching = frozenset(self._names[surface] for surface in self._pressing or ())
+        if touching != self._touching:
+            self._touching = touching
+            observer.on_touch(step, touching)
+
+    def _sample(self) -> Sample:
+        client, ball = self._client, self._ball
+        joints = pybullet.getJointStates(self._scenery.robot, self._scenery.joints, client)
+        positions, velocities, _, torques = zip(*joints, strict=True)
+        place, turn = pybullet.getBasePositionAndOrientation(ball, client)
+        linear, angular = pybullet.getBaseVelocity(ball, client)
+        return (*positions, *velocities, *torques, *place, *turn, *linear, *angular)
+
+    def _apply_drag(self, drag_kgpm: float) -> None:
+        position, _ = pybullet.getBasePositionAndOrientation(self._ball, physicsClientId=self._client)
+        velocity, _ = pybullet.getBaseVelocity(self._ball, physicsClientId=self._client)
+        factor = -drag_kgpm * math.hypot(*velocity)
+        force = [factor * component for component in velocity]
+        pybullet.applyExternalForce(
+            self._ball, BASE, force, position, pybullet.WORLD_FRAME, physicsClientId=self._client
+        )

@@ -1,0 +1,312 @@
+"""What a physics engine is: one world that is loaded from a scene, put into a state, and stepped by joint commands.
+
+An engine knows neither configurations nor trials: it gets values and gives numbers. The rules of a trial, such as when
+it ends, are those of `throwcollect.sim`, and the same on every engine.
+
+Frames and units: world with x forward, y left, z up; metres, radians, seconds, kilograms; quaternions are xyzw.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Vector = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
+
+Box = tuple[Vector, Vector]
+"""Lowest and highest corner [m]."""
+
+Sample = tuple[float, ...]
+"""Robot and ball at one instant: positions [rad], velocities [rad/s] and motor torques [Nm] of all moving joints, then
+position, orientation, linear and angular velocity of the ball. Bare numbers, as there is one every few steps."""
+
+BALL_NUMBERS = 13
+"""How many numbers of a sample, the last ones, are those of the ball."""
+
+GROUND = "ground"
+"""Name of the ground among what touches the ball."""
+
+
+@dataclass(frozen=True)
+class BodyState:
+    """A body at one instant.
+
+    Attributes:
+        position: Its origin in world [m]; that of the ball is its centre.
+        orientation_xyzw: Unit quaternion, body to world.
+        linear_velocity: In world [m/s].
+        angular_velocity: In world [rad/s].
+    """
+
+    position: Vector
+    orientation_xyzw: Quaternion = (0.0, 0.0, 0.0, 1.0)
+    linear_velocity: Vector = (0.0, 0.0, 0.0)
+    angular_velocity: Vector = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class ToolLink:
+    """What the robot throws with.
+
+    Attributes:
+        link: Its link in the robot's description.
+        name: Its name among what touches the ball.
+        opening: Unit vector in the frame of the link: where the tool is open, so that it cannot pull the ball back.
+    """
+
+    link: str
+    name: str
+    opening: Vector
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What a world is made of; another scene takes another world.
+
+    Attributes:
+        urdf: The robot's description. All its movable joints are in `moving`, mesh paths are absolute, and its files
+            can be trusted.
+        moving: The joints that are commanded, in the order of every command and sample.
+        base_height_m: Height of its fixed base above the ground.
+        tool: What it throws with.
+        ground_is_solid: Whether the ground stops the ball; it stops other bodies in any case.
+        ball_radius_m: Radius of the ball.
+    """
+
+    urdf: str
+    moving: tuple[str, ...]
+    base_height_m: float
+    tool: ToolLink
+    ground_is_solid: bool
+    ball_radius_m: float
+
+
+@dataclass(frozen=True)
+class Physics:
+    """Numbers that the physics of a scene depends on; an engine may leave out what it has no use for.
+
+    Attributes:
+        hz: Physics steps per simulated second.
+        solver_iterations: Iterations of the contact solver per step.
+        gravity_mps2: Gravity, downwards.
+        ball_mass_kg: Mass of the ball.
+        ball_friction: Coulomb friction of the ball [-].
+        ball_restitution: Coefficient of restitution between the ball and whatever it touches [-].
+        surface_friction: Coulomb friction of robot, tool, ground and bodies that are added [-].
+        efforts: The most torque of each moving joint [Nm].
+        position_gain_per_s: Velocity that a motor adds per radian of position error.
+        velocity_gain: Share of the velocity error that a motor removes in one step [-].
+    """
+
+    hz: int
+    solver_iterations: int
+    gravity_mps2: float
+    ball_mass_kg: float
+    ball_friction: float
+    ball_restitution: float
+    surface_friction: float
+    efforts: tuple[float, ...]
+    position_gain_per_s: float
+    velocity_gain: float
+
+
+@dataclass(frozen=True)
+class State:
+    """A state that a world can be put into.
+
+    Attributes:
+        sample: Robot and ball; the torques do not matter.
+        touching: Names of the bodies that press on the ball.
+    """
+
+    sample: Sample
+    touching: frozenset[str]
+
+
+@dataclass(frozen=True)
+class Steps:
+    """Physics steps to take, and what is wanted in each.
+
+    Attributes:
+        targets: Positions of the moving joints [rad], shape ``(n_steps + 1, n_moving)``: a step begins where one row
+            is wanted, and ends where the next one is.
+        velocities: Velocities that lead from each row to the next [rad/s], shape ``(n_steps, n_moving)``.
+        first_sample: Number of the first step after which a sample is due; the first step is number 1.
+        stride: Steps from one sample to the next.
+        drag_kgpm: The air's force on the ball is this times the square of the ball's speed.
+    """
+
+    targets: NDArray[np.float64]
+    velocities: NDArray[np.float64]
+    first_sample: int
+    stride: int
+    drag_kgpm: float = 0.0
+
+
+class Observer:
+    """Sees what happens while steps are taken, and may stop them; this one sees nothing."""
+
+    def on_touch(self, step: int, bodies: frozenset[str]) -> None:
+        """Other bodies than before press on the ball.
+
+        Args:
+            step: Number of the first step in which they do.
+            bodies: Their names: that of the tool, `GROUND`, a link of the robot, or ``body/link`` of an added body.
+        """
+
+    def on_sample(self, step: int, sample: Sample) -> bool:
+        """A sample is due after a step; what touches the ball in that step was told before.
+
+        Returns:
+            Whether this was the last step, so that the others are not taken.
+        """
+        del step, sample
+        return False
+
+
+@dataclass(frozen=True)
+class BodyModel:
+    """A body that can be added to a world.
+
+    Attributes:
+        name: Name that its description gives itself.
+        urdf: Its description, checked and written anew; its meshes are called ``0.stl``, ``1.stl`` and so on.
+        meshes: Corners of the triangles of these meshes, each of shape ``(n_triangles, 3, 3)``.
+        joints: Number of joints that can move.
+        is_fixed: Whether it is attached to the world.
+    """
+
+    name: str
+    urdf: str
+    meshes: tuple[NDArray[np.float32], ...]
+    joints: int
+    is_fixed: bool
+
+    @property
+    def is_static(self) -> bool:
+        """Whether no part of it ever moves on its own."""
+        return self.is_fixed and not self.joints
+
+
+class Bodies(ABC):
+    """Bodies in a world besides robot, ground and ball, by name. They collide with everything, and with each other."""
+
+    @abstractmethod
+    def __contains__(self, name: object) -> bool: ...
+
+    @abstractmethod
+    def add(self, name: str, model: BodyModel, start: BodyState) -> None:
+        """Put a body into the world.
+
+        Args:
+            name: Its name, which no other body has.
+            model: What it is.
+            start: Its state; only the pose matters.
+
+        Raises:
+            RequestError: ``RESOURCE_PARSE_ERROR`` if the engine does not take it.
+        """
+
+    @abstractmethod
+    def remove(self, name: str) -> None:
+        """Take a body out of the world."""
+
+    @abstractmethod
+    def state(self, name: str) -> BodyState:
+        """Where the root link of a body is and how it moves."""
+
+    @abstractmethod
+    def place(self, name: str, state: BodyState) -> None:
+        """Put the root link of a body somewhere; its joints stay as they are."""
+
+    @abstractmethod
+    def boxes(self, name: str) -> list[Box]:
+        """Boxes along the axes of the world around the links of a body."""
+
+    @abstractmethod
+    def bounds(self, name: str) -> list[Box]:
+        """Boxes along the axes of a body's root link around its links."""
+
+
+class Engine(ABC):
+    """One world with a robot, a ball and the ground.
+
+    What follows from a state and commands does not depend on what happened in the world before, to the last bit.
+
+    Attributes:
+        bodies: Further bodies; None if the engine takes none.
+    """
+
+    bodies: Bodies | None = None
+
+    @abstractmethod
+    def close(self) -> None:
+        """Free the world; it cannot be used afterwards."""
+
+    @abstractmethod
+    def load(self, scene: Scene) -> None:
+        """Make the world of a scene; bodies that were added are gone. It may keep what is as the scene wants it.
+
+        Raises:
+            ConfigError: If the engine does not take the robot's description.
+        """
+
+    @property
+    @abstractmethod
+    def is_as_loaded(self) -> bool:
+        """Whether nothing was added since the world was loaded; otherwise it must be loaded before the next trial."""
+
+    @abstractmethod
+    def configure(self, physics: Physics) -> None:
+        """Set all numbers of the physics, so that nothing of earlier ones remains."""
+
+    @abstractmethod
+    def rest(self, joints: Sequence[float], seat: Vector) -> None:
+        """Put the joints somewhere and the ball into the tool, all at rest.
+
+        Args:
+            joints: Position of each moving joint [rad].
+            seat: Centre of the ball in the frame of the tool's link [m].
+        """
+
+    @abstractmethod
+    def reset(self, state: State) -> None:
+        """Put robot and ball into a state, leaving nothing behind of what went on before."""
+
+    @property
+    @abstractmethod
+    def state(self) -> State:
+        """Robot and ball now."""
+
+    @abstractmethod
+    def run(self, steps: Steps, observer: Observer) -> int:
+        """Take steps until the observer stops them.
+
+        An engine may compute ahead, but what it tells, and the state that it ends in, are those of the last step.
+
+        Returns:
+            Number of steps taken.
+        """
+
+    @abstractmethod
+    def place_ball(self, ball: BodyState) -> None:
+        """Put the ball somewhere."""
+
+    @abstractmethod
+    def ball_boxes(self) -> list[Box]:
+        """A box along the axes of the world around the ball."""
+
+    @abstractmethod
+    def robot_boxes(self) -> list[Box]:
+        """Boxes along the axes of the world around the links of the robot; none if the engine knows no shapes."""
+
+
+def ball_of(sample: Sample) -> BodyState:
+    """The ball of a sample."""
+    x, y, z, qx, qy, qz, qw, vx, vy, vz, wx, wy, wz = sample[-BALL_NUMBERS:]
+    return BodyState((x, y, z), (qx, qy, qz, qw), (vx, vy, vz), (wx, wy, wz))

@@ -1,0 +1,229 @@
+"""Message records of a chunk as they lie there: rows of equal size, or one after the other.
+
+As every message of a channel of the state chunk has the same size, that chunk is a table: one row a sample, at a
+constant place in each row the record of each channel. The chunks of sensors are no tables: their messages may vary in
+size, and each of their channels may have a rate of its own.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from mcap.opcode import Opcode
+from numpy.typing import NDArray
+
+from throwcollect.episode.channels import BALL_ODOMETRY_ID, JOINT_STATES_ID
+from throwcollect.episode.chunk import MESSAGE_HEADER, RECORD_PREFIX_BYTES, encode_message_index
+from throwcollect.episode.record import NS_PER_S, Samples
+from throwcollect.episode.topics import Rows, Topic, ball_odometry, joint_states, read_samples
+from throwcollect.errors import DatasetError
+
+_HEADERS = np.dtype(
+    {
+        "names": ["opcode", "length", "channel", "sequence", "log_time", "publish_time"],
+        "formats": ["u1", "<u8", "<u2", "<u4", "<u8", "<u8"],
+    }
+)
+"""`MESSAGE_HEADER`, of many records at once."""
+_ALIKE_BYTES = 11
+"""Opcode, length and channel: what is the same at the start of all records of a channel."""
+_STAMP = np.dtype([("sec", "<i4"), ("nanosec", "<u4")])
+_STAMP_OFFSET = 4
+"""Where the stamp of a message lies that begins with its std_msgs/Header: behind the CDR encapsulation [bytes]."""
+
+
+class Column(NamedTuple):
+    """Where the records of one channel lie in each row."""
+
+    offset: int
+    size: int
+
+
+class MessageTable:
+    """The records of a chunk seen as a table, without a copy.
+
+    Unless it is made otherwise, holding one guarantees that every row has the same channels at the same places.
+
+    Attributes:
+        columns: Place of each channel's record in a row, by the channel's number.
+        log_times: Time of each row's first record [ns], shape ``(n_samples,)``, uint64.
+
+    Args:
+        contents: Uncompressed records; what is seen of a bytearray can be written to.
+        samples: Number of samples.
+        first_row_only: Whether the first row stands for all; for records that only have to be read, and fast.
+
+    Raises:
+        DatasetError: If the records are not such a table.
+    """
+
+    def __init__(self, contents: bytes | bytearray, samples: int, *, first_row_only: bool = False) -> None:
+        if samples < 1 or len(contents) % samples or not contents:
+            raise DatasetError(f"chunk: {len(contents)} bytes are not the records of {samples} samples")
+        self._table: NDArray[np.uint8] = np.frombuffer(contents, np.uint8).reshape(samples, -1)
+        self.columns: dict[int, Column] = {}
+        width, offset = self._table.shape[1], 0
+        while offset < width:
+            header = contents[offset : offset + MESSAGE_HEADER.size]
+            if len(header) < MESSAGE_HEADER.size:
+                raise DatasetError(f"chunk: a record is cut off at byte {offset}")
+            opcode, length, channel, *_ = MESSAGE_HEADER.unpack(header)
+            column = Column(offset, RECORD_PREFIX_BYTES + length)
+            offset += column.size
+            if (
+                opcode != Opcode.MESSAGE
+                or length < MESSAGE_HEADER.size - RECORD_PREFIX_BYTES
+                or offset > width
+                or channel in self.columns
+            ):
+                raise DatasetError(f"chunk: not one message per channel and sample at byte {column.offset}")
+            self.columns[channel] = column
+            alike = self._table[:, column.offset : column.offset + _ALIKE_BYTES]
+            if not first_row_only and alike.tobytes() != header[:_ALIKE_BYTES] * samples:
+                raise DatasetError(f"chunk: the records of channel {channel} are not alike")
+        self.log_times = self.headers(next(iter(self.columns)))["log_time"]
+
+    def __len__(self) -> int:
+        return len(self._table)
+
+    def headers(self, channel: int) -> Rows:
+        """Sequence numbers and times of one channel's records, shape ``(n_samples,)``; a view.
+
+        Raises:
+            KeyError: If the chunk has no such channel.
+        """
+        column = self.columns[channel]
+        return self._table[:, column.offset : column.offset + _HEADERS.itemsize].view(_HEADERS)[:, 0]
+
+    def are_timed_by(self, stamps_ns: NDArray[np.int64]) -> bool:
+        """Whether all records are numbered from 0 and logged and published at these times [ns], ``(n_samples,)``."""
+        return all(
+            np.array_equal(headers["sequence"], np.arange(len(self)))
+            and np.array_equal(headers["log_time"], stamps_ns)
+            and np.array_equal(headers["publish_time"], stamps_ns)
+            for headers in map(self.headers, self.columns)
+        )
+
+    def messages(self, channel: int) -> NDArray[np.uint8]:
+        """CDR messages of one channel, shape ``(n_samples, size)``.
+
+        Raises:
+            KeyError: If the chunk has no such channel.
+        """
+        column = self.columns[channel]
+        return self._table[:, column.offset + MESSAGE_HEADER.size : column.offset + column.size]
+
+    def message_index(self, channel: int) -> bytes:
+        """The MCAP Message Index record of one channel: log time and offset in the chunk of each of its messages.
+
+        Raises:
+            KeyError: If the chunk has no such channel.
+        """
+        offsets = np.arange(self.columns[channel].offset, self._table.size, self._table.shape[1])
+        return encode_message_index(channel, self.headers(channel)["log_time"], offsets)
+
+    @cached_property
+    def samples(self) -> Samples:
+        """The samples; joint columns and the ball's pose are views of the records.
+
+        Raises:
+            DatasetError: If joint states or the ball's odometry are missing, or not laid out as they are written here.
+        """
+        topics = {JOINT_STATES_ID: joint_states(), BALL_ODOMETRY_ID: ball_odometry()}
+        return read_samples(*(self._read(channel, topic) for channel, topic in topics.items()))
+
+    def _read(self, channel: int, topic: Topic) -> Rows:
+        self.check_layout(channel, topic)
+        return self.messages(channel).view(topic.layout.dtype)[:, 0]
+
+    def check_layout(self, channel: int, topic: Topic) -> None:
+        """Compare the first message of a channel, which stands for the layout of all, with that of a topic.
+
+        Raises:
+            DatasetError: If the chunk has no such channel, or its messages are laid out otherwise.
+        """
+        if channel not in self.columns:
+            raise DatasetError(f"chunk: no messages of {topic.name}")
+        if not topic.layout.describes_message(self.messages(channel)[0].tobytes()):
+            raise DatasetError(
+                f"chunk: the messages of {topic.name} have another layout than {topic.type_name} written here"
+            )
+
+
+class MessageList:
+    """The records of a chunk of any messages that begin with their std_msgs/Header, in order, without a copy.
+
+    Attributes:
+        headers: Fields of the records' headers, shape ``(n_messages,)``: ``channel``, ``sequence``, ``log_time`` and
+            ``publish_time`` [ns] among them.
+        offsets: Where the records begin [bytes], shape ``(n_messages,)``.
+
+    Args:
+        contents: Uncompressed records; what is seen of a bytearray can be written to.
+
+    Raises:
+        DatasetError: If the contents are anything but such records, at least one.
+    """
+
+    def __init__(self, contents: bytes | bytearray) -> None:
+        offsets, offset = [], 0
+        shortest = MESSAGE_HEADER.size - RECORD_PREFIX_BYTES + _STAMP_OFFSET + _STAMP.itemsize
+        while offset < len(contents):
+            if len(contents) - offset < MESSAGE_HEADER.size:
+                raise DatasetError(f"chunk: a record is cut off at byte {offset}")
+            opcode, length, *_ = MESSAGE_HEADER.unpack_from(contents, offset)
+            end = offset + RECORD_PREFIX_BYTES + length
+            if opcode != Opcode.MESSAGE or length < shortest or end > len(contents):
+                raise DatasetError(f"chunk: not a message with a header at byte {offset}")
+            offsets.append(offset)
+            offset = end
+        if not offsets:
+            raise DatasetError("chunk: holds no messages")
+        self._bytes = np.frombuffer(contents, np.uint8)
+        self.offsets = np.array(offsets)
+        self.headers: Rows = self._gather(0, _HEADERS)
+
+    def __len__(self) -> int:
+        return len(self.offsets)
+
+    @property
+    def channels(self) -> tuple[int, ...]:
+        """Numbers of the channels that have messages, in order."""
+        return tuple(np.unique(self.headers["channel"]).tolist())
+
+    @property
+    def stamps_ns(self) -> NDArray[np.int64]:
+        """Stamps in the messages' headers [ns], shape ``(n_messages,)``."""
+        stamps = self._gather(MESSAGE_HEADER.size + _STAMP_OFFSET, _STAMP)
+        times: NDArray[np.int64] = stamps["sec"].astype(np.int64) * NS_PER_S + stamps["nanosec"]
+        return times
+
+    def message_index(self, channel: int) -> bytes:
+        """The MCAP Message Index record of one channel."""
+        rows = self.headers["channel"] == channel
+        return encode_message_index(channel, self.headers["log_time"][rows], self.offsets[rows])
+
+    def move(self, by_ns: int) -> None:
+        """Change all times and stamps, in the contents themselves, which are a bytearray.
+
+        Args:
+            by_ns: How much later they are to be [ns].
+        """
+        stamps = self._gather(MESSAGE_HEADER.size + _STAMP_OFFSET, _STAMP)
+        stamps["sec"], stamps["nanosec"] = np.divmod(self.stamps_ns + by_ns, NS_PER_S)
+        for time in ("log_time", "publish_time"):
+            self.headers[time] = self.headers[time].astype(np.int64) + by_ns
+        self._scatter(MESSAGE_HEADER.size + _STAMP_OFFSET, stamps)
+        self._scatter(0, self.headers)
+
+    def _gather(self, start: int, kind: np.dtype[np.void]) -> Rows:
+        """A copy of what lies in each record from byte `start` on."""
+        places = self.offsets[:, np.newaxis] + start + np.arange(kind.itemsize)
+        return self._bytes[places].view(kind)[:, 0]
+
+    def _scatter(self, start: int, values: Rows) -> None:
+        """Put back what `_gather` gives."""
+        places = self.offsets[:, np.newaxis] + start + np.arange(values.itemsize)
+        self._bytes[places] = values[:, np.newaxis].view(np.uint8)

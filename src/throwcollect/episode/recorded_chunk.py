@@ -1,0 +1,61 @@
+"""A chunk of an episode with the hash of its records: the unit in which recordings are hashed, checked and kept."""
+
+from __future__ import annotations
+
+import hashlib
+from functools import cached_property
+
+from throwcollect.episode.chunk import Chunk
+from throwcollect.episode.message_table import MessageList
+from throwcollect.errors import DatasetError
+
+
+class RecordedChunk:
+    """A chunk that is decompressed and hashed when that is asked for, and once.
+
+    Attributes:
+        chunk: The recorded messages, compressed.
+        said_sha256: SHA-256 of the uncompressed message records in hexadecimal, as it was written beside them; None if
+            it is not known yet.
+    """
+
+    def __init__(self, chunk: Chunk, said_sha256: str | None = None) -> None:
+        self.chunk = chunk
+        self.said_sha256 = said_sha256
+
+    @cached_property
+    def contents(self) -> bytes:
+        """The uncompressed message records.
+
+        Raises:
+            DatasetError: If the chunk is damaged.
+        """
+        return self.chunk.decompress()
+
+    @cached_property
+    def records_sha256(self) -> str:
+        """SHA-256 of the uncompressed message records in hexadecimal: as it was said, or else worked out.
+
+        Raises:
+            DatasetError: If it has to be worked out and the chunk is damaged.
+        """
+        return self.said_sha256 or hashlib.sha256(self.contents).hexdigest()
+
+    @cached_property
+    def messages(self) -> MessageList:
+        """The message records of a sensor.
+
+        Raises:
+            DatasetError: If the chunk is damaged, or holds anything else.
+        """
+        return MessageList(self.contents)
+
+    def check_records(self) -> None:
+        """Hash the message records again.
+
+        Raises:
+            DatasetError: If the chunk is damaged, or `records_sha256` is not that of its records.
+        """
+        actual = hashlib.sha256(self.contents).hexdigest()
+        if actual != self.records_sha256:
+            raise DatasetError(f"chunk: SHA-256 of its records is {actual}", expected=self.records_sha256)

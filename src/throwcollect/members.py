@@ -1,0 +1,68 @@
+"""Families of things that a collection is made of, such as robots and tools, and their members by name.
+
+A family has members of its own, and those that other installed packages add with an entry point of the group
+``throwcollect.<family>``; its name is the member's, and it points to the same kind of object as the table here::
+
+    [project.entry-points."throwcollect.robots"]
+    planar_arm = "my_package.robot:PLANAR_ARM"
+
+The table holds names of objects instead of the objects, so that a configuration can be read without importing what
+only simulations need.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from importlib import import_module
+from importlib.metadata import EntryPoint, entry_points
+from types import MappingProxyType
+from typing import Any
+
+_OWN = MappingProxyType(
+    {
+        "robots": {"talos": "throwcollect.robots.talos:TALOS"},
+        "tools": {"spoon": "throwcollect.tools.spoon.config:SpoonConfig"},
+        "engines": {
+            "bullet": "throwcollect.engines.bullet.bullet_engine:BulletEngine",
+            "ballistic": "throwcollect.engines.ballistic.ballistic_engine:BallisticEngine",
+        },
+        "tasks": {"throw": "throwcollect.tasks.throw.config:ThrowConfig"},
+    }
+)
+
+
+def names_of(family: str) -> tuple[str, ...]:
+    """List the names of the members of a family: its own first, then those of other packages, by name."""
+    return tuple(_table(family))
+
+
+def load_member(family: str, name: str) -> Any:
+    """Import a member of a family.
+
+    Args:
+        family: ``robots``, ``tools``, ``engines`` or ``tasks``.
+        name: Name of the member.
+
+    Returns:
+        A `Robot`; the class of an engine; for tools and tasks, the class of their section of the configuration.
+
+    Raises:
+        KeyError: If the family has no such member.
+        ImportError: If the package that the member is in cannot be imported.
+    """
+    return _table(family)[name].load()
+
+
+def load_object(path: str) -> Any:
+    """Import what ``module:name`` stands for."""
+    module, _, name = path.partition(":")
+    return getattr(import_module(module), name)
+
+
+@cache
+def _table(family: str) -> Mapping[str, EntryPoint]:
+    group = f"throwcollect.{family}"
+    own = {name: EntryPoint(name, path, group) for name, path in _OWN[family].items()}
+    others = {entry.name: entry for entry in sorted(entry_points(group=group), key=lambda entry: entry.name)}
+    return MappingProxyType(own | {name: entry for name, entry in others.items() if name not in own})

@@ -1,0 +1,58 @@
+"""Limits of the joints of a robot, as its URDF states them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from throwcollect.errors import ConfigError
+from throwcollect.robots.robot import Robot, read_xml
+
+
+@dataclass(frozen=True)
+class JointLimits:
+    """Limits and damping of the joints of a robot, each of shape ``(n_joints,)`` in the order of `Robot.joints`.
+
+    Attributes:
+        lower: Lowest position [rad].
+        upper: Highest position [rad].
+        velocity: Highest speed [rad/s].
+        effort: Highest torque [Nm].
+        damping: Viscous friction [Nms/rad].
+    """
+
+    lower: NDArray[np.float64]
+    upper: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+    effort: NDArray[np.float64]
+    damping: NDArray[np.float64]
+
+
+@cache
+def joint_limits(robot: Robot) -> JointLimits:
+    """Read the limits of the joints of a robot.
+
+    Raises:
+        ConfigError: If the URDF cannot be read or lacks a joint or its limits.
+    """
+    path = robot.urdf_path
+    joints = {joint.get("name"): joint for joint in read_xml(path).iter("joint") if joint.find("limit") is not None}
+    rows = []
+    for name in robot.joints:
+        joint = joints.get(name)
+        limit = joint.find("limit") if joint is not None else None
+        if joint is None or limit is None:
+            raise ConfigError(f"{path}: joint {name} is missing or has no limit")
+        dynamics = joint.find("dynamics")
+        damping = dynamics.get("damping", "0") if dynamics is not None else "0"
+        try:
+            numbers = [float(limit.attrib[key]) for key in ("lower", "upper", "velocity", "effort")]
+            rows.append([*numbers, float(damping)])
+        except (KeyError, ValueError) as error:
+            raise ConfigError(f"{path}: joint {name}: limit is not readable: {error}") from error
+    table = np.array(rows)
+    table.flags.writeable = False
+    return JointLimits(*table.T)

@@ -1,0 +1,119 @@
+"""What a robot is: joints, the controllers that command them, and where its description is."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from types import MappingProxyType
+
+from throwcollect.errors import ConfigError
+
+
+@dataclass(frozen=True, eq=False)
+class Robot:
+    """A robot with a fixed base whose joints are all revolute, and the hand that holds the tool.
+
+    Attributes:
+        name: Its name in configurations, such as ``talos``.
+        title: Its name in sentences, such as ``Talos``.
+        controllers: Joint trajectory controller of each limb and its joints, in order.
+        share: Returns the directory that ``package://`` paths of the description are relative to; raises `ConfigError`
+            if the package that brings it is not installed.
+        urdf: Path of the URDF in that directory.
+        srdf: Path of the SRDF in that directory; it says which links may overlap, and holds the posture at rest.
+        rest: Name of the SRDF's posture that joints have unless a configuration says otherwise.
+        hand: Link that the tool is fixed to.
+        open_hand: How the names of the links begin that have no collision shapes, as the tool reaches into them.
+        holding: How the names of the links begin that are not checked for collisions with the tool that they hold.
+        rigid: For each group of links that only mimic joints move: how their names begin. Links of a group are not
+            checked for collisions with each other.
+        ros1_names: Name of each controller on the robot's ROS 1 software; empty if they are the same.
+    """
+
+    name: str
+    title: str
+    controllers: Mapping[str, tuple[str, ...]]
+    share: Callable[[], Path]
+    urdf: str
+    srdf: str
+    rest: str
+    hand: str
+    open_hand: str = ""
+    holding: tuple[str, ...] = ()
+    rigid: tuple[str, ...] = ()
+    ros1_names: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+
+    @cached_property
+    def joints(self) -> tuple[str, ...]:
+        """All joints that are commanded, in the order of every joint state and joint array."""
+        return tuple(joint for joints in self.controllers.values() for joint in joints)
+
+    def controller_of(self, joint: str) -> str:
+        """Return the name of the controller that commands a joint.
+
+        Raises:
+            KeyError: If the robot has no such joint.
+        """
+        for controller, joints in self.controllers.items():
+            if joint in joints:
+                return controller
+        raise KeyError(joint)
+
+    def graph_name(self, controller: str, naming: str) -> str:
+        """Return the name of a controller in the ROS graph.
+
+        Args:
+            controller: Name of one of `controllers`.
+            naming: ``ros2`` or ``ros1``: whose names it has.
+        """
+        return self.ros1_names.get(controller, controller) if naming == "ros1" else controller
+
+    @property
+    def urdf_path(self) -> Path:
+        """Path of the URDF.
+
+        Raises:
+            ConfigError: If the description is not installed.
+        """
+        return self.share() / self.urdf
+
+    @property
+    def srdf_path(self) -> Path:
+        """Path of the SRDF.
+
+        Raises:
+            ConfigError: If the description is not installed.
+        """
+        return self.share() / self.srdf
+
+    @cached_property
+    def rest_posture(self) -> Mapping[str, float]:
+        """Angle [rad] of each joint in the posture at rest, in the order of `joints`; those that the SRDF omits are 0.
+
+        Raises:
+            ConfigError: If the SRDF cannot be read or has no such posture.
+        """
+        path = self.srdf_path
+        state = read_xml(path).find(f"group_state[@name='{self.rest}']")
+        if state is None:
+            raise ConfigError(f"{path}: no group_state {self.rest}")
+        angles = {joint.get("name"): joint.get("value", "0") for joint in state.iter("joint")}
+        try:
+            return MappingProxyType({name: float(angles.get(name, "0")) for name in self.joints})
+        except ValueError as error:
+            raise ConfigError(f"{path}: group_state {self.rest} is not readable: {error}") from error
+
+
+def read_xml(path: Path) -> ElementTree.Element:
+    """Read a file of a robot's description.
+
+    Raises:
+        ConfigError: If it cannot be read.
+    """
+    try:
+        return ElementTree.parse(path).getroot()  # noqa: S314 - a file of an installed package
+    except (OSError, ElementTree.ParseError) as error:
+        raise ConfigError(f"{path}: cannot be read as robot description: {error}") from error

@@ -1,0 +1,85 @@
+"""Where the tool is and how fast it moves, from the measured joints."""
+
+from __future__ import annotations
+
+import threading
+
+import numpy as np
+from numpy.typing import NDArray
+
+from throwcollect.config.schema import Config
+from throwcollect.pinocchio_library import pinocchio
+from throwcollect.robots.description import joint_model, robot_of
+from throwcollect.robots.robot import Robot
+from throwcollect.tools.tool import tool_of
+
+
+class ToolMotion:
+    """Place and velocity of the point of the tool in which a resting ball has its centre; world frame.
+
+    Args:
+        config: Configuration of the trial.
+
+    Raises:
+        ConfigError: If the robot's files cannot be read, or the ball does not fit the tool.
+    """
+
+    def __init__(self, config: Config) -> None:
+        tool = tool_of(config.tool)
+        self._seat = tool.mount * pinocchio.SE3(np.eye(3), np.array(tool.ball_seat(config.ball.radius_m)))
+        self._model = _MODELS.of(robot_of(config))
+        self._base = np.array([0.0, 0.0, config.robot.base_height_m])
+
+    def place(self, position: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Where the point is [m], shape ``(3,)``.
+
+        Args:
+            position: Of the joints [rad], shape ``(n_joints,)``, in the order of `Robot.joints`.
+        """
+        model = self._model
+        pinocchio.forwardKinematics(model.model, model.data, position[model.order])
+        hand = pinocchio.updateFramePlacement(model.model, model.data, model.hand)
+        place: NDArray[np.float64] = self._base + (hand * self._seat).translation
+        return place
+
+    def velocity(self, position: NDArray[np.float64], velocity: NDArray[np.float64]) -> NDArray[np.float64]:
+        """How fast the point moves [m/s], shape ``(3,)``.
+
+        Args:
+            position: Of the joints [rad], shape ``(n_joints,)``, in the order of `Robot.joints`.
+            velocity: Of the joints [rad/s], shape ``(n_joints,)``.
+        """
+        model = self._model
+        pinocchio.forwardKinematics(model.model, model.data, position[model.order], velocity[model.order])
+        hand = pinocchio.updateFramePlacement(model.model, model.data, model.hand)
+        # Of the point, first along the axes of the seat, then along those of the world.
+        along_seat = self._seat.actInv(pinocchio.getFrameVelocity(model.model, model.data, model.hand))
+        turn = pinocchio.SE3((hand * self._seat).rotation, np.zeros(3))
+        velocity_in_world: NDArray[np.float64] = turn.act(along_seat).linear
+        return velocity_in_world
+
+
+class _JointModel:
+    """A robot with all joints, its kinematics, and for each of its joints the place in `Robot.joints`."""
+
+    def __init__(self, robot: Robot) -> None:
+        self.model = joint_model(robot)
+        self.data = self.model.createData()
+        self.order = np.array([robot.joints.index(name) for name in list(self.model.names)[1:]], dtype=np.intp)
+        self.hand = self.model.getFrameId(robot.hand, pinocchio.BODY)
+
+
+class _ModelsOfThread(threading.local):
+    """The models that a thread has made; to make one costs a hundred times as much as to use it."""
+
+    def __init__(self) -> None:
+        self._models: dict[Robot, _JointModel] = {}
+
+    def of(self, robot: Robot) -> _JointModel:
+        """Return the model of a robot."""
+        if robot not in self._models:
+            self._models[robot] = _JointModel(robot)
+        return self._models[robot]
+
+
+_MODELS = _ModelsOfThread()

@@ -1,0 +1,61 @@
+"""What a configuration says of the world, as values for a physics engine."""
+
+from __future__ import annotations
+
+import math
+
+from throwcollect.config.schema import Config
+from throwcollect.engines.engine import Physics, Scene, ToolLink
+from throwcollect.robots.description import Description, robot_of
+from throwcollect.robots.limits import joint_limits
+from throwcollect.tools.tool import tool_of
+
+_OPENING = (1.0, 0.0, 0.0)
+"""Where every tool is open, in the frame of its link."""
+
+
+def scene_of(config: Config, description: Description) -> Scene:
+    """What the world of a trial is made of.
+
+    Args:
+        config: Configuration of the trial.
+        description: Its robot.
+    """
+    tool = tool_of(config.tool)
+    return Scene(
+        urdf=description.urdf,
+        moving=description.moving,
+        base_height_m=config.robot.base_height_m,
+        tool=ToolLink(tool.link, tool.name, _OPENING),
+        # On a landing plane at height zero the trial ends before the ground could stop the ball.
+        ground_is_solid=config.scene.landing_height_m > 0,
+        ball_radius_m=config.ball.radius_m,
+    )
+
+
+def physics_of(config: Config, moving: tuple[str, ...]) -> Physics:
+    """The numbers that the physics of a trial depends on.
+
+    Args:
+        config: Configuration of the trial.
+        moving: The moving joints.
+    """
+    robot = robot_of(config)
+    efforts = joint_limits(robot).effort * config.robot.effort_scale
+    return Physics(
+        hz=config.sim.physics_hz,
+        solver_iterations=config.sim.solver_iterations,
+        gravity_mps2=config.scene.gravity_mps2,
+        ball_mass_kg=config.ball.mass_kg,
+        ball_friction=config.ball.friction,
+        ball_restitution=config.ball.restitution,
+        surface_friction=config.scene.spoon_friction,
+        efforts=tuple(float(efforts[robot.joints.index(joint)]) for joint in moving),
+        position_gain_per_s=config.robot.position_gain_per_s,
+        velocity_gain=config.robot.velocity_gain,
+    )
+
+
+def drag_of(config: Config) -> float:
+    """The air's force on the ball over the square of its speed [kg/m]."""
+    return config.ball.drag_coefficient * config.scene.air_density_kgpm3 * math.pi * config.ball.radius_m**2 / 2

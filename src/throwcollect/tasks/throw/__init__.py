@@ -1,0 +1,1 @@
+"""The task `throw`: a ball flies out of the tool and lands."""

@@ -1,0 +1,51 @@
+"""Keys of the task `throw`."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from throwcollect.config.key import Effect, Key
+from throwcollect.config.kinds import Angle, Joint
+from throwcollect.config.task import TaskConfig
+
+
+class ThrowConfig(TaskConfig):
+    """The task `throw`: the arm swings from `start` to `end`; the ball leaves the spoon when the spoon brakes."""
+
+    name: Literal["throw"] = "throw"
+    """Task."""
+    start: Annotated[dict[Joint, Angle], Key(Effect.PHYSICS, swept=True)] = {
+        "torso_1_joint": 0.0,
+        "arm_right_1_joint": 1.5,
+        "arm_right_2_joint": -2.6,
+        "arm_right_3_joint": -1.57,
+        "arm_right_4_joint": -1.9,
+        "arm_right_5_joint": 0.0,
+        "arm_right_6_joint": 0.0,
+        "arm_right_7_joint": -0.1,
+    }
+    """Joint angles at the start of each trial; the spoon must hold the ball, or the trial is refused."""
+    end: Annotated[dict[Joint, Angle], Key(swept=True)] = {
+        "torso_1_joint": 0.0,
+        "arm_right_1_joint": 1.5,
+        "arm_right_2_joint": -2.6,
+        "arm_right_4_joint": -0.5,
+        "arm_right_7_joint": 0.5,
+    }
+    """Joint angles at the end of the motion. The joints named here are the moving ones, even if end equals start.
+    One of them must move the spoon."""
+    recatch_gap_s: Annotated[float, Field(ge=0, le=1)] = 0.02
+    """The ball counts as released when it has been out of the spoon for this long."""
+
+
+def throw_section(task: TaskConfig) -> ThrowConfig:
+    """Return the section of a task that is known to be a throw.
+
+    Raises:
+        TypeError: If it is another task's.
+    """
+    if not isinstance(task, ThrowConfig):
+        raise TypeError(f"the task is {task.name}, not throw")
+    return task

@@ -1,0 +1,1 @@
+"""What the hand of a robot holds, and the ball lies in."""

@@ -1,0 +1,48 @@
+"""Keys of the throwing spoon."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar, Literal
+
+from pydantic import Field, model_validator
+
+from throwcollect.config.kinds import ContradictionError
+from throwcollect.config.tool import ToolConfig
+
+
+class SpoonConfig(ToolConfig):
+    """The throwing spoon: a handle and a cone of thin walls, fixed to the right gripper."""
+
+    implementation: ClassVar[str] = "throwcollect.tools.spoon.spoon:Spoon"
+
+    name: Literal["spoon"] = "spoon"
+    """Tool model."""
+    handle_length_m: Annotated[float, Field(ge=0.05, le=0.5)] = 0.15
+    """Length of the handle, along -z of the gripper's base link."""
+    handle_width_m: Annotated[float, Field(ge=0.004, le=0.05)] = 0.012
+    """Width and thickness of the handle."""
+    mount_offset_m: Annotated[float, Field(ge=0.0, le=0.3)] = 0.10
+    """Distance from the gripper's base link to the handle's upper end."""
+    cup_walls: Annotated[int, Field(ge=4, le=24)] = 6
+    """Number of flat walls that form the cone; each costs about 5 µs a step."""
+    cup_floor_radius_m: Annotated[float, Field(gt=0, le=0.05)] = 0.004
+    """Radius of the cone at its bottom."""
+    cup_rim_radius_m: Annotated[float, Field(gt=0, le=0.2)] = 0.045
+    """Radius of the cone at its rim."""
+    cup_depth_m: Annotated[float, Field(gt=0, le=0.2)] = 0.032
+    """Depth of the cone."""
+    wall_thickness_m: Annotated[float, Field(gt=0, le=0.02)] = 0.004
+    """Thickness of the cone's walls."""
+    mass_kg: Annotated[float, Field(gt=0, le=2)] = 0.12
+    """Mass of the whole spoon."""
+
+    @model_validator(mode="after")
+    def _cone_opens(self) -> SpoonConfig:
+        if self.cup_rim_radius_m <= self.cup_floor_radius_m:
+            raise ContradictionError(
+                {
+                    "cup_rim_radius_m": f"{self.cup_rim_radius_m} m should be above cup_floor_radius_m, "
+                    f"{self.cup_floor_radius_m} m, or the cup holds no ball"
+                }
+            )
+        return self

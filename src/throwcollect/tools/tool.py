@@ -1,0 +1,95 @@
+"""What a tool is: a body in the robot's hand with a cup from which a ball is thrown."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from throwcollect.config.tool import ToolConfig
+from throwcollect.members import load_object
+from throwcollect.pinocchio_library import pinocchio
+
+
+@dataclass(frozen=True)
+class Box:
+    """A box of a tool.
+
+    Attributes:
+        size: Edge lengths [m].
+        placement: Pose of the box (its frame lies at its centre, along its edges) in the tool's frame.
+    """
+
+    size: tuple[float, float, float]
+    placement: pinocchio.SE3
+
+
+class Tool(ABC):
+    """A tool; in the frame of its link, the cup opens along +x, and the rest is its own choice.
+
+    Attributes:
+        name: Name by which contacts with it are recorded, such as ``spoon``; its link is ``<name>_link``.
+    """
+
+    name: str
+
+    @property
+    def link(self) -> str:
+        """Name of its link in descriptions."""
+        return f"{self.name}_link"
+
+    @property
+    @abstractmethod
+    def mount(self) -> pinocchio.SE3:
+        """Pose of the tool's frame in the hand that holds it."""
+
+    @property
+    @abstractmethod
+    def boxes(self) -> tuple[Box, ...]:
+        """The boxes that it consists of."""
+
+    @property
+    @abstractmethod
+    def inertia(self) -> pinocchio.Inertia:
+        """Its inertia, in its frame."""
+
+    @property
+    @abstractmethod
+    def rim_radius_m(self) -> float:
+        """Radius of the opening through which the ball leaves [m]."""
+
+    @property
+    @abstractmethod
+    def depth_m(self) -> float:
+        """Depth of the cup below that opening [m]."""
+
+    @abstractmethod
+    def ball_seat(self, radius: float) -> tuple[float, float, float]:
+        """Find the centre [m] of a ball that rests in the upright cup, in the tool's frame.
+
+        Args:
+            radius: Radius of the ball [m].
+
+        Raises:
+            ConfigError: If the cup cannot hold such a ball.
+        """
+
+    @abstractmethod
+    def way_out(self, radius: float, up: NDArray[np.float64]) -> float:
+        """Find the slope of the lowest way on which a ball can leave the cup when it does not move.
+
+        Args:
+            radius: Radius of the ball [m].
+            up: Unit vector against gravity in the tool's frame, shape ``(3,)``.
+
+        Returns:
+            [rad]; above zero the way climbs and the ball stays, below zero it goes down.
+        """
+
+
+def tool_of(section: ToolConfig) -> Tool:
+    """Make the tool that a section of a configuration describes."""
+    tool: Tool = load_object(section.implementation)(section)
+    return tool

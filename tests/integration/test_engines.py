@@ -1,0 +1,36 @@
+"""A simulation on an engine that knows robot, ground and ball alone."""
+
+from collections.abc import Iterator
+
+import pytest
+
+from tests.integration.robot import Robot, running_simulation, swing
+from tests.unit.sim.bodies import box
+from throwcollect.config.schema import Config
+from throwcollect.ros import Context, get_message
+
+Features = get_message("simulation_interfaces/msg/SimulatorFeatures")
+Result = get_message("simulation_interfaces/msg/Result")
+
+
+@pytest.fixture(scope="module")
+def kinematic(tmp_path_factory: pytest.TempPathFactory, endpoint: str, session: Context) -> Iterator[Robot]:
+    config = Config.model_validate({"sim": {"engine": "ballistic"}})
+    directory = tmp_path_factory.mktemp("kinematic")
+    with running_simulation(directory, endpoint, session, "kinematic", config) as robot:
+        yield robot
+
+
+def test_goals_are_carried_out(kinematic: Robot) -> None:
+    assert kinematic.outcome(kinematic.send(swing(0.3)))[1] == 0
+    assert kinematic.joint("arm_right_4_joint") == pytest.approx(-0.5, abs=1e-9)
+
+
+def test_nothing_can_be_spawned_and_the_features_say_so(kinematic: Robot) -> None:
+    features = kinematic.call("get_simulator_features").features
+    assert Features.SPAWNING not in features.features
+    assert Features.STEP_SIMULATION_ACTION in features.features
+    assert list(features.spawn_formats) == []
+    answer = kinematic.call("spawn_entity", name="crate", resource_string=box())
+    assert answer.result.result == Result.RESULT_FEATURE_UNSUPPORTED
+    assert "knows robot, ground and ball alone" in answer.result.error_message

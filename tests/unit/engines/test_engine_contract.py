@@ -1,0 +1,238 @@
+"""What every physics engine of the table has to keep to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from tests.unit.sim.bodies import box
+
+from throwcollect.config.schema import Config
+from throwcollect.engines.engine import GROUND, BodyState, Engine, Observer, Sample, State, Steps, ball_of
+from throwcollect.members import load_member, names_of
+from throwcollect.robots.description import physics_description, start_posture
+from throwcollect.sim.scene import physics_of, scene_of
+from throwcollect.sim.urdf import read_model
+from throwcollect.tools.tool import tool_of
+
+CONFIG = Config.model_validate({"scene": {"landing_height_m": 0.5}})
+DESCRIPTION = physics_description(CONFIG)
+MOVING = DESCRIPTION.moving
+SCENE = scene_of(CONFIG, DESCRIPTION)
+PHYSICS = physics_of(CONFIG, MOVING)
+SEAT = tool_of(CONFIG.tool).ball_seat(CONFIG.ball.radius_m)
+START = np.array([start_posture(CONFIG)[joint] for joint in MOVING])
+END = np.array([CONFIG.task.end[joint] for joint in MOVING])
+SPOON = SCENE.tool.name
+STRIDE = 2
+
+
+@dataclass
+class Watcher(Observer):
+    """Notes what it sees, and stops the steps at one sample if it is told to."""
+
+    last: int | None = None
+    touches: list[tuple[int, frozenset[str]]] = field(default_factory=list)
+    samples: list[tuple[int, Sample]] = field(default_factory=list)
+    offset: int = 0
+
+    def on_touch(self, step: int, bodies: frozenset[str]) -> None:
+        self.touches.append((self.offset + step, bodies))
+
+    def on_sample(self, step: int, sample: Sample) -> bool:
+        self.samples.append((self.offset + step, sample))
+        return step == self.last
+
+
+def swing(steps: int, *, duration_s: float = 1.0, first: int = 0) -> Steps:
+    """Minimum-jerk motion from the start to the end of the task, from one of its steps on."""
+    x = np.minimum(np.arange(first, first + steps + 1) / PHYSICS.hz / duration_s, 1.0) ** 1.2
+    targets = START + (10 * x**3 - 15 * x**4 + 6 * x**5)[:, np.newaxis] * (END - START)
+    return Steps(targets, np.diff(targets, axis=0) * PHYSICS.hz, STRIDE - first % STRIDE, STRIDE)
+
+
+def still(engine: Engine, steps: int, *, drag_kgpm: float = 0.0) -> Steps:
+    targets = np.tile(engine.state.sample[: len(MOVING)], (steps + 1, 1))
+    return Steps(targets, np.zeros((steps, len(MOVING))), 1, 1, drag_kgpm)
+
+
+def begin(engine: Engine) -> State:
+    """Put the ball into the spoon, let it settle, and begin a trial from there."""
+    engine.load(SCENE)
+    engine.configure(PHYSICS)
+    engine.rest(START.tolist(), SEAT)
+    engine.run(still(engine, 25), Observer())
+    settled = engine.state
+    engine.reset(settled)
+    return settled
+
+
+@pytest.fixture(params=names_of("engines"))
+def name(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+@pytest.fixture
+def engine(name: str) -> Iterator[Engine]:
+    made = load_member("engines", name)()
+    begin(made)
+    yield made
+    made.close()
+
+
+def thrown(engine: Engine) -> Watcher:
+    seen = Watcher()
+    assert engine.run(swing(600), seen) == 600
+    return seen
+
+
+def test_the_ball_rests_in_the_tool_of_the_still_robot(engine: Engine) -> None:
+    state = engine.state
+    assert state.touching == {SPOON}
+    assert state.sample[: len(MOVING)] == pytest.approx(START, abs=1e-4)
+    assert len(state.sample) == 3 * len(MOVING) + 13
+    ball = ball_of(state.sample)
+    assert ball.linear_velocity == pytest.approx((0, 0, 0), abs=1e-4)
+    engine.run(still(engine, 100), Observer())
+    assert ball_of(engine.state.sample).position == pytest.approx(ball.position, abs=1e-4)
+
+
+def test_what_follows_from_a_state_does_not_depend_on_what_was_before(name: str, engine: Engine) -> None:
+    settled = begin(engine)
+    first = thrown(engine)
+    engine.reset(settled)
+    assert thrown(engine) == first
+    engine.place_ball(BodyState((0.0, 0.05, 2.2), (0.0, 0.6, 0.0, 0.8), (0.1, 0.2, 0.3), (1.0, 2.0, 3.0)))
+    engine.run(still(engine, 100), Observer())
+    begin(engine)
+    assert thrown(engine) == first
+    engine.load(replace(SCENE, ball_radius_m=0.03))
+    engine.configure(replace(PHYSICS, gravity_mps2=3.0, ball_mass_kg=0.2))
+    engine.rest(END.tolist(), SEAT)
+    engine.run(swing(50), Observer())
+    begin(engine)
+    assert thrown(engine) == first
+    fresh = load_member("engines", name)()
+    begin(fresh)
+    assert thrown(fresh) == first
+    fresh.close()
+
+
+def test_single_steps_are_the_same_as_many_at_once(engine: Engine) -> None:
+    at_once, one_by_one = thrown(engine), Watcher()
+    begin(engine)
+    for number in range(600):
+        one_by_one.offset = number
+        assert engine.run(swing(1, first=number), one_by_one) == 1
+    assert one_by_one.samples == at_once.samples
+    assert one_by_one.touches == at_once.touches
+
+
+def test_samples_are_those_of_the_steps_that_are_asked_for(engine: Engine) -> None:
+    seen = Watcher()
+    steps = replace(swing(20), first_sample=3, stride=4)
+    engine.run(steps, seen)
+    assert [number for number, _ in seen.samples] == [3, 7, 11, 15, 19]
+
+
+def test_an_observer_can_stop_the_steps_and_have_them_go_on(engine: Engine) -> None:
+    whole = thrown(engine)
+    begin(engine)
+    seen = Watcher(last=400)
+    assert engine.run(swing(600), seen) == 400
+    assert engine.state.sample == seen.samples[-1][1]
+    seen.last, seen.offset = None, 400
+    assert engine.run(swing(200, first=400), seen) == 200
+    assert (seen.samples, seen.touches) == (whole.samples, whole.touches)
+
+
+def test_joints_are_where_they_are_wanted_at_the_end_of_each_step(engine: Engine) -> None:
+    steps = swing(600)
+    seen = Watcher()
+    engine.run(steps, seen)
+    for number, sample in seen.samples:
+        assert sample[: len(MOVING)] == pytest.approx(steps.targets[number], abs=1e-3)
+
+
+def test_a_throw_leaves_the_tool_and_each_touch_differs_from_the_one_before(engine: Engine) -> None:
+    seen = thrown(engine)
+    assert engine.state.touching == frozenset()
+    assert seen.touches[-1][1] == frozenset()
+    steps = [number for number, _ in seen.touches]
+    assert steps == sorted(set(steps))
+    states = [frozenset({SPOON}), *(bodies for _, bodies in seen.touches)]
+    assert all(one != other for one, other in pairwise(states))
+    assert 200 < steps[-1] < 500
+    forward, _, height = ball_of(engine.state.sample).position
+    assert forward > 1.0
+    assert height < 1.5
+
+
+def test_a_free_ball_takes_gravity_first_and_then_moves(engine: Engine) -> None:
+    engine.place_ball(BodyState((3.0, 0.0, 2.0), linear_velocity=(1.0, -0.5, 2.0)))
+    seen = Watcher()
+    engine.run(still(engine, 100), seen)
+    assert seen.touches == [(1, frozenset())]
+    n = 100
+    dt = 1 / PHYSICS.hz
+    ball = ball_of(engine.state.sample)
+    fallen = PHYSICS.gravity_mps2 * dt * dt * n * (n + 1) / 2
+    assert ball.position == pytest.approx((3.0 + n * dt, -0.5 * n * dt, 2.0 + 2.0 * n * dt - fallen), abs=1e-12)
+    assert ball.linear_velocity == pytest.approx((1.0, -0.5, 2.0 - PHYSICS.gravity_mps2 * n * dt), abs=1e-12)
+
+
+def test_drag_brakes_by_the_square_of_the_speed(engine: Engine) -> None:
+    speed, drag_kgpm = 4.0, 0.01
+    engine.place_ball(BodyState((3.0, 0.0, 2.0), linear_velocity=(speed, 0.0, 0.0)))
+    engine.run(still(engine, 1, drag_kgpm=drag_kgpm), Observer())
+    lost = drag_kgpm * speed**2 / PHYSICS.ball_mass_kg / PHYSICS.hz
+    assert ball_of(engine.state.sample).linear_velocity[0] == pytest.approx(speed - lost, rel=1e-9)
+
+
+def test_solid_ground_stops_the_ball_and_other_ground_does_not(engine: Engine) -> None:
+    low = BodyState((2.0, 0.0, 0.2), linear_velocity=(0.0, 0.0, -2.0))
+    engine.place_ball(low)
+    engine.run(still(engine, 100), Observer())
+    assert engine.state.touching == {GROUND}
+    assert ball_of(engine.state.sample).position[2] == pytest.approx(SCENE.ball_radius_m, abs=2e-3)
+    engine.load(replace(SCENE, ground_is_solid=False))
+    engine.configure(PHYSICS)
+    engine.rest(START.tolist(), SEAT)
+    engine.place_ball(low)
+    engine.run(still(engine, 100), Observer())
+    assert engine.state.touching == frozenset()
+    assert ball_of(engine.state.sample).position[2] < -0.2
+
+
+def test_the_ball_is_where_it_is_put(engine: Engine) -> None:
+    put = BodyState((1.0, 2.0, 3.0), (0.0, 0.6, 0.0, 0.8), (0.1, 0.2, 0.3))
+    engine.place_ball(put)
+    assert ball_of(engine.state.sample) == put
+    ((lowest, highest),) = engine.ball_boxes()
+    assert all(low < at < high for low, at, high in zip(lowest, put.position, highest, strict=True))
+
+
+def test_bodies_come_and_go_where_an_engine_takes_any(engine: Engine) -> None:
+    assert engine.is_as_loaded
+    if engine.bodies is None:
+        return
+    crate = read_model(box("0.2 0.4 0.6", mass=0), lambda _: pytest.fail("there is no mesh"))
+    start = BodyState((3.0, 0.0, 0.5))
+    engine.bodies.add("crate", crate, start)
+    assert engine.bodies.state("crate") == start
+    engine.place_ball(BodyState((3.0, 0.0, 0.83)))
+    engine.run(still(engine, 50), Observer())
+    assert engine.state.touching == {"crate/body"}
+    engine.bodies.remove("crate")
+    assert engine.state.touching == frozenset()
+    seen = Watcher()
+    engine.run(still(engine, 1), seen)
+    assert seen.touches == [(1, frozenset())]
+    assert not engine.is_as_loaded
+    engine.bodies.add("crate", crate, start)
+    begin(engine)
+    assert "crate" not in engine.bodies
+    assert engine.is_as_loaded

@@ -1,0 +1,61 @@
+"""Messages of a sensor: of any size, one after the other. `test_chunk` has the tables of samples."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mcap.records import Message
+
+from rclzenoh.interfaces import get_message, serialize
+from throwcollect.episode.chunk import count_indexed, encode_records
+from throwcollect.episode.message_table import MessageList
+from throwcollect.errors import DatasetError
+
+LATE_NS = 3_000_000_000
+
+
+def stamped(stamp_ns: int, text: str) -> bytes:
+    sec, nanosec = divmod(stamp_ns, 1_000_000_000)
+    stamp = get_message("builtin_interfaces/msg/Time")(sec=sec, nanosec=nanosec)
+    header = get_message("std_msgs/msg/Header")(stamp=stamp, frame_id=text)
+    return bytes(serialize(get_message("sensor_msgs/msg/CompressedImage")(header=header, format="", data=[1, 2])))
+
+
+@pytest.fixture
+def contents() -> bytes:
+    times = [5, 1_000_000_000, 1_999_999_999]
+    return encode_records(
+        *(Message(100 + n % 2, time, stamped(time, "a" * n * 7), time, n // 2) for n, time in enumerate(times))
+    )
+
+
+def test_they_are_found_one_after_the_other(contents: bytes) -> None:
+    messages = MessageList(contents)
+    assert len(messages) == 3
+    assert messages.channels == (100, 101)
+    assert messages.stamps_ns.tolist() == messages.headers["log_time"].tolist() == [5, 1_000_000_000, 1_999_999_999]
+    assert messages.headers["sequence"].tolist() == [0, 0, 1]
+    assert [count_indexed(messages.message_index(channel)) for channel in messages.channels] == [2, 1]
+
+
+def test_moved_messages_differ_in_times_and_stamps_alone(contents: bytes) -> None:
+    moved = bytearray(contents)
+    MessageList(moved).move(LATE_NS)
+    after, before = MessageList(moved), MessageList(contents)
+    assert np.array_equal(after.stamps_ns, before.stamps_ns + LATE_NS)
+    assert np.array_equal(after.headers["publish_time"], before.headers["log_time"] + LATE_NS)
+    MessageList(moved).move(-LATE_NS)
+    assert moved == contents
+
+
+def test_what_are_no_such_messages_is_refused(contents: bytes) -> None:
+    short = encode_records(Message(100, 5, b"\0\1\0\0abc", 5, 0))
+    for broken, problem in [
+        (b"", "holds no messages"),
+        (contents[:-1], "not a message with a header"),
+        (contents + bytes(3), "cut off"),
+        (contents + b"\x06" + bytes(40), "not a message with a header"),
+        (short, "not a message with a header at byte 0"),
+    ]:
+        with pytest.raises(DatasetError, match=problem):
+            MessageList(broken)

@@ -1,0 +1,53 @@
+"""What holds for every robot of the table, and for one of another package."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from throwcollect.members import load_member, names_of
+from throwcollect.robots.description import joint_model
+from throwcollect.robots.limits import joint_limits
+from throwcollect.robots.robot import Robot
+
+sys.path.append(str(Path(__file__).parents[2] / "plugins"))
+
+from planar_arm.robot import PLANAR_ARM
+
+ROBOTS = [*(load_member("robots", name) for name in names_of("robots")), PLANAR_ARM]
+
+of_every_robot = pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: robot.name)
+
+
+@of_every_robot
+def test_every_joint_has_one_controller(robot: Robot) -> None:
+    assert len(set(robot.joints)) == len(robot.joints) > 0
+    for controller, joints in robot.controllers.items():
+        assert {robot.controller_of(joint) for joint in joints} == {controller}
+    with pytest.raises(KeyError, match="tail_joint"):
+        robot.controller_of("tail_joint")
+
+
+@of_every_robot
+def test_names_of_controllers_in_the_graph_are_told_apart(robot: Robot) -> None:
+    for naming in ("ros1", "ros2"):
+        assert len({robot.graph_name(controller, naming) for controller in robot.controllers}) == len(robot.controllers)
+
+
+@of_every_robot
+def test_the_posture_at_rest_is_within_the_limits(robot: Robot) -> None:
+    limits = joint_limits(robot)
+    posture = np.array([robot.rest_posture[joint] for joint in robot.joints])
+    assert tuple(robot.rest_posture) == robot.joints
+    assert limits.lower.shape == (len(robot.joints),)
+    assert np.all((limits.lower <= posture) & (posture <= limits.upper))
+    assert np.all(limits.velocity > 0)
+    assert np.all(limits.effort > 0)
+
+
+@of_every_robot
+def test_the_description_has_the_joints_and_the_hand(robot: Robot) -> None:
+    model = joint_model(robot)
+    assert set(model.names[1:]) == set(robot.joints)
+    assert model.existBodyName(robot.hand)
