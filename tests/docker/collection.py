@@ -18,10 +18,12 @@ from throwcollect.coordinator.prepare import prepare
 from throwcollect.dataset.inspect import info
 from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
-from throwcollect.runtime.docker import DockerRuntime
-from throwcollect.runtime.docker_runs import remove
-from throwcollect.runtime.nodes import NodeExit
-from throwcollect.runtime.supervisor import Supervisor
+from throwcollect.runtimes.docker.containers import DockerNodes
+from throwcollect.runtimes.docker.held_runs import remove
+from throwcollect.runtimes.node_collection import roster
+from throwcollect.runtimes.nodes import NodeExit
+from throwcollect.runtimes.runtime import Place
+from throwcollect.runtimes.supervisor import Supervisor
 
 TRIALS = 40
 
@@ -44,7 +46,7 @@ class Collection:
         end: How the coordinator ended.
     """
 
-    runtime: DockerRuntime
+    runtime: DockerNodes
     supervisor: Supervisor
     directory: Path
     news: list[str] = field(default_factory=list)
@@ -90,6 +92,11 @@ def key_in(directory: Path) -> RunKey:
     return key
 
 
+def place_of(run: str, dataset: Path, key: RunKey, *, volume: str | None = None) -> Place:
+    """A run whose logs lie beside the dataset."""
+    return Place(run, dataset, volume, dataset / "logs", 2, Middleware(), key)
+
+
 @contextmanager
 def collecting(
     client: DockerClient, directory: Path, *overrides: str, run: str | None = None, found: tuple[str, ...] = ()
@@ -100,19 +107,10 @@ def collecting(
     dataset = directory / "dataset"
     if not dataset.exists():
         prepare(config, dataset, sweep_directory=directory)
-    runtime = DockerRuntime(
-        run,
-        config,
-        directory=dataset,
-        logs=dataset / "logs",
-        key=key_in(directory),
-        middleware=Middleware(),
-        client=client,
-    )
+    runtime = DockerNodes(place_of(run, dataset, key_in(directory)), config, client=client)
     try:
-        with Supervisor(runtime, config.run, simulations=config.run.simulations) as supervisor:
-            runtime.open()
-            assert sorted(runtime.found()) == sorted(found)
+        with Supervisor(runtime, config.run, roster(runtime, config.run.simulations)) as supervisor:
+            assert sorted(runtime.open()) == sorted(found)
             supervisor.start(found=found)
             yield Collection(runtime, supervisor, dataset)
     finally:

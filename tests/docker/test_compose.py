@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from tests.e2e.collection import collect, fingerprints, write_config
-from throwcollect.runtime.docker_engine import connect
+from throwcollect.runtimes.docker.engine import connect
 
 pytestmark = [pytest.mark.docker, pytest.mark.usefixtures("client")]
 ROOT = Path(__file__).parents[2]
@@ -72,7 +72,7 @@ def run(environment: dict[str, str], *arguments: str | Path, cwd: Path = ROOT) -
 
 
 @pytest.mark.parametrize(
-    ("environment", "numbers"), [("v2", ("1", "8")), ("1.29", ("4",))], indirect=["environment"], ids=["v2", "1.29"]
+    ("environment", "numbers"), [("v2", ("1", "3")), ("1.29", ("2",))], indirect=["environment"], ids=["v2", "1.29"]
 )
 def test_the_files_are_those_of_processes_for_any_number(
     environment: dict[str, str], numbers: tuple[str, ...], tmp_path: Path

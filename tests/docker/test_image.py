@@ -11,7 +11,7 @@ from docker.client import DockerClient
 from docker.errors import ContainerError
 
 import throwcollect
-from throwcollect.runtime.image import default_tag
+from throwcollect.runtimes.docker.image import default_tag
 
 pytestmark = pytest.mark.docker
 

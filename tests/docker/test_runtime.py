@@ -18,20 +18,20 @@ from docker.client import DockerClient
 from docker.errors import NotFound
 from docker.models.containers import Container
 
-from tests.docker.collection import Collection, collecting, config_for, key_in, new_run
+from tests.docker.collection import Collection, collecting, config_for, key_in, new_run, place_of
 from tests.docker.cut_line import CutLine
 from throwcollect.coordinator.prepare import prepare
 from throwcollect.dataset.inspect import info
 from throwcollect.errors import ConfigError, WorkerError
-from throwcollect.ros.middleware import Middleware
-from throwcollect.runtime import docker_watch
-from throwcollect.runtime.docker import DockerRuntime
-from throwcollect.runtime.docker_engine import connect
-from throwcollect.runtime.docker_options import KEY_LABEL
-from throwcollect.runtime.docker_runs import remove, runs
-from throwcollect.runtime.local import LocalRuntime
-from throwcollect.runtime.nodes import COORDINATOR, ROUTER, NodeExit
-from throwcollect.runtime.supervisor import Supervisor
+from throwcollect.runtimes.docker import watch as docker_watch
+from throwcollect.runtimes.docker.containers import DockerNodes
+from throwcollect.runtimes.docker.engine import connect
+from throwcollect.runtimes.docker.held_runs import held_runs, remove
+from throwcollect.runtimes.docker.options import KEY_LABEL
+from throwcollect.runtimes.local import LocalNodes
+from throwcollect.runtimes.node_collection import roster
+from throwcollect.runtimes.nodes import COORDINATOR, ROUTER, NodeExit, NodeSpec, Role
+from throwcollect.runtimes.supervisor import Supervisor
 
 pytestmark = pytest.mark.docker
 
@@ -50,8 +50,8 @@ def digest(tmp_path_factory: pytest.TempPathFactory) -> str:
     directory = tmp_path_factory.mktemp("local")
     config = config_for(directory)
     prepare(config, directory / "dataset", sweep_directory=directory)
-    runtime = LocalRuntime(directory / "dataset", directory / "logs", config.run, key_in(directory), Middleware())
-    with Supervisor(runtime, config.run, simulations=2) as supervisor:
+    runtime = LocalNodes(place_of("local", directory / "dataset", key_in(directory)), config)
+    with Supervisor(runtime, config.run, roster(runtime, 2)) as supervisor:
         supervisor.start()
         until(lambda: supervisor.poll()[0] is not None)
     return info(directory / "dataset").digest
@@ -64,7 +64,7 @@ def until(condition: Callable[[], bool], *, seconds: float = 60) -> None:
         time.sleep(0.02)
 
 
-def ended(runtime: DockerRuntime) -> NodeExit:
+def ended(runtime: DockerNodes) -> NodeExit:
     found: list[NodeExit] = []
     until(lambda: bool(found.extend(runtime.exits()) or found))
     return found[0]
@@ -96,7 +96,7 @@ def test_a_collection_in_containers_yields_the_dataset_of_one_in_processes(
         os.chown(path, caller, -1)
     with collecting(client, tmp_path, run=run) as collection:
         collection.until(lambda: collection.status("sim_1") == "running")
-        known = next(each for each in runs(client) if each.run_id == run)
+        known = next(each for each in held_runs(client) if each.run_id == run)
         assert known.source == str(prepared)
         assert [node.name for node in known.nodes] == [COORDINATOR, ROUTER, "sim_0", "sim_1"]
         for node in collection.runtime.running():
@@ -170,22 +170,19 @@ def test_runs_side_by_side_do_not_disturb_one_another(client: DockerClient, tmp_
     config = config_for(tmp_path / "other", f"containers.volume={volume}", "run.simulations=1")
     prepare(config, tmp_path / "other" / "dataset", sweep_directory=tmp_path)
     key = key_in(tmp_path / "other")
-    runtime = DockerRuntime(
-        run, config, directory=None, logs=tmp_path / "other" / "logs", key=key, middleware=Middleware(), client=client
-    )
+    runtime = DockerNodes(place_of(run, tmp_path / "other" / "dataset", key, volume=volume), config, client=client)
     assert runtime.data == f"/data/{run}"
     try:
         with (
-            Supervisor(runtime, config.run, simulations=1) as supervisor,
+            Supervisor(runtime, config.run, roster(runtime, 1)) as supervisor,
             collecting(client, tmp_path / "one", "run.simulations=1") as collection,
         ):
             runtime.open()
-            runtime.place(tmp_path / "other" / "dataset")
             supervisor.start()
             assert collection.finish() == digest
-            collection.supervisor.runtime.close()
+            collection.supervisor.host.close()
             until(lambda: supervisor.poll()[0] is not None)
-            assert runtime.info()["digest"] == digest
+            assert runtime.info().digest == digest
         assert left_of(client, f"throwcollect.run={run}") == []
         assert client.volumes.get(volume).attrs["Labels"]["throwcollect.run"] == run
     finally:
@@ -198,14 +195,16 @@ from pathlib import Path
 from throwcollect.config.loader import load
 from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
-from throwcollect.runtime.docker import DockerRuntime
-from throwcollect.runtime.supervisor import Supervisor
+from throwcollect.runtimes.docker.containers import DockerNodes
+from throwcollect.runtimes.node_collection import roster
+from throwcollect.runtimes.runtime import Place
+from throwcollect.runtimes.supervisor import Supervisor
 run, directory = sys.argv[1], Path(sys.argv[2])
 config = load(directory / "config.yaml")
 key = RunKey(directory.parent / "key")
-runtime = DockerRuntime(run, config, directory=directory, logs=directory / "logs", key=key, middleware=Middleware())
+runtime = DockerNodes(Place(run, directory, None, directory / "logs", 2, Middleware(), key), config)
 runtime.open()
-supervisor = Supervisor(runtime, config.run, simulations=2)
+supervisor = Supervisor(runtime, config.run, roster(runtime, 2))
 supervisor.start()
 while True:
     supervisor.poll()
@@ -236,19 +235,12 @@ def test_a_run_whose_launcher_vanished_is_taken_over(client: DockerClient, tmp_p
 @pytest.fixture
 def bare(client: DockerClient, tmp_path: Path) -> Any:
     """Makes runtimes without a dataset, for nodes that need none."""
-    made: list[tuple[DockerRuntime, str]] = []
+    made: list[tuple[DockerNodes, str]] = []
 
-    def make(*overrides: str, through: DockerClient = client) -> DockerRuntime:
+    def make(*overrides: str, through: DockerClient = client) -> DockerNodes:
         run = new_run()
-        runtime = DockerRuntime(
-            run,
-            config_for(tmp_path, *overrides),
-            directory=tmp_path,
-            logs=tmp_path / "logs",
-            key=key_in(tmp_path),
-            middleware=Middleware(),
-            client=through,
-        )
+        place = place_of(run, tmp_path, key_in(tmp_path))
+        runtime = DockerNodes(place, config_for(tmp_path, *overrides), client=through)
         made.append((runtime, run))
         runtime.open()
         return runtime
@@ -261,31 +253,31 @@ def bare(client: DockerClient, tmp_path: Path) -> Any:
 
 def test_what_the_engine_refuses_is_the_reason_of_an_end(bare: Any) -> None:
     runtime = bare("containers.sim.options.runtime=nowhere", "containers.coordinator.memory=16m")
-    runtime.start("sim_0", ["--version"])
+    runtime.start(NodeSpec("sim_0", ("--version",), Role.WORKER))
     end = ended(runtime)
     assert (end.name, end.code) == ("sim_0", None)
     assert "cannot be started" in end.reason
     assert "nowhere" in end.reason
     assert (runtime.running(), runtime.handle("sim_0")) == ((), None)
-    runtime.start(COORDINATOR, ["config", "/data/small.yaml"])
+    runtime.start(NodeSpec(COORDINATOR, ("config", "/data/small.yaml"), Role.WORKER))
     assert ended(runtime).reason == "ran out of memory (limit 16m)"
 
 
 def test_a_node_says_how_it_ended_and_what_it_said_last(monkeypatch: pytest.MonkeyPatch, bare: Any) -> None:
     monkeypatch.setattr(docker_watch, "_LOOK_EVERY_S", 3600.0)  # the engine's events are enough
     runtime = bare()
-    runtime.start("sim_0", ["sim", "/data/nothing.yaml"])
+    runtime.start(NodeSpec("sim_0", ("sim", "/data/nothing.yaml"), Role.WORKER))
     end = ended(runtime)
     assert (end.code, end.reason) == (2, "exit code 2")
     assert end.log.splitlines()[-1] == "throwcollect: /data/nothing.yaml: no such file"
     assert runtime.exits() == []
-    runtime.start("sim_0", ["--version"])
+    runtime.start(NodeSpec("sim_0", ("--version",), Role.WORKER))
     assert ended(runtime).log.splitlines()[-2:] == [*end.log.splitlines()[-1:], "throwcollect 0.1.0"]
 
 
 def test_a_container_that_somebody_removes_has_ended(bare: Any, client: DockerClient) -> None:
     runtime = bare()
-    runtime.start(ROUTER, ["router", "--listen", runtime.listen])
+    runtime.start(NodeSpec(ROUTER, ("router", "--listen", runtime.listen), Role.WORKER))
     until(lambda: runtime.handle(ROUTER) is not None)
     client.containers.get(runtime.handle(ROUTER)).remove(force=True)
     assert ended(runtime).reason in ("its container was removed", "ended by SIGKILL")
@@ -297,7 +289,7 @@ def test_a_published_router_is_reached_on_the_loopback_interface_alone(bare: Any
         with pytest.raises(ConfigError, match=f"run.router_port: port {port} of 127.0.0.1 cannot be used"):
             bare(f"run.router_port={port}")
     runtime = bare(f"run.router_port={port}")
-    runtime.start(ROUTER, ["router", "--listen", runtime.listen])
+    runtime.start(NodeSpec(ROUTER, ("router", "--listen", runtime.listen), Role.WORKER))
     until(lambda: runtime.log_tail(ROUTER) != "")
     assert runtime.router_address() == ("127.0.0.1", port)
     socket.create_connection(("127.0.0.1", port), 5).close()
@@ -313,7 +305,7 @@ def test_a_node_has_the_key_as_files_of_the_caller_which_the_engine_tells_nobody
     monkeypatch.setattr(os, "getuid", lambda: 4242)
     key = key_in(tmp_path).private_key.read_text()
     runtime = bare()
-    runtime.start(ROUTER, ["router", "--listen", runtime.listen])
+    runtime.start(NodeSpec(ROUTER, ("router", "--listen", runtime.listen), Role.WORKER))
     until(lambda: runtime.log_tail(ROUTER) != "")
     assert runtime.log_tail(ROUTER) == "router listening on tls/router:7447"
     router = client.containers.get(runtime.handle(ROUTER))
@@ -361,7 +353,7 @@ def test_mounts_environment_and_networks_of_the_configuration_are_there(
             "containers.router.cpuset='0'",
             "containers.router.options={ulimits: {nofile: 99}, tmpfs: {/tmp: size=1m}}",
         )
-        runtime.start(ROUTER, ["router", "--listen", runtime.listen])
+        runtime.start(NodeSpec(ROUTER, ("router", "--listen", runtime.listen), Role.WORKER))
         until(lambda: runtime.log_tail(ROUTER) != "")
         script = (
             "cat /extra; echo $ANSWER; ulimit -n; grep Cpus_allowed_list /proc/self/status; grep ' /tmp ' /proc/mounts"
@@ -386,7 +378,7 @@ def line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> CutLine:
 
 def test_a_broken_line_to_the_engine_is_mended(bare: Any, client: DockerClient, line: CutLine) -> None:
     runtime = bare(through=connect())
-    runtime.start(ROUTER, ["router", "--listen", runtime.listen])
+    runtime.start(NodeSpec(ROUTER, ("router", "--listen", runtime.listen), Role.WORKER))
     until(lambda: runtime.log_tail(ROUTER) != "")
     handle = runtime.handle(ROUTER)
     line.interrupt()
@@ -405,9 +397,9 @@ def test_an_engine_that_does_not_answer_any_more_is_said_so_with_what_is_safe(
     trouble: str,
     evidence: str,
 ) -> None:
-    monkeypatch.setattr("throwcollect.runtime.docker._SILENCE_S", 3.0)
+    monkeypatch.setattr("throwcollect.runtimes.docker.containers._SILENCE_S", 3.0)
     runtime = bare(through=connect())
-    runtime.start(ROUTER, ["router", "--listen", runtime.listen])
+    runtime.start(NodeSpec(ROUTER, ("router", "--listen", runtime.listen), Role.WORKER))
     until(lambda: runtime.log_tail(ROUTER) != "")
     handle = runtime.handle(ROUTER)
     getattr(line, trouble)()

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from throwcollect.ros.backend import EMBEDDED_RMW, RMW_VARIABLE
+from throwcollect.ros.middleware import EMBEDDED_RMW, RMW_VARIABLE
 
 ROOT = Path(__file__).parents[2]
 

@@ -18,7 +18,7 @@ import pytest
 from tests.e2e.collection import Running, call, collect, fingerprints, start, write_config
 from throwcollect.dataset.journal import read_journal
 from throwcollect.errors import WorkerError
-from throwcollect.runtime.records import STATE_VARIABLE, Records
+from throwcollect.runs.records import STATE_VARIABLE, Records
 
 TRIALS = 12
 DOMAIN = "83"

@@ -9,9 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from throwcollect import interfaces
-from throwcollect.interfaces import type_hash
-from throwcollect.interfaces.catalog import DEFINITIONS
+from rclzenoh import interfaces
+from rclzenoh.interfaces import type_hash
+from rclzenoh.interfaces.catalog import DEFINITIONS
+from rclzenoh.interfaces.typed_names import ACTIONS, MESSAGES, SERVICES
 
 ROOT = Path(__file__).parents[2]
 BUILT = ("control_msgs", "controller_manager_msgs", "simulation_interfaces", "tf2_msgs")
@@ -19,9 +20,10 @@ NAME = re.compile(r"""["']([a-z0-9_]+/(?:msg|srv|action)/[A-Z]\w+)["']""")
 
 
 def used() -> set[str]:
-    """Every interface that is named in the sources."""
+    """Every interface that is named in the sources, or that they import."""
     sources = (ROOT / "src" / "throwcollect").rglob("*.py")
-    return {name for path in sources for name in NAME.findall(path.read_text(encoding="utf-8"))}
+    named = {name for path in sources for name in NAME.findall(path.read_text(encoding="utf-8"))}
+    return named.union(MESSAGES.values(), SERVICES.values(), ACTIONS.values())
 
 
 def defined() -> set[str]:

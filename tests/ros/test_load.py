@@ -5,10 +5,10 @@ import subprocess
 import sys
 
 from tests.integration.robot import discovery_server
+from throwcollect.ros.connection import Connection
 from throwcollect.ros.middleware import Middleware
 from throwcollect.ros.router import router
 from throwcollect.run_key import RunKey
-from throwcollect.runtime.nodes import joining_environment
 
 SMALL, LARGE, EVERY = 300, 4, 75
 """Episodes of 82 kB, at 100 a second; and of 5 MB, one after so many small ones."""
@@ -19,7 +19,7 @@ import time
 from throwcollect import ros
 
 ros.init()
-node = ros.create_node("simulation")
+node = ros.Node("simulation")
 kind = ros.get_message("std_msgs/msg/UInt8MultiArray")
 publisher = node.create_publisher(kind, "episode", {QOS})
 while not publisher.get_subscription_count():
@@ -40,7 +40,9 @@ import time
 from throwcollect import ros
 
 ros.init()
-node = ros.create_node("coordinator")
+node = ros.Node("coordinator")
+executor = ros.SingleThreadedExecutor()
+executor.add_node(node)
 heard = []
 
 def hear(message):
@@ -53,7 +55,7 @@ def hear(message):
 node.create_subscription(ros.get_message("std_msgs/msg/UInt8MultiArray"), "episode", hear, {QOS})
 deadline = time.monotonic() + 40
 while len(heard) < {SMALL + LARGE} and time.monotonic() < deadline:
-    ros.spin_once(node, timeout_sec=0.1)
+    executor.spin_once(timeout_sec=0.1)
 print([number for number, _ in heard] == list(range({SMALL + LARGE})), sum(large for _, large in heard), len(heard))
 """
 
@@ -61,7 +63,7 @@ print([number for number, _ in heard] == list(range({SMALL + LARGE})), sum(large
 def test_no_episode_is_dropped_however_slow_the_subscriber_is(tmp_path):
     middleware = Middleware("rclpy", Middleware.of_process().rmw)
     with discovery_server() if middleware.is_fast_dds else router("tcp/127.0.0.1:0") as endpoint:
-        joining = joining_environment(endpoint, 0, RunKey(tmp_path), middleware)
+        joining = Connection(endpoint, RunKey(tmp_path), 0, middleware).environment()
 
         def start(program: str) -> subprocess.Popen[str]:
             return subprocess.Popen(

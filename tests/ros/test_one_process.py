@@ -7,6 +7,8 @@ import sys
 
 import pytest
 
+from throwcollect.ros.middleware import Middleware
+
 IMPORTS = {
     "rclpy": "import rclpy, rclpy.action, control_msgs.action, trajectory_msgs.msg",
     "pybullet": "import pybullet",
@@ -24,8 +26,8 @@ for _ in range(240):
     pybullet.stepSimulation()
 assert pybullet.getBasePositionAndOrientation(ball)[0][2] < -3
 
-from throwcollect.robots.model import urdf_path
-model = pinocchio.buildModelFromUrdf(str(urdf_path()))
+from throwcollect.robots.talos import TALOS
+model = pinocchio.buildModelFromUrdf(str(TALOS.urdf_path))
 data = model.createData()
 pinocchio.forwardKinematics(model, data, pinocchio.neutral(model))
 assert numpy.isfinite(data.oMi[model.njoints - 1].translation).all()
@@ -82,3 +84,36 @@ def test_all_libraries_work_in_one_process(order):
         check=False,
     )
     assert (found.returncode, found.stdout.splitlines()[-1:]) == (0, ["all of it works"]), found.stderr
+
+
+SECOND_RUN = """
+from pathlib import Path
+
+from throwcollect import ros
+from throwcollect.errors import WorkerError
+from throwcollect.ros.connection import Connection
+from throwcollect.ros.middleware import Middleware
+from throwcollect.run_key import RunKey
+
+def join(port):
+    way = Connection(f"udp/127.0.0.1:{port}", RunKey(Path("nowhere")), 0, Middleware.of_process())
+    context = ros.Context()
+    ros.init(context=context, connection=way)
+    return context
+
+for _ in range(2):
+    ros.shutdown(context=join(7411))
+try:
+    join(7412)
+except WorkerError as error:
+    print(error.message)
+"""
+
+
+@pytest.mark.skipif(not Middleware.of_process().is_fast_dds, reason="a discovery server is Fast DDS's")
+def test_a_process_on_fast_dds_is_in_one_run_and_says_so():
+    found = subprocess.run([sys.executable, "-c", SECOND_RUN], capture_output=True, text=True, timeout=60, check=False)
+    said = (
+        "this process is in the run at udp/127.0.0.1:7411, and on Fast DDS it cannot be in that at udp/127.0.0.1:7412"
+    )
+    assert (found.returncode, found.stdout.splitlines()[-1:]) == (0, [said]), found.stderr

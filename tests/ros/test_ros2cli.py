@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 import pytest
 
 from tests.integration.robot import POSTURE, environment, start_simulation
-from throwcollect.robots.talos import CONTROLLERS
+from throwcollect.robots.talos import TALOS
 from throwcollect.ros.router import router
 
 Ros2 = Callable[..., str]
@@ -83,7 +83,7 @@ def test_parameters_are_read_described_and_set(ros2: Ros2) -> None:
 
 
 def test_a_goal_is_carried_out_with_feedback(ros2: Ros2) -> None:
-    positions = [POSTURE[joint] for joint in CONTROLLERS["torso_controller"]]
+    positions = [POSTURE[joint] for joint in TALOS.controllers["torso_controller"]]
     point = f"{{positions: {positions}, time_from_start: {{sec: 1}}}}"
     goal = f"{{trajectory: {{joint_names: [torso_1_joint, torso_2_joint], points: [{point}]}}}}"
     said = ros2("action", "send_goal", "--feedback", TORSO, ACTION, goal)

@@ -15,6 +15,7 @@ from typer.exceptions import TyperException
 
 from throwcollect.cli.streams import ReaderGone, ensure_written
 from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError
+from throwcollect.extras import explained
 from throwcollect.interruption import stop_signals
 from throwcollect.wording import is_text, printable
 
@@ -29,7 +30,8 @@ def execute(app: typer.Typer) -> NoReturn:
         signal.signal(number, signal.default_int_handler)
     try:
         _check_surroundings()
-        code = app(prog_name="throwcollect", standalone_mode=False) or 0
+        with explained():
+            code = app(prog_name="throwcollect", standalone_mode=False) or 0
         if code == Interrupted.exit_code:
             raise Interrupted("interrupted")
         ensure_written(reader_may_leave=True)

@@ -1,37 +1,96 @@
-"""`throwcollect coordinator`: where nobody has prepared the dataset, it does so itself."""
+"""`throwcollect router`, `sim`, `coordinator` and `health`: the nodes, as `up` and Compose start them."""
 
 from __future__ import annotations
 
 import json
-import sys
-from collections.abc import Sequence
 from pathlib import Path
+from typing import Annotated
 
-from throwcollect.cli.dataset.info import describe
-from throwcollect.config.loader import load, loaded
-from throwcollect.coordinator.main import run
-from throwcollect.coordinator.prepare import more_trials, prepare
-from throwcollect.coordinator.resume import begun, resume
-from throwcollect.dataset.directory import CONFIG, PLAN
-from throwcollect.dataset.inspect import info
-from throwcollect.errors import LossError
-from throwcollect.sweep.plan import Plan
-from throwcollect.wording import counted
+import typer
+
+from throwcollect.cli.options import DEFAULT_CONFIG, ConfigArgument, DatasetArgument
+from throwcollect.cli.streams import only_log
 
 
-def simulate(directory: Path, trials: Sequence[int]) -> None:
-    """Simulate trials of a plan in this process and print the digest of each episode, a JSON document a line.
+def router(
+    listen: Annotated[
+        str, typer.Option("--listen", metavar="ENDPOINT", help="Zenoh endpoint to listen on.")
+    ] = "tcp/127.0.0.1:7447",
+    key: Annotated[
+        Path | None,
+        typer.Option(
+            "--key",
+            metavar="DIR",
+            help="Key that tls/... lets nobody in without; made if DIR has none. By default, that of THROWCOLLECT_KEY.",
+            readable=False,
+        ),
+    ] = None,
+) -> None:
+    """Run the router that all nodes connect to."""
+    from throwcollect.ros.router import serve
 
-    Args:
-        directory: Directory that holds configuration and plan.
-        trials: Their numbers.
+    only_log()
+    serve(listen, key)
 
-    Raises:
-        ConfigError: If the configuration is wrong.
-        DatasetError: If there is no plan.
-        ThrowcollectError: If a trial cannot be simulated.
-    """
+
+def sim(
+    config: ConfigArgument = DEFAULT_CONFIG,
+    name: Annotated[
+        str | None, typer.Option("--name", help="Name of the node, and of its namespace; sim_<host name> by default.")
+    ] = None,
+    namespace: Annotated[
+        str | None, typer.Option("--namespace", help="Namespace: / where nodes look that know of no other; /<name>.")
+    ] = None,
+) -> None:
+    """Run one simulation."""
+    from socket import gethostname
+
+    from throwcollect.runtimes.nodes import simulation_name_of
+    from throwcollect.sim.main import run
+
+    only_log()
+    run(config, name=name or simulation_name_of(gethostname()), namespace=namespace)
+
+
+def coordinator(
+    directory: DatasetArgument,
+    config: Annotated[
+        Path | None,
+        typer.Option("--config", metavar="CONFIG", help="Make the plan of this YAML file first.", readable=False),
+    ] = None,
+) -> None:
+    """Collect into a directory that holds `config.yaml` and `plan.parquet`, or into a new one with --config."""
+    from throwcollect.coordinator.main import run
+
+    only_log()
+    if config is None:
+        run(directory)
+        return
+    from throwcollect.cli.dataset.info import describe
+    from throwcollect.coordinator.prepare import more_trials
+    from throwcollect.coordinator.resume import prepare_or_resume
+    from throwcollect.dataset.inspect import info
+    from throwcollect.errors import LossError
+    from throwcollect.wording import counted
+
+    plan = prepare_or_resume(config, directory)
+    print(f"plan: {counted(len(plan.trials), 'trial')}{more_trials(plan)}; dataset: {directory}", flush=True)
+    loss: LossError | None = None
+    try:
+        run(directory)
+    except LossError as error:
+        loss = error
+    typer.echo(describe(info(directory)), nl=False)
+    if loss is not None:
+        raise loss
+
+
+def simulate(directory: DatasetArgument, trials: list[int]) -> None:
+    """Simulate trials of a plan and print the digests of their episodes, as a coordinator wants to know them."""
+    from throwcollect.config.loader import load
+    from throwcollect.dataset.directory import CONFIG, PLAN
     from throwcollect.replay.throw import Replayer
+    from throwcollect.sweep.plan import Plan
 
     plan = Plan.read(directory / PLAN, load(directory / CONFIG))
     replayer = Replayer(plan.config)
@@ -39,32 +98,16 @@ def simulate(directory: Path, trials: Sequence[int]) -> None:
         print(json.dumps({"trial": trial, "digest": replayer.run(plan.trials[trial]).digest}), flush=True)
 
 
-def coordinate(directory: Path, *, config: Path | None) -> None:
-    """Collect into a directory.
+def health(
+    node: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="NODE",
+            help="router, coordinator, or the name of a simulation; by default what THROWCOLLECT_NODE says.",
+        ),
+    ] = None,
+) -> None:
+    """Ask a node for a sign of life; exit code 1 if there is none."""
+    from throwcollect.ros.health import check
 
-    Args:
-        directory: Directory of the dataset: prepared, or also a new one if a configuration is given.
-        config: YAML file of the collection, of which the plan is made first, unless it is there; the summary is
-            printed at the end.
-
-    Raises:
-        ConfigError: If the configuration, the sweep or the directory cannot be used.
-        DatasetError: If the directory holds no plan, or cannot be written.
-        LossError: If trials are lost.
-        Interrupted: If a signal ended the collection before its last trial.
-    """
-    if config is None:
-        run(directory)
-        return
-    freeze = resume if begun(directory) else prepare
-    with loaded(config) as read:
-        plan = freeze(read, directory, sweep_directory=config.parent)
-    print(f"plan: {counted(len(plan.trials), 'trial')}{more_trials(plan)}; dataset: {directory}", flush=True)
-    loss: LossError | None = None
-    try:
-        run(directory)
-    except LossError as error:
-        loss = error
-    sys.stdout.write(describe(info(directory).as_dict()))
-    if loss is not None:
-        raise loss
+    check(node)

@@ -1,44 +1,49 @@
-"""`throwcollect config`, `plan` and `doctor`: what would be done, and where."""
+"""`throwcollect config`, `plan`, `doctor` and `image build`: what would be done, where, and from which image."""
 
 from __future__ import annotations
 
 import json as jsonlib
 from collections import Counter
-from collections.abc import Sequence
 from pathlib import Path
+from typing import Annotated
 
 import typer
 
-from throwcollect.config.loader import load, loaded, resolved_yaml
-from throwcollect.config.reference import json_schema
+from throwcollect.cli.options import DEFAULT_CONFIG, ConfigArgument, JsonOption, SetOption, TrialsOption, overrides
+from throwcollect.cli.streams import end_with_reader
 from throwcollect.wording import counted
 
 
-def show_schema() -> None:
-    """Print the JSON Schema of the configuration."""
-    typer.echo(jsonlib.dumps(json_schema(), indent=2))
+def config(
+    path: ConfigArgument = DEFAULT_CONFIG,
+    settings: SetOption = None,
+    schema: Annotated[bool, typer.Option("--schema", help="Print the JSON Schema instead.")] = False,
+    json: JsonOption = False,
+) -> None:
+    """Print the resolved configuration."""
+    from throwcollect.config.loader import load, resolved_yaml
+    from throwcollect.config.reference import json_schema
+
+    if schema:
+        typer.echo(jsonlib.dumps(json_schema(), indent=2))
+        return
+    found = load(path, overrides(settings))
+    typer.echo(found.model_dump_json(indent=2) if json else resolved_yaml(found), nl=json)
 
 
-def show_config(path: Path, overrides: Sequence[str], *, json: bool) -> None:
-    """Print the resolved configuration.
-
-    Raises:
-        ConfigError: If the configuration cannot be used.
-    """
-    config = load(path, overrides)
-    typer.echo(config.model_dump_json(indent=2) if json else resolved_yaml(config), nl=json)
-
-
-def show_plan(path: Path, overrides: Sequence[str], *, json: bool) -> None:
-    """Print the trials that would be run: of a plan that grows, those that are known before anything runs.
-
-    Raises:
-        ConfigError: If the configuration cannot be used, or the sweep yields no trial that could be run.
-    """
+def plan(
+    path: ConfigArgument = DEFAULT_CONFIG,
+    settings: SetOption = None,
+    trials: TrialsOption = None,
+    json: JsonOption = False,
+) -> None:
+    """Print the trials without running them."""
+    from throwcollect.config.loader import loaded
     from throwcollect.coordinator.prepare import checked_plan, more_trials
 
-    with loaded(path, overrides) as config:
-        plan = checked_plan(config, directory=path.parent)
+    end_with_reader()
+    with loaded(path, overrides(settings, trials=trials)) as config:
+        found = checked_plan(config, directory=path.parent)
     if json:
         rows = [
             {
@@ -48,27 +53,23 @@ def show_plan(path: Path, overrides: Sequence[str], *, json: bool) -> None:
                 "digest": trial.digest,
                 "refused": trial.refused,
             }
-            for trial in plan.trials
+            for trial in found.trials
         ]
         typer.echo(jsonlib.dumps(rows, indent=2))
         return
-    columns = ["trial", *plan.keys]
+    columns = ["trial", *found.keys]
     typer.echo("  ".join(columns))
-    for trial in plan.trials:
-        numbers = [f"{trial.values[key]:.6g}".rjust(len(key)) for key in plan.keys]
+    for trial in found.trials:
+        numbers = [f"{trial.values[key]:.6g}".rjust(len(key)) for key in found.keys]
         note = f"  refused: {trial.refused}" if trial.refused else ""
         typer.echo("  ".join([str(trial.number).rjust(len("trial")), *numbers]) + note)
-    refused = Counter(trial.refused for trial in plan.trials if trial.refused)
-    typer.echo(f"{counted(len(plan.trials), 'trial')}, {refused.total()} refused{more_trials(plan)}", err=True)
+    refused = Counter(trial.refused for trial in found.trials if trial.refused)
+    typer.echo(f"{counted(len(found.trials), 'trial')}, {refused.total()} refused{more_trials(found)}", err=True)
 
 
-def show_doctor(*, json: bool) -> None:
-    """Print what this machine can do.
-
-    Raises:
-        typer.Exit: With code 1 when collections would not run here.
-    """
-    from throwcollect.runtime.doctor import examine
+def doctor(json: JsonOption = False) -> None:
+    """Check what this machine can do."""
+    from throwcollect.runs.doctor import examine
 
     checks = examine(Path.cwd())
     if json:
@@ -79,3 +80,35 @@ def show_doctor(*, json: bool) -> None:
             typer.echo(f"{check.status:8}{check.name:{width}}  {check.finding}")
     if any(check.status == "problem" for check in checks):
         raise typer.Exit(1)
+
+
+def build_image(
+    base: Annotated[
+        str | None,
+        typer.Option("--base", metavar="IMAGE", help="Base image; an official one of Python 3.11 by default."),
+    ] = None,
+    wheelhouse: Annotated[
+        Path | None,
+        typer.Option(
+            "--wheelhouse",
+            metavar="DIR",
+            help="Take the wheels from here, not from the package index; docker/wheelhouse.py fills it.",
+            readable=False,
+        ),
+    ] = None,
+    tag: Annotated[
+        str | None, typer.Option("--tag", metavar="TAG", help="Name of the image; throwcollect:VERSION by default.")
+    ] = None,
+) -> None:
+    """Build the image from a clone of the project."""
+    from contextlib import closing
+    from functools import partial
+
+    from throwcollect.runtimes.docker.engine import connect
+    from throwcollect.runtimes.docker.image import DEFAULT_BASE, build, default_tag
+
+    tag = tag or default_tag()
+    with closing(connect()) as client:
+        say = partial(typer.echo, err=True)
+        size = build(client, tag, base=base or DEFAULT_BASE, wheelhouse=wheelhouse, say=say)
+    typer.echo(f"{tag}  {size / 1e6:.0f} MB")

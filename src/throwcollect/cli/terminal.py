@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import sys
 import time
+from abc import ABC, abstractmethod
 from types import TracebackType
-from typing import Protocol
 
 from throwcollect.coordinator.progress import Progress
+from throwcollect.runs.launcher import Onlooker
 
 _LINE_EVERY_S = 2.0
 
@@ -15,23 +16,16 @@ _TEXT_COLUMNS = 72
 """Width of everything beside the bar."""
 
 
-class Display(Protocol):
+class Display(Onlooker, ABC):
     """Shows the progress of a run; a context manager."""
 
+    @abstractmethod
     def __enter__(self) -> Display: ...
 
+    @abstractmethod
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None: ...
-
-    def update(self, progress: Progress) -> None:
-        """Show a progress report of the coordinator."""
-
-    def say(self, line: str) -> None:
-        """Show a line that stays."""
-
-    def warn(self, line: str) -> None:
-        """Show a line that stays, also where all else is silent."""
 
 
 def display(*, quiet: bool, bar: bool = True) -> Display:
@@ -46,7 +40,7 @@ def display(*, quiet: bool, bar: bool = True) -> Display:
     return _Lines(quiet=quiet)
 
 
-class _Lines:
+class _Lines(Display):
     def __init__(self, *, quiet: bool) -> None:
         self._quiet = quiet
         self._next = 0.0
@@ -78,7 +72,7 @@ class _Lines:
         print(line, file=sys.stderr, flush=True)
 
 
-class _Bar:
+class _Bar(Display):
     def __init__(self) -> None:
         from rich import progress
         from rich.console import Console

@@ -7,16 +7,18 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from throwcollect.build import build_digest
+from throwcollect.config.key import Effect
 from throwcollect.config.schema import Config
-from throwcollect.config.values import is_physics
+from throwcollect.config.values import sweepable_keys
 from throwcollect.coordinator.goals import goal_message, trial_goals
-from throwcollect.dataset.verify_episode import stamp_problems
-from throwcollect.dataset.verify_header import header_problems
-from throwcollect.dataset.verify_motion import infinite_columns
+from throwcollect.dataset.recorded_trial import RecordedTrial
+from throwcollect.dataset.verify_episode import find_channel_problems, find_sensor_problems, find_stamp_problems
+from throwcollect.dataset.verify_header import find_header_problems
+from throwcollect.dataset.verify_motion import find_infinite_columns
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.message import Delivery, Episode
 from throwcollect.errors import DatasetError
-from throwcollect.robots.description import full_description, start_posture, touchable_bodies
+from throwcollect.robots.description import full_description, robot_of, start_posture, touchable_bodies
 from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.sweep.plan import Plan, Trial
 from throwcollect.tasks.trajectory import throw_trajectory
@@ -60,15 +62,16 @@ class Acceptance:
     def __init__(self, config: Config) -> None:
         self._config = config
         self._settings = Settings(config)
-        self._recorded = [channel.id for channel in Channels(config, full_description(config)).recorded]
-        self._bodies = touchable_bodies()
+        self._physics = set(sweepable_keys(config, Effect.PHYSICS))
+        self._channels = Channels(config, full_description(config))
+        self._bodies = touchable_bodies(config)
 
     def assign(self, plan: Plan, trial: Trial) -> Assignment:
         """Work out a trial."""
         config = plan.config_of(trial)
         trajectory = throw_trajectory(config)
-        goals = trial_goals(trajectory, start_posture(config))
-        physics = {key: value for key, value in trial.values.items() if is_physics(key)}
+        goals = trial_goals(robot_of(config), trajectory, start_posture(config))
+        physics = {key: value for key, value in trial.values.items() if key in self._physics}
         conditions = Conditions(
             build=build_digest(),
             settings=self._settings.digest,
@@ -114,14 +117,9 @@ class Acceptance:
 
     def _problems(self, episode: Episode, assignment: Assignment) -> Iterator[str]:
         samples = episode.samples()
-        if list(episode.table.columns) != self._recorded:
-            yield f"has the channels {list(episode.table.columns)} instead of {self._recorded}"
-        yield from stamp_problems(episode, samples, assignment.config)
-        yield from infinite_columns(samples)
-        yield from header_problems(
-            samples,
-            episode.header,
-            config=assignment.config,
-            trajectory=assignment.trajectory,
-            bodies=self._bodies,
-        )
+        yield from find_channel_problems(episode, self._channels)
+        yield from find_stamp_problems(episode, samples, assignment.config)
+        yield from find_sensor_problems(episode)
+        yield from find_infinite_columns(samples)
+        trial = RecordedTrial(samples, episode.header, assignment.config, assignment.trajectory)
+        yield from find_header_problems(trial, self._bodies)

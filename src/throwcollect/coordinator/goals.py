@@ -3,35 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.control import Trajectory, TrajectoryGoal, TrajectoryPoint
-from throwcollect.robots.talos import CONTROLLERS, controller_of
+from throwcollect.robots.robot import Robot
 from throwcollect.robots.trajectory import JointTrajectory
-from throwcollect.ros import get_action, get_message
-
-FollowJointTrajectory: Any = get_action("control_msgs/action/FollowJointTrajectory")
-JointTrajectoryPoint: Any = get_message("trajectory_msgs/msg/JointTrajectoryPoint")
-Duration: Any = get_message("builtin_interfaces/msg/Duration")
+from throwcollect.ros.action import FollowJointTrajectory
+from throwcollect.ros.msg import Duration, JointTrajectoryPoint
 
 
-def trial_goals(trajectory: JointTrajectory, posture: Mapping[str, float]) -> dict[str, TrajectoryGoal]:
+def trial_goals(robot: Robot, trajectory: JointTrajectory, posture: Mapping[str, float]) -> dict[str, TrajectoryGoal]:
     """Split a joint trajectory into one goal for each controller that moves, in the robot's order.
 
     Controllers refuse partial goals by default, so joints of a moving limb that do not move are sent where they are.
 
     Args:
+        robot: The robot.
         trajectory: Trajectory of the moving joints.
-        posture: Angle of all 32 joints at the start of the trial [rad].
+        posture: Angle of all joints at the start of the trial [rad].
     """
-    moved = {controller_of(joint) for joint in trajectory.joints}
-    return {name: _goal(trajectory, joints, posture) for name, joints in CONTROLLERS.items() if name in moved}
+    moved = {robot.controller_of(joint) for joint in trajectory.joints}
+    return {name: _goal(trajectory, joints, posture) for name, joints in robot.controllers.items() if name in moved}
 
 
-def goal_message(goal: TrajectoryGoal) -> Any:
+def goal_message(goal: TrajectoryGoal) -> FollowJointTrajectory.Goal:
     """The goal of a FollowJointTrajectory action that `trial_goals` gives."""
     message = FollowJointTrajectory.Goal()
     message.trajectory.joint_names = list(goal.trajectory.joint_names)

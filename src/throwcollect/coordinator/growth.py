@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from throwcollect.coordinator.prepare import feasibility_check
 from throwcollect.sweep.plan import Check, Plan, Trial, make_trials
 from throwcollect.sweep.rounds import Rounds
-from throwcollect.tasks.throw import ThrowResult
+from throwcollect.tasks.throw.outcome import ThrowResult
 
 
 class Growth:

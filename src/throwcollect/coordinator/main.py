@@ -9,21 +9,13 @@ from pathlib import Path
 from types import FrameType
 
 from throwcollect import ros
+from throwcollect.coordinator.collection import TrialCollection
 from throwcollect.coordinator.node import Coordinator
-from throwcollect.coordinator.replay_check import check_by_replay
-from throwcollect.dataset.directory import known_directory
-from throwcollect.dataset.inspect import info, loss
-from throwcollect.dataset.writer import DatasetWriter
-from throwcollect.errors import Interrupted, WorkerError
 from throwcollect.heartbeat import Heartbeat
 from throwcollect.interruption import stop_signals
 from throwcollect.ros.self_check import check_answers
-from throwcollect.tasks.throw import ThrowResult
-from throwcollect.wording import command, counted
 
 _IDLE_S = 0.05
-_SYNC_EVERY_S = 1.0
-"""What a power cut may cost."""
 _TELL_EVERY_S = 10.0
 """For whoever reads the log; the topic has it more often."""
 
@@ -43,96 +35,59 @@ def run(directory: Path) -> None:
         LossError: If the dataset is finished, and trials of it are lost.
         Interrupted: If a signal ended the collection before its last trial.
     """
-    writer = DatasetWriter.open(directory)
-    # All of that before there is a node: a large dataset takes its time, in which nobody would get an answer.
-    there: list[tuple[int, ThrowResult]] = []
-    if found := writer.recover(lambda trial, result: there.append((trial, result))):
-        print(f"keeps {counted(found, 'episode')} of an earlier collection", flush=True)
-    ros.init()
-    if not ros.joins_protected():
-        writer.note("exposed")
-    node = Coordinator(writer.plan, writer)
-    for trial, result in there:
-        node.recall(trial, result)
+    # The dataset is opened before there is a node: a large one takes its time, in which nobody would get an answer.
+    with TrialCollection.open(directory, say=_say) as collection:
+        ros.init()
+        if not ros.joins_protected():
+            collection.writer.note("exposed")
+        node = Coordinator(collection)
 
-    def drain(_number: int, _frame: FrameType | None) -> None:
-        node.drain()
+        def drain(_number: int, _frame: FrameType | None) -> None:
+            collection.drain()
 
-    for number in stop_signals():
-        signal.signal(number, drain)
-    executor = ros.SingleThreadedExecutor()
-    executor.add_node(node)
-    check_answers(node, executor)
-    # What is here now stays until the end; the garbage collector need not go through it again and again.
-    gc.freeze()
-    try:
-        _collect(node, writer, executor)
-        if not node.complete:
-            known = known_directory(directory)
-            raise Interrupted(
-                f"interrupted; what is finished is in {known or 'the volume'}",
-                hint=command("resume", known) if known else None,
-            )
-        _check(directory, writer, executor)
-        writer.finish()
-    finally:
-        writer.close()
-        node.destroy_node()
-        ros.shutdown()
-    known = known_directory(directory)
-    lost = loss(info(directory).outcomes, hint=f"{command('resume', known)} runs them again" if known else None)
-    if lost is not None:
-        raise lost
+        for number in stop_signals():
+            signal.signal(number, drain)
+        executor = ros.SingleThreadedExecutor()
+        executor.add_node(node)
+        check_answers(node, executor)
+        # What is here now stays until the end; the garbage collector need not go through it again and again.
+        gc.freeze()
+        heartbeat = Heartbeat()
+
+        def go_on() -> None:
+            """Answer while trials are simulated again."""
+            heartbeat.beat()
+            executor.spin_once(timeout_sec=_IDLE_S)
+
+        try:
+            _collect(node, collection, executor, heartbeat)
+            collection.finish(directory, meanwhile=go_on, say=_say)
+        finally:
+            node.destroy_node()
+            ros.shutdown()
 
 
-def _collect(node: Coordinator, writer: DatasetWriter, executor: ros.Executor) -> None:
+def _collect(node: Coordinator, collection: TrialCollection, executor: ros.Executor, heartbeat: Heartbeat) -> None:
     """Have all trials run, or drain.
 
     Raises:
         WorkerError: If every simulation refuses every trial.
         DatasetError: If the dataset cannot be written.
     """
-    told = synced = time.monotonic()
-    heartbeat = Heartbeat()
-    while not node.finished:
+    told = time.monotonic()
+    while not collection.finished:
         heartbeat.beat()
         # Simulations come first: what can wait is done when no message is there.
-        waiting = node.backlog or node.prepare_one()
+        waiting = collection.backlog or collection.prepare_one()
         ros.spin_some(executor, timeout_sec=0.0 if waiting else _IDLE_S)
-        if node.backlog:
-            node.write_one()
-        if (reason := node.hopeless) is not None:
-            raise WorkerError("every simulation refuses its trials, and none was ever done", evidence=reason)
-        now = time.monotonic()
-        if now >= synced + _SYNC_EVERY_S:
-            synced = now
-            writer.sync()
-        if now >= told + _TELL_EVERY_S:
-            told = now
-            print(node.report().line, flush=True)
-    print(node.report().line, flush=True)
+        if collection.backlog:
+            collection.write_one()
+        collection.look_after()
+        if time.monotonic() >= told + _TELL_EVERY_S:
+            told = time.monotonic()
+            _say(node.report().line)
+    _say(node.report().line)
 
 
-def _check(directory: Path, writer: DatasetWriter, executor: ros.Executor) -> None:
-    """Simulate some trials again; the node answers meanwhile.
-
-    Raises:
-        DatasetError: If a trial came out otherwise.
-        WorkerError: If trials cannot be simulated again.
-    """
-    config = writer.plan.config
-    heartbeat = Heartbeat()
-
-    def go_on() -> None:
-        heartbeat.beat()
-        executor.spin_once(timeout_sec=_IDLE_S)
-
-    said = check_by_replay(
-        directory,
-        writer.digests(),
-        count=config.run.replay,
-        seed=config.seed,
-        meanwhile=go_on,
-    )
-    if said is not None:
-        print(said, flush=True)
+def _say(line: str) -> None:
+    print(line, flush=True)

@@ -6,22 +6,22 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from throwcollect.config.loader import load, resolved_yaml
+from throwcollect.config.loader import load, loaded, resolved_yaml
 from throwcollect.config.problems import quoted
 from throwcollect.config.schema import Config
 from throwcollect.config.values import differences
-from throwcollect.coordinator.prepare import checked_plan, listed_points, self_contained
-from throwcollect.dataset.completeness import is_as_written, missing_or_damaged
+from throwcollect.coordinator.prepare import checked_plan, listed_points, prepare, self_contained
+from throwcollect.dataset.completeness import find_damage, is_as_written
 from throwcollect.dataset.directory import CONFIG, METADATA, PLAN, SOURCES, TRIALS, config_path
 from throwcollect.dataset.lock import held_alone
-from throwcollect.dataset.reader import read_throws
 from throwcollect.dataset.recovery import remove_unfinished
-from throwcollect.dataset.verify_tables import wrong_trials
+from throwcollect.dataset.throws_table import read_throws
+from throwcollect.dataset.verify_tables import find_wrong_trials
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError, Problem
 from throwcollect.files import check_regular, is_there, remove, write_file
 from throwcollect.sweep.plan import Plan, Trial
 from throwcollect.sweep.point_file import encode_points
-from throwcollect.tasks.throw import Outcome
+from throwcollect.tasks.throw.outcome import Outcome
 from throwcollect.wording import command
 
 Say = Callable[[str], None]
@@ -65,11 +65,27 @@ def resume(
                 f"{directory / TRIALS}: is missing or damaged, and nothing else holds the list of trials",
                 hint=f"{command('up', 'CONFIG', '--resume', directory)}, with the file that sweep.file of CONFIG names",
             )
-        if old is not None and PLAN in damaged and (not config.grows or wrong_trials(old)):
+        if old is not None and PLAN in damaged and (not config.grows or find_wrong_trials(old)):
             # It is drawn again; one that grew with the results cannot be, and stays if its trials are what they were.
             old = None
         remove_unfinished(directory)
         return _written(config, directory, sweep_directory, stored, old, damaged)
+
+
+def prepare_or_resume(path: Path, directory: Path) -> Plan:
+    """Have a directory hold the plan of a configuration's file: a new one, or the one that an earlier collection left.
+
+    Args:
+        path: The configuration's file.
+        directory: Directory of the dataset.
+
+    Raises:
+        ConfigError: If the configuration, the sweep or the directory cannot be used.
+        DatasetError: If files cannot be written, or something is damaged that cannot be made again.
+    """
+    freeze = resume if begun(directory) else prepare
+    with loaded(path) as config:
+        return freeze(config, directory, sweep_directory=path.parent)
 
 
 def _written(
@@ -108,7 +124,7 @@ def _damaged(directory: Path, plan: Plan | None, *, check: bool, say: Say) -> fr
     """Names of the files of a finished dataset that are missing or damaged; none if it is not finished."""
     if not is_there(directory / METADATA):
         return frozenset()
-    findings = missing_or_damaged(directory, plan, in_full=check)
+    findings = find_damage(directory, plan, in_full=check)
     for finding in findings:
         say(f"{directory}: {finding}")
     if any(finding.file == SOURCES for finding in findings):

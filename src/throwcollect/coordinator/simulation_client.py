@@ -15,14 +15,11 @@ from throwcollect.ros import (
     Parameter,
     QoSProfile,
     ReliabilityPolicy,
-    get_message,
-    get_service,
 )
+from throwcollect.ros.action import FollowJointTrajectory
+from throwcollect.ros.msg import UUID, UInt8MultiArray
+from throwcollect.ros.srv import SetParametersAtomically
 from throwcollect.trial.lease import CONTROLLERS, LEASE, NUMBER, Lease
-
-SetParametersAtomically: Any = get_service("rcl_interfaces/srv/SetParametersAtomically")
-UUID: Any = get_message("unique_identifier_msgs/msg/UUID")
-UInt8MultiArray: Any = get_message("std_msgs/msg/UInt8MultiArray")
 
 _LEASE = "the lease"
 _ANSWER_S = 5.0
@@ -55,7 +52,7 @@ class SimulationClient:
         publishers: AbstractSet[bytes],
         *,
         controllers: Mapping[str, str],
-        action_type: Any,
+        action_type: type[FollowJointTrajectory],
         on_episode: Callable[[str, bytes], None],
         on_refusal: Callable[[str, str], None],
     ) -> None:
@@ -98,7 +95,7 @@ class SimulationClient:
         """Whether everything that a trial needs is offered."""
         return all(client.service_is_ready() for client in (self._parameters, *self._goals.values()))
 
-    def begin(self, lease: Lease, token: str, goals: Mapping[str, Any]) -> None:
+    def begin(self, lease: Lease, token: str, goals: Mapping[str, FollowJointTrajectory.Goal]) -> None:
         """Start a trial.
 
         The goals leave when the lease has been accepted, as nothing in ROS 2 says in which order a node handles
@@ -140,7 +137,7 @@ class SimulationClient:
             self._node.destroy_client(client)
         self._node.destroy_subscription(self._episodes)
 
-    def _send(self, lease: Lease, goals: Mapping[str, Any]) -> None:
+    def _send(self, lease: Lease, goals: Mapping[str, FollowJointTrajectory.Goal]) -> None:
         self._generation += 1
         self._sent, self._sent_at = (lease, goals), time.monotonic()
         self.unanswered = [_LEASE, *goals]

@@ -2,12 +2,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from rclzenoh.interfaces import deserialize, serialize
 from throwcollect.config.schema import Config
 from throwcollect.control import JointTolerance
 from throwcollect.coordinator.goals import FollowJointTrajectory, goal_message, trial_goals
-from throwcollect.interfaces import deserialize, serialize
 from throwcollect.robots.description import start_posture
-from throwcollect.robots.talos import CONTROLLERS
+from throwcollect.robots.talos import TALOS
 from throwcollect.sim.controller_messages import read_goal
 from throwcollect.tasks.trajectory import throw_trajectory
 
@@ -18,15 +18,15 @@ POSTURE = start_posture(CONFIG)
 
 
 def test_each_moving_limb_gets_one_goal_over_all_of_its_joints() -> None:
-    goals = trial_goals(TRAJECTORY, POSTURE)
+    goals = trial_goals(TALOS, TRAJECTORY, POSTURE)
     assert list(goals) == [ARM, "torso_controller"]
     for controller, goal in goals.items():
-        assert tuple(goal.trajectory.joint_names) == CONTROLLERS[controller]
+        assert tuple(goal.trajectory.joint_names) == TALOS.controllers[controller]
         assert len(goal.trajectory.points) == len(TRAJECTORY.times)
 
 
 def test_joints_that_do_not_move_are_sent_where_they_are() -> None:
-    arm = trial_goals(TRAJECTORY, POSTURE)[ARM].trajectory
+    arm = trial_goals(TALOS, TRAJECTORY, POSTURE)[ARM].trajectory
     still = arm.joint_names.index("arm_right_3_joint")
     for point in arm.points:
         assert point.positions[still] == POSTURE["arm_right_3_joint"]
@@ -34,7 +34,7 @@ def test_joints_that_do_not_move_are_sent_where_they_are() -> None:
 
 
 def test_moving_joints_are_sent_their_trajectory() -> None:
-    arm = trial_goals(TRAJECTORY, POSTURE)[ARM].trajectory
+    arm = trial_goals(TALOS, TRAJECTORY, POSTURE)[ARM].trajectory
     column, own = arm.joint_names.index("arm_right_4_joint"), TRAJECTORY.joints.index("arm_right_4_joint")
     sent = np.array([[point.positions[column], point.velocities[column]] for point in arm.points])
     assert np.array_equal(sent, np.stack([TRAJECTORY.positions[:, own], TRAJECTORY.velocities[:, own]], axis=1))
@@ -43,13 +43,13 @@ def test_moving_joints_are_sent_their_trajectory() -> None:
 
 
 def test_a_goal_is_the_same_after_its_way_through_a_message() -> None:
-    for goal in trial_goals(TRAJECTORY, POSTURE).values():
+    for goal in trial_goals(TALOS, TRAJECTORY, POSTURE).values():
         text = serialize(goal_message(goal))
         assert read_goal(deserialize(text, FollowJointTrajectory.Goal)).digest == goal.digest
 
 
 def test_the_digest_of_a_goal_covers_all_that_it_says() -> None:
-    goal = trial_goals(TRAJECTORY, POSTURE)[ARM]
+    goal = trial_goals(TALOS, TRAJECTORY, POSTURE)[ARM]
     trajectory, point = goal.trajectory, goal.trajectory.points[3]
     nudged = np.nextafter(np.asarray(point.positions), 9.0)
     changes = [

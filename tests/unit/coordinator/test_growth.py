@@ -8,7 +8,7 @@ from throwcollect.config.schema import Config
 from throwcollect.coordinator.growth import Growth
 from throwcollect.coordinator.prepare import checked_plan, more_trials
 from throwcollect.sweep.plan import Plan, Trial, make_plan
-from throwcollect.tasks.throw import Outcome, ThrowResult
+from throwcollect.tasks.throw.outcome import Outcome, ThrowResult
 
 FAST = {"task.duration_s": {"min": 0.4, "max": 1.2}, "task.trajectory.gamma": {"min": 1.0, "max": 1.4}}
 

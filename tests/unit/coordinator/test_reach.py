@@ -10,6 +10,7 @@ import pytest
 from throwcollect import ros
 from throwcollect.config.loader import load
 from throwcollect.coordinator import node as coordinator_node
+from throwcollect.coordinator.collection import TrialCollection
 from throwcollect.coordinator.goals import FollowJointTrajectory
 from throwcollect.coordinator.node import Coordinator
 from throwcollect.dataset.writer import DatasetWriter, create
@@ -33,7 +34,7 @@ class Bench:
         plan = make_plan(load(directory / "reach.yaml"))
         create(directory / "data", plan)
         self.writer = DatasetWriter.open(directory / "data")
-        self.coordinator = Coordinator(self.writer.plan, self.writer)
+        self.coordinator = Coordinator(TrialCollection(self.writer))
         self.executor = ros.SingleThreadedExecutor()
         self.executor.add_node(self.coordinator)
 

@@ -13,7 +13,7 @@ from throwcollect.coordinator.resume import finished, resume
 from throwcollect.dataset.manifest import entry_of_file, manifest_text, promised_names
 from throwcollect.dataset.writer import DatasetWriter, create
 from throwcollect.errors import DatasetError
-from throwcollect.tasks.throw import ThrowResult
+from throwcollect.tasks.throw.outcome import ThrowResult
 
 TRIALS = 4
 SHARD = "quick_00001.mcap"
@@ -77,7 +77,7 @@ def dataset(request: pytest.FixtureRequest, promised: Path) -> Path:
 
 
 def contents(directory: Path) -> dict[str, bytes]:
-    others = ("README.md", "datapackage.json")
+    others = ("README.md", "provenance.json", "datapackage.json")
     return {path.name: path.read_bytes() for path in directory.iterdir() if path.is_file() and path.name not in others}
 
 

@@ -5,13 +5,13 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
+from rclzenoh.interfaces import get_service
 from throwcollect import ros
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.goals import FollowJointTrajectory, goal_message, trial_goals
 from throwcollect.coordinator.simulation_client import SimulationClient
-from throwcollect.interfaces import get_service
 from throwcollect.robots.description import start_posture
-from throwcollect.robots.talos import graph_name
+from throwcollect.robots.talos import TALOS
 from throwcollect.ros import ActionServer, GoalResponse
 from throwcollect.ros.router import router
 from throwcollect.tasks.trajectory import throw_trajectory
@@ -21,7 +21,8 @@ GetParameters = get_service("rcl_interfaces/srv/GetParameters")
 NAMING = "ros1"
 CONFIG = Config()
 GOALS = {
-    name: goal_message(goal) for name, goal in trial_goals(throw_trajectory(CONFIG), start_posture(CONFIG)).items()
+    name: goal_message(goal)
+    for name, goal in trial_goals(TALOS, throw_trajectory(CONFIG), start_posture(CONFIG)).items()
 }
 
 
@@ -52,7 +53,7 @@ class Bench:
             namespace,
             "sim_0",
             set(),
-            controllers={name: graph_name(name, NAMING) for name in GOALS},
+            controllers={name: TALOS.graph_name(name, NAMING) for name in GOALS},
             action_type=FollowJointTrajectory,
             on_episode=lambda *_: None,
             on_refusal=lambda namespace, reason: self.refusals.append((namespace, reason)),
@@ -63,7 +64,7 @@ class Bench:
         assert self.spin(self.client.ready)
 
     def offer(self, controller: str) -> None:
-        name = f"{graph_name(controller, NAMING)}/follow_joint_trajectory"
+        name = f"{TALOS.graph_name(controller, NAMING)}/follow_joint_trajectory"
         server = ActionServer(self.simulation, FollowJointTrajectory, name, self._execute, goal_callback=self._consider)
         self.servers.append(server)
 

@@ -5,59 +5,75 @@ from __future__ import annotations
 import json as jsonlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from throwcollect.derive.derivation import Derived
-from throwcollect.derive.selection import filtered, merge, sample
-from throwcollect.derive.split import SQUARES, split
-from throwcollect.derive.statistics import Statistics, statistics
+from throwcollect.cli.options import DatasetArgument, JsonOption, OutputArgument
 from throwcollect.wording import counted
+
+if TYPE_CHECKING:
+    from throwcollect.derive.derivation import Derived
+    from throwcollect.derive.statistics import Statistics
+
+SeedOption = Annotated[int, typer.Option("--seed", metavar="S", min=0, help="Seed of the choice.")]
 
 _COLUMNS = ("count", "nulls", "min", "q05", "q50", "q95", "max", "mean", "std")
 _MOMENTS = ("min", "max", "mean", "std")
 
 
-def show_merged(directories: Sequence[Path], output: Path, *, json: bool) -> None:
-    """Merge datasets and print what came of it.
+def merge_datasets(
+    directories: Annotated[list[Path], typer.Argument(metavar="DIR...", help="Directories of the datasets.")],
+    output: OutputArgument,
+    json: JsonOption = False,
+) -> None:
+    """Put the trials of several datasets one after the other."""
+    from throwcollect.derive.selection import merge
 
-    Raises:
-        ConfigError: If the datasets do not go together, or the output cannot be used.
-        DatasetError: If a dataset is damaged or the output cannot be written.
-    """
     _show(output, merge(directories, output), json=json)
 
 
-def show_filtered(directory: Path, output: Path, *, where: str, json: bool) -> None:
-    """Filter a dataset and print what came of it.
+def filter_dataset(
+    directory: DatasetArgument,
+    output: OutputArgument,
+    where: Annotated[str, typer.Option("--where", metavar="CONDITION", help="Such as: landing_x_m > 1.5")],
+    json: JsonOption = False,
+) -> None:
+    """Take the trials that fulfil a condition on columns of throws.parquet."""
+    from throwcollect.derive.selection import filter_trials
 
-    Raises:
-        ConfigError: If the condition is wrong or fits no trial, or the output cannot be used.
-        DatasetError: If the dataset is damaged or the output cannot be written.
-    """
-    _show(output, filtered(directory, output, where=where), json=json)
+    _show(output, filter_trials(directory, output, where=where), json=json)
 
 
-def show_sample(directory: Path, output: Path, *, count: int, seed: int, json: bool) -> None:
-    """Sample a dataset and print what came of it.
+def sample_dataset(
+    directory: DatasetArgument,
+    output: OutputArgument,
+    count: Annotated[int, typer.Option("--count", metavar="K", help="Number of trials.")],
+    seed: SeedOption = 0,
+    json: JsonOption = False,
+) -> None:
+    """Take trials at random; they stay in their order."""
+    from throwcollect.derive.selection import sample
 
-    Raises:
-        ConfigError: If there are not so many trials, or the output cannot be used.
-        DatasetError: If the dataset is damaged or the output cannot be written.
-    """
     _show(output, sample(directory, output, count=count, seed=seed), json=json)
 
 
-def show_split(
-    directory: Path, output: Path, *, fractions: str, cells: Sequence[str] | None, seed: int, json: bool
+def split_dataset(
+    directory: DatasetArgument,
+    output: OutputArgument,
+    fractions: Annotated[
+        str, typer.Option("--fractions", metavar="NAME=SHARE,...", help="Such as: train=0.8,test=0.2")
+    ],
+    cells: Annotated[
+        list[str] | None,
+        typer.Option("--cells", metavar="EXPRESSION=WIDTH", help="Axis of cells that are not torn apart; repeatable."),
+    ] = None,
+    seed: SeedOption = 0,
+    json: JsonOption = False,
 ) -> None:
-    """Split a dataset and print what came of it.
+    """Split a dataset so that throws to the same place, by default a square of 5 cm, go to the same part."""
+    from throwcollect.derive.split import SQUARES, split
 
-    Raises:
-        ConfigError: If fractions or cells are wrong, a part is empty, or the output cannot be used.
-        DatasetError: If the dataset is damaged or a part cannot be written.
-    """
     found = split(directory, output, fractions=fractions, cells=cells or SQUARES, seed=seed)
     if json:
         typer.echo(jsonlib.dumps(found.as_dict(), indent=2))
@@ -69,12 +85,10 @@ def show_split(
     _tell_left_out(found.without_episode)
 
 
-def show_statistics(directory: Path, *, json: bool) -> None:
-    """Print statistics of a dataset.
+def show_statistics(directory: DatasetArgument, json: JsonOption = False) -> None:
+    """Print statistics of the table of throws and of all trajectories."""
+    from throwcollect.derive.statistics import statistics
 
-    Raises:
-        DatasetError: If the directory holds no finished dataset, or it is damaged.
-    """
     found = statistics(directory)
     typer.echo(jsonlib.dumps(found.as_dict(), indent=2) if json else _tables(found), nl=json)
 

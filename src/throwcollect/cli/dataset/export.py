@@ -4,22 +4,27 @@ from __future__ import annotations
 
 import json as jsonlib
 from dataclasses import asdict
-from pathlib import Path
+from typing import Annotated
 
 import typer
 
-from throwcollect.export.formats import export
+from throwcollect.cli.options import DatasetArgument, JsonOption, OutputArgument
 from throwcollect.wording import counted
 
 
-def export_dataset(directory: Path, output: Path, *, to: str, rate_hz: int | None, json: bool) -> None:
-    """Write a dataset in another format and print what was written.
+def export_dataset(
+    directory: DatasetArgument,
+    output: OutputArgument,
+    to: Annotated[str, typer.Option("--to", metavar="parquet|npz|lerobot|hdf5|mat", help="Format.")],
+    rate: Annotated[
+        int | None, typer.Option("--rate", metavar="HZ", help="Samples per second; as recorded if not given.")
+    ] = None,
+    json: JsonOption = False,
+) -> None:
+    """Write a dataset in another format, with a data card."""
+    from throwcollect.export.formats import export
 
-    Raises:
-        ConfigError: If the request is wrong.
-        DatasetError: If the dataset cannot be read, or the output not be written.
-    """
-    exported = export(directory, output, to=to, rate_hz=rate_hz)
+    exported = export(directory, output, to=to, rate_hz=rate)
     if json:
         typer.echo(jsonlib.dumps(asdict(exported), indent=2))
         return

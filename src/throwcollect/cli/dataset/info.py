@@ -5,64 +5,81 @@ from __future__ import annotations
 import json as jsonlib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import typer
 
-from throwcollect.dataset.inspect import digest, info
+from throwcollect.cli.options import DatasetArgument, JsonOption
+from throwcollect.cli.streams import ensure_written
+from throwcollect.wording import command
+
+if TYPE_CHECKING:
+    from throwcollect.dataset.summary import Info
 
 
-def show_info(directory: Path, *, json: bool) -> None:
-    """Print what a dataset holds.
+def show_info(directory: DatasetArgument, json: JsonOption = False) -> None:
+    """Say what a dataset holds."""
+    from throwcollect.dataset.inspect import info
 
-    Raises:
-        DatasetError: If the directory holds no finished dataset.
-    """
-    found = info(directory).as_dict()
-    typer.echo(jsonlib.dumps(found, indent=2) if json else describe(found), nl=json)
+    found = info(directory)
+    typer.echo(jsonlib.dumps(found.as_dict(), indent=2) if json else describe(found), nl=json)
 
 
-def show_digest(directory: Path) -> None:
-    """Print one hash over all episodes in trial order.
+def show_digest(directory: DatasetArgument) -> None:
+    """Print one hash over all episodes in trial order."""
+    from throwcollect.dataset.inspect import digest
 
-    Raises:
-        DatasetError: If the directory holds no finished dataset, or an episode is damaged.
-    """
     typer.echo(digest(directory))
 
 
-def describe(found: Mapping[str, Any]) -> str:
-    """Summary of a dataset in words, one fact a line.
+def print_summary(found: Info, directory: Path | None, *, as_json: bool) -> None:
+    """Print what a collection has given.
 
     Args:
-        found: `Info` as dictionary; beside it, whether the run was `open` is told, too.
+        found: Summary of its dataset.
+        directory: Directory of the dataset; None if it is in a volume.
+        as_json: Whether to print one JSON document.
+
+    Raises:
+        OutputError: If it cannot be printed.
     """
-    outcomes = ", ".join(f"{count} {outcome}" for outcome, count in found["outcomes"].items())
+    typer.echo(jsonlib.dumps(found.as_dict(), indent=2) if as_json else describe(found), nl=as_json)
+    look = command("dataset", "info", directory) if directory is not None else None
+    if look is not None and not as_json:
+        typer.echo(f"look into it: {look}   (or open the .mcap files in Foxglove)")
+    ensure_written(hint=look and f"{look} prints it again")
+
+
+def describe(found: Info) -> str:
+    """Summary of a dataset in words, one fact a line; that of a run also says whether the run was open."""
+    from throwcollect.runs.record import Summary
+
+    outcomes = ", ".join(f"{count} {outcome}" for outcome, count in found.outcomes.items())
     lines = {
-        "trials": f"{found['trials']}: {outcomes}{_missing(found)}",
-        "landing": _landing(found.get("landing")),
-        "episodes": f"{found['episodes']}, {found['samples']} samples, {found['duration_s']:.0f} s of simulated time",
-        "files": f"{found['shards']} MCAP of {found['recordings_bytes'] / 1e6:.1f} MB, "
-        f"{found['size_bytes'] / 1e6:.1f} MB in all",
-        "topics": ", ".join(f"{topic} ({count})" for topic, count in found["topics"].items()),
-        "digest": found["digest"],
+        "trials": f"{found.trials}: {outcomes}{_missing(found)}",
+        "landing": _landing(found.landing),
+        "episodes": f"{found.episodes}, {found.samples} samples, {found.duration_s:.0f} s of simulated time",
+        "files": f"{found.shards} MCAP of {found.recordings_bytes / 1e6:.1f} MB, "
+        f"{found.size_bytes / 1e6:.1f} MB in all",
+        "topics": ", ".join(f"{topic} ({count})" for topic, count in found.topics.items()),
+        "digest": found.digest,
     }
-    if wall_s := found.get("wall_s"):
-        lines["took"] = f"{wall_s:.1f} s, {found['episodes'] / wall_s:.1f} throws/s, start-up included"
-    if found.get("open"):
+    if found.wall_s:
+        speed = found.episodes / found.wall_s
+        lines["took"] = f"{found.wall_s:.1f} s, {speed:.1f} throws/s, start-up included"
+    if isinstance(found, Summary) and found.open:
         lines["open"] = "anybody who reached the router could join, read and disturb the run"
     width = max(map(len, lines))
     return "".join(f"{key:{width}}  {text}\n" for key, text in lines.items())
 
 
-def _missing(found: Mapping[str, Any]) -> str:
-    wanted = found.get("wanted")
-    if wanted is None or found["outcomes"].get("landed", 0) >= wanted:
+def _missing(found: Info) -> str:
+    if found.wanted is None or found.outcomes.get("landed", 0) >= found.wanted:
         return ""
-    return f"; {wanted} should have landed, but all trials were used up"
+    return f"; {found.wanted} should have landed, but all trials were used up"
 
 
-def _landing(landing: Mapping[str, Any] | None) -> str:
+def _landing(landing: Mapping[str, tuple[float, float]] | None) -> str:
     if landing is None:
         return "no ball landed"
     x, y = landing["x_m"], landing["y_m"]

@@ -5,27 +5,20 @@ from __future__ import annotations
 import json as jsonlib
 from collections.abc import Sequence
 from dataclasses import asdict
-from pathlib import Path
 
 import typer
 
-from throwcollect.coordinator.prepare import checked_plan
-from throwcollect.dataset.directory import THROWS
-from throwcollect.dataset.rebuild import rebuild
-from throwcollect.dataset.repair import repair
+from throwcollect.cli.options import DatasetArgument, JsonOption, OutputArgument
 from throwcollect.errors import LossError
 from throwcollect.wording import command, counted
 
 _MOST_NAMED = 10
 
 
-def show_rebuilt(directory: Path, *, json: bool) -> None:
-    """Write the derived files of a dataset anew and print which they are.
+def rebuild_dataset(directory: DatasetArgument, json: JsonOption = False) -> None:
+    """Write throws.parquet, datapackage.json and metadata.yaml anew, from the recordings."""
+    from throwcollect.dataset.rebuild import rebuild
 
-    Raises:
-        DatasetError: If the plan or a recording is missing or damaged, or a file cannot be written.
-        ConfigError: If the configuration of the dataset is wrong.
-    """
     rebuilt = rebuild(directory)
     if json:
         typer.echo(jsonlib.dumps(asdict(rebuilt), indent=2))
@@ -44,14 +37,12 @@ def _named(things: Sequence[str]) -> str:
     return ", ".join(things[:_MOST_NAMED]) + (" and more" if len(things) > _MOST_NAMED else "")
 
 
-def show_repaired(directory: Path, output: Path, *, json: bool) -> None:
-    """Mend a dataset into a new directory and print what was wrong and what is lost.
+def repair_dataset(directory: DatasetArgument, output: OutputArgument, json: JsonOption = False) -> None:
+    """Write a sound dataset with all that is whole in a damaged one; exit code 5 if trials are lost."""
+    from throwcollect.coordinator.prepare import checked_plan
+    from throwcollect.dataset.directory import THROWS
+    from throwcollect.dataset.repair import repair
 
-    Raises:
-        LossError: If trials are lost, or have other episodes than the table of throws had.
-        DatasetError: If configuration and plan cannot be had, or files cannot be read or written.
-        ConfigError: If the new directory holds something already.
-    """
     repaired = repair(directory, output, remake=lambda config: checked_plan(config, directory=directory))
     if json:
         typer.echo(jsonlib.dumps(repaired.as_dict(), indent=2))

@@ -3,41 +3,39 @@
 from __future__ import annotations
 
 import json as jsonlib
-from collections.abc import Sequence
 from dataclasses import asdict
-from pathlib import Path
+from typing import Annotated
 
 import typer
 
-from throwcollect.dataset.reader import Dataset
+from throwcollect.cli.options import DatasetArgument, JsonOption
 from throwcollect.errors import ConfigError, DatasetError
-from throwcollect.replay.audit import chosen_trials, replayed
 from throwcollect.wording import counted
 
 
-def show_replay(directory: Path, trials: Sequence[int], *, everything: bool, sample: int | None, json: bool) -> None:
-    """Simulate stored throws again and print in what they differ.
+def replay_dataset(
+    directory: DatasetArgument,
+    trials: Annotated[
+        list[int] | None, typer.Option("--trial", metavar="K", help="Number of a trial; may be repeated.")
+    ] = None,
+    everything: Annotated[bool, typer.Option("--all", help="All trials.")] = False,
+    sample: Annotated[
+        int | None, typer.Option("--sample", metavar="N", min=1, help="With --all: so many of them, chosen at random.")
+    ] = None,
+    json: JsonOption = False,
+) -> None:
+    """Simulate stored throws again and compare them bit for bit; exit code 4 if any differs."""
+    from throwcollect.dataset.reader import Dataset
+    from throwcollect.replay.audit import chosen_trials, replayed
 
-    Args:
-        directory: Directory of the dataset.
-        trials: Numbers of trials.
-        everything: Whether all trials are meant instead.
-        sample: How many of all; None for all of them.
-        json: Whether to print one JSON document.
-
-    Raises:
-        ConfigError: If it is not clear which trials are meant.
-        DatasetError: If a throw differs, has no episode or is damaged.
-        WorkerError: If the physics engine does not start.
-    """
     if bool(trials) == everything:
         raise ConfigError("which throws?", expected="either --trial K, which may be repeated, or --all")
     if sample is not None and not everything:
         raise ConfigError("--sample: should be given with --all")
     dataset = Dataset.open(directory)
-    for trial in trials:
+    for trial in trials or ():
         dataset.episode(trial)
-    chosen = list(dict.fromkeys(trials)) or chosen_trials(dataset, sample=sample)
+    chosen = list(dict.fromkeys(trials or ())) or chosen_trials(dataset, sample=sample)
     found = []
     for comparison in replayed(directory, chosen):
         found.append(comparison)

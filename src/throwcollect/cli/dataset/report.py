@@ -4,28 +4,31 @@ from __future__ import annotations
 
 import json as jsonlib
 from pathlib import Path
+from typing import Annotated
 
 import typer
 
-from throwcollect.report.write import write_report
+from throwcollect.cli.options import DatasetArgument, JsonOption
 
 
-def report_dataset(directory: Path, output: Path | None, *, pictures: Path | None, json: bool) -> None:
-    """Write a report and print where it is.
+def report_dataset(
+    directory: DatasetArgument,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", metavar="FILE", help="HTML file to write; DIR.html beside the dataset if not given."),
+    ] = None,
+    png: Annotated[
+        Path | None,
+        typer.Option("--png", metavar="DIR", help="Also write the main plots as pictures; must be new or empty."),
+    ] = None,
+    json: JsonOption = False,
+) -> None:
+    """Write a page that shows what a dataset holds, and pictures for papers."""
+    from throwcollect.report.write import write_report
 
-    Args:
-        directory: Directory of the dataset.
-        output: HTML file to write; when None, beside the dataset and named like it.
-        pictures: Directory for pictures; when None, none are drawn.
-        json: Whether to print JSON.
-
-    Raises:
-        ConfigError: If what draws is not installed, or a file is there already.
-        DatasetError: If the directory holds no finished dataset, it is damaged, or the report cannot be written.
-    """
     resolved = directory.resolve()
     page = output or resolved.with_name(f"{resolved.name}.html")
-    written = write_report(directory, page, pictures=pictures)
+    written = write_report(directory, page, pictures=png)
     size = written.page.stat().st_size
     if json:
         found = {"page": str(written.page), "size_bytes": size, "pictures": [str(path) for path in written.pictures]}

@@ -4,21 +4,25 @@ from __future__ import annotations
 
 import json as jsonlib
 import re
-from pathlib import Path
+from typing import Annotated
 
 import typer
 
+from throwcollect.cli.options import DatasetArgument, JsonOption, OutputArgument
 from throwcollect.errors import ConfigError
-from throwcollect.view.viewer_directory import view
 
 
-def write_view(directory: Path, output: Path, *, trials: str | None, json: bool) -> None:
-    """Make throws ready for viewers and print what was written.
+def view_dataset(
+    directory: DatasetArgument,
+    output: OutputArgument,
+    trials: Annotated[
+        str | None, typer.Option("--trials", metavar="3,5,7-9", help="Trials to show; all if not given.")
+    ] = None,
+    json: JsonOption = False,
+) -> None:
+    """Write throws with frames, meshes, markers and a layout, for Foxglove, Rerun and RViz."""
+    from throwcollect.view.viewer_directory import view
 
-    Raises:
-        ConfigError: If the choice of trials is wrong, or the output cannot be used.
-        DatasetError: If the dataset is damaged, a trial has no episode, or the output cannot be written.
-    """
     written = view(directory, output, None if trials is None else numbers(trials))
     if json:
         typer.echo(jsonlib.dumps(written.as_dict(), indent=2))

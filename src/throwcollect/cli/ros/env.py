@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,11 +10,12 @@ import typer
 
 from throwcollect.errors import WorkerError
 from throwcollect.files import beside, write_all
-from throwcollect.ros.backend import RMW_VARIABLE
+from throwcollect.ros.connection import Connection
 from throwcollect.ros.fast_dds import PLAIN_DISCOVERY, PROFILE_VARIABLE, client_profile
-from throwcollect.runtime import nodes
-from throwcollect.runtime.records import Record, Records, Run
-from throwcollect.runtime.runs import living, to_change
+from throwcollect.ros.middleware import RMW_VARIABLE
+from throwcollect.runs.record import Record
+from throwcollect.runs.records import Records, Run
+from throwcollect.runs.selection import require_living, to_change
 
 _PROFILE = "fast_dds.xml"
 
@@ -34,8 +34,13 @@ class _Way:
     record: Record
     endpoint: str
 
+    @property
+    def connection(self) -> Connection:
+        """By which a process of ours joins the run."""
+        return Connection(self.endpoint, self.run.key, self.record.domain_id, self.record.middleware.joining)
 
-def named(run: str | None) -> _Way:
+
+def find_way(run: str | None) -> _Way:
     """The way into a run.
 
     Args:
@@ -46,7 +51,7 @@ def named(run: str | None) -> _Way:
         WorkerError: If the run has no router (any more).
     """
     found = to_change(Records(), run, command="ros env")
-    record = living(found)
+    record = require_living(found)
     if record.endpoint is None:
         raise WorkerError(f"run {record.run} has no router yet", hint="try once more")
     return _Way(found, record, record.endpoint)
@@ -56,7 +61,7 @@ def settle(run: str | None) -> str | None:
     """Have this process use what carries the messages of a run, before it imports anything that depends on it.
 
     Args:
-        run: As `named` takes it; None leaves everything to the environment.
+        run: As `find_way` takes it; None leaves everything to the environment.
 
     Returns:
         The same.
@@ -66,29 +71,23 @@ def settle(run: str | None) -> str | None:
         WorkerError: If the run has no router (any more).
     """
     if run is not None:
-        named(run).record.middleware.joining.settle()
+        find_way(run).record.middleware.joining.settle()
     return run
-
-
-def joining_environment(way: _Way) -> Mapping[str, str]:
-    """Environment variables by which a process of ours joins a run."""
-    record = way.record
-    return nodes.joining_environment(way.endpoint, record.domain_id, way.run.key, record.middleware.joining)
 
 
 def show_environment(run: str | None) -> None:
     """Print a line for the shell that has what is started there next join a run; it names files, and no secrets.
 
     Args:
-        run: As `named` takes it.
+        run: As `find_way` takes it.
 
     Raises:
         ConfigError: If there is no such run, or it has ended.
         WorkerError: If the run has no router (any more).
     """
-    way = named(run)
+    way = find_way(run)
     middleware = way.record.middleware
-    variables = {**joining_environment(way), RMW_VARIABLE: middleware.rmw}
+    variables = {**way.connection.environment(), RMW_VARIABLE: middleware.rmw}
     if middleware.is_fast_dds:
         variables |= {PROFILE_VARIABLE: str(_write_profile(way)), **PLAIN_DISCOVERY}
     typer.echo("export " + " ".join(f"{name}={shlex.quote(value)}" for name, value in variables.items()))

@@ -4,52 +4,48 @@ from __future__ import annotations
 
 import sys
 
-from throwcollect.cli.ros.session import Session, absolute, is_hidden, joined, known
-from throwcollect.ros import get_action_client_names_and_types_by_node, get_action_server_names_and_types_by_node
+import typer
+
+from throwcollect import ros
+from throwcollect.cli.ros.options import HiddenOption, NodeArgument, RunOption
+from throwcollect.cli.ros.session import absolute_name, is_hidden, join_graph, require_name
+
+node_app = typer.Typer(help="Nodes: list, info.", no_args_is_help=True)
 
 
-def show_nodes(run: str | None, *, hidden: bool) -> None:
-    """Print the names of all nodes but our own."""
-    with joined(run) as session:
-        names = [name for name in node_names(session) if hidden or not is_hidden(name)]
+@node_app.command("list")
+def list_nodes(hidden: HiddenOption = False, run: RunOption = None) -> None:
+    """List the nodes."""
+    with join_graph(run) as session:
+        names = [name for name in session.node_names() if hidden or not is_hidden(name)]
         if len(set(names)) < len(names):
             print("warning: several nodes have the same name", file=sys.stderr)
         for name in names:
             print(name)
 
 
-def show_node(run: str | None, name: str, *, hidden: bool) -> None:
-    """Print what a node has.
-
-    Raises:
-        ConfigError: If there is no such node.
-    """
-    with joined(run) as session:
-        full_name = absolute(name)
-        names = node_names(session)
-        known("node", full_name, names)
+@node_app.command("info")
+def show_node(node: NodeArgument, hidden: HiddenOption = False, run: RunOption = None) -> None:
+    """Print what a node publishes, subscribes to, offers and uses."""
+    with join_graph(run) as session:
+        full_name = absolute_name(node)
+        names = session.node_names()
+        require_name("node", full_name, names)
         if (count := names.count(full_name)) > 1:
             print(f"warning: {count} nodes are named {full_name}; this is what they have together", file=sys.stderr)
         namespace, _, short = full_name.rpartition("/")
         owner = (short, namespace or "/")
-        node = session.node
+        ours = session.node
         print(full_name)
         for what, found in (
-            ("Subscribers", node.get_subscriber_names_and_types_by_node(*owner)),
-            ("Publishers", node.get_publisher_names_and_types_by_node(*owner)),
-            ("Service Servers", node.get_service_names_and_types_by_node(*owner)),
-            ("Service Clients", node.get_client_names_and_types_by_node(*owner)),
-            ("Action Servers", get_action_server_names_and_types_by_node(node, *owner)),
-            ("Action Clients", get_action_client_names_and_types_by_node(node, *owner)),
+            ("Subscribers", ours.get_subscriber_names_and_types_by_node(*owner)),
+            ("Publishers", ours.get_publisher_names_and_types_by_node(*owner)),
+            ("Service Servers", ours.get_service_names_and_types_by_node(*owner)),
+            ("Service Clients", ours.get_client_names_and_types_by_node(*owner)),
+            ("Action Servers", ros.get_action_server_names_and_types_by_node(ours, *owner)),
+            ("Action Clients", ros.get_action_client_names_and_types_by_node(ours, *owner)),
         ):
             print(f"  {what}:")
             for each, types in sorted(found):
                 if hidden or not is_hidden(each):
                     print(f"    {each}: {', '.join(types)}")
-
-
-def node_names(session: Session) -> list[str]:
-    """Absolute names of all nodes but our own, sorted."""
-    found = session.node.get_node_names_and_namespaces()
-    own = session.node.get_name()
-    return sorted(f"{namespace.removesuffix('/')}/{name}" for name, namespace in found if name != own)

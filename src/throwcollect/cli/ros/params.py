@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import sys
-from typing import Any
+from typing import Annotated, Any
 
-from throwcollect.cli.ros.nodes import node_names
-from throwcollect.cli.ros.session import Session, absolute, is_hidden, joined, known
-from throwcollect.cli.ros.values import parse, plain
+import typer
+
+from throwcollect import ros
+from throwcollect.cli.ros.options import NodeArgument, ParameterArgument, RunOption
+from throwcollect.cli.ros.session import Session, absolute_name, is_hidden, join_graph, require_name
 from throwcollect.errors import ConfigError, WorkerError
-from throwcollect.ros import Parameter, get_service
+
+param_app = typer.Typer(help="Parameters: list, get, set.", no_args_is_help=True)
 
 _SERVICE_S = 5.0
 _FIELDS = {
@@ -26,19 +29,18 @@ _FIELDS = {
 """By rcl_interfaces/msg/ParameterType."""
 
 
-def show_parameters(run: str | None, node: str | None) -> None:
-    """Print the names of the parameters of a node, or of all nodes.
-
-    Raises:
-        ConfigError: If there is no such node.
-        WorkerError: If the node does not answer.
-    """
-    with joined(run) as session:
+@param_app.command("list")
+def list_parameters(
+    node: Annotated[str | None, typer.Argument(metavar="[NODE]", help="Name of the node; all nodes if none.")] = None,
+    run: RunOption = None,
+) -> None:
+    """List the parameters of a node, or of all nodes."""
+    with join_graph(run) as session:
         if node is not None:
             name = _node(session, node)
             _print_sorted(_ask(session, name, "ListParameters").result.names)
             return
-        for name in sorted({each for each in node_names(session) if not is_hidden(each)}):
+        for name in sorted({each for each in session.node_names() if not is_hidden(each)}):
             try:
                 names = _ask(session, name, "ListParameters").result.names
             except WorkerError as error:
@@ -48,18 +50,16 @@ def show_parameters(run: str | None, node: str | None) -> None:
             _print_sorted(names)
 
 
-def show_value(run: str | None, node: str, name: str) -> None:
-    """Print the value of a parameter.
+@param_app.command("get")
+def show_parameter(node: NodeArgument, name: ParameterArgument, run: RunOption = None) -> None:
+    """Print the value of a parameter."""
+    from throwcollect.cli.ros.values import plain
 
-    Raises:
-        ConfigError: If there is no such node or parameter.
-        WorkerError: If the node does not answer.
-    """
-    with joined(run) as session:
+    with join_graph(run) as session:
         owner = _node(session, node)
         values = _ask(session, owner, "GetParameters", names=[name]).values
         if not values:
-            known("parameter", name, _ask(session, owner, "ListParameters").result.names, of=owner)
+            require_name("parameter", name, _ask(session, owner, "ListParameters").result.names, of=owner)
         if not values or values[0].type not in _FIELDS:
             print("Parameter not set.")
             return
@@ -67,15 +67,16 @@ def show_value(run: str | None, node: str, name: str) -> None:
         print(label, plain(getattr(values[0], field)))
 
 
-def change_value(run: str | None, node: str, name: str, text: str) -> None:
-    """Set a parameter.
-
-    Raises:
-        ConfigError: If there is no such node or parameter, or it refuses the value.
-        WorkerError: If the node does not answer.
-    """
-    wanted = _parameter(name, text).to_parameter_msg()
-    with joined(run) as session:
+@param_app.command("set")
+def set_parameter(
+    node: NodeArgument,
+    name: ParameterArgument,
+    value: Annotated[str, typer.Argument(metavar="VALUE", help="Value in YAML.")],
+    run: RunOption = None,
+) -> None:
+    """Set a parameter."""
+    wanted = _parameter(name, value).to_parameter_msg()
+    with join_graph(run) as session:
         owner = _node(session, node)
         (result,) = _ask(session, owner, "SetParameters", parameters=[wanted]).results
         if not result.successful:
@@ -83,23 +84,25 @@ def change_value(run: str | None, node: str, name: str, text: str) -> None:
         print("Set parameter successful" + (f": {result.reason}" if result.reason else ""))
 
 
-def _parameter(name: str, text: str) -> Parameter:
+def _parameter(name: str, text: str) -> ros.Parameter:
     """A parameter of the type that its value has in YAML; what is of no such type is a text."""
+    from throwcollect.cli.ros.values import parse
+
     try:
         value = parse(text, "VALUE")
-        return Parameter(name, value=text if value is None else value)
+        return ros.Parameter(name, value=text if value is None else value)
     except (TypeError, ConfigError):
-        return Parameter(name, value=text)
+        return ros.Parameter(name, value=text)
 
 
 def _node(session: Session, name: str) -> str:
-    owner = absolute(name)
-    known("node", owner, node_names(session))
+    owner = absolute_name(name)
+    require_name("node", owner, session.node_names())
     return owner
 
 
 def _ask(session: Session, node: str, service: str, **fields: Any) -> Any:
-    service_type: Any = get_service(f"rcl_interfaces/srv/{service}")
+    service_type: Any = ros.get_service(f"rcl_interfaces/srv/{service}")
     snake = "".join(f"_{letter.lower()}" if letter.isupper() else letter for letter in service).strip("_")
     client = session.node.create_client(service_type, f"{node}/{snake}")
     if not client.wait_for_service(timeout_sec=_SERVICE_S):

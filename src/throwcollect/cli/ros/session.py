@@ -8,12 +8,13 @@ import re
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from throwcollect import ros
-from throwcollect.cli.ros.env import joining_environment, named
 from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError, WorkerError
-from throwcollect.ros.middleware import Middleware
+
+if TYPE_CHECKING:
+    from throwcollect.ros.connection import Connection
 
 _SLICE_S = 0.2
 """rclpy looks at signals between two waits only."""
@@ -32,7 +33,7 @@ class Session:
     """
 
     def __init__(self) -> None:
-        self.node = ros.create_node(f"_throwcollect_{os.getpid()}", enable_rosout=False, start_parameter_services=False)
+        self.node = ros.Node(f"_throwcollect_{os.getpid()}", enable_rosout=False, start_parameter_services=False)
         self._executor = ros.SingleThreadedExecutor()
         self._executor.add_node(self.node)
 
@@ -73,6 +74,12 @@ class Session:
             raise WorkerError(f"{who} is gone and has not answered")
         return future.result()
 
+    def node_names(self) -> list[str]:
+        """Absolute names of all nodes but our own, sorted."""
+        found = self.node.get_node_names_and_namespaces()
+        own = self.node.get_name()
+        return sorted(f"{namespace.removesuffix('/')}/{name}" for name, namespace in found if name != own)
+
     def close(self) -> None:
         """Leave."""
         self.node.destroy_node()
@@ -80,7 +87,7 @@ class Session:
 
 
 @contextmanager
-def joined(run: str | None) -> Iterator[Session]:
+def join_graph(run: str | None) -> Iterator[Session]:
     """Join the graph of a run, or of the router that the environment names.
 
     Args:
@@ -94,10 +101,11 @@ def joined(run: str | None) -> Iterator[Session]:
         WorkerError: If the run has no router (any more).
         Interrupted: If the user leaves; the message is empty, as that is how one leaves.
     """
-    if run is not None:
-        os.environ.update(joining_environment(named(run)))
+    # Here, as every command of throwcollect loads this module, and those load Zenoh.
+    from throwcollect.ros.middleware import Middleware
+
     try:
-        _init()
+        _init(None if run is None else _connection(run))
         session = Session()
         try:
             if Middleware.of_process().is_fast_dds:
@@ -109,9 +117,15 @@ def joined(run: str | None) -> Iterator[Session]:
         raise Interrupted("") from None
 
 
-def _init() -> None:
+def _connection(run: str) -> Connection:
+    from throwcollect.cli.ros.env import find_way
+
+    return find_way(run).connection
+
+
+def _init(connection: Connection | None) -> None:
     try:
-        ros.init()
+        ros.init(connection=connection)
     except ConfigError:
         raise
     except ThrowcollectError as error:
@@ -122,7 +136,7 @@ def _init() -> None:
         ) from error
 
 
-def absolute(name: str) -> str:
+def absolute_name(name: str) -> str:
     """Absolute name of a node, topic, service or action that a user names with or without its leading slash.
 
     Raises:
@@ -141,7 +155,7 @@ def is_hidden(name: str) -> bool:
     return any(part.startswith("_") for part in name.split("/"))
 
 
-def known(what: str, name: str, names: Iterable[str], *, of: str = "") -> None:
+def require_name(what: str, name: str, names: Iterable[str], *, of: str = "") -> None:
     """Refuse a name that is not there.
 
     Args:
@@ -167,7 +181,7 @@ def full_name(kind: str, name: str) -> str:
     return name.replace("/", f"/{kind}/") if name.count("/") == 1 else name
 
 
-def interface(kind: str, get: Callable[[str], Any], name: str) -> Any:
+def find_interface(kind: str, get: Callable[[str], Any], name: str) -> Any:
     """Class of a message, service or action that a user names.
 
     Args:

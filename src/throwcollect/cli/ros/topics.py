@@ -6,33 +6,48 @@ import statistics
 import time
 from collections import deque
 from itertools import pairwise
-from typing import Any
+from typing import Annotated, Any
 
-from throwcollect.cli.ros.session import Session, absolute, full_name, interface, is_hidden, joined, known, print_names
-from throwcollect.cli.ros.values import SHORT, plain, yaml_text
+import typer
+
+from throwcollect import ros
+from throwcollect.cli.ros.options import HiddenOption, RunOption, TopicArgument, TypesOption
+from throwcollect.cli.ros.session import (
+    Session,
+    absolute_name,
+    find_interface,
+    full_name,
+    is_hidden,
+    join_graph,
+    print_names,
+    require_name,
+)
+from throwcollect.cli.streams import end_with_reader
 from throwcollect.errors import ConfigError
-from throwcollect.ros import DurabilityPolicy, QoSProfile, ReliabilityPolicy, get_message
+
+topic_app = typer.Typer(help="Topics: list, echo, hz, info.", no_args_is_help=True)
 
 _DEPTH = 100
 _REPORT_NS = 10**9
-_SENSOR_DATA = QoSProfile(depth=_DEPTH, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
-def show_topics(run: str | None, *, types: bool, hidden: bool) -> None:
-    """Print the names of all topics."""
-    with joined(run) as session:
+@topic_app.command("list")
+def list_topics(types: TypesOption = False, hidden: HiddenOption = False, run: RunOption = None) -> None:
+    """List the topics."""
+    with join_graph(run) as session:
         print_names(sorted(session.node.get_topic_names_and_types()), types=types, hidden=hidden)
 
 
-def show_topic(run: str | None, topic: str, *, verbose: bool) -> None:
-    """Print the type of a topic and its endpoints.
-
-    Raises:
-        ConfigError: If there is no such topic.
-    """
-    with joined(run) as session:
+@topic_app.command("info")
+def show_topic(
+    topic: TopicArgument,
+    verbose: Annotated[bool, typer.Option("-v", "--verbose", help="Show every publisher and subscription.")] = False,
+    run: RunOption = None,
+) -> None:
+    """Print the type of a topic and who publishes and subscribes to it."""
+    with join_graph(run) as session:
         name, kinds = _types(session, topic)
-        known("topic", name, _names(session))
+        require_name("topic", name, _names(session))
         end = "\n\n" if verbose else "\n"
         print(f"Type: {kinds[0] if len(kinds) == 1 else kinds}", end=end)
         node = session.node
@@ -46,14 +61,27 @@ def show_topic(run: str | None, topic: str, *, verbose: bool) -> None:
                     print(info, end=end)
 
 
-def echo(run: str | None, topic: str, kind: str | None, *, once: bool, field: str | None, full: bool) -> None:
-    """Print the messages of a topic until the user leaves.
+@topic_app.command("echo")
+def echo(
+    topic: TopicArgument,
+    kind: Annotated[
+        str | None,
+        typer.Argument(metavar="[TYPE]", help="Type, such as std_msgs/msg/String; needed if nobody publishes."),
+    ] = None,
+    once: Annotated[bool, typer.Option("--once", help="End after the first message.")] = False,
+    field: Annotated[
+        str | None, typer.Option("--field", metavar="FIELD", help="Print this field alone, such as pose.pose.position.")
+    ] = None,
+    full: Annotated[
+        bool, typer.Option("-f", "--full-length", help="Print texts and arrays of more than 128 elements in full.")
+    ] = False,
+    run: RunOption = None,
+) -> None:
+    """Print the messages of a topic as YAML."""
+    from throwcollect.cli.ros.values import SHORT, plain, yaml_text
 
-    Raises:
-        ConfigError: If there is no such topic, type or field.
-        Interrupted: If the user leaves.
-    """
-    with joined(run) as session:
+    end_with_reader()
+    with join_graph(run) as session:
         name, message_type = _message_type(session, topic, kind)
         path = field.split(".") if field else []
         _check_field(message_type, path)
@@ -72,18 +100,22 @@ def echo(run: str | None, topic: str, kind: str | None, *, once: bool, field: st
         session.spin_until(lambda: once and heard)
 
 
-def show_rate(run: str | None, topic: str, *, window: int) -> None:
-    """Print every second how often messages have arrived, until the user leaves.
-
-    Raises:
-        ConfigError: If there is no such topic.
-        Interrupted: If the user leaves.
-    """
-    with joined(run) as session:
+@topic_app.command("hz")
+def show_rate(
+    topic: TopicArgument,
+    window: Annotated[
+        int, typer.Option("-w", "--window", min=2, metavar="N", help="Number of messages that are averaged.")
+    ] = 10_000,
+    run: RunOption = None,
+) -> None:
+    """Print how often messages arrive."""
+    end_with_reader()
+    with join_graph(run) as session:
         name, message_type = _message_type(session, topic, None)
         arrivals: deque[int] = deque(maxlen=window + 1)
+        qos = ros.QoSProfile(depth=_DEPTH, reliability=ros.ReliabilityPolicy.BEST_EFFORT)
         session.node.create_subscription(
-            message_type, name, lambda _: arrivals.append(time.monotonic_ns()), _SENSOR_DATA, raw=True
+            message_type, name, lambda _: arrivals.append(time.monotonic_ns()), qos, raw=True
         )
         told = time.monotonic_ns()
         while True:
@@ -109,7 +141,7 @@ def _names(session: Session) -> list[str]:
 
 
 def _types(session: Session, topic: str) -> tuple[str, list[str]]:
-    name = absolute(topic)
+    name = absolute_name(topic)
     return name, dict(session.node.get_topic_names_and_types()).get(name, [])
 
 
@@ -117,11 +149,11 @@ def _message_type(session: Session, topic: str, kind: str | None) -> tuple[str, 
     """Absolute name and class of a topic."""
     name, kinds = _types(session, topic)
     if kind is None:
-        known("topic", name, (each for each in _names(session) if not is_hidden(each) or each == name))
+        require_name("topic", name, (each for each in _names(session) if not is_hidden(each) or each == name))
         if len(kinds) > 1:
             raise ConfigError(f"{name} has {len(kinds)} types", expected=f"one of {', '.join(kinds)}")
         (kind,) = kinds
-    message_type = interface("msg", get_message, kind)
+    message_type = find_interface("msg", ros.get_message, kind)
     if kinds and (full := full_name("msg", kind)) not in kinds:
         raise ConfigError(f"{name} is no {full}", expected=", ".join(kinds))
     return name, message_type
@@ -139,12 +171,12 @@ def _check_field(message_type: Any, path: list[str]) -> None:
         value = getattr(value, part)
 
 
-def _offered_qos(session: Session, name: str) -> QoSProfile:
+def _offered_qos(session: Session, name: str) -> ros.QoSProfile:
     """What all publishers of a topic offer."""
     offered = [info.qos_profile for info in session.node.get_publishers_info_by_topic(name)]
-    profile = QoSProfile(depth=_DEPTH, reliability=ReliabilityPolicy.BEST_EFFORT)
-    if offered and all(qos.reliability == ReliabilityPolicy.RELIABLE for qos in offered):
-        profile.reliability = ReliabilityPolicy.RELIABLE
-    if offered and all(qos.durability == DurabilityPolicy.TRANSIENT_LOCAL for qos in offered):
-        profile.durability = DurabilityPolicy.TRANSIENT_LOCAL
+    profile = ros.QoSProfile(depth=_DEPTH, reliability=ros.ReliabilityPolicy.BEST_EFFORT)
+    if offered and all(qos.reliability == ros.ReliabilityPolicy.RELIABLE for qos in offered):
+        profile.reliability = ros.ReliabilityPolicy.RELIABLE
+    if offered and all(qos.durability == ros.DurabilityPolicy.TRANSIENT_LOCAL for qos in offered):
+        profile.durability = ros.DurabilityPolicy.TRANSIENT_LOCAL
     return profile

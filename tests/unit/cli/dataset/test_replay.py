@@ -8,8 +8,10 @@ from types import SimpleNamespace
 import pyarrow as pa
 import pytest
 
-from throwcollect.cli.dataset import replay as module
+from throwcollect.cli.dataset.replay import replay_dataset
+from throwcollect.dataset import reader
 from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.replay import audit
 from throwcollect.replay.comparison import Comparison
 
 DIFFERENT = Comparison(5, "aa", "bb", ("samples: 300 stored, 301 now", "effort: from 0.100 s on, by up to 1e-12"))
@@ -31,13 +33,13 @@ def chosen(monkeypatch: pytest.MonkeyPatch) -> list[int]:
         trials.extend(wanted)
         yield from (DIFFERENT if trial == 5 else Comparison(trial, "aa", "aa", ()) for trial in wanted)
 
-    monkeypatch.setattr(module, "Dataset", SimpleNamespace(open=lambda _: dataset))
-    monkeypatch.setattr(module, "replayed", replayed)
+    monkeypatch.setattr(reader, "Dataset", SimpleNamespace(open=lambda _: dataset))
+    monkeypatch.setattr(audit, "replayed", replayed)
     return trials
 
 
 def test_throws_that_come_out_again_are_counted(chosen: list[int], capsys: pytest.CaptureFixture[str]) -> None:
-    module.show_replay(Path("data"), [4, 7, 4], everything=False, sample=None, json=False)
+    replay_dataset(Path("data"), [4, 7, 4], everything=False, sample=None, json=False)
     assert chosen == [4, 7]
     assert capsys.readouterr().out == "data: 2 throws replayed, the same bit for bit\n"
 
@@ -46,13 +48,13 @@ def test_a_throw_that_comes_out_otherwise_is_an_error_with_its_differences(
     chosen: list[int], capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(DatasetError, match="data: 1 of 2 throws came out otherwise"):
-        module.show_replay(Path("data"), [4, 5], everything=False, sample=None, json=False)
+        replay_dataset(Path("data"), [4, 5], everything=False, sample=None, json=False)
     assert capsys.readouterr().out == f"trial 5: {'; '.join(DIFFERENT.differences)}\n"
 
 
 def test_programs_get_every_comparison(chosen: list[int], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(DatasetError, match="1 of 19 throws"):
-        module.show_replay(Path("data"), [], everything=True, sample=None, json=True)
+        replay_dataset(Path("data"), [], everything=True, sample=None, json=True)
     found = json.loads(capsys.readouterr().out)
     assert [each["trial"] for each in found] == chosen == [trial for trial in range(20) if trial != 3]
     assert found[4]["differences"] == list(DIFFERENT.differences)
@@ -60,7 +62,7 @@ def test_programs_get_every_comparison(chosen: list[int], capsys: pytest.Capture
 
 def test_a_sample_is_always_the_same(chosen: list[int]) -> None:
     for _ in range(2):
-        module.show_replay(Path("data"), [], everything=True, sample=4, json=True)
+        replay_dataset(Path("data"), [], everything=True, sample=4, json=True)
     assert len(set(chosen)) == 4
     assert chosen[:4] == chosen[4:] == sorted(chosen[:4])
 
@@ -77,4 +79,4 @@ def test_it_must_be_clear_which_throws_are_meant(
     trials: list[int], everything: bool, sample: int | None, message: str
 ) -> None:
     with pytest.raises(ConfigError, match=message):
-        module.show_replay(Path("data"), trials, everything=everything, sample=sample, json=False)
+        replay_dataset(Path("data"), trials, everything=everything, sample=sample, json=False)

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from tests.unit.dataset.conftest import Collection
 
-from throwcollect.cli.dataset import verify as module
+from throwcollect.cli.dataset.verify import verify_dataset
 from throwcollect.errors import DatasetError
 from throwcollect.replay.comparison import Comparison
 
@@ -27,12 +27,12 @@ def replays(monkeypatch: pytest.MonkeyPatch) -> list[int]:
         trials.extend(wanted)
         yield from (Comparison(trial, "aa", "bb", ("effort: otherwise",) * (trial == 1)) for trial in wanted)
 
-    monkeypatch.setattr(module, "replayed", replayed)
+    monkeypatch.setattr("throwcollect.replay.verification.replayed", replayed)
     return trials
 
 
 def test_what_only_a_replay_tells_is_said_with_the_command(source: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    module.show_verification(source, replay=None, json=False)
+    verify_dataset(source, replay=None, json=False)
     first, second = capsys.readouterr().out.splitlines()
     assert first == f"{source}: nothing wrong"
     assert f"throwcollect dataset verify '{source}' --replay 100" in second
@@ -42,7 +42,7 @@ def test_a_throw_that_comes_out_otherwise_is_a_finding(
     source: Path, replays: list[int], capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(DatasetError, match="1 finding"):
-        module.show_verification(source, replay=100, json=True)
+        verify_dataset(source, replay=100, json=True)
     assert replays == [0, 1, 2]
     assert json.loads(capsys.readouterr().out) == [
         {"file": "quick_00000.mcap", "place": "trial 1", "problem": "comes out otherwise: effort: otherwise"}
@@ -52,7 +52,7 @@ def test_a_throw_that_comes_out_otherwise_is_a_finding(
 def test_the_seed_chooses_what_is_replayed(source: Path, replays: list[int]) -> None:
     for _ in range(2):
         with suppress(DatasetError):
-            module.show_verification(source, replay=2, json=False)
+            verify_dataset(source, replay=2, json=False)
     assert len(replays) == 4
     assert replays[:2] == replays[2:]
 
@@ -62,6 +62,6 @@ def test_a_dataset_that_cannot_be_opened_is_still_told_about(
 ) -> None:
     (source / "throws.parquet").unlink()
     with pytest.raises(DatasetError, match="findings"):
-        module.show_verification(source, replay=2, json=False)
+        verify_dataset(source, replay=2, json=False)
     assert "cannot be replayed: " in capsys.readouterr().out
     assert replays == []

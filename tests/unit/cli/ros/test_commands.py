@@ -16,9 +16,7 @@ from typing import Any, NamedTuple
 import pytest
 from ruamel.yaml import YAML
 
-from throwcollect.cli.main import main
-from throwcollect.interfaces import get_action, get_message, get_service, type_hash
-from throwcollect.ros.embedded.api import (
+from rclzenoh.api import (
     ActionServer,
     CancelResponse,
     Context,
@@ -32,12 +30,15 @@ from throwcollect.ros.embedded.api import (
     QoSProfile,
     SingleThreadedExecutor,
 )
+from rclzenoh.interfaces import get_action, get_message, get_service, type_hash
+from rclzenoh.session_config import OVERRIDE_VARIABLE
+from throwcollect.cli.main import main
+from throwcollect.ros.connection import Connection
 from throwcollect.ros.middleware import Middleware
 from throwcollect.ros.router import router
-from throwcollect.ros.session_config import OVERRIDE_VARIABLE
 from throwcollect.run_key import RunKey
-from throwcollect.runtime.nodes import joining_environment
-from throwcollect.runtime.records import Record, Records
+from throwcollect.runs.record import Record
+from throwcollect.runs.records import Records
 
 String: Any = get_message("std_msgs/msg/String")
 JointState: Any = get_message("sensor_msgs/msg/JointState")
@@ -289,7 +290,7 @@ def test_a_wrong_request_is_one_clear_message_and_exit_code_2(
 
 
 def test_without_a_router_there_is_one_clear_message(say: Callable[..., Said], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("throwcollect.ros.embedded.session._PATIENCE_S", 0.1)
+    monkeypatch.setattr("rclzenoh.session._PATIENCE_S", 0.1)
     monkeypatch.setenv(OVERRIDE_VARIABLE, 'connect/endpoints=["tcp/127.0.0.1:9"]')
     said = say("node", "list")
     assert said.code == 2
@@ -301,7 +302,7 @@ def test_a_run_is_joined_by_its_name_or_directory(
     endpoint: str, say: Callable[..., Said], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setenv("THROWCOLLECT_STATE", str(tmp_path))
-    for variable in joining_environment(endpoint, 0, RunKey(tmp_path), Middleware()):
+    for variable in Connection(endpoint, RunKey(tmp_path)).environment():
         monkeypatch.setenv(variable, "nonsense")
     run = Records().new("throws")
     record = Record(
@@ -415,11 +416,12 @@ def test_a_reader_that_leaves_early_is_no_error(endpoint: str) -> None:
 
 def test_a_service_that_goes_away_before_it_answers_is_told() -> None:
     server = (
-        "from throwcollect.ros.embedded import api as ros; from throwcollect.interfaces import get_service\n"
-        "ros.init(); node = ros.create_node('n')\n"
+        "from rclzenoh import api as ros; from rclzenoh.interfaces import get_service\n"
+        "ros.init(); node = ros.Node('n')\n"
         "async def wait(request, response): await ros.Future()\n"
         "node.create_service(get_service('std_srvs/srv/SetBool'), 'slow', wait)\n"
-        "print('ready', flush=True); ros.spin(node)\n"
+        "executor = ros.SingleThreadedExecutor(); executor.add_node(node)\n"
+        "print('ready', flush=True); executor.spin()\n"
     )
     with router("tcp/127.0.0.1:0") as endpoint, pytest.MonkeyPatch.context() as patch:
         patch.setenv(OVERRIDE_VARIABLE, f"connect/endpoints={json.dumps([endpoint])}")

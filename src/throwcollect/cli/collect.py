@@ -1,0 +1,161 @@
+"""`throwcollect up` and `resume`: from a YAML file to a dataset, in this terminal or by a launcher that outlives it."""
+
+from __future__ import annotations
+
+import json as jsonlib
+from collections.abc import Callable
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from throwcollect.cli.options import DEFAULT_CONFIG, DatasetArgument, JsonOption, SetOption, TrialsOption, overrides
+from throwcollect.errors import ConfigError
+
+if TYPE_CHECKING:
+    from throwcollect.cli.terminal import Display
+    from throwcollect.runs.preparation import PreparedRun
+
+SimulationsOption = Annotated[
+    str | None, typer.Option("-n", metavar="N", help="Number of simulations: run.simulations.")
+]
+RuntimeOption = Annotated[
+    str | None,
+    typer.Option("--runtime", metavar="auto|local|docker|inprocess", help="Where the nodes run: run.runtime."),
+]
+DetachOption = Annotated[
+    bool, typer.Option("-d", "--detach", help="Print the id of the run as soon as its nodes are started.")
+]
+
+
+def up(
+    config: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="[CONFIG]", help="YAML file of the collection; throwcollect.yaml by default.", readable=False
+        ),
+    ] = None,
+    simulations: SimulationsOption = None,
+    settings: SetOption = None,
+    runtime: RuntimeOption = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", metavar="DIR", help="Directory of the dataset; must be new or empty.")
+    ] = None,
+    resume: Annotated[
+        Path | None,
+        typer.Option("--resume", metavar="DIR", help="Go on with the dataset in DIR; without CONFIG, with its own."),
+    ] = None,
+    trials: TrialsOption = None,
+    detach: DetachOption = False,
+    json: JsonOption = False,
+) -> None:
+    """Collect a dataset: start the simulations, run all trials, write the files."""
+    changes = overrides(settings, trials=trials, run__simulations=simulations, run__runtime=runtime)
+    if resume is None:
+        _collect(
+            lambda runs, shown: runs.prepare(
+                config or DEFAULT_CONFIG, overrides=changes, output=output, onlooker=shown
+            ),
+            detach=detach,
+            json=json,
+        )
+    elif output is not None:
+        raise ConfigError(f"--output {output}: should be left out with --resume, which names the directory")
+    else:
+        _go_on(resume, config, changes, detach=detach, json=json)
+
+
+def resume(
+    directory: DatasetArgument,
+    simulations: SimulationsOption = None,
+    settings: SetOption = None,
+    runtime: RuntimeOption = None,
+    trials: TrialsOption = None,
+    check: Annotated[
+        bool, typer.Option("--check", help="If it is finished, compare every byte of its files, not only their sizes.")
+    ] = False,
+    detach: DetachOption = False,
+    json: JsonOption = False,
+) -> None:
+    """Go on with a dataset whose collection was ended by anything, or with more trials."""
+    changes = overrides(settings, trials=trials, run__simulations=simulations, run__runtime=runtime)
+    _go_on(directory, None, changes, detach=detach, json=json, check=check)
+
+
+def launch(run: str, lock: Annotated[int, typer.Option("--lock", help="Descriptor of the run's locked file.")]) -> None:
+    """Launch a prepared run, as `up -d` does."""
+    from throwcollect.cli.interruptions import Interruptions
+    from throwcollect.cli.streams import only_log
+    from throwcollect.cli.terminal import display
+    from throwcollect.runs.launcher import launch_inherited
+
+    only_log()
+    with display(quiet=True) as shown, Interruptions() as interruptions:
+        launch_inherited(run, lock, onlooker=shown, interruptions=lambda: interruptions.count)
+
+
+def _go_on(
+    directory: Path, config: Path | None, changes: list[str], *, detach: bool, json: bool, check: bool = False
+) -> None:
+    from throwcollect.cli.dataset.info import print_summary
+    from throwcollect.dataset.inspect import info
+
+    launched = _collect(
+        lambda runs, shown: runs.resume(directory, config=config, overrides=changes, check=check, onlooker=shown),
+        detach=detach,
+        json=json,
+    )
+    if not launched:
+        print_summary(info(directory), directory, as_json=json)
+
+
+def _collect(prepare: Callable[[Any, Display], PreparedRun | None], *, detach: bool, json: bool) -> bool:
+    """Launch a run and print its summary or, detached, its id.
+
+    Args:
+        prepare: Prepares the run, with the room that does such things, and a display that shows how that goes.
+        detach: Whether to come back as soon as its nodes are started.
+        json: Whether to print JSON.
+
+    Returns:
+        Whether there was anything to do.
+    """
+    from throwcollect.cli.dataset.info import print_summary
+    from throwcollect.cli.interruptions import Interruptions
+    from throwcollect.cli.terminal import display
+    from throwcollect.dataset.inspect import loss
+    from throwcollect.runs import preparation
+
+    with ExitStack() as held:
+        with display(quiet=json, bar=not detach) as shown:
+            if (run := prepare(preparation, shown)) is None:
+                return False
+            held.enter_context(run)
+            if not detach:
+                with Interruptions() as interruptions:
+                    summary = run.collect(interruptions=lambda: interruptions.count)
+        if detach:
+            _start(run, json=json)
+            return True
+    print_summary(summary, run.directory, as_json=json)
+    if (lost := loss(summary.outcomes, hint=run.place.way_on)) is not None:
+        raise lost
+    return True
+
+
+def _start(run: PreparedRun, *, json: bool) -> None:
+    """Hand the run over to a process of its own, and say how to follow it."""
+    from throwcollect.cli.interruptions import Interruptions
+    from throwcollect.cli.streams import ensure_written
+    from throwcollect.wording import command
+
+    with Interruptions() as interruptions:
+        record = run.start(interruptions=lambda: interruptions.count).record
+    if json:
+        where = {"volume": record.volume} if record.volume else {"directory": record.directory}
+        typer.echo(jsonlib.dumps({"run": record.run, **where}, indent=2))
+    else:
+        typer.echo(record.run)
+        typer.echo(f"follow it: {command('wait', '--run', record.run)}   (or ps, logs -f, stop)", err=True)
+    ensure_written(hint=f"run {record.run} goes on; throwcollect ps lists it")

@@ -1,0 +1,34 @@
+"""Arguments and options that several commands have in common."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+DEFAULT_CONFIG = Path("throwcollect.yaml")
+
+ConfigArgument = Annotated[
+    # Whether it can be read is found where it is read, and said there.
+    Path,
+    typer.Argument(metavar="CONFIG", help="YAML file of the collection.", show_default=True, readable=False),
+]
+DatasetArgument = Annotated[Path, typer.Argument(metavar="DIR", help="Directory of the dataset.", readable=False)]
+OutputArgument = Annotated[Path, typer.Argument(metavar="OUTPUT", help="Directory to write; must be new or empty.")]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+SetOption = Annotated[
+    list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Replace a key of the file; may be repeated.")
+]
+TrialsOption = Annotated[str | None, typer.Option("--trials", metavar="K", help="Number of trials.")]
+
+
+def overrides(settings: list[str] | None, **options: str | None) -> list[str]:
+    """What replaces keys of a configuration: options for single keys are overrides like any other.
+
+    Args:
+        settings: ``key=value`` pairs.
+        options: Values of further keys, whose dots are written as ``__``; None for those that are not given.
+    """
+    named = (f"{key.replace('__', '.')}={value}" for key, value in options.items() if value is not None)
+    return [*(settings or []), *named]

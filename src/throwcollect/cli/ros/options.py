@@ -1,0 +1,30 @@
+"""Options and arguments that several commands of `throwcollect ros` have."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+
+def _settle(run: str | None) -> str | None:
+    from throwcollect.cli.ros.env import settle
+
+    return settle(run)
+
+
+RunOption = Annotated[
+    str | None,
+    typer.Option(
+        "--run",
+        metavar="RUN",
+        callback=_settle,
+        help="Join this run: its id, the beginning of that, or the dataset's directory. By default, the router that "
+        "ZENOH_CONFIG_OVERRIDE names, or the one at tcp/localhost:7447.",
+    ),
+]
+TypesOption = Annotated[bool, typer.Option("-t", "--show-types", help="Show the types, too.")]
+HiddenOption = Annotated[bool, typer.Option("-a", "--all", help="Show what is hidden, too: names that begin with '_'.")]
+TopicArgument = Annotated[str, typer.Argument(metavar="TOPIC", help="Name of the topic.")]
+NodeArgument = Annotated[str, typer.Argument(metavar="NODE", help="Name of the node, with its namespace.")]
+ParameterArgument = Annotated[str, typer.Argument(metavar="NAME", help="Name of the parameter.")]

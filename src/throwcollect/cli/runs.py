@@ -1,0 +1,255 @@
+"""`throwcollect ps`, `wait`, `logs`, `events`, `scale`, `stop` and `down`: runs, watched and changed."""
+
+from __future__ import annotations
+
+import json as jsonlib
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict
+from datetime import datetime, timezone
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from throwcollect.cli.options import JsonOption
+from throwcollect.cli.streams import end_with_reader
+from throwcollect.errors import ConfigError, Interrupted
+from throwcollect.wording import command, counted
+
+if TYPE_CHECKING:
+    from throwcollect.runs.record import Record
+    from throwcollect.runs.records import Run
+    from throwcollect.runtimes.runtime import HeldRun, NodeState
+
+RunOption = Annotated[
+    str | None,
+    typer.Option(
+        "--run", metavar="RUN", help="Id of a run, its beginning, or the dataset's directory; by default, the only one."
+    ),
+]
+
+_UNITS = (("d", 86400), ("h", 3600), ("min", 60), ("s", 1))
+_HEADINGS = ("RUN", "RUNTIME", "SIMULATIONS", "THROWS", "STATUS", "DATASET")
+_tell = partial(typer.echo, err=True)
+
+
+def ps(
+    everything: Annotated[bool, typer.Option("-a", "--all", help="Runs that have ended, too.")] = False,
+    json: JsonOption = False,
+) -> None:
+    """List the runs of this machine, with their nodes."""
+    from throwcollect.runs.records import Records
+    from throwcollect.runs.selection import held_elsewhere
+
+    records = Records()
+    known: list[Run] = []
+    for name in records.ids():
+        try:
+            known.append(records.get(name))
+        except ConfigError as error:
+            typer.echo(f"throwcollect: {error}", err=True)
+    shown = [run for run in known if everything or run.status != "ended"]
+    shown.sort(key=lambda run: run.record.started)
+    ids = records.ids()
+    held = held_elsewhere()
+    strangers = [each for run, each in held.items() if run not in ids]
+    if json:
+        documents = [_document(run) for run in shown] + [_strange_document(*each) for each in strangers]
+        typer.echo(jsonlib.dumps(documents, indent=2, default=_in_json))
+        return
+    rows = [(_row(run), _node_lines(run, held.get(run.id))) for run in shown]
+    rows += [(_strange_row(*each), _held_node_lines(*each)) for each in strangers]
+    for line in _table(rows):
+        typer.echo(line)
+
+
+def wait(run: RunOption = None, json: JsonOption = False) -> None:
+    """Show the progress of a run until it ends, and then its summary; Ctrl-C leaves it alone."""
+    from throwcollect.cli.dataset.info import print_summary
+    from throwcollect.cli.interruptions import Interruptions
+    from throwcollect.cli.terminal import display
+    from throwcollect.runs.following import follow
+    from throwcollect.runs.records import Records
+    from throwcollect.runs.selection import died, to_watch
+
+    found = to_watch(Records(), run, say=_tell)
+    with display(quiet=json) as shown, Interruptions() as interruptions:
+        for look in follow(found, keep_on=lambda: not interruptions.count):
+            found = look.run
+            if look.progress is not None:
+                shown.update(look.progress)
+            for event in look.events:
+                if event.alarming:
+                    shown.warn(str(event))
+    record = found.record
+    if found.status == "running":
+        raise Interrupted(f"left; run {found.id} goes on", hint=command("wait", "--run", found.id))
+    if found.status == "died":
+        raise died(found)
+    if record.summary is not None:
+        print_summary(record.summary, None if record.volume else Path(record.directory), as_json=json)
+    if (error := record.error) is not None:
+        raise error
+
+
+def logs(
+    nodes: Annotated[list[str] | None, typer.Argument(metavar="[NODE]...", help="Names of nodes; all if none.")] = None,
+    follow: Annotated[bool, typer.Option("-f", "--follow", help="Go on until the run ends.")] = False,
+    run: RunOption = None,
+) -> None:
+    """Print what the nodes of a run print."""
+    from throwcollect.runs.following import read_logs
+    from throwcollect.runs.records import Records
+    from throwcollect.runs.selection import to_watch
+
+    end_with_reader()
+    found = to_watch(Records(), run, say=_tell)
+    for name, line, width in read_logs(found, nodes or (), follow=follow):
+        typer.echo(f"{name:{width}} | {line}")
+
+
+def events(run: RunOption = None, json: JsonOption = False) -> None:
+    """Print what happens in a run, from its start until it ends: nodes started, ready, lost and so on."""
+    from throwcollect.runs.following import read_events
+    from throwcollect.runs.records import Records
+    from throwcollect.runs.selection import to_watch
+
+    end_with_reader()
+    for event, line in read_events(to_watch(Records(), run, say=_tell)):
+        typer.echo(line if json else f"{event.time}  {event}")
+
+
+def scale(
+    simulations: Annotated[int, typer.Argument(metavar="N", min=0, max=256, help="Number of simulations.")],
+    run: RunOption = None,
+) -> None:
+    """Change the number of simulations of a run."""
+    from throwcollect.runs import control
+    from throwcollect.runs.records import Records
+    from throwcollect.runs.selection import to_change
+
+    found = to_change(Records(), run, command=f"scale {simulations}")
+    control.scale(found, simulations)
+    typer.echo(f"{found.id}: {found.record.simulations} -> {counted(simulations, 'simulation')}")
+
+
+def stop(run: RunOption = None) -> None:
+    """Finish the running trials of a run, close its files and end it."""
+    from throwcollect.cli.interruptions import Interruptions
+    from throwcollect.runs import control
+    from throwcollect.runs.records import Records
+    from throwcollect.runs.selection import died, require_living, to_change
+
+    found = to_change(Records(), run, command="stop")
+    require_living(found)
+    typer.echo(f"{found.id}: finishing the running trials", err=True)
+    with Interruptions() as interruptions:
+        found = control.stop(found, keep_on=lambda: not interruptions.count)
+    if found.status == "running":
+        raise Interrupted(f"not waited for; run {found.id} is stopping all the same")
+    error = died(found) if found.status == "died" else found.record.error
+    if error is not None and not isinstance(error, Interrupted):
+        raise error
+    complete = "is complete" if error is None else "is not complete"
+    typer.echo(f"{found.id}: stopped; the dataset {complete}: {found.place.dataset}")
+
+
+def down(
+    volumes: Annotated[
+        bool, typer.Option("-v", "--volumes", help="Remove the volume that holds the dataset, too.")
+    ] = False,
+    run: RunOption = None,
+) -> None:
+    """End everything of a run, by force if need be, and forget it; never removes a directory with a dataset."""
+    from throwcollect.runs import control
+
+    ended, removed = control.down(run, volumes=volumes)
+    for name in removed:
+        typer.echo(f"removed {name}", err=True)
+    typer.echo(f"{ended}: ended and forgotten")
+
+
+def _in_json(value: datetime) -> str:
+    """A time by RFC 3339, as events have it."""
+    return value.isoformat(timespec="milliseconds")
+
+
+def _document(run: Run) -> dict[str, Any]:
+    error = run.record.error if run.record.failure else None
+    return {**asdict(run.record), "message": str(error or ""), "status": run.status}
+
+
+def _strange_document(runtime: str, held: HeldRun) -> dict[str, Any]:
+    return {"run": held.run_id, "runtime": runtime, "status": "unrecorded", **asdict(held)}
+
+
+def _row(run: Run) -> tuple[str, ...]:
+    record = run.record
+    throws = f"{record.trials_ended}/{record.trials}" if record.trials is not None else "-"
+    return run.id, record.runtime, str(record.simulations), throws, _status(run, record), run.place.dataset
+
+
+def _status(run: Run, record: Record) -> str:
+    if record.ended is not None:
+        return f"{run.status} {_age(record.ended)} ago, exit code {record.exit_code}"
+    return f"running for {_age(record.started)}" if run.lives else run.status
+
+
+def _strange_row(runtime: str, held: HeldRun) -> tuple[str, ...]:
+    simulations = sum(node.name.startswith("sim_") for node in held.nodes)
+    return held.run_id, runtime, str(simulations), "-", "unrecorded", held.source
+
+
+def _node_lines(run: Run, held: tuple[str, HeldRun] | None) -> list[tuple[str, ...]]:
+    if run.status == "running":
+        return [_node_line(node, _handle(run.record.runtime)) for node in run.record.nodes]
+    # What a launcher that is gone wrote of its nodes may be true no more.
+    return _held_node_lines(*held) if held is not None else []
+
+
+def _node_line(node: NodeState, handle: str) -> tuple[str, ...]:
+    again = counted(node.restarts, "restart") if node.restarts else ""
+    return (
+        node.name,
+        node.status,
+        f"{handle} {node.handle[:12]}" if node.handle else "",
+        ", ".join(filter(None, (again, node.last_end and f"last: {node.last_end}"))),
+    )
+
+
+def _held_node_lines(runtime: str, held: HeldRun) -> list[tuple[str, ...]]:
+    return [(node.name, node.status, f"{_handle(runtime)} {node.handle[:12]}", "") for node in held.nodes]
+
+
+def _handle(name: str) -> str:
+    """What the nodes of a runtime are known by, as a noun; that of processes if the runtime is not known here."""
+    from throwcollect.runtimes.registry import get_runtime
+    from throwcollect.runtimes.runtime import Runtime
+
+    try:
+        return get_runtime(name).handle
+    except ConfigError:
+        return Runtime.handle
+
+
+def _table(rows: Sequence[tuple[tuple[str, ...], list[tuple[str, ...]]]]) -> Iterable[str]:
+    """Runs as one table, and below each run its nodes, indented."""
+    runs = _aligned([_HEADINGS, *(run for run, _ in rows)])
+    nodes = iter(_aligned([line for _, lines in rows for line in lines]))
+    yield runs[0]
+    for text, (_, lines) in zip(runs[1:], rows, strict=True):
+        yield text
+        for _ in lines:
+            yield f"  {next(nodes)}"
+
+
+def _aligned(rows: Sequence[Sequence[str]]) -> list[str]:
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return ["  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
+
+
+def _age(since: datetime) -> str:
+    """A time in its largest unit."""
+    seconds = max(0, int((datetime.now(timezone.utc) - since).total_seconds()))
+    return next((f"{seconds // size} {unit}" for unit, size in _UNITS if seconds >= size), "0 s")

@@ -1,0 +1,366 @@
+"""The trials of a plan on their way into the dataset, whoever simulates them and however that is reached.
+
+It decides which trial a simulation gets next, whether an episode is the one that was asked for, and what is written. It
+knows no network and no processes: the coordinator's node drives it with simulations that it finds in the ROS graph, a
+run in one process with a simulation of its own.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import Counter, deque
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from types import TracebackType
+
+from throwcollect.coordinator.acceptance import Acceptance, Assignment
+from throwcollect.coordinator.growth import Growth
+from throwcollect.coordinator.leases import Leases
+from throwcollect.coordinator.progress import Progress
+from throwcollect.coordinator.replay_check import check_by_replay
+from throwcollect.dataset.directory import known_directory
+from throwcollect.dataset.inspect import info, loss
+from throwcollect.dataset.writer import DatasetWriter
+from throwcollect.episode.message import Delivery, Episode
+from throwcollect.errors import Interrupted, WorkerError
+from throwcollect.sweep.plan import Trial
+from throwcollect.tasks.throw.judge import judge
+from throwcollect.tasks.throw.outcome import Outcome, ThrowResult
+from throwcollect.wording import command, counted
+
+_RATE_WINDOW_S = 10.0
+"""Throws per second are averaged over this time."""
+_SYNC_EVERY_S = 1.0
+"""What a power cut may cost."""
+
+
+class TrialCollection:
+    """The trials of one dataset; close it, or use it as a context manager.
+
+    A simulation is known by an address that is unique in the run (its ROS namespace), and named in the journal and in
+    reports by its node's name.
+
+    Attributes:
+        writer: The dataset that is filled.
+        warn: Is told of trials that go to another simulation; to be replaced by whoever knows a log.
+        on_more_trials: Is called when the plan has grown, so that idle simulations can be given something to do.
+
+    Args:
+        writer: A dataset that is open.
+    """
+
+    def __init__(self, writer: DatasetWriter) -> None:
+        self.writer = writer
+        self.warn: Callable[[str], object] = lambda _: None
+        self.on_more_trials: Callable[[], None] = lambda: None
+        self._config = writer.plan.config
+        self._trials: dict[int, Trial] = {trial.number: trial for trial in writer.plan.trials if trial.refused is None}
+        self._leases = Leases(self._trials, retries=self._config.run.retries)
+        self._growth = Growth(writer.plan) if self._config.grows else None
+        self._names: dict[str, str] = {}
+        self._acceptance = Acceptance(self._config)
+        self._assignments: dict[int, Assignment] = {}
+        self._backlog: deque[tuple[Episode, Assignment]] = deque()
+        self._set_aside: dict[str, str] = {}
+        self._outcomes: Counter[str] = Counter()
+        self._ends: deque[tuple[float, int]] = deque([(time.monotonic(), 0)])
+        self._draining = False
+        self._drain_deadline = math.inf
+        self._synced_at = time.monotonic()
+
+    @classmethod
+    def open(cls, directory: Path, *, say: Callable[[str], object]) -> TrialCollection:
+        """Open a dataset to collect into, and count what an earlier collection has left there as done.
+
+        Args:
+            directory: Directory of the dataset, as `prepare` or `resume` left it.
+            say: Is told how much was there.
+
+        Raises:
+            DatasetError: If the directory holds no plan, or another process collects into it.
+            ConfigError: If its ``config.yaml`` is wrong.
+        """
+        writer = DatasetWriter.open(directory)
+        there: list[tuple[int, ThrowResult]] = []
+        if found := writer.recover(lambda trial, result: there.append((trial, result))):
+            say(f"keeps {counted(found, 'episode')} of an earlier collection")
+        collection = cls(writer)
+        for trial, result in there:
+            collection.recall(trial, result)
+        return collection
+
+    def __enter__(self) -> TrialCollection:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.writer.close()
+
+    @property
+    def backlog(self) -> int:
+        """Number of episodes that have arrived but are not written yet."""
+        return len(self._backlog)
+
+    @property
+    def draining(self) -> bool:
+        """Whether no more trials are leased."""
+        return self._draining
+
+    @property
+    def finished(self) -> bool:
+        """Whether every trial has ended and is written; while draining, whether running ones have ended or had time."""
+        if self._backlog:
+            return False
+        if self.complete:
+            return True
+        if self._growth is not None and self._growth.over:
+            return False
+        return self._draining and (self._leases.leased == 0 or time.monotonic() > self._drain_deadline)
+
+    @property
+    def complete(self) -> bool:
+        """Whether every trial of the plan has ended, and none will be added to it."""
+        return self._leases.finished and self._growth is None
+
+    def drain(self) -> None:
+        """Lease no more trials; those that run may end within `run.grace_s`."""
+        if not self._draining:
+            self._draining = True
+            self._drain_deadline = time.monotonic() + self._config.run.grace_s
+
+    def recall(self, trial: int, result: ThrowResult) -> None:
+        """Count a trial as ended whose episode is in the dataset already, before anything is leased.
+
+        Args:
+            trial: Number of the trial.
+            result: What came of it.
+        """
+        self._leases.recall(trial)
+        self._note(trial, result)
+        self._ends = deque([(time.monotonic(), self._leases.ended)])
+
+    def join(self, simulation: str, name: str) -> None:
+        """Take note of a simulation that can be given trials.
+
+        Args:
+            simulation: Its address.
+            name: Name of its node.
+        """
+        self._names[simulation] = name
+
+    def leave(self, simulation: str, reason: str) -> None:
+        """Take a trial back from a simulation that is gone, and forget it; the next one of its name is another one."""
+        self.take_back(simulation, reason)
+        self._leases.forget(simulation)
+        del self._names[simulation]
+
+    def held_by(self, simulation: str) -> int | None:
+        """Trial that a simulation works at; None if at none."""
+        return self._leases.held_by(simulation)
+
+    def lease(self, simulation: str) -> tuple[int, Assignment] | None:
+        """Give the next trial to a simulation that has none.
+
+        Returns:
+            Number of the trial, and all that is worked out of it; None if the simulation gets none for now.
+        """
+        if self._draining or self._leases.held_by(simulation) is not None:
+            return None
+        trial = self._leases.lease(simulation, others=self._names)
+        if trial is None:
+            return None
+        assignment = self._assignments.get(trial) or self._assign(trial)
+        self._assignments[trial] = assignment
+        self.writer.note("lease", trial=trial, simulation=self.name_of(simulation))
+        return trial, assignment
+
+    def take_in(self, simulation: str, delivery: Delivery, token: str) -> bool:
+        """Take an episode in, to be written by `write_one`, if it is the one that was asked for.
+
+        Args:
+            simulation: The simulation that has handed it over.
+            delivery: The episode, with what the simulation says of it.
+            token: Signature of the lease; empty if it was not signed.
+
+        Returns:
+            Whether it was; if not, its trial goes to another simulation.
+        """
+        trial = delivery.episode.header.trial
+        assignment = self._assignments[trial]
+        if (reason := self._acceptance.foreign(delivery, assignment, token)) is not None:
+            self.take_back(simulation, f"its episode is refused: {reason}", refused=True)
+            return False
+        self._leases.deliver(simulation, trial)
+        self._backlog.append((delivery.episode, self._assignments.pop(trial)))
+        return True
+
+    def take_back(self, simulation: str, reason: str, *, refused: bool = False) -> None:
+        """Take a trial back from a simulation that did not do it; without one, nothing happens.
+
+        Args:
+            simulation: Its address.
+            reason: What happened, kept as evidence.
+            refused: Whether the simulation refused the trial, so that it may refuse all others, too.
+        """
+        trial = self._leases.held_by(simulation)
+        if trial is not None:
+            given_up = self._leases.fail(simulation, reason, refused=refused)
+            self._give_back(simulation, trial, reason, given_up and given_up[1])
+
+    def write_one(self) -> None:
+        """Check, judge and write the oldest episode of the backlog.
+
+        Raises:
+            DatasetError: If the dataset cannot be written.
+        """
+        episode, assignment = self._backlog.popleft()
+        trial = episode.header.trial
+        if (problem := self._acceptance.unsound(episode, assignment)) is not None:
+            simulation = self._leases.deliverer(trial)
+            self._assignments[trial] = assignment
+            self._give_back(
+                simulation, trial, f"its episode is refused: {problem}", self._leases.reject(trial, problem)
+            )
+            return
+        result = judge(
+            episode.samples(),
+            episode.header,
+            config=assignment.config,
+            trajectory=assignment.trajectory,
+        )
+        self.writer.append(episode, result)
+        self._leases.complete(trial)
+        self._tell_set_aside()
+        self._note(trial, result)
+
+    def prepare_one(self) -> bool:
+        """Do a piece of work that can wait, of some milliseconds, so that no simulation will wait for it.
+
+        That is to work out one of the trials that will be leased next, or to get on with the next round of the plan.
+
+        Returns:
+            Whether there was something to do.
+
+        Raises:
+            DatasetError: If the plan, or a shard that is complete without further trials, cannot be written.
+        """
+        for trial in self._leases.upcoming(len(self._names)):
+            if trial not in self._assignments:
+                self._assignments[trial] = self._assign(trial)
+                return True
+        return self._growth is not None and self._grow(self._growth)
+
+    def look_after(self) -> None:
+        """Have what is written survive a power cut, now and then, and end a collection that cannot go on.
+
+        Raises:
+            WorkerError: If every simulation refuses every trial.
+            DatasetError: If the disk fails.
+        """
+        if (reason := self._leases.hopeless(self._names)) is not None:
+            raise WorkerError("every simulation refuses its trials, and none was ever done", evidence=reason)
+        if time.monotonic() >= self._synced_at + _SYNC_EVERY_S:
+            self._synced_at = time.monotonic()
+            self.writer.sync()
+
+    def progress(self, hung: Iterable[str] = ()) -> Progress:
+        """How far the collection has come.
+
+        Args:
+            hung: Names of the simulations that took too long for a trial.
+        """
+        now = time.monotonic()
+        ended = self._leases.ended
+        self._ends.append((now, ended))
+        while self._ends[0][0] < now - _RATE_WINDOW_S:
+            self._ends.popleft()
+        since, before = self._ends[0]
+        # Of a plan that ends when enough throws have landed, nobody knows how many trials it will have.
+        expected = self._growth.most if self._growth is not None and self._config.until is None else 0
+        return Progress(
+            total=self._leases.total + expected,
+            ended=ended,
+            outcomes=dict(self._outcomes),
+            simulations=len(self._names),
+            throws_per_s=(ended - before) / (now - since) if now > since else 0.0,
+            hung=sorted(hung),
+            wanted=self._config.until.landed if self._config.until else None,
+            set_aside={self.name_of(simulation): reason for simulation, reason in self._set_aside.items()},
+        )
+
+    def finish(self, directory: Path, *, meanwhile: Callable[[], None], say: Callable[[str], object]) -> None:
+        """Simulate some trials again in a fresh process, and write what describes the dataset as a whole.
+
+        Args:
+            directory: Directory of the dataset.
+            meanwhile: Called again and again while that process works.
+            say: Is told what was simulated again.
+
+        Raises:
+            Interrupted: If the collection was drained before its last trial.
+            DatasetError: If a trial came out otherwise, or a file cannot be written.
+            WorkerError: If trials cannot be simulated again.
+            LossError: If the dataset is finished, and trials of it are lost.
+        """
+        known = known_directory(directory)
+        if not self.complete:
+            raise Interrupted(
+                f"interrupted; what is finished is in {known or 'the volume'}",
+                hint=command("resume", known) if known else None,
+            )
+        said = check_by_replay(
+            directory,
+            self.writer.digests(),
+            count=self._config.run.replay,
+            seed=self._config.seed,
+            meanwhile=meanwhile,
+        )
+        if said is not None:
+            say(said)
+        self.writer.finish()
+        lost = loss(info(directory).outcomes, hint=f"{command('resume', known)} runs them again" if known else None)
+        if lost is not None:
+            raise lost
+
+    def name_of(self, simulation: str) -> str:
+        """Name of a simulation's node, also when it has left."""
+        return self._names.get(simulation, simulation.strip("/"))
+
+    def _assign(self, number: int) -> Assignment:
+        return self._acceptance.assign(self.writer.plan, self._trials[number])
+
+    def _grow(self, growth: Growth) -> bool:
+        if growth.over:
+            self._growth = None
+            self.writer.close_plan()
+            return True
+        trials = None if self._draining else growth.step()
+        if trials:
+            self.writer.extend(trials)
+            fresh = {trial.number: trial for trial in trials if trial.refused is None}
+            self._trials |= fresh
+            self._leases.add(fresh)
+            self.on_more_trials()
+        return trials is not None
+
+    def _note(self, trial: int, result: ThrowResult) -> None:
+        self._outcomes[result.outcome.value] += 1
+        if self._growth is not None:
+            self._growth.tell(trial, result)
+
+    def _tell_set_aside(self) -> None:
+        aside = {each: reason for each in self._names if (reason := self._leases.set_aside(each)) is not None}
+        for simulation in aside.keys() - self._set_aside.keys():
+            self.warn(f"{simulation}: gets no more trials, as others could do what it refused: {aside[simulation]}")
+        self._set_aside = aside
+
+    def _give_back(self, simulation: str, trial: int, reason: str, given_up: list[str] | None) -> None:
+        """Tell of a trial that goes to another simulation, or write that it is lost, with the reasons."""
+        self.warn(f"{simulation}: trial {trial} is given to another simulation: {reason}")
+        self.writer.note("fail", trial=trial, simulation=self.name_of(simulation), reason=reason)
+        if given_up is not None:
+            del self._assignments[trial]
+            self.writer.append_lost(trial, "; ".join(given_up))
+            self._note(trial, ThrowResult(Outcome.LOST, reason="; ".join(given_up)))

@@ -1,0 +1,59 @@
+"""Runs: prepared, launched, followed, scaled and ended, by the command line or by a Python program.
+
+What stands behind these names is imported when they are taken; see ``docs/runs.md``.
+"""
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from throwcollect.runs.control import down as down
+    from throwcollect.runs.control import scale as scale
+    from throwcollect.runs.control import stop as stop
+    from throwcollect.runs.following import Look as Look
+    from throwcollect.runs.following import follow as follow
+    from throwcollect.runs.following import wait as wait
+    from throwcollect.runs.launcher import Onlooker as Onlooker
+    from throwcollect.runs.preparation import PreparedRun as PreparedRun
+    from throwcollect.runs.preparation import prepare as prepare
+    from throwcollect.runs.preparation import resume as resume
+    from throwcollect.runs.record import Summary as Summary
+    from throwcollect.runs.records import Run as Run
+    from throwcollect.runs.selection import find as find
+else:
+
+    def __getattr__(name: str) -> object:
+        from importlib import import_module
+
+        rooms = {
+            "control": ("down", "scale", "stop"),
+            "following": ("Look", "follow", "wait"),
+            "launcher": ("Onlooker",),
+            "preparation": ("PreparedRun", "prepare", "resume"),
+            "record": ("Summary",),
+            "records": ("Run",),
+            "selection": ("find",),
+        }
+        for room, names in rooms.items():
+            if name in names:
+                return getattr(import_module(f"throwcollect.runs.{room}"), name)
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+    def __dir__() -> list[str]:
+        return sorted({*globals(), *__all__})
+
+
+__all__ = [
+    "Look",
+    "Onlooker",
+    "PreparedRun",
+    "Run",
+    "Summary",
+    "down",
+    "find",
+    "follow",
+    "prepare",
+    "resume",
+    "scale",
+    "stop",
+    "wait",
+]

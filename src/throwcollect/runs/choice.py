@@ -1,0 +1,69 @@
+"""Which runtime a run has, and what carries its messages."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from throwcollect.config.schema import Config
+from throwcollect.errors import WorkerError
+from throwcollect.extras import MissingExtraError
+from throwcollect.ros.middleware import Middleware
+from throwcollect.ros.middleware import wanted as wanted_middleware
+from throwcollect.runtimes.registry import AUTOMATIC, get_runtime
+from throwcollect.runtimes.runtime import Runtime
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What has the trials of a run simulated, and what carries their messages.
+
+    Attributes:
+        name: Name of the runtime.
+        runtime: The runtime.
+        middleware: What carries the messages.
+    """
+
+    name: str
+    runtime: Runtime
+    middleware: Middleware
+
+
+def choose(config: Config, *, say: Callable[[str], None], warn: Callable[[str], None]) -> Choice:
+    """What a configuration asks for; with ``auto``, containers where they can be had, and rclpy where it is installed.
+
+    Args:
+        config: The configuration.
+        say: Told in one line what was chosen, and before that what is done to get it.
+        warn: Told in one line of what may not be as it should, such as an image that is not that of these sources.
+
+    Raises:
+        ConfigError: If rclpy is asked for, and is not there, or there is no such runtime.
+        MissingExtraError: If what the runtime needs is not installed.
+        WorkerError: If the runtime that is asked for cannot be had.
+    """
+    wanted = config.run.runtime
+    launcher = wanted_middleware(config.run.ros)
+    candidates = AUTOMATIC if wanted == "auto" else (wanted,)
+    note = " (auto)" if wanted == "auto" else ""
+    for name in candidates[:-1]:
+        try:
+            return _chosen(name, config, launcher, note, say, warn)
+        except (MissingExtraError, WorkerError) as error:
+            note = f" (auto, as {error.message})"
+    return _chosen(candidates[-1], config, launcher, note, say, warn)
+
+
+def _chosen(
+    name: str,
+    config: Config,
+    launcher: Middleware,
+    note: str,
+    say: Callable[[str], None],
+    warn: Callable[[str], None],
+) -> Choice:
+    found = get_runtime(name)
+    middleware = found.prepare(config, launcher, say=say, warn=warn)
+    rclpy = f" on genuine rclpy with {middleware.rmw}" if middleware.backend == "rclpy" else ""
+    say(f"runtime: {found.in_words(config)}{rclpy}{note}")
+    return Choice(name, found, middleware)

@@ -1,0 +1,173 @@
+"""End and scale a run from another process than its launcher."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any
+
+from throwcollect.errors import ConfigError, ThrowcollectError, WorkerError
+from throwcollect.ros.endpoint import answers
+from throwcollect.runs.record import Record
+from throwcollect.runs.records import Records, Run
+from throwcollect.runs.selection import held_elsewhere, id_of, require_living, to_change
+from throwcollect.runtimes.nodes import LAUNCHER
+from throwcollect.runtimes.registry import get_runtime
+from throwcollect.wording import command
+
+if TYPE_CHECKING:
+    from throwcollect import ros
+
+_POLL_S = 0.05
+_STOP_S = 60.0
+"""More than a launcher needs to drain and to end all nodes."""
+_GRACE_S = 3.0
+_FORCE_S = 10.0
+_ANSWER_S = 10.0
+"""Time in which a launcher answers; it may be busy ending simulations."""
+
+
+def stop(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Run:
+    """Drain a run: no new trial is started, running ones are finished and written, all nodes end.
+
+    Args:
+        run: The run.
+        keep_on: Asked again and again whether to wait on.
+
+    Returns:
+        The run, as it is by then.
+
+    Raises:
+        ConfigError: If the run has ended, or its record cannot be read.
+        WorkerError: If its launcher died, or does not end.
+    """
+    _signal(run.records, require_living(run), signal.SIGTERM)
+    deadline = time.monotonic() + _STOP_S
+    while run.records.lives(run.id) and keep_on():
+        if time.monotonic() > deadline:
+            raise WorkerError(
+                f"run {run.id} has not ended within {_STOP_S:g} s",
+                hint=f"{command('down', '--run', run.id)} ends it by force",
+            )
+        time.sleep(_POLL_S)
+    return run.now()
+
+
+def down(named: str | Run | None, *, volumes: bool = False) -> tuple[str, list[str]]:
+    """End everything of a run, by force if need be, and forget it; a dataset in a directory stays.
+
+    Args:
+        named: A run, or what `to_change` takes, or the id of a run of which only a runtime knows; None for the only run
+            of the current directory that lives, or whose launcher died.
+        volumes: Whether a volume that holds the dataset is removed, too.
+
+    Returns:
+        Id of the run, and names of what was removed.
+
+    Raises:
+        ConfigError: If there is no such run, or more than one.
+        WorkerError: If something cannot be ended or removed.
+    """
+    records, held = Records(), held_elsewhere()
+    # What a runtime holds besides may be somebody else's, so that has to be named.
+    if named is None:
+        run = to_change(records, None, command="down -v" if volumes else "down", died=True).id
+    elif isinstance(named, Run):
+        run = named.id
+    else:
+        run = named if named in held else id_of(records, named)
+    record: Record | None = None
+    with suppress(ConfigError):
+        record = records.get(run).record
+    if record is not None:
+        _end_launcher(records, record)
+    taken = records.take(run)
+    if taken is None:
+        raise WorkerError(f"run {run}: its launcher does not end", evidence=f"its pid is {record and record.launcher}")
+    lived_in = record.runtime if record is not None else held[run][0] if run in held else None
+    try:
+        removed = [] if lived_in is None else get_runtime(lived_in).remove(run, volumes=volumes)
+    except ThrowcollectError:
+        taken.close()
+        raise
+    taken.forget()
+    return run, removed
+
+
+def scale(run: Run, simulations: int) -> None:
+    """Ask the launcher of a run for another number of simulations.
+
+    Raises:
+        ConfigError: If the run has ended, cannot be scaled, or the launcher refuses that number.
+        WorkerError: If the launcher died, or does not answer.
+    """
+    record = require_living(run)
+    if not get_runtime(record.runtime).can_be_scaled:
+        raise ConfigError(f"run {run.id}: has one simulation, as all runs of the runtime {record.runtime} have")
+    connection = run.connection
+    if connection is None or not answers(connection.endpoint):
+        raise _silent(run)
+    connection.middleware.joining.settle()
+    from throwcollect import ros
+
+    context = ros.Context()
+    ros.init(context=context, connection=connection)
+    try:
+        result = _set_simulations(context, simulations)
+    finally:
+        ros.shutdown(context=context)
+    if result is None:
+        raise _silent(run)
+    if not result.successful:
+        raise ConfigError(f"run {run.id}: {result.reason}")
+
+
+def _set_simulations(context: ros.Context, simulations: int) -> Any:
+    """What the launcher answers, as rcl_interfaces/msg/SetParametersResult; None if it does not."""
+    from throwcollect import ros
+    from throwcollect.ros.srv import SetParameters
+    from throwcollect.runtimes.node_collection import SIMULATIONS
+
+    node = ros.Node(f"_throwcollect_{os.getpid()}", context=context)
+    executor = ros.SingleThreadedExecutor(context=context)
+    executor.add_node(node)
+    client = node.create_client(SetParameters, f"/{LAUNCHER}/set_parameters")
+    if not client.wait_for_service(_ANSWER_S):
+        return None
+    wanted = ros.Parameter(SIMULATIONS, value=simulations).to_parameter_msg()
+    future = client.call_async(SetParameters.Request(parameters=[wanted]))
+    executor.spin_until_future_complete(future, timeout_sec=_ANSWER_S)
+    result = future.result().results[0] if future.done() else None
+    node.destroy_node()
+    return result
+
+
+def _silent(run: Run) -> WorkerError:
+    endpoint = run.record.endpoint
+    return WorkerError(
+        f"run {run.id}: its launcher does not answer" + (f" over the router at {endpoint}" if endpoint else ""),
+        hint="its router may just be starting again: try once more, or look at throwcollect events",
+    )
+
+
+def _end_launcher(records: Records, record: Record) -> None:
+    """End a launcher, and with it the processes that it started: it may drain, is told to hurry, and then killed."""
+    for number, patience_s in ((signal.SIGTERM, _GRACE_S), (signal.SIGTERM, _FORCE_S), (signal.SIGKILL, _FORCE_S)):
+        _signal(records, record, number)
+        deadline = time.monotonic() + patience_s
+        while records.lives(record.run) and time.monotonic() < deadline:
+            time.sleep(_POLL_S)
+
+
+def _signal(records: Records, record: Record, number: signal.Signals) -> None:
+    """Send a signal to a launcher, but to no process that got its pid later."""
+    with suppress(ProcessLookupError):
+        process = os.pidfd_open(record.launcher)
+        try:
+            if records.lives(record.run):
+                signal.pidfd_send_signal(process, number)
+        finally:
+            os.close(process)

@@ -1,0 +1,146 @@
+"""What this machine can do for a collection, in plain words."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import socket
+import sys
+from collections.abc import Callable
+from importlib.metadata import version
+from pathlib import Path
+from typing import Literal
+
+from throwcollect import ros_installation
+from throwcollect.errors import ConfigError
+from throwcollect.extras import EXTRA_OF, MissingExtraError, explained, install_command, is_installed
+from throwcollect.robots.limits import joint_limits
+from throwcollect.robots.talos import TALOS
+from throwcollect.runtimes.registry import get_runtime, runtime_names
+from throwcollect.runtimes.runtime import Check
+from throwcollect.wording import counted, listed
+
+_GIB = 1024**3
+_SIMULATION_MEMORY_GIB = 0.3
+"""Resident memory of one simulation, generously."""
+
+_ROS_ROUTER_PORT = 7447
+"""Port where ROS 2 nodes on rmw_zenoh_cpp look for a router."""
+
+_LEAST_DISK_GIB = 1.0
+
+
+def _python() -> Check:
+    found = ".".join(map(str, sys.version_info[:3]))
+    if not (3, 10) <= sys.version_info[:2] <= (3, 11):
+        status: Literal["note", "problem"] = "note" if is_installed("pybullet") else "problem"
+        return Check("python", status, f"{found}; pybullet has wheels for 3.10 and 3.11")
+    return Check("python", "ok", found)
+
+
+def _cores() -> Check:
+    cores = len(os.sched_getaffinity(0))
+    return Check("cores", "ok", f"{cores}; up to {counted(cores, 'simulation')} side by side (`-n {cores}`)")
+
+
+def _memory() -> Check:
+    for line in Path("/proc/meminfo").read_text(encoding="ascii").splitlines():
+        if line.startswith("MemAvailable:"):
+            available = int(line.split()[1]) * 1024 / _GIB
+            room = int(available / _SIMULATION_MEMORY_GIB)
+            status: Literal["ok", "problem"] = "ok" if room >= 1 else "problem"
+            return Check("memory", status, f"{available:.1f} GiB available, enough for {counted(room, 'simulation')}")
+    return Check("memory", "note", "/proc/meminfo does not say what is available")
+
+
+def _pybullet() -> Check:
+    if not is_installed("pybullet"):
+        return Check("pybullet", "problem", f"not installed; try: {MissingExtraError('pybullet').hint}")
+    return Check("pybullet", "ok", version("pybullet"))
+
+
+def _robot() -> Check:
+    try:
+        joint_limits(TALOS)
+        _ = TALOS.rest_posture
+        return Check("robot", "ok", f"Talos of example-robot-data {version('example-robot-data')}, {TALOS.urdf_path}")
+    except (ConfigError, MissingExtraError) as error:
+        return Check("robot", "problem", "; try: ".join(filter(None, [error.message, error.hint])))
+
+
+def _extras() -> Check:
+    """Extras that are installed, and those of which at least a package is missing."""
+    lacking = sorted({extra for package, extra in EXTRA_OF.items() if not is_installed(package)})
+    there = listed(sorted(set(EXTRA_OF.values()) - set(lacking)))
+    if not lacking:
+        return Check("extras", "ok", there)
+    without = f"without {listed(lacking)} (try: {install_command(','.join(lacking))})"
+    return Check("extras", "note", f"{there}, {without}" if there else without)
+
+
+def _check_runtime(name: str) -> Check | None:
+    try:
+        with explained():
+            return get_runtime(name).check()
+    except MissingExtraError as error:
+        return Check(name, "note", f"{error.package} is not installed; try: {error.hint}")
+
+
+def _port() -> Check:
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind(("127.0.0.1", _ROS_ROUTER_PORT))
+        except OSError as error:
+            return Check(
+                "ports", "note", f"{_ROS_ROUTER_PORT} is taken ({error.strerror}); runs use a free port by default"
+            )
+    return Check("ports", "ok", f"{_ROS_ROUTER_PORT}, where ROS nodes look for a router, is free")
+
+
+def _rclpy() -> Check:
+    lacking = ros_installation.missing()
+    if "rclpy" in lacking:
+        return Check("rclpy", "note", f"not installed; to have it: {ros_installation.how_to_install()}")
+    rmws = listed(ros_installation.rmws()) or "no RMW"
+    found = f"{ros_installation.rclpy_version() or 'of unknown version'} with {rmws}"
+    if lacking:
+        return Check("rclpy", "note", f"{found}, without {listed(lacking)}; try: {ros_installation.how_to_install()}")
+    return Check("rclpy", "ok", f"{found} and all interfaces")
+
+
+def _embedded() -> Check:
+    if not is_installed("zenoh"):
+        return Check("embedded", "problem", f"Zenoh is not installed; try: {MissingExtraError('zenoh').hint}")
+    found = f"Zenoh {version('eclipse-zenoh')}"
+    try:
+        # Its package loads the backend that is chosen.
+        from throwcollect.ros.middleware import VARIABLE, uses_rclpy
+
+        chosen = "rclpy" if uses_rclpy() else "the embedded backend"
+    except ConfigError as error:
+        return Check("embedded", "problem", f"{found}; {'; try: '.join(filter(None, [error.message, error.hint]))}")
+    except ImportError as error:
+        return Check("embedded", "problem", f"{found}, but rclpy is chosen and cannot be imported: {error}")
+    value = os.environ.get(VARIABLE)
+    return Check("embedded", "ok", f"{found}; nodes run on {chosen}, as {VARIABLE} is {value or 'not set'}")
+
+
+def _disk(directory: Path) -> Check:
+    free = shutil.disk_usage(directory).free / _GIB
+    status: Literal["ok", "problem"] = "ok" if free >= _LEAST_DISK_GIB else "problem"
+    return Check("disk", status, f"{free:.1f} GiB free in {directory}")
+
+
+def examine(directory: Path) -> list[Check]:
+    """Look at everything a collection needs.
+
+    Args:
+        directory: Where datasets would be written.
+
+    Returns:
+        The findings, in a fixed order.
+    """
+    machine: list[Callable[[], Check]] = [_python, _extras, _cores, _memory, _pybullet, _robot, _rclpy, _embedded]
+    of_runtimes = [found for name in runtime_names() if (found := _check_runtime(name)) is not None]
+    return [*(check() for check in machine), *of_runtimes, _port(), _disk(directory)]

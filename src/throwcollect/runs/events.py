@@ -1,0 +1,145 @@
+"""What happened in a run: one JSON document a line in ``events.jsonl`` beside the logs."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import Literal
+
+from throwcollect.files import open_log
+from throwcollect.runtimes.runtime import NodeState, RunEvent
+from throwcollect.wording import counted
+
+EVENTS = "events.jsonl"
+
+NodeEvent = Literal["started", "ready", "lost", "restarting", "given up", "frozen", "continued", "removed"]
+
+_ALARMING = ("lost", "given up", "frozen")
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happened to a run, or to one of its nodes.
+
+    Attributes:
+        time: When, by RFC 3339.
+        run: Id of the run.
+        event: What: a `RunEvent`, or a `NodeEvent` if there is a node.
+        node: Name of the node.
+        handle: Process or container id of a node that was started.
+        reason: Why a node or the run ended, in words.
+        simulations: Number of simulations that are wanted, when that was set.
+        exit_code: Exit code of a run that has ended.
+    """
+
+    time: str
+    run: str
+    event: str
+    node: str | None = None
+    handle: str | None = None
+    reason: str | None = None
+    simulations: int | None = None
+    exit_code: int | None = None
+
+    @property
+    def alarming(self) -> bool:
+        """Whether somebody who follows the run wants to see it: a node was lost or is frozen."""
+        return self.node is not None and self.event in _ALARMING
+
+    def __str__(self) -> str:
+        """The event for people."""
+        details = [self.reason.partition("\n")[0] if self.reason else None]
+        details += [counted(self.simulations, "simulation") if self.simulations is not None else None]
+        details += [f"exit code {self.exit_code}" if self.exit_code else None, self.handle and self.handle[:12]]
+        told = ", ".join(filter(None, details))
+        return f"{self.node or self.run} {self.event}" + (f": {told}" if told else "")
+
+
+class EventLog:
+    """Appends the events of one run.
+
+    Args:
+        logs: Directory of the logs, which exists or is made.
+        run: Id of the run.
+    """
+
+    def __init__(self, logs: Path, run: str) -> None:
+        self._path = logs / EVENTS
+        self._run = run
+
+    def run_event(
+        self,
+        event: RunEvent,
+        *,
+        reason: str | None = None,
+        simulations: int | None = None,
+        exit_code: int | None = None,
+    ) -> None:
+        """Append an event of the run.
+
+        Raises:
+            OSError: If it cannot be written.
+        """
+        self._append([Event(_now(), self._run, event, None, None, reason, simulations, exit_code)])
+
+    def node_events(self, before: Sequence[NodeState], after: Sequence[NodeState]) -> None:
+        """Append what happened to the nodes between two looks at them.
+
+        Raises:
+            OSError: If it cannot be written.
+        """
+        now = _now()
+        self._append(
+            Event(now, self._run, event, state.name, handle, reason)
+            for state, event, handle, reason in _changes(before, after)
+        )
+
+    def _append(self, events: Iterable[Event]) -> None:
+        lines = [
+            json.dumps({key: value for key, value in asdict(event).items() if value is not None}) for event in events
+        ]
+        if lines:
+            with open(open_log(self._path), "a", encoding="utf-8") as file:
+                file.write("\n".join([*lines, ""]))
+
+
+def parse(line: str) -> Event | None:
+    """The event that a line holds; None if it is torn."""
+    try:
+        return Event(**json.loads(line))
+    except (ValueError, TypeError):
+        return None
+
+
+_Change = tuple[NodeState, NodeEvent, str | None, str | None]
+
+
+def _changes(before: Sequence[NodeState], after: Sequence[NodeState]) -> list[_Change]:
+    """Node, event, handle and reason of everything that changed."""
+    known = {state.name: state for state in before}
+    changes: list[_Change] = []
+    for state in after:
+        changes += _node_changes(known.pop(state.name, None), state)
+    return changes + [(state, "removed", None, None) for state in known.values()]
+
+
+def _node_changes(old: NodeState | None, new: NodeState) -> list[_Change]:
+    old = old or NodeState(new.name, "starting", 0, None, None)
+    changes: list[_Change] = []
+    if new.restarts > old.restarts or (new.status == "lost" and old.status != "lost"):
+        changes.append((new, "lost", None, new.last_end))
+        changes.append((new, "given up" if new.status == "lost" else "restarting", None, None))
+    if new.handle is not None and new.handle != old.handle:
+        changes.append((new, "started", new.handle, None))
+    if new.status == "frozen" and old.status != "frozen":
+        changes.append((new, "frozen", None, None))
+    if new.status == "running" and new.handle == old.handle and old.status in ("starting", "frozen"):
+        changes.append((new, "ready" if old.status == "starting" else "continued", None, None))
+    return changes
+
+
+def _now() -> str:
+    return datetime.now(timezone.utc).isoformat(timespec="milliseconds")

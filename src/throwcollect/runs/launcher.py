@@ -1,0 +1,246 @@
+"""The launcher of a run: the process that has its trials simulated, and the only one that changes its record."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Sequence
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import Any
+
+from throwcollect.config.loader import load
+from throwcollect.config.schema import Config
+from throwcollect.coordinator.progress import Progress
+from throwcollect.dataset.directory import config_path
+from throwcollect.dataset.inspect import loss
+from throwcollect.dataset.lock import held_together
+from throwcollect.errors import ConfigError, Interrupted, LossError, ThrowcollectError, WorkerError
+from throwcollect.files import open_log
+from throwcollect.runs.events import EventLog
+from throwcollect.runs.record import Failure, Record, Summary
+from throwcollect.runs.records import OpenRun, Records
+from throwcollect.runtimes.node_logs import NodeLogs
+from throwcollect.runtimes.nodes import LAUNCHER
+from throwcollect.runtimes.registry import get_runtime
+from throwcollect.runtimes.runtime import Host, NodeState, RunEvent
+from throwcollect.wording import command
+
+_POLL_S = 0.05
+_WRITE_PROGRESS_S = 1.0
+
+
+class Onlooker:
+    """Is told what goes on in a run that this process prepares or launches; this one heeds nothing of it."""
+
+    def update(self, progress: Progress) -> None:
+        """Take in a progress report of the coordinator."""
+
+    def say(self, line: str) -> None:
+        """Take in what is good to know."""
+
+    def warn(self, line: str) -> None:
+        """Take in what went wrong."""
+
+
+SILENT = Onlooker()
+
+
+def launch(run: OpenRun, config: Config, *, onlooker: Onlooker, interruptions: Callable[[], int]) -> Summary:
+    """Run a prepared collection until its last trial has ended, or go on with one whose launcher died.
+
+    Args:
+        run: The run, with a record; its end is written there, and the run is let go of.
+        config: Configuration of the collection.
+        onlooker: Is told what goes on.
+        interruptions: How often the user has asked to stop: at first running trials are finished, then no more.
+
+    Returns:
+        What the dataset holds; its outcomes say whether trials are lost.
+
+    Raises:
+        ConfigError: If the configuration cannot be used after all.
+        WorkerError: If nodes cannot be started or kept alive.
+        DatasetError: If another process changes the dataset, or it cannot be written.
+        Interrupted: If the user stopped the collection.
+    """
+    session = _Session(run, onlooker, interruptions)
+    place = run.record.place(run.key)
+    code, summary = 1, None
+    failure: Failure | None = Failure("internal error")
+    host: Host | None = None
+    try:
+        run.record.middleware.joining.settle()
+        host = get_runtime(run.record.runtime).host(place, config, warn=onlooker.warn)
+        with held_together(place.directory):
+            run.update(launcher=os.getpid(), nodes=(), endpoint=None)
+            summary = Summary(**vars(host.collect(session)), open=config.run.open)
+        lost = loss(summary.outcomes, hint=place.way_on)
+        code, failure = (0, None) if lost is None else (lost.exit_code, Failure.of(lost))
+        return summary
+    except ThrowcollectError as error:
+        code, failure = error.exit_code, Failure.of(error)
+        raise
+    finally:
+        # What was there before may be there still, if it could not even be looked for.
+        left = run.record.left if host is None else not host.cleared
+        if left:
+            onlooker.warn(f"containers of this run may be left: {command('down', '--run', run.run)} ends them")
+        session.end(code, failure, summary, left=left)
+        run.close()
+
+
+class _Session:
+    """Writes down what happens in a run; where that is impossible, the run itself may still go on."""
+
+    def __init__(self, run: OpenRun, onlooker: Onlooker, interruptions: Callable[[], int]) -> None:
+        self.interruptions = interruptions
+        self.say = onlooker.say
+        self.warn = onlooker.warn
+        self._run = run
+        self._onlooker = onlooker
+        self._events = EventLog(Path(run.record.logs), run.run)
+        self._states: list[NodeState] = []
+        self._progress: Progress | None = None
+        self._written_at = 0.0
+        self._failed = False
+
+    def update(self, progress: Progress) -> None:
+        """A progress report of the coordinator, to be written with what comes next."""
+        self._progress = progress
+        self._onlooker.update(progress)
+
+    def event(self, event: RunEvent, **details: Any) -> None:
+        """Something that happened to the run."""
+        self._write(lambda: self._events.run_event(event, **details))
+
+    def known(self, states: Sequence[NodeState]) -> None:
+        """Nodes of which a launcher before this one has written."""
+        self._states = list(states)
+
+    def nodes(self, states: Sequence[NodeState], *, endpoint: str | None, simulations: int) -> None:
+        """How the nodes are by now."""
+        if states != self._states:
+            before, self._states = self._states, list(states)
+            self._write(lambda: self._events.node_events(before, states))
+        trials = {}
+        if time.monotonic() >= self._written_at + _WRITE_PROGRESS_S:
+            self._written_at = time.monotonic()
+            trials = self._trials()
+        self._write(lambda: self._run.update(nodes=tuple(states), endpoint=endpoint, simulations=simulations, **trials))
+
+    def end(self, code: int, failure: Failure | None, summary: Summary | None, *, left: bool) -> None:
+        """How the run ended, last of all, and whether containers of it may be left."""
+        event: RunEvent = "failed"
+        if code in (0, LossError.exit_code):
+            event = "finished"
+        elif code == Interrupted.exit_code:
+            event = "stopped"
+        self.event(event, reason=failure and str(failure.error(code)), exit_code=code)
+        end = {
+            "ended": datetime.now(timezone.utc),
+            "exit_code": code,
+            "failure": failure,
+            "summary": summary,
+            "left": left,
+        }
+        self._write(lambda: self._run.update(nodes=(), endpoint=None, **end, **self._trials()))
+
+    def _trials(self) -> dict[str, int]:
+        progress = self._progress
+        return {} if progress is None else {"trials": progress.total, "trials_ended": progress.ended}
+
+    def _write(self, write: Callable[[], None]) -> None:
+        try:
+            write()
+        except (OSError, ConfigError) as error:
+            if not self._failed:
+                self._failed = True
+                reason = error.message if isinstance(error, ConfigError) else str(error)
+                self._onlooker.warn(f"what happens in this run is not written down any more: {reason}")
+
+
+def start_launcher(run: OpenRun) -> subprocess.Popen[bytes]:
+    """Hand a prepared run over to a new process, which the terminal that started it does not take along.
+
+    Args:
+        run: The run, with a record; this process lets go of it.
+
+    Returns:
+        The process.
+
+    Raises:
+        WorkerError: If it cannot be started.
+    """
+    path = NodeLogs(Path(run.record.logs)).path(LAUNCHER)
+    words = [sys.executable, "-m", "throwcollect", "launch", run.run, "--lock", str(run.lock)]
+    try:
+        with open(open_log(path), "ab") as log:
+            return subprocess.Popen(
+                words,
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=subprocess.STDOUT,
+                start_new_session=True,
+                # It holds the lock from its first moment, so that nobody ever takes the run for dead.
+                pass_fds=[run.lock],
+            )
+    except OSError as error:
+        raise WorkerError(f"the launcher cannot be started: {error}") from error
+    finally:
+        run.close()
+
+
+def launch_inherited(run: str, lock: int, *, onlooker: Onlooker, interruptions: Callable[[], int]) -> None:
+    """Launch a prepared run in the process that `start_launcher` has started.
+
+    Args:
+        run: Id of the run.
+        lock: Descriptor of its locked file, which this process has inherited.
+        onlooker: Is told what goes on.
+        interruptions: How often somebody has asked to stop.
+
+    Raises:
+        ThrowcollectError: As `launch`, or if its record or configuration cannot be read.
+    """
+    inherited = Records().inherited(run, lock)
+    config = load(config_path(Path(inherited.record.directory)))
+    launch(inherited, config, onlooker=onlooker, interruptions=interruptions)
+
+
+def wait_for_nodes(
+    records: Records, record: Record, process: subprocess.Popen[bytes], *, interruptions: Callable[[], int]
+) -> None:
+    """Wait until a new launcher has started its nodes.
+
+    Args:
+        records: All runs.
+        record: The run, as it was handed over.
+        process: The launcher.
+        interruptions: How often the user has asked to stop; the launcher is told then, and waited for.
+
+    Raises:
+        ConfigError: If the record cannot be read.
+        ThrowcollectError: What the run ended with, if it did.
+        WorkerError: If the launcher ended without saying why.
+        Interrupted: If the user stopped it.
+    """
+    told = 0
+    while (run := records.get(record.run)).status == "running":
+        if interruptions() > told:
+            told = interruptions()
+            process.terminate()
+        nodes = run.record.nodes
+        if nodes and all(node.handle for node in nodes) and not told:
+            return
+        time.sleep(_POLL_S)
+    if run.record.ended is not None:
+        if (error := run.record.error) is not None:
+            raise error
+    elif told:
+        raise Interrupted("interrupted before any node was started")
+    else:
+        evidence = NodeLogs(Path(record.logs)).tail(LAUNCHER)
+        raise WorkerError(f"run {record.run}: its launcher died", evidence=evidence or None)

@@ -1,0 +1,205 @@
+"""Which run is meant, and what is left of runs that have no launcher any more."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from throwcollect.errors import ConfigError, WorkerError
+from throwcollect.runs.record import Record
+from throwcollect.runs.records import Records, Run
+from throwcollect.runtimes.registry import get_runtime, runtime_names
+from throwcollect.runtimes.runtime import HeldRun
+from throwcollect.wording import command
+
+_MOST_LISTED = 5
+
+
+def to_change(records: Records, named: str | None, *, command: str, died: bool = False) -> Run:
+    """The run that a command is to change.
+
+    Args:
+        records: All runs.
+        named: Id, unique beginning of one, or directory of the dataset; None for the only one that lives and belongs to
+            the current directory: it was begun there, or its dataset lies below.
+        command: The command without its option ``--run``, which a message adds.
+        died: Whether a run whose launcher died may be meant, too.
+
+    Raises:
+        ConfigError: If there is no such run, or more than one, or the only one belongs to another directory.
+    """
+    if named is not None:
+        return records.get(id_of(records, named))
+    runs = records.all()
+    there = [run for run in runs if run.status == "running" or (died and run.status == "died")]
+    here = [run for run in there if _belongs_here(run.record)]
+    if not here and len(there) == 1:
+        record = there[0].record
+        raise ConfigError(
+            f"no run of this directory lives; {record.run} {_origin(there[0])}",
+            hint=f"throwcollect {command} --run {record.run}, if that one is meant",
+        )
+    return _only(here or there, runs)
+
+
+def find(named: str | os.PathLike[str]) -> Run:
+    """A run of this machine.
+
+    Args:
+        named: Its id, a unique beginning of that, or the directory of its dataset.
+
+    Raises:
+        ConfigError: If there is no such run, or more than one.
+    """
+    records = Records()
+    return records.get(id_of(records, os.fspath(named)))
+
+
+def to_watch(records: Records, named: str | None, *, say: Callable[[str], object]) -> Run:
+    """The run that a command is to look at.
+
+    Args:
+        records: All runs.
+        named: As `to_change` takes it; None for the only one that lives, or else the latest that has ended, of the
+            current directory or, if that has none, of any.
+        say: Is told which one is meant if it belongs to another directory.
+
+    Raises:
+        ConfigError: If there is no such run, or more than one.
+    """
+    if named is not None:
+        return records.get(id_of(records, named))
+    runs = records.all()
+    here = [run for run in runs if _belongs_here(run.record)]
+    known = here or runs
+    living = [run for run in known if run.status == "running"]
+    run = known[-1] if known and not living else _only(living, runs)
+    if not here:
+        say(f"run {run.record.run}, which {_origin(run)}")
+    return run
+
+
+def _only(living: Sequence[Run], runs: Sequence[Run]) -> Run:
+    if len(living) == 1:
+        return living[0]
+    if living:
+        raise ConfigError(
+            f"{len(living)} runs live", expected=_listed(_latest_first(living)), hint="name one of them with --run"
+        )
+    over = f"; of those that are over, there is {_listed(_latest_first(runs))}" if runs else ""
+    raise ConfigError(f"no run lives{over}", hint="throwcollect up -d starts one" if not runs else "name it with --run")
+
+
+def _belongs_here(record: Record) -> bool:
+    """Whether a run was begun in the current directory, or its dataset lies below that."""
+    here = os.getcwd()
+    dataset = None if record.volume else Path(os.path.realpath(record.directory))
+    return record.begun_in == here or (dataset is not None and dataset.is_relative_to(here))
+
+
+def _origin(run: Run) -> str:
+    begun_in = run.record.begun_in
+    return f"was begun in {begun_in}" if begun_in else f"collects into {run.place.dataset}"
+
+
+def id_of(records: Records, named: str) -> str:
+    """Id of the run that a user names by its id, a unique beginning of that, or the directory of the dataset.
+
+    Raises:
+        ConfigError: If there is no such run, or more than one.
+    """
+    ids = records.ids()
+    if named in ids:
+        return named
+    if into := _into(records, Path(named)):
+        return into[0].record.run
+    alike = [run for run in ids if run.startswith(named)]
+    if len(alike) == 1:
+        return alike[0]
+    if alike:
+        raise ConfigError(f"{len(alike)} runs begin with {named!r}", expected=f"one of {_listed(alike)}")
+    known = _listed(_latest_first(records.all()))
+    hint = "throwcollect ps -a lists all" if known else None
+    raise ConfigError(f"no run {named!r}", expected=f"one of {known}" if known else None, hint=hint)
+
+
+def _latest_first(runs: Sequence[Run]) -> list[str]:
+    return [run.record.run for run in reversed(runs)]
+
+
+def _listed(runs: Sequence[str]) -> str:
+    more = len(runs) - _MOST_LISTED
+    return ", ".join(runs[:_MOST_LISTED]) + (f" and {more} more" if more > 0 else "")
+
+
+def left_in(records: Records, directory: Path) -> Run | None:
+    """The run that has no launcher any more while its nodes are left, and collect or have collected into a directory.
+
+    Args:
+        records: All runs.
+        directory: Directory of a dataset.
+
+    Raises:
+        ConfigError: If a run whose launcher lives collects into it.
+        WorkerError: If such a run may be left, which cannot be found out in time.
+    """
+    for run in _into(records, directory):
+        if run.status == "running":
+            raise busy(run.record)
+        if run.status not in ("died", "abandoned"):
+            continue
+        try:
+            if get_runtime(run.record.runtime).is_left(run.id):
+                return run
+        except WorkerError as error:
+            raise WorkerError(
+                f"{directory.absolute()}: containers of run {run.id} may still collect into it: {error.message}",
+                hint=error.hint,
+            ) from error
+    return None
+
+
+def _into(records: Records, directory: Path) -> list[Run]:
+    """Runs that collect, or have collected, into a directory; the latest first."""
+    path = str(directory.absolute())
+    return [run for run in reversed(records.all()) if run.record.volume is None and run.record.directory == path]
+
+
+def busy(record: Record) -> ConfigError:
+    """The error that says that a run collects into a directory."""
+    return ConfigError(
+        f"{record.directory}: run {record.run} collects into it",
+        hint=f"{command('wait', '--run', record.run)} follows it",
+    )
+
+
+def died(run: Run) -> WorkerError:
+    """The error that says that the launcher of a run died before the run ended."""
+    hint = f"{command('down', '--run', run.id)} cleans up"
+    if again := run.place.way_on:
+        hint = f"{again} goes on where it ended, or with its containers if they live; {hint}"
+    return WorkerError(
+        f"run {run.id}: its launcher died; finished throws are in {run.place.dataset}",
+        evidence=f"the logs are in {run.record.logs}",
+        hint=hint,
+    )
+
+
+def require_living(run: Run) -> Record:
+    """The record of a run that lives.
+
+    Raises:
+        ConfigError: If it has ended.
+        WorkerError: If its launcher died.
+    """
+    if run.status == "died":
+        raise died(run)
+    if run.status != "running":
+        raise ConfigError(f"run {run.id} has ended", hint="throwcollect ps lists those that live")
+    return run.record
+
+
+def held_elsewhere() -> dict[str, tuple[str, HeldRun]]:
+    """Runs of which a runtime holds something by their ids, each with the name of the runtime."""
+    return {held.run_id: (name, held) for name in runtime_names() for held in get_runtime(name).held()}

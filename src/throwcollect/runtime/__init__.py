@@ -1,1 +1,0 @@
-"""Where the nodes of a run live: start them, watch them, restart them, stop them."""

@@ -1,0 +1,95 @@
+"""Whether an engine and this machine have what a configuration asks for; looked at before anything is started."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+from docker.client import DockerClient
+from docker.errors import ImageNotFound
+
+from throwcollect.config.host_paths import DEVICES, SECRETS, is_allowed_device, refusal
+from throwcollect.config.schema import Config
+from throwcollect.errors import ConfigError, Problem, WorkerError
+from throwcollect.runtimes.docker.engine import engine_address, engine_errors
+from throwcollect.runtimes.docker.image import default_tag
+from throwcollect.runtimes.docker.options import RUN_LABEL, RunPlace, image, mount_source, section_of
+from throwcollect.runtimes.nodes import COORDINATOR, ROUTER
+from throwcollect.runtimes.ports import reserved_port
+
+_NODES = {"router": ROUTER, "sim": "sim_0", "coordinator": COORDINATOR}
+
+
+def check(client: DockerClient, place: RunPlace, config: Config) -> None:
+    """Look for the image, the mounts, the networks, and the router's port.
+
+    Args:
+        client: Client of the engine.
+        place: The run.
+        config: Its configuration.
+
+    Raises:
+        ConfigError: If a mount or a network is not there or must not be used, or the router's port is taken.
+        WorkerError: If the engine does not answer, or does not have the image.
+    """
+    with engine_errors("the Docker engine cannot be asked"):
+        networks = {each["Name"] for each in client.api.networks()}
+        root = os.path.realpath(client.api.info()["DockerRootDir"])
+        # The containers of a launcher that died hold the port already, and are taken over with it.
+        begun = client.api.containers(all=True, filters={"label": f"{RUN_LABEL}={place.run_id}"})
+        try:
+            client.images.get(image(config))
+        except ImageNotFound as error:
+            name = image(config)
+            hint = "throwcollect image build" if name == default_tag() else f"docker pull {name}"
+            raise WorkerError(f"the Docker engine has no image {name}", hint=hint) from error
+    if problems := list(_problems(config, networks, root)):
+        raise ConfigError(problems)
+    if config.run.router_port and not begun:
+        reserved_port(config.run.router_port).close()
+
+
+def _problems(config: Config, networks: set[str], root: str) -> Iterator[Problem]:
+    for section, node in _NODES.items():
+        wanted = section_of(config, node)
+        for index, mount in enumerate(wanted.mounts):
+            if (wrong := _wrong_mount(mount_source(mount), root)) is not None:
+                yield Problem(wrong, f"containers.{section}.mounts.{index}")
+        for index, device in enumerate(wanted.options.get("devices", [])):
+            if (wrong := _wrong_device(Path(device.partition(":")[0]))) is not None:
+                yield Problem(wrong, f"containers.{section}.options.devices.{index}")
+        for index, network in enumerate(wanted.networks):
+            if network not in networks:
+                key = f"containers.{section}.networks.{index}"
+                yield Problem(f"the Docker engine has no network {network}; create it first", key)
+
+
+def _wrong_mount(source: Path, root: str) -> str | None:
+    """Why a directory or file must not be mounted, wherever links lead; None if it may be.
+
+    Args:
+        source: Its path as the configuration has it.
+        root: Directory in which the engine keeps everything.
+    """
+    if not source.exists():
+        return f"{source} does not exist on this machine"
+    real = source.resolve()
+    kind, _, address = engine_address().partition("://")
+    engine = [root, os.path.realpath(address)] if kind == "unix" else [root]
+    if (reason := refusal(str(real), more=engine)) is None:
+        secret = next((name for name in SECRETS if (real / name).exists()), None)
+        reason = None if secret is None else f"is refused, as {secret} in it holds secrets; mounts are for data"
+    if reason is None:
+        return None
+    return f"{source} {reason}" if real == source else f"{source}, which is {real}, {reason}"
+
+
+def _wrong_device(device: Path) -> str | None:
+    """Why a device must not be handed over, wherever links lead; None if it may be."""
+    if not device.exists():
+        return f"{device} does not exist on this machine"
+    files = [device, *device.rglob("*")] if device.is_dir() else [device]
+    if all(is_allowed_device(str(each.resolve())) and not each.is_block_device() for each in files):
+        return None
+    return f"{device} is refused, as it leads to other devices; containers get {DEVICES}"

@@ -1,0 +1,201 @@
+"""What the containers of a run are made with: names, labels, limits, mounts, environment."""
+
+from __future__ import annotations
+
+import os
+import socket
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from docker.types import EndpointConfig, LogConfig, Mount, Ulimit
+
+from throwcollect.config.containers import NodeContainerConfig
+from throwcollect.config.schema import Config
+from throwcollect.dataset.directory import DIRECTORY_VARIABLE
+from throwcollect.dataset.provenance import HOST_VARIABLE
+from throwcollect.ros.connection import Connection
+from throwcollect.ros.middleware import Middleware
+from throwcollect.run_key import RunKey
+from throwcollect.runtimes.docker.image import default_tag
+from throwcollect.runtimes.nodes import COORDINATOR, ROUTER, NodeSpec, node_environment, protocol_of
+from throwcollect.runtimes.ports import LOOPBACK
+from throwcollect.version import __version__
+
+RUN_LABEL = "throwcollect.run"
+NODE_LABEL = "throwcollect.node"
+DIRECTORY_LABEL = "throwcollect.directory"
+VERSION_LABEL = "throwcollect.version"
+KEY_LABEL = "throwcollect.key"
+"""Marks the volume that holds the key of a run."""
+LOG_LABEL = "throwcollect.log-offset"
+"""Size of a node's log file when this container began to write to it [bytes]."""
+
+ROUTER_PORT = 7447
+
+DATA = "/data"
+KEY = RunKey(Path("/key"))
+"""The key of the run, as nodes see it."""
+
+_API_VERSION = "1.41"
+_PIDS = 512
+_TMPFS = "rw,noexec,nosuid,size=64m"
+_LOG_SIZE = {"max-size": "10m", "max-file": "2"}
+
+
+@dataclass(frozen=True)
+class RunPlace:
+    """A run and where its dataset lies.
+
+    Attributes:
+        run_id: Name of the run.
+        source: Absolute path of a directory of this machine, or name of a volume.
+    """
+
+    run_id: str
+    source: str
+
+    @property
+    def in_volume(self) -> bool:
+        """Whether the dataset lies in a volume."""
+        return not self.source.startswith("/")
+
+    @property
+    def data(self) -> str:
+        """Directory of the dataset, as nodes see it; a volume may hold those of several runs."""
+        return f"{DATA}/{self.run_id}" if self.in_volume else DATA
+
+    @property
+    def network(self) -> str:
+        """Name of the run's network."""
+        return f"throwcollect-{self.run_id}"
+
+    @property
+    def key_volume(self) -> str:
+        """Name of the volume that holds the run's key."""
+        return f"throwcollect-{self.run_id}-key"
+
+    def container(self, node: str) -> str:
+        """Name of a node's container."""
+        return f"throwcollect-{self.run_id}-{node}"
+
+    def labels(self, node: str | None = None) -> dict[str, str]:
+        """Labels of what is made for the run, or for one of its nodes."""
+        labels = {
+            RUN_LABEL: self.run_id,
+            DIRECTORY_LABEL: self.source,
+            VERSION_LABEL: __version__,
+        }
+        return labels if node is None else {**labels, NODE_LABEL: node}
+
+    def mount(self, *, read_only: bool) -> Mount:
+        """The dataset, or the volume that it lies in, for a container."""
+        kind = "volume" if self.in_volume else "bind"
+        return Mount(target=DATA, source=self.source, type=kind, read_only=read_only)
+
+    def key_mount(self, *, read_only: bool) -> Mount:
+        """The volume with the run's key, for a container."""
+        return Mount(target=str(KEY.directory), source=self.key_volume, type="volume", read_only=read_only)
+
+
+def router_endpoint(config: Config, middleware: Middleware) -> str:
+    """Zenoh endpoint of the router: in the router itself, its name means its address in the run's network alone."""
+    return f"{protocol_of(config.run, middleware)}/{ROUTER}:{ROUTER_PORT}"
+
+
+def image(config: Config) -> str:
+    """Image of all nodes."""
+    return config.containers.image or default_tag()
+
+
+def section_of(config: Config, name: str) -> NodeContainerConfig:
+    """What the configuration says of a node's container."""
+    return config.containers.sim if name not in (ROUTER, COORDINATOR) else getattr(config.containers, name)
+
+
+def published(config: Config) -> bool:
+    """Whether anything is published to this machine, which a network without a way out does not allow."""
+    each = (config.containers.router, config.containers.sim, config.containers.coordinator)
+    return bool(config.run.router_port or any(node.ports for node in each))
+
+
+def confined(place: RunPlace, config: Config) -> dict[str, Any]:
+    """Keywords for `containers.create` that every container of a run gets: it can do little but compute."""
+    return {
+        "image": image(config),
+        "labels": place.labels(),
+        "environment": {"HOME": "/tmp"},  # noqa: S108 - the one place in the container that can be written
+        "user": f"{os.getuid()}:{os.getgid()}",
+        "init": True,
+        "read_only": True,
+        "tmpfs": {"/tmp": _TMPFS},  # noqa: S108
+        "cap_drop": ["ALL"],
+        "security_opt": ["no-new-privileges"],
+        "pids_limit": _PIDS,
+        "stop_signal": "SIGTERM",
+        "log_config": LogConfig(type=LogConfig.types.JSON, config=_LOG_SIZE),
+    }
+
+
+def node_options(
+    node: NodeSpec, *, place: RunPlace, config: Config, middleware: Middleware, address: str | None = None
+) -> dict[str, Any]:
+    """Keywords for `containers.create` that make the container of a node.
+
+    Args:
+        node: The node; the configuration may bind it to other cores.
+        place: The run.
+        config: Its configuration.
+        middleware: What carries the messages of its nodes.
+        address: Its address in the run's network; None for any.
+    """
+    section = section_of(config, node.name)
+    options: dict[str, Any] = dict(section.options)
+    general = confined(place, config)
+    own = {
+        **node_environment(Connection(router_endpoint(config, middleware), KEY, config.run.domain_id, middleware)),
+        # What nodes would say otherwise, a random id and /data, means nothing outside of the container.
+        HOST_VARIABLE: socket.gethostname(),
+        DIRECTORY_VARIABLE: "" if place.in_volume else place.source,
+    }
+    wanted = {key: str(value) for key, value in section.environment.items()}
+    ports = {port: (LOOPBACK, host_port) for port, host_port in section.ports.items()}
+    if node.name == ROUTER and config.run.router_port:
+        ports[f"{ROUTER_PORT}/tcp"] = (LOOPBACK, config.run.router_port)
+    mounts = [place.key_mount(read_only=True)]
+    if node.name != ROUTER:
+        mounts.append(place.mount(read_only=node.name != COORDINATOR))
+    return {
+        **general,
+        **options,
+        "command": list(node.arguments),
+        "name": place.container(node.name),
+        "labels": {**options.get("labels", {}), **place.labels(node.name)},
+        "environment": {**general["environment"], **own, **wanted, "THROWCOLLECT_NODE": node.name},
+        "tmpfs": _with_tmpfs(general["tmpfs"], options.get("tmpfs", {})),
+        "ulimits": [Ulimit(name=key, soft=value, hard=value) for key, value in options.get("ulimits", {}).items()],
+        "mounts": [*mounts, *map(_bind, section.mounts)],
+        "network": place.network,
+        "networking_config": {place.network: EndpointConfig(_API_VERSION, aliases=[node.name], ipv4_address=address)},
+        "ports": ports,
+        "nano_cpus": None if section.cpus is None else round(section.cpus * 10**9),
+        "mem_limit": section.memory,
+        "memswap_limit": section.memory,
+        "cpuset_cpus": section.cpuset or (None if node.core is None else str(node.core)),
+    }
+
+
+def mount_source(mount: str) -> Path:
+    """Path on this machine of a mount of the configuration."""
+    return Path(mount.partition(":")[0])
+
+
+def _bind(mount: str) -> Mount:
+    source, target, *mode = mount.split(":")
+    return Mount(target=target, source=source, type="bind", read_only=bool(mode))
+
+
+def _with_tmpfs(own: Mapping[str, str], wanted: Mapping[str, str]) -> dict[str, str]:
+    # The last of contradicting mount options wins.
+    return {**own, **{path: ",".join(filter(None, [own.get(path), options])) for path, options in wanted.items()}}

@@ -1,0 +1,168 @@
+"""Docker as a runtime: whether it can be had, and what an engine holds of runs.
+
+The client of the engine is imported when it is needed: most commands only ask whether there is an engine at all.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from contextlib import closing
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from throwcollect.errors import ConfigError, Problem, WorkerError
+from throwcollect.ros.middleware import Middleware
+from throwcollect.runtimes.runtime import Check, HeldRun, Place, Runtime
+
+if TYPE_CHECKING:
+    from docker.client import DockerClient
+
+    from throwcollect.config.schema import Config
+    from throwcollect.runtimes.docker.containers import DockerNodes
+
+_PROBE_S = 3.0
+"""Where processes will do as well, an engine that takes longer to answer is as good as none."""
+_LOOK_S = 2.0
+_SOCKET = "/var/run/docker.sock"
+
+
+class DockerRuntime(Runtime):
+    """Nodes as containers of a Docker engine, which go on without their launcher."""
+
+    handle = "container"
+    outlives_launcher = True
+    has_volumes = True
+
+    def in_words(self, config: Config) -> str:
+        """Where trials are simulated."""
+        from throwcollect.runtimes.docker.options import image
+
+        return f"Docker containers of {image(config)}"
+
+    def host(self, place: Place, config: Config, *, warn: Callable[[str], None]) -> DockerNodes:
+        """The containers of a run.
+
+        Raises:
+            ConfigError: If something that the configuration asks for is not there, or taken.
+            WorkerError: If no engine answers, or it does not have the image.
+        """
+        from throwcollect.runtimes.docker.containers import DockerNodes
+
+        return DockerNodes(place, config, warn=warn)
+
+    def prepare(
+        self, config: Config, middleware: Middleware, *, say: Callable[[str], None], warn: Callable[[str], None]
+    ) -> Middleware:
+        """Have the image, and find out what carries the messages of containers; see `Runtime.prepare`."""
+        from throwcollect.runtimes.docker.engine import connect
+        from throwcollect.runtimes.docker.image import ensure, is_outdated
+        from throwcollect.runtimes.docker.options import image
+
+        with closing(connect(timeout_s=None if config.run.runtime == "docker" else _PROBE_S)) as client:
+            ensure(client, image(config), say=say)
+            if is_outdated(client, image(config)):
+                _settle(client, config, warn)
+            return _middleware_of_image(client, config, middleware)
+
+    def check(self) -> Check:
+        """Whether an engine answers, and has the image of these sources."""
+        from docker.errors import ImageNotFound
+
+        from throwcollect.runtimes.docker.engine import connect, engine_address, engine_errors
+        from throwcollect.runtimes.docker.image import default_tag, is_outdated
+
+        try:
+            with closing(connect(timeout_s=_PROBE_S)) as client, engine_errors("the Docker engine fails"):
+                engine = client.version()["Version"]
+                found = f"Docker {engine} answers at {engine_address()}"
+                try:
+                    client.images.get(default_tag())
+                except ImageNotFound:
+                    lacking = f"the image {default_tag()} is not there yet; throwcollect image build makes it"
+                    return Check("docker", "note", f"{found}; {lacking}")
+                if is_outdated(client, default_tag()):
+                    old = f"the image {default_tag()} was made from other sources than these"
+                    return Check("docker", "note", f"{found}; {old}; throwcollect image build makes it anew")
+        except WorkerError as error:
+            return Check("docker", "note", f"{error.message}; runs use processes")
+        return Check("docker", "ok", f"{found}, with the image {default_tag()}")
+
+    def held(self) -> list[HeldRun]:
+        """Runs of which the engine holds something; none if there is no engine that answers quickly."""
+        if "DOCKER_HOST" not in os.environ and not Path(_SOCKET).exists():
+            return []
+        from throwcollect.runtimes.docker.engine import connect
+        from throwcollect.runtimes.docker.held_runs import held_runs
+
+        try:
+            return held_runs(connect(timeout_s=_LOOK_S))
+        except WorkerError:
+            return []
+
+    def is_left(self, run: str) -> bool:
+        """Whether the engine holds containers of a run; one that is gone holds none that run.
+
+        Raises:
+            WorkerError: If the engine does not answer in time.
+        """
+        from throwcollect.runtimes.docker.engine import connect, timed_out
+        from throwcollect.runtimes.docker.held_runs import held_runs
+
+        try:
+            return any(found.nodes for found in held_runs(connect()) if found.run_id == run)
+        except WorkerError as error:
+            if error.__cause__ is None or not timed_out(error.__cause__):
+                return False
+            raise WorkerError(error.message, hint="try again once the Docker engine answers") from error
+
+    def remove(self, run: str, *, volumes: bool) -> list[str]:
+        """Remove containers, network, key and, if asked for, the dataset's volume; see `Runtime.remove`."""
+        from throwcollect.runtimes.docker.engine import connect
+        from throwcollect.runtimes.docker.held_runs import remove
+
+        return remove(connect(), run, volumes=volumes)
+
+
+def _middleware_of_image(client: DockerClient, config: Config, launcher: Middleware) -> Middleware:
+    """What carries the messages of containers: what their image has and the launcher can join.
+
+    Raises:
+        ConfigError: If rclpy is asked for, and the image has none, or the launcher could not join its nodes.
+    """
+    from throwcollect.runtimes.docker.engine import engine_address, is_local
+    from throwcollect.runtimes.docker.image import rmw_of
+    from throwcollect.runtimes.docker.options import image
+
+    rmw = rmw_of(client, image(config))
+    if rmw is None:
+        problem = f"the image {image(config)} has no rclpy"
+    elif (found := Middleware("rclpy", rmw)).joining.backend == "embedded":
+        return found if config.run.ros != "embedded" else Middleware()
+    elif not is_local():
+        problem = f"with {rmw} nodes talk to each other directly, and those at {engine_address()} cannot be reached"
+    else:
+        return found if launcher.rmw == rmw else Middleware()
+    if config.run.ros == "rclpy":
+        raise ConfigError([Problem(problem, key="run.ros")], expected="embedded, or auto")
+    return Middleware()
+
+
+def _settle(client: DockerClient, config: Config, warn: Callable[[str], None]) -> None:
+    """Decide about an image of other sources: it may collect other bytes than these, so it is used on demand only.
+
+    Raises:
+        WorkerError: If processes will do as well, or the image cannot be built anew.
+    """
+    from throwcollect.runtimes.docker.image import build
+    from throwcollect.runtimes.docker.options import image
+
+    name = image(config)
+    finding = f"the image {name} was made from other sources than these"
+    if config.containers.image is not None:
+        warn(f"{finding}; it is used, as containers.image names it")
+    elif config.run.runtime == "auto":
+        raise WorkerError(f"{finding}; throwcollect image build makes it anew")
+    else:
+        warn(f"{finding}; building it anew, which takes minutes")
+        build(client, name, say=lambda _line: None)

@@ -1,0 +1,139 @@
+"""What an engine knows of the containers of one run, kept up to date by threads."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any
+
+from docker.client import DockerClient
+from docker.errors import NotFound
+
+from throwcollect.runtimes.docker.clock import EngineClock
+from throwcollect.runtimes.docker.engine import ENGINE_ERRORS, in_words, timed_out
+from throwcollect.runtimes.docker.options import RUN_LABEL, RunPlace
+
+_EVENTS = ["start", "die", "oom", "destroy", "pause", "unpause", "health_status"]
+_LOOK_EVERY_S = 2.0
+"""Events come at once, but a stream that hangs or breaks brings none."""
+
+
+@dataclass(frozen=True)
+class ContainerState:
+    """A container as the engine last described it.
+
+    Attributes:
+        status: The engine's word, such as ``running``, ``paused`` or ``exited``; ``removed`` when it is gone.
+        code: Exit code; None while it runs.
+        out_of_memory: Whether the kernel has ended a process of it for want of memory.
+        healthy: Whether its health check succeeded last.
+        address: Its address in the run's network; None if it has none.
+    """
+
+    status: str
+    code: int | None = None
+    out_of_memory: bool = False
+    healthy: bool = False
+    address: str | None = None
+
+    @property
+    def ended(self) -> bool:
+        """Whether it will never run again."""
+        return self.status in ("exited", "dead", "removed")
+
+
+class EngineWatch:
+    """Follows the containers of one run by the engine's events, and by looking at all of them every few seconds.
+
+    Events only say where to look: what is known is always what the engine says of a container when it is asked.
+
+    Attributes:
+        last_error: What the engine, or the system, said when it last refused to answer; empty if it never did.
+
+    Args:
+        client: Client of the engine.
+        place: The run.
+        clock: Is told of every event; it counts the client's answers by itself.
+    """
+
+    def __init__(self, client: DockerClient, place: RunPlace, clock: EngineClock) -> None:
+        self.last_error = ""
+        self._client = client
+        self._clock = clock
+        self._network = place.network
+        self._label = f"{RUN_LABEL}={place.run_id}"
+        self._states: dict[str, ContainerState] = {}
+        # One look at a time, so that an old finding never replaces a newer one.
+        self._looking = threading.Lock()
+        self._closed = threading.Event()
+        self._stream: Any = None
+        for target in (self._follow_events, self._look_around):
+            threading.Thread(target=target, daemon=True).start()
+
+    def state(self, container: str | None) -> ContainerState | None:
+        """What is known of a container; None when nothing is."""
+        return None if container is None else self._states.get(container)
+
+    def look(self, container: str) -> None:
+        """Ask the engine for a container.
+
+        Raises:
+            OSError: If the engine does not answer; in general, one of `ENGINE_ERRORS`.
+        """
+        with self._looking:
+            try:
+                self._states[container] = _state(self._client.api.inspect_container(container), self._network)
+            except NotFound:
+                self._states[container] = ContainerState("removed")
+
+    def close(self) -> None:
+        """Stop watching."""
+        self._closed.set()
+        if self._stream is not None:
+            # The stream may end by itself at the same time.
+            with suppress(AttributeError, *ENGINE_ERRORS):
+                self._stream.close()
+
+    def _follow_events(self) -> None:
+        filters = {"type": "container", "label": self._label, "event": _EVENTS}
+        while not self._closed.is_set():
+            try:
+                self._stream = self._client.events(decode=True, filters=filters)
+                for event in self._stream:
+                    self._clock.heard()
+                    self.look(event["id"])
+            except ENGINE_ERRORS as error:
+                self._note(error)
+            self._closed.wait(_LOOK_EVERY_S)
+
+    def _look_around(self) -> None:
+        while not self._closed.wait(_LOOK_EVERY_S):
+            try:
+                listed = self._client.api.containers(all=True, filters={"label": self._label})
+                now = {each["Id"]: each["State"] for each in listed}
+                before = {key: state.status for key, state in self._states.copy().items() if state.status != "removed"}
+                for container in now.keys() | before.keys():
+                    if now.get(container) != before.get(container):
+                        self.look(container)
+            except ENGINE_ERRORS as error:
+                self._note(error)
+
+    def _note(self, error: BaseException) -> None:
+        # That nothing comes in for a while says nothing beyond the silence, which the clock measures; and a stream
+        # without an event is none.
+        if not timed_out(error):
+            self.last_error = in_words(error)
+
+
+def _state(details: Mapping[str, Any], network: str) -> ContainerState:
+    state = details["State"]
+    attached = details["NetworkSettings"]["Networks"].get(network, {})
+    return ContainerState(
+        status=state["Status"],
+        code=None if state["Running"] or state["Status"] == "created" else state["ExitCode"],
+        out_of_memory=state["OOMKilled"],
+        healthy=state.get("Health", {}).get("Status") == "healthy",
+        address=attached.get("IPAddress") or None,
+    )

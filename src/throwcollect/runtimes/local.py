@@ -1,0 +1,169 @@
+"""Nodes as processes of this machine."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from throwcollect.errors import WorkerError
+from throwcollect.files import open_log
+from throwcollect.interruption import die_with_parent
+from throwcollect.runtimes.node_logs import NodeLogs
+from throwcollect.runtimes.nodes import ROUTER, NodeExit, NodeHost, NodeSpec, node_environment, protocol_of
+from throwcollect.runtimes.ports import reserved_port
+from throwcollect.runtimes.runtime import Place, Runtime, Session
+
+if TYPE_CHECKING:
+    from throwcollect.config.schema import Config
+    from throwcollect.dataset.summary import Info
+
+
+def _enter(core: int | None) -> None:
+    """What a child does before it becomes the node: it asks to die with its parent, and takes its core."""
+    # By force: without router and simulations there is nothing that a coordinator could wait for.
+    die_with_parent()
+    if core is not None:
+        os.sched_setaffinity(0, {core})
+
+
+class LocalRuntime(Runtime):
+    """Nodes as child processes of the launcher."""
+
+    def in_words(self, config: Config) -> str:
+        """Where trials are simulated."""
+        return "local processes"
+
+    def host(self, place: Place, config: Config, *, warn: Callable[[str], None]) -> LocalNodes:
+        """The processes of a run.
+
+        Raises:
+            ConfigError: If the router's port is taken.
+        """
+        return LocalNodes(place, config)
+
+
+class LocalNodes(NodeHost):
+    """Runs nodes as child processes, each with a log file of its own; see `nodes.NodeHost` for what it offers.
+
+    Children live in sessions of their own, so that Ctrl-C reaches the launcher alone, and are ended by the kernel when
+    the launcher dies.
+
+    Args:
+        place: The run.
+        config: Its configuration.
+
+    Raises:
+        ConfigError: If the router's port is taken.
+    """
+
+    cleared = True
+
+    def __init__(self, place: Place, config: Config) -> None:
+        self.place = place
+        self.config = config
+        self.data = str(place.directory)
+        self.logs = NodeLogs(place.logs)
+        self._reserved = reserved_port(config.run.router_port)
+        self._address: tuple[str, int] = self._reserved.getsockname()
+        self.listen = "{}/{}:{}".format(protocol_of(config.run, place.middleware), *self._address)
+        self._environment = {**os.environ, **node_environment(self.connection_at(self.listen))}
+        self._processes: dict[str, subprocess.Popen[bytes]] = {}
+
+    def collect(self, session: Session) -> Info:
+        """See `runtime.Host.collect`."""
+        # It takes ROS along, so it is imported when it is known what ROS is to run on.
+        from throwcollect.runtimes.node_collection import NodeCollection
+
+        return NodeCollection(self, session).run_to_the_end()
+
+    def router_address(self) -> tuple[str, int]:
+        """Host and port of the router."""
+        return self._address
+
+    def start(self, node: NodeSpec) -> None:
+        """Start a node; its name names the log file, too.
+
+        Raises:
+            WorkerError: If the process cannot be started or its log cannot be written.
+        """
+        if node.name == ROUTER:
+            self._reserved.close()
+        try:
+            with open(open_log(self.logs.path(node.name)), "ab") as log:
+                self._processes[node.name] = subprocess.Popen(
+                    [sys.executable, "-m", "throwcollect", *node.arguments],
+                    stdin=subprocess.DEVNULL,
+                    stdout=log,
+                    stderr=subprocess.STDOUT,
+                    env=self._environment,
+                    start_new_session=True,
+                    preexec_fn=partial(_enter, node.core),  # noqa: PLW1509 - it calls nothing that takes a lock
+                )
+        except OSError as error:
+            raise WorkerError(f"{node.name}: cannot be started: {error}") from error
+
+    def handle(self, name: str) -> str | None:
+        """Process id of a running node; None if it does not run."""
+        process = self._processes.get(name)
+        return None if process is None else str(process.pid)
+
+    def running(self) -> tuple[str, ...]:
+        """Names of the nodes whose end has not been reported yet."""
+        return tuple(self._processes)
+
+    def exits(self) -> list[NodeExit]:
+        """Nodes that ended since the last call."""
+        ended = [(name, process.returncode) for name, process in self._processes.items() if process.poll() is not None]
+        for name, _ in ended:
+            del self._processes[name]
+        return [NodeExit(name, code, _reason(code), self.log_tail(name)) for name, code in ended]
+
+    def frozen(self) -> frozenset[str]:
+        """Nodes that were stopped by a signal and not continued."""
+        return frozenset(name for name, process in self._processes.items() if _is_stopped(process.pid))
+
+    def signal(self, name: str, number: signal.Signals) -> None:
+        """Send a signal to a node; one that has ended is left alone."""
+        if (process := self._processes.get(name)) is not None:
+            process.send_signal(number)
+
+    def stop(self, names: Sequence[str], *, grace_s: float = 3.0) -> None:
+        """End nodes: politely, then after `grace_s` [s] by force."""
+        for name in names:
+            self.signal(name, signal.SIGTERM)
+        deadline = time.monotonic() + grace_s
+        for name in names:
+            process = self._processes.pop(name, None)
+            if process is None:
+                continue
+            try:
+                process.wait(max(0.0, deadline - time.monotonic()))
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+
+    def close(self) -> None:
+        """End all nodes, the router last, and free its port."""
+        self._reserved.close()
+        self.stop([name for name in self._processes if name != ROUTER])
+        self.stop([ROUTER])
+
+
+def _reason(code: int) -> str:
+    return f"ended by {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
+
+
+def _is_stopped(pid: int) -> bool:
+    try:
+        status = Path(f"/proc/{pid}/stat").read_text(encoding="ascii", errors="replace")
+    except OSError:
+        return False
+    # The name of the command, in brackets, may hold anything; the state is the first field after it.
+    return status.rpartition(")")[2].split()[0] == "T"

@@ -1,0 +1,201 @@
+"""A collection by nodes, from their start to their end: they are kept alive, listened to, scaled, and asked to stop.
+
+The process that does so is the node ``/launcher``; setting its integer parameter ``simulations`` scales the run.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import time
+from collections.abc import Callable
+
+from throwcollect import ros
+from throwcollect.coordinator.progress import Progress
+from throwcollect.dataset.summary import Info
+from throwcollect.errors import DatasetError, Interrupted, LossError, WorkerError
+from throwcollect.ros import IntegerRange
+from throwcollect.ros.fast_dds import SERVER_REST_S
+from throwcollect.runtimes.nodes import (
+    COORDINATOR,
+    LAUNCHER,
+    ROUTER,
+    NodeExit,
+    NodeHost,
+    NodeSpec,
+    Role,
+    simulation_name,
+)
+from throwcollect.runtimes.run_listener import RunListener
+from throwcollect.runtimes.runtime import Session
+from throwcollect.runtimes.supervisor import Supervisor
+
+SIMULATIONS = "simulations"
+"""Name of the launcher's parameter."""
+MOST_SIMULATIONS = 256
+
+_POLL_S = 0.05
+_MEET_S = 12.0
+"""Nodes that are ready see each other within a second."""
+
+
+def roster(host: NodeHost, simulations: int) -> list[NodeSpec]:
+    """The nodes of a collection: a router, simulations, and a coordinator.
+
+    Args:
+        host: Where they are to live.
+        simulations: Number of simulations.
+    """
+    rest_s = SERVER_REST_S if host.place.middleware.is_fast_dds else 0.0
+    cores = sorted(os.sched_getaffinity(0))
+    # Where simulations fill all cores, moving them around was measured to cost about a tenth of the speed.
+    bound = simulations >= len(cores)
+    return [
+        NodeSpec(ROUTER, ("router", "--listen", host.listen), Role.VITAL, rest_s=rest_s),
+        *(
+            NodeSpec(
+                name := simulation_name(index),
+                ("sim", f"{host.data}/config.yaml", "--name", name),
+                Role.WORKER,
+                core=cores[index % len(cores)] if bound else None,
+            )
+            for index in range(simulations)
+        ),
+        NodeSpec(COORDINATOR, ("coordinator", host.data), Role.MAIN),
+    ]
+
+
+def offer_scaling(
+    node: ros.Node, simulations: int, on_wanted: Callable[[int], None], *, most: int = MOST_SIMULATIONS
+) -> None:
+    """Declare the parameter by which any ROS 2 node may change the number of simulations.
+
+    Args:
+        node: Node of the launcher.
+        simulations: Its value.
+        on_wanted: Called with another value when somebody sets one.
+        most: Largest value that can be set.
+    """
+
+    def tell(parameters: list[ros.Parameter]) -> None:
+        for parameter in parameters:
+            if parameter.name == SIMULATIONS:
+                on_wanted(int(parameter.value))
+
+    span = IntegerRange(from_value=0, to_value=most, step=1)
+    described = ros.ParameterDescriptor(description="Number of simulations.", integer_range=[span])
+    node.declare_parameter(SIMULATIONS, simulations, described)
+    node.add_post_set_parameters_callback(tell)
+
+
+class NodeCollection:
+    """One collection by nodes.
+
+    Args:
+        host: Where the nodes live; closed at the end.
+        session: The run.
+    """
+
+    def __init__(self, host: NodeHost, session: Session) -> None:
+        self._host = host
+        self._session = session
+        self._simulations = self._wanted = host.place.simulations
+        self._set_aside: set[str] = set()
+        self._apart_since = math.inf
+        self._started_again = False
+        self._supervisor = Supervisor(host, host.config.run, roster(host, self._simulations))
+        self._listener = RunListener(self._report, name=LAUNCHER, on_connect=self._offer_scaling)
+
+    def run_to_the_end(self) -> Info:
+        """See `runtime.Host.collect`."""
+        with self._supervisor, self._listener:
+            found = self._host.open()
+            self._session.event("adopted" if found else "started", simulations=self._simulations)
+            self._supervisor.start(found=found)
+            self._session.known([state for state in self._supervisor.states() if state.name in found])
+            self._check(self._follow())
+            return self._host.info()
+
+    def _follow(self) -> NodeExit | None:
+        """How the coordinator ended; None when it had to be ended by force."""
+        end = None
+        while end is None and not self._session.interruptions():
+            self._listen()
+            if self._wanted != self._simulations:
+                self._simulations = self._wanted
+                self._session.event("scaled", simulations=self._simulations)
+                self._supervisor.change(roster(self._host, self._simulations))
+            end, news = self._supervisor.poll()
+            for line in news:
+                self._session.warn(line)
+            self._session.nodes(self._supervisor.states(), endpoint=self._endpoint, simulations=self._simulations)
+        if end is None:
+            self._session.event("stopping")
+            self._session.say("interrupted: finishing the running trials; once more ends at once")
+            end = self._supervisor.drain(hurry=lambda: self._session.interruptions() > 1)
+        self._listen()
+        return end
+
+    def _check(self, end: NodeExit | None) -> None:
+        place = self._host.place
+        finished = end is not None and end.code in (0, LossError.exit_code)
+        if self._session.interruptions() and not finished:
+            message = f"interrupted; finished throws are in {place.dataset}, the dataset is not complete"
+            raise Interrupted(message, hint=place.way_on)
+        if end is not None and not finished:
+            kind = DatasetError if end.code == DatasetError.exit_code else WorkerError
+            hint = place.way_on if kind is WorkerError else None
+            raise kind(f"the coordinator stopped: {end.reason}", evidence=end.log or None, hint=hint)
+
+    @property
+    def _endpoint(self) -> str | None:
+        connection = self._host.connection
+        return None if connection is None else connection.endpoint
+
+    def _listen(self) -> None:
+        self._listener.spin(self._host.connection, _POLL_S)
+
+    def _report(self, progress: Progress) -> None:
+        self._session.update(progress)
+        self._check_that_nodes_meet(progress)
+        self._supervisor.replace(progress.hung)
+        for name in progress.set_aside.keys() - self._set_aside:
+            self._set_aside.add(name)
+            self._session.warn(
+                f"{name} gets no more trials, as others could do what it refused: {progress.set_aside[name]}"
+            )
+
+    def _check_that_nodes_meet(self, progress: Progress) -> None:
+        """Start nodes again that do not see each other: on DDS that happens, and they do at the next try.
+
+        Raises:
+            WorkerError: If that did not help; the run would go on for ever with nothing done.
+        """
+        states = self._supervisor.states()
+        ready = any(state.status == "running" for state in states if state.name not in (ROUTER, COORDINATOR))
+        if progress.simulations or progress.ended or not ready:
+            self._apart_since = math.inf
+            return
+        self._apart_since = min(self._apart_since, time.monotonic())
+        if time.monotonic() - self._apart_since <= _MEET_S:
+            return
+        if not self._started_again:
+            self._started_again = True
+            # Those that are started have as much time again; nobody reports until there is a coordinator.
+            self._apart_since = math.inf
+            self._session.warn("the coordinator does not see the simulations; all of them are started again")
+            self._supervisor.replace([state.name for state in states if state.name != ROUTER])
+        else:
+            raise WorkerError(
+                f"simulations have been ready for {_MEET_S:g} s, twice, but the coordinator does not see them",
+                evidence=f"they use {self._host.place.middleware.rmw}, and the router at {self._endpoint}",
+                hint="a firewall may keep nodes apart; throwcollect doctor shows what is installed",
+            )
+
+    def _offer_scaling(self, node: ros.Node) -> None:
+        most = 1 if self._host.config.run.root_namespace else MOST_SIMULATIONS
+        offer_scaling(node, self._simulations, self._want, most=most)
+
+    def _want(self, simulations: int) -> None:
+        # Not done here: whoever asks shall not have to wait for nodes that are slow to end.
+        self._wanted = simulations

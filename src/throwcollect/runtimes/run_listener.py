@@ -1,0 +1,96 @@
+"""Hears how far a run has come, for its launcher and for everybody who follows it."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from types import TracebackType
+
+from throwcollect import ros
+from throwcollect.coordinator.progress import Progress
+from throwcollect.coordinator.progress_topic import PROGRESS_QOS, PROGRESS_TOPIC
+from throwcollect.errors import ConfigError, ThrowcollectError
+from throwcollect.ros.connection import Connection
+from throwcollect.ros.endpoint import answers
+from throwcollect.ros.msg import String
+
+_SILENT_S = 8.0
+"""Reports come several times a second; after a silence like this the connection is made anew, should it be broken."""
+
+
+class RunListener:
+    """A node that hears the coordinator, and moves along when the router gets another address.
+
+    Use it as a context manager. It has a ROS context of its own, so that a process may listen to several runs.
+
+    Args:
+        on_progress: Called with every report, within `spin`.
+        name: Name of the node; one of this process alone, and hidden, by default.
+        on_connect: Called with the node whenever it is made anew.
+    """
+
+    def __init__(
+        self,
+        on_progress: Callable[[Progress], None],
+        *,
+        name: str | None = None,
+        on_connect: Callable[[ros.Node], None] = lambda _: None,
+    ) -> None:
+        self._on_progress = on_progress
+        self._name = name or f"_throwcollect_{os.getpid()}"
+        self._on_connect = on_connect
+        self._node: ros.Node | None = None
+        self._connection: Connection | None = None
+        self._heard_at = 0.0
+
+    def __enter__(self) -> RunListener:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._node is not None:
+            self._node.destroy_node()
+            ros.shutdown(context=self._context)
+            self._node = None
+
+    def spin(self, connection: Connection | None, seconds: float) -> None:
+        """Wait for a report, or for the router.
+
+        Args:
+            connection: The way into the run by now; None while its router has no address.
+            seconds: Longest time [s].
+
+        Raises:
+            ConfigError: If the key of the run cannot be read.
+        """
+        elsewhere = connection != self._connection or time.monotonic() > self._heard_at + _SILENT_S
+        if connection is not None and elsewhere and answers(connection.endpoint):
+            self.__exit__(None, None, None)
+            self._connect(connection)
+        if self._node is not None:
+            self._executor.spin_once(timeout_sec=seconds)
+        else:
+            time.sleep(seconds)
+
+    def _connect(self, connection: Connection) -> None:
+        self._heard_at = time.monotonic()
+        self._context = ros.Context()
+        try:
+            ros.init(context=self._context, connection=connection)
+        except ConfigError:
+            raise
+        except ThrowcollectError:
+            # It answered a moment ago, so it has just ended; the next attempt finds its successor.
+            return
+        self._node, self._connection = ros.Node(self._name, context=self._context), connection
+        self._executor = ros.SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self._node)
+        self._node.create_subscription(String, PROGRESS_TOPIC, self._hear, PROGRESS_QOS)
+        self._on_connect(self._node)
+
+    def _hear(self, message: String) -> None:
+        if (progress := Progress.read(message.data)) is not None:
+            self._heard_at = time.monotonic()
+            self._on_progress(progress)

@@ -1,0 +1,241 @@
+"""Keeps the nodes of a roster alive, wherever they live, until the one that does the work has come to its end."""
+
+from __future__ import annotations
+
+import math
+import signal
+import time
+from collections.abc import Callable, Collection, Iterable, Sequence
+from types import TracebackType
+
+from throwcollect.config.run import RunConfig
+from throwcollect.errors import Interrupted, WorkerError
+from throwcollect.runtimes.nodes import NodeExit, NodeHost, NodeSpec, Role
+from throwcollect.runtimes.runtime import NodeState, Status
+from throwcollect.wording import counted
+
+_FIRST_BACKOFF_S = 0.2
+_LONGEST_BACKOFF_S = 10.0
+_CLOSING_S = 7.0
+"""Time that a coordinator gets to write its files once the running trials have ended or were dropped."""
+_FROZEN_S = 3.0
+"""Somebody may stop a node to look at it; after this time it counts as lost."""
+
+_RESTARTS_BEFORE_READY = 1
+"""A node that has never worked will hardly do so at the tenth attempt."""
+
+
+class Supervisor:
+    """Keeps the nodes of one run alive; use it as a context manager, so that none is left behind.
+
+    Args:
+        host: Where the nodes live; closed at the end.
+        run: How to run.
+        roster: The nodes that there are to be, in the order in which they are started; one of them is the main one.
+    """
+
+    def __init__(self, host: NodeHost, run: RunConfig, roster: Sequence[NodeSpec]) -> None:
+        self.host = host
+        self._run = run
+        self._roster = {node.name: node for node in roster}
+        self._restarts: dict[str, int] = {}
+        self._last_end: dict[str, str] = {}
+        self._due: dict[str, float] = {}
+        self._given_up: dict[str, NodeExit] = {}
+        self._ready: set[str] = set()
+        self._frozen_since: dict[str, float] = {}
+        self._start_deadline = math.inf
+        self._hung: frozenset[str] = frozenset()
+
+    def __enter__(self) -> Supervisor:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.host.close()
+
+    def start(self, *, found: Collection[str] = ()) -> None:
+        """Start all nodes.
+
+        Args:
+            found: Nodes that run already, of a launcher that died.
+
+        Raises:
+            WorkerError: If a node cannot be started.
+        """
+        self._start_deadline = time.monotonic() + self._run.start_timeout_s
+        for name in self._roster:
+            if name not in found:
+                self._start(name)
+
+    def change(self, roster: Sequence[NodeSpec]) -> None:
+        """Have other nodes from now on: start those that are new, and end those that are no more.
+
+        Raises:
+            WorkerError: If a node cannot be started.
+        """
+        before, self._roster = self._roster, {node.name: node for node in roster}
+        removed = [name for name in before if name not in self._roster]
+        for name in removed:
+            for memory in (self._restarts, self._last_end, self._due, self._given_up, self._frozen_since):
+                memory.pop(name, None)
+            self._ready.discard(name)
+        self.host.stop(removed)
+        if not self._ready:
+            self._start_deadline = time.monotonic() + self._run.start_timeout_s
+        for name in self._roster:
+            if name not in before:
+                self._start(name)
+
+    def poll(self) -> tuple[NodeExit | None, list[str]]:
+        """Look after the nodes: restart what died.
+
+        Returns:
+            How the main node ended, None while it runs; and what happened to other nodes since the last call.
+
+        Raises:
+            WorkerError: If no worker was ready in time, or a vital node or all workers are lost for good; with the
+                evidence.
+        """
+        end = None
+        news = self._end_frozen()
+        self._ready |= {name for name in self._workers if name not in self._ready and self.host.ready(name)}
+        for node in self.host.exits():
+            if node.name not in self._roster:
+                # It was taken over from a launcher that had already decided to end it.
+                continue
+            self._last_end[node.name] = node.reason
+            is_main = self._roster[node.name].role is Role.MAIN
+            if is_main and not (_killed(node) and self._schedule_restart(node)):
+                end = node
+            elif is_main:
+                news.append(f"{node.name} was lost ({node.reason}) and is started again")
+            else:
+                fate = "is started again" if self._schedule_restart(node) else "is given up"
+                news.append(f"{node.name} was lost ({node.reason}) and {fate}{_last_words(node)}")
+        now = time.monotonic()
+        for name in [name for name, due in self._due.items() if due <= now]:
+            del self._due[name]
+            self._start(name)
+        if end is None:
+            self._check_hope()
+        return end, news
+
+    def states(self) -> list[NodeState]:
+        """All nodes of the run, in the order of the roster."""
+        return [self._state(name) for name in self._roster]
+
+    def replace(self, hung: Iterable[str]) -> None:
+        """End nodes by force that do not answer any more, so that they are started again.
+
+        Args:
+            hung: Names of all of which that is known; each is ended once until it is missing here again.
+        """
+        known, self._hung = self._hung, frozenset(hung)
+        for name in self._hung - known:
+            self.host.signal(name, signal.SIGKILL)
+
+    def drain(self, *, hurry: Callable[[], bool] = lambda: False) -> NodeExit | None:
+        """Let the main node finish what runs and close its files.
+
+        Args:
+            hurry: Asked again and again whether to end at once.
+
+        Returns:
+            How it ended; None when it had to be ended by force, or was about to be started again.
+        """
+        (main,) = self._named(Role.MAIN)
+        if main in self._due:
+            return None
+        self.host.signal(main, signal.SIGINT)
+        deadline = time.monotonic() + self._run.grace_s + _CLOSING_S
+        while time.monotonic() < deadline and not hurry():
+            for node in self.host.exits():
+                if node.name == main:
+                    return node
+            time.sleep(0.02)
+        self.host.stop([main], grace_s=0.0)
+        return None
+
+    @property
+    def _workers(self) -> list[str]:
+        return self._named(Role.WORKER)
+
+    def _named(self, role: Role) -> list[str]:
+        return [node.name for node in self._roster.values() if node.role is role]
+
+    def _start(self, name: str) -> None:
+        self.host.start(self._roster[name])
+
+    def _state(self, name: str) -> NodeState:
+        handle = self.host.handle(name)
+        status: Status = "running"
+        if name in self._given_up:
+            status = "lost"
+        elif name in self._due or name not in self.host.running():
+            status = "restarting"
+        elif name in self._frozen_since:
+            status = "frozen"
+        elif handle is None or (self._roster[name].role is Role.WORKER and name not in self._ready):
+            status = "starting"
+        return NodeState(name, status, self._restarts.get(name, 0), handle, self._last_end.get(name))
+
+    def _end_frozen(self) -> list[str]:
+        """End nodes by force that have been frozen for long."""
+        now, news = time.monotonic(), []
+        frozen = self.host.frozen()
+        self._frozen_since = {name: self._frozen_since.get(name, now) for name in frozen}
+        for name, since in self._frozen_since.items():
+            if now - since >= _FROZEN_S:
+                # Report each frozen node only once.
+                self._frozen_since[name] = math.inf
+                news.append(f"{name} is frozen (paused or stopped) and is ended")
+                self.host.signal(name, signal.SIGKILL)
+        return news
+
+    def _schedule_restart(self, node: NodeExit) -> bool:
+        """Whether a node that ended will be started again."""
+        count = self._restarts.get(node.name, 0)
+        worked = self._roster[node.name].role is not Role.WORKER or node.name in self._ready
+        if count >= (self._run.restarts if worked else min(_RESTARTS_BEFORE_READY, self._run.restarts)):
+            self._given_up[node.name] = node
+            return False
+        self._restarts[node.name] = count + 1
+        rest = min(_FIRST_BACKOFF_S * 2**count, _LONGEST_BACKOFF_S)
+        self._due[node.name] = time.monotonic() + max(rest, self._roster[node.name].rest_s)
+        return True
+
+    def _check_hope(self) -> None:
+        hint = "throwcollect logs shows what the nodes said"
+        workers = self._workers
+        vital = next((self._given_up[name] for name in self._named(Role.VITAL) if name in self._given_up), None)
+        lost = [name for name in workers if name in self._given_up]
+        if vital is not None or (lost and len(lost) == len(workers)):
+            last = vital or self._given_up[lost[-1]]
+            restarts = self._restarts.get(last.name, 0)
+            what = f"the {last.name}" if vital else f"no simulation can be kept alive; the last, {last.name},"
+            raise WorkerError(
+                f"{what} ended again after {counted(restarts, 'restart')}: {last.reason}",
+                evidence=last.log or None,
+                hint=hint,
+            )
+        if not self._ready and not any(map(self.host.handle, workers)):
+            # None of them runs yet: it is the engine that takes its time, and it has a patience of its own.
+            self._start_deadline = time.monotonic() + self._run.start_timeout_s
+        if workers and not self._ready and time.monotonic() > self._start_deadline:
+            raise WorkerError(
+                f"no simulation was ready within {self._run.start_timeout_s:g} s (run.start_timeout_s)",
+                evidence=self.host.log_tail(workers[0]) or None,
+                hint=hint,
+            )
+
+
+def _killed(node: NodeExit) -> bool:
+    """Whether a node was ended from outside, and not by itself: its exit code is no number that it could return."""
+    return node.code is not None and (node.code < 0 or node.code > Interrupted.exit_code)
+
+
+def _last_words(node: NodeExit) -> str:
+    lines = node.log.splitlines()
+    return f"; its log ends: {lines[-1]}" if lines else ""

@@ -1,0 +1,105 @@
+import threading
+from collections.abc import Iterator
+from datetime import datetime, timezone
+from pathlib import Path
+
+import pytest
+
+from rclzenoh.session_config import CONFIG_FILE_VARIABLE, OVERRIDE_VARIABLE
+from throwcollect.errors import ConfigError, WorkerError
+from throwcollect.ros import Context, Node, SingleThreadedExecutor
+from throwcollect.ros.router import router
+from throwcollect.run_key import RunKey
+from throwcollect.runs import control
+from throwcollect.runs.control import scale
+from throwcollect.runs.record import Record
+from throwcollect.runs.records import STATE_VARIABLE, Records, Run
+from throwcollect.runtimes.node_collection import MOST_SIMULATIONS, offer_scaling
+from throwcollect.runtimes.nodes import LAUNCHER
+
+
+@pytest.fixture(autouse=True)
+def state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "state"))
+
+
+def living(endpoint: str | None, runtime: str = "local") -> Run:
+    started = datetime.now(timezone.utc)
+    record = Record("a-0123", "a", runtime, "/a", None, "/a/logs", 0, started, 1, 2, endpoint=endpoint)
+    return Run(record, lives=True, key=RunKey(Path("/a/key")), records=Records())
+
+
+@pytest.fixture
+def endpoint(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
+    monkeypatch.delenv(CONFIG_FILE_VARIABLE, raising=False)
+    monkeypatch.setenv("ROS_DOMAIN_ID", "0")
+    with router("tcp/127.0.0.1:0") as endpoint:
+        yield endpoint
+
+
+@pytest.fixture
+def most() -> int:
+    return MOST_SIMULATIONS
+
+
+@pytest.fixture
+def wanted(endpoint: str, most: int, monkeypatch: pytest.MonkeyPatch) -> Iterator[list[int]]:
+    """What a launcher that offers scaling is asked for."""
+    asked: list[int] = []
+    monkeypatch.setenv(OVERRIDE_VARIABLE, f'connect/endpoints=["{endpoint}"]')
+    context = Context()
+    context.init()
+    node = Node(LAUNCHER, context=context)
+    offer_scaling(node, 1, asked.append, most=most)
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(node)
+    done = threading.Event()
+
+    def serve() -> None:
+        while not done.is_set():
+            executor.spin_once(timeout_sec=0.05)
+
+    thread = threading.Thread(target=serve)
+    thread.start()
+    yield asked
+    done.set()
+    thread.join()
+    context.shutdown()
+
+
+def test_the_launcher_is_asked_for_another_number(endpoint: str, wanted: list[int]) -> None:
+    for simulations in (5, 0, 256):
+        scale(living(endpoint), simulations)
+    assert wanted == [5, 0, 256]
+
+
+@pytest.mark.parametrize("simulations", [-1, 257])
+def test_the_launcher_refuses_what_is_out_of_range(simulations: int, endpoint: str, wanted: list[int]) -> None:
+    with pytest.raises(ConfigError, match=f"run a-0123: .* out of range. Min: 0, max: 256, value: {simulations}"):
+        scale(living(endpoint), simulations)
+    assert wanted == []
+
+
+@pytest.mark.parametrize("most", [1])
+def test_the_launcher_refuses_a_second_simulation_where_there_is_room_for_one(endpoint: str, wanted: list[int]) -> None:
+    with pytest.raises(ConfigError, match=r"out of range. Min: 0, max: 1, value: 2"):
+        scale(living(endpoint), 2)
+    scale(living(endpoint), 0)
+    assert wanted == [0]
+
+
+def test_a_launcher_that_is_not_there_is_one_message(endpoint: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(control, "_ANSWER_S", 0.2)
+    with pytest.raises(WorkerError, match=f"run a-0123: its launcher does not answer over the router at {endpoint}"):
+        scale(living(endpoint), 3)
+
+
+@pytest.mark.parametrize("nowhere", [None, "tcp/127.0.0.1:1"])
+def test_a_router_that_is_not_there_is_one_message(nowhere: str | None) -> None:
+    with pytest.raises(WorkerError, match="run a-0123: its launcher does not answer"):
+        scale(living(nowhere), 3)
+
+
+def test_a_run_in_one_process_cannot_be_scaled() -> None:
+    with pytest.raises(ConfigError, match="run a-0123: has one simulation, as all runs of the runtime inprocess have"):
+        scale(living(None, runtime="inprocess"), 2)

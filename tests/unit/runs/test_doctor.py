@@ -1,0 +1,131 @@
+import json
+import socketserver
+import threading
+from http.server import BaseHTTPRequestHandler
+from importlib.metadata import version
+from pathlib import Path
+
+import pytest
+
+from throwcollect.ros.middleware import VARIABLE, _installed
+from throwcollect.runs.doctor import examine
+from throwcollect.runtimes.docker.image import SOURCES_LABEL, default_tag
+
+
+def test_a_machine_that_runs_the_tests_has_no_problem(tmp_path: Path) -> None:
+    checks = {check.name: check for check in examine(tmp_path)}
+    assert list(checks) == [
+        "python",
+        "extras",
+        "cores",
+        "memory",
+        "pybullet",
+        "robot",
+        "rclpy",
+        "embedded",
+        "docker",
+        "ports",
+        "disk",
+    ]
+    assert [check for check in checks.values() if check.status == "problem"] == []
+    assert str(tmp_path) in checks["disk"].finding
+
+
+def backends(directory: Path) -> dict[str, tuple[str, str]]:
+    _installed.cache_clear()
+    found = {check.name: (check.status, check.finding) for check in examine(directory)}
+    _installed.cache_clear()
+    return {name: found[name] for name in ("rclpy", "embedded")}
+
+
+def test_both_backends_and_what_is_missing_of_one_are_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    zenoh = f"Zenoh {version('eclipse-zenoh')}"
+    monkeypatch.delenv(VARIABLE, raising=False)
+    monkeypatch.setattr("throwcollect.ros_installation.rmws", lambda: ["rmw_fastrtps_cpp"])
+    monkeypatch.setattr("throwcollect.ros_installation.rclpy_version", lambda: "7.1.6")
+    monkeypatch.setattr("throwcollect.ros_installation.how_to_install", lambda: "pip install it")
+    monkeypatch.setattr("throwcollect.ros_installation.missing", lambda: ["rclpy"])
+    assert backends(tmp_path)["rclpy"] == ("note", "not installed; to have it: pip install it")
+    monkeypatch.setattr("throwcollect.ros_installation.missing", lambda: ["tf2_msgs"])
+    finding = "7.1.6 with rmw_fastrtps_cpp, without tf2_msgs; try: pip install it"
+    assert backends(tmp_path)["rclpy"] == ("note", finding)
+    monkeypatch.setattr("throwcollect.ros_installation.missing", list)
+    assert backends(tmp_path)["rclpy"] == ("ok", "7.1.6 with rmw_fastrtps_cpp and all interfaces")
+    monkeypatch.setenv(VARIABLE, "embedded")
+    finding = f"{zenoh}; nodes run on the embedded backend, as THROWCOLLECT_ROS is embedded"
+    assert backends(tmp_path)["embedded"] == ("ok", finding)
+
+
+def test_a_backend_that_nodes_cannot_run_on_is_a_problem(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(VARIABLE, "rclpy")
+    monkeypatch.setattr("throwcollect.ros.middleware.missing", lambda: ["tf2_msgs"])
+    status, finding = backends(tmp_path)["embedded"]
+    assert status == "problem"
+    assert "; THROWCOLLECT_ROS is rclpy, but Python does not find tf2_msgs; try: " in finding
+
+
+class Engine(BaseHTTPRequestHandler):
+    """As much of a Docker engine as says its version, and whether it has an image."""
+
+    images: tuple[str, ...] = ()
+    sources = "unknown"
+
+    def do_GET(self) -> None:
+        path = self.path.removeprefix("/v1.41")
+        if path == "/version":
+            self.answer(200, {"Version": "27.1", "ApiVersion": "1.41"})
+        elif path in [f"/images/{image}/json" for image in self.images]:
+            self.answer(200, {"Id": "sha256:0", "Config": {"Labels": {SOURCES_LABEL: self.sources}}})
+        else:
+            self.answer(404, {"message": f"No such image: {path}"})
+
+    def answer(self, code: int, document: dict[str, object]) -> None:
+        body = json.dumps(document).encode()
+        self.send_response(code)
+        self.send_header("Content-Length", str(len(body)))
+        self.end_headers()
+        self.wfile.write(body)
+
+    def address_string(self) -> str:
+        return "client"
+
+    def log_message(self, *_: object) -> None:
+        pass
+
+
+def test_a_docker_engine_and_its_image_are_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "docker.sock"
+    monkeypatch.setenv("DOCKER_HOST", f"unix://{path}")
+
+    def found() -> tuple[str, str]:
+        check = {check.name: check for check in examine(tmp_path)}["docker"]
+        return check.status, check.finding
+
+    assert found() == (
+        "note",
+        f"no Docker engine answers at unix://{path}: No such file or directory; runs use processes",
+    )
+    with socketserver.ThreadingUnixStreamServer(str(path), Engine) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        lacking = f"the image {default_tag()} is not there yet; throwcollect image build makes it"
+        assert found() == ("note", f"Docker 27.1 answers at unix://{path}; {lacking}")
+        monkeypatch.setattr(Engine, "images", (default_tag(),))
+        assert found() == ("ok", f"Docker 27.1 answers at unix://{path}, with the image {default_tag()}")
+        monkeypatch.setattr(Engine, "sources", "0" * 64)
+        outdated = f"the image {default_tag()} was made from other sources than these"
+        status, finding = found()
+        assert (status, finding.partition("; ")[2]) == (
+            "note",
+            f"{outdated}; throwcollect image build makes it anew",
+        )
+        server.shutdown()
+
+
+@pytest.mark.parametrize(("installed", "status"), [(True, "note"), (False, "problem")])
+def test_another_python_is_a_problem_only_where_pybullet_is_missing(
+    installed: bool, status: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sys.version_info", (3, 12, 3))
+    monkeypatch.setattr("throwcollect.runs.doctor.is_installed", lambda _: installed)
+    (python,) = [check for check in examine(tmp_path) if check.name == "python"]
+    assert (python.status, python.finding) == (status, "3.12.3; pybullet has wheels for 3.10 and 3.11")

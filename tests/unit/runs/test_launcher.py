@@ -1,0 +1,138 @@
+"""What a launcher leaves behind on a Docker engine, and what the record of the run says of it."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Iterator
+from datetime import datetime, timezone
+from pathlib import Path
+
+import pytest
+from tests.unit.runtimes.docker.engine import Engine, engine_at
+
+from throwcollect.cli.runs import ps
+from throwcollect.config.schema import Config
+from throwcollect.coordinator.progress import Progress
+from throwcollect.errors import DatasetError, WorkerError
+from throwcollect.runs.launcher import launch
+from throwcollect.runs.record import Record
+from throwcollect.runs.records import STATE_VARIABLE, OpenRun, Records
+from throwcollect.runtimes.docker import containers as docker_containers
+from throwcollect.runtimes.docker import watch as docker_watch
+from throwcollect.runtimes.docker.options import NODE_LABEL, RUN_LABEL
+from throwcollect.runtimes.nodes import COORDINATOR
+
+CONFIG = Config.model_validate({"containers": {"image": "image"}, "run": {"simulations": 1}})
+
+
+class Onlooker:
+    """Remembers what it is warned of."""
+
+    def __init__(self) -> None:
+        self.warnings: list[str] = []
+
+    def update(self, progress: Progress) -> None:
+        pass
+
+    def say(self, line: str) -> None:
+        pass
+
+    def warn(self, line: str) -> None:
+        self.warnings.append(line)
+
+
+@pytest.fixture
+def engine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Engine]:
+    monkeypatch.setenv("DOCKER_HOST", f"unix://{tmp_path}/engine.sock")
+    monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "state"))
+    monkeypatch.setattr(docker_watch, "_LOOK_EVERY_S", 0.1)
+    monkeypatch.setattr(docker_containers, "_SILENCE_S", 1.0)
+    with engine_at(tmp_path / "engine.sock") as engine:
+        yield engine
+
+
+@pytest.fixture
+def run(engine: Engine, tmp_path: Path) -> OpenRun:
+    for name in ("logs", "data"):
+        (tmp_path / name).mkdir()
+    run = Records().new("throws")
+    record = Record(
+        run=run.run,
+        name="throws",
+        runtime="docker",
+        directory=str(tmp_path / "data"),
+        volume=None,
+        logs=str(tmp_path / "logs"),
+        domain_id=0,
+        started=datetime.now(timezone.utc),
+        launcher=1,
+        simulations=1,
+    )
+    run.write(record)
+    return run
+
+
+def launched(run: OpenRun, each_look: Callable[[], None] = lambda: None, *, onlooker: Onlooker | None = None) -> None:
+    def interruptions() -> int:
+        each_look()
+        return 0
+
+    launch(run, CONFIG, onlooker=onlooker or Onlooker(), interruptions=interruptions)
+
+
+def status(run: OpenRun) -> str:
+    return Records().get(run.run).status
+
+
+def test_a_launcher_that_gives_up_says_that_containers_are_left(
+    engine: Engine, run: OpenRun, capsys: pytest.CaptureFixture[str]
+) -> None:
+    onlooker = Onlooker()
+
+    def silence() -> None:
+        if len(engine.running()) == 3:
+            engine.withheld = "."
+
+    with pytest.raises(WorkerError, match=r"the Docker engine has not answered for [12] s"):
+        launched(run, silence, onlooker=onlooker)
+    assert onlooker.warnings == [
+        f"containers of this run may be left: throwcollect down --run {run.run} ends them",
+    ]
+    engine.answer_all()
+    assert status(run) == "abandoned"
+    ps(everything=False, json=False)
+    told = capsys.readouterr().out
+    assert re.search(rf"{run.run} +docker .* abandoned \d+ s ago, exit code 3", told)
+    assert re.search(r"  sim_0 +running +container ", told)
+
+
+def test_a_launcher_that_gets_no_answer_at_all_leaves_the_record_of_what_was_there(
+    engine: Engine, run: OpenRun, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(docker_containers, "_SILENCE_S", 0.1)
+    run.update(left=True)
+    engine.withheld = "."
+    with pytest.raises(WorkerError, match="no answer in time"):
+        launched(run)
+    assert status(run) == "abandoned"
+
+
+def test_what_was_left_is_ended_even_if_the_coordinator_has_finished_meanwhile(engine: Engine, run: OpenRun) -> None:
+    for name in ("router", "sim_0", COORDINATOR):
+        key = engine.create(f"throwcollect-{run.run}-{name}", {RUN_LABEL: run.run, NODE_LABEL: name})
+        engine.answer("POST", f"/containers/{key}/start", {}, None)
+    engine.end(f"throwcollect-{run.run}-{COORDINATOR}", 0)
+    run.update(left=True)
+    # There is no dataset here, which is found out when the coordinator has ended well.
+    with pytest.raises(DatasetError, match=r"/data: "):
+        launched(run)
+    assert engine.names() == []
+    assert status(run) == "ended"
+
+
+def test_times_are_told_by_rfc_3339(run: OpenRun, capsys: pytest.CaptureFixture[str]) -> None:
+    ps(everything=True, json=True)
+    document = json.loads(capsys.readouterr().out)[0]
+    assert re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}\+00:00", document["started"])
+    assert document["ended"] is None

@@ -1,0 +1,336 @@
+import json
+import os
+import stat
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from datetime import datetime, timedelta, timezone
+from pathlib import Path
+
+import pytest
+
+from throwcollect.errors import ConfigError
+from throwcollect.run_key import RunKey
+from throwcollect.runs.record import Failure, Record, Summary
+from throwcollect.runs.records import STATE_VARIABLE, OpenRun, Records
+from throwcollect.runtimes.runtime import NodeState
+
+NOW = datetime.now(timezone.utc)
+SUMMARY = Summary(
+    "small", 3, 3, {"landed": 3}, None, {"x_m": (1.0, 2.0), "y_m": (0.0, 0.1)}, 30, 1.0, 1, 10, 5, {}, "0", open=True
+)
+NODE = NodeState("sim_0", "restarting", 2, None, "ended by SIGKILL")
+
+
+@pytest.fixture
+def state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "state"))
+    return tmp_path / "state"
+
+
+def mode(path: Path) -> int:
+    return stat.S_IMODE(path.stat(follow_symlinks=False).st_mode)
+
+
+def record(run: OpenRun, **fields: object) -> Record:
+    values = {
+        "name": "small",
+        "runtime": "local",
+        "directory": "/data/small",
+        "volume": None,
+        "logs": "/data/small/logs",
+        "domain_id": 0,
+        "started": NOW,
+        "launcher": 1,
+        "simulations": 2,
+    }
+    return Record(run=run.run, **{**values, **fields})  # type: ignore[arg-type]
+
+
+def remember(records: Records, **fields: object) -> str:
+    """A run whose launcher is gone."""
+    run = records.new("small")
+    run.write(record(run, **fields))
+    run.close()
+    return run.run
+
+
+def test_what_is_written_is_read_by_others(state: Path) -> None:
+    run = Records().new("small")
+    written = record(run, nodes=(NODE,), trials=7, endpoint="tcp/127.0.0.1:1", summary=SUMMARY)
+    run.write(written)
+    assert Records().get(run.run).record == written
+    run.update(trials_ended=5, failure=Failure("ä"))
+    assert Records().get(run.run).record == replace(written, trials_ended=5, failure=Failure("ä"))
+    assert Records().ids() == [run.run]
+
+
+def test_a_run_is_named_after_its_collection_and_never_like_another(
+    state: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    draws = iter(["aaaa", "aaaa", "bbbb"])
+    monkeypatch.setattr("throwcollect.runs.records.secrets.token_hex", lambda _: next(draws))
+    records = Records()
+    assert [records.new("small").run, records.new("small").run] == ["small-aaaa", "small-bbbb"]
+
+
+def test_a_run_without_a_record_is_none(state: Path) -> None:
+    records = Records()
+    run = records.new("small")
+    assert records.ids() == []
+    with pytest.raises(ConfigError, match=f"no run {run.run}"):
+        records.get(run.run)
+
+
+def test_a_record_is_written_only_when_something_has_changed(state: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    run = Records().new("small")
+    run.write(record(run))
+    written: list[Record] = []
+    monkeypatch.setattr(run, "write", written.append)
+    run.update(simulations=2, nodes=())
+    assert written == []
+    run.update(simulations=3)
+    assert [each.simulations for each in written] == [3]
+
+
+def test_a_run_lives_as_long_as_somebody_holds_it(state: Path) -> None:
+    records = Records()
+    run = records.new("small")
+    run.write(record(run))
+    assert (records.lives(run.run), records.get(run.run).status) == (True, "running")
+    run.close()
+    assert (records.lives(run.run), records.get(run.run).status) == (False, "died")
+
+
+def test_a_run_that_has_ended_has_not_died(state: Path) -> None:
+    records = Records()
+    assert records.get(remember(records, ended=NOW, exit_code=3)).status == "ended"
+
+
+def test_a_launcher_that_is_killed_holds_nothing_though_its_pid_may_be_used_again(state: Path) -> None:
+    code = (
+        "import sys; from throwcollect.runs.records import Records; sys.path.insert(0, sys.argv[1])\n"
+        "from test_records import record; run = Records().new('small'); run.write(record(run, launcher=1))\n"
+        "print(run.run, flush=True); sys.stdin.read()"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", code, str(Path(__file__).parent)], stdin=-1, stdout=-1, text=True
+    ) as process:
+        assert process.stdout is not None
+        run = process.stdout.readline().strip()
+        records = Records()
+        assert records.get(run).status == "running"
+        assert records.take(run) is None
+        process.kill()
+        process.wait()
+    assert records.get(run).status == "died"
+
+
+def test_a_run_is_handed_to_another_process_without_ever_seeming_dead(state: Path) -> None:
+    records = Records()
+    run = records.new("small")
+    run.write(record(run))
+    with subprocess.Popen(["/bin/cat"], stdin=-1, pass_fds=[run.lock]) as process:
+        inherited = records.inherited(run.run, os.dup(run.lock))
+        run.close()
+        inherited.close()
+        assert records.lives(run.run)
+        process.kill()
+        process.wait()
+    assert not records.lives(run.run)
+
+
+def test_a_dead_run_is_taken_by_one_and_refused_to_others(state: Path) -> None:
+    records = Records()
+    name = remember(records)
+    taken = records.take(name)
+    assert taken is not None
+    assert records.take(name) is None
+    assert records.get(name).status == "running"
+    taken.update(simulations=5)
+    taken.close()
+    assert records.get(name).record.simulations == 5
+
+
+def test_what_is_forgotten_leaves_no_file_but_datasets(state: Path, tmp_path: Path) -> None:
+    (tmp_path / "data").mkdir()
+    records = Records()
+    run = records.new("small")
+    run.write(record(run, directory=str(tmp_path / "data")))
+    (run.directory / "logs").mkdir(parents=True)
+    run.forget()
+    assert list((state / "runs").iterdir()) == []
+    assert (tmp_path / "data").exists()
+
+
+@pytest.mark.parametrize(
+    ("fields", "remembered"),
+    [
+        ({"ended": NOW - timedelta(days=6)}, True),
+        ({"ended": NOW - timedelta(days=8)}, False),
+        ({"started": NOW - timedelta(days=8)}, False),
+        ({"started": NOW - timedelta(days=8), "runtime": "docker"}, True),
+        ({"started": NOW - timedelta(days=8), "ended": NOW}, True),
+    ],
+)
+def test_runs_are_remembered_for_a_week_after_their_end(
+    fields: dict[str, object], remembered: bool, state: Path
+) -> None:
+    records = Records()
+    name = remember(records, **fields)
+    records.new("small")
+    assert (name in records.ids()) == remembered
+
+
+def test_a_long_run_is_not_forgotten_while_it_lives(state: Path) -> None:
+    records = Records()
+    run = records.new("small")
+    run.write(record(run, started=NOW - timedelta(days=80)))
+    records.new("small")
+    assert records.ids() == [run.run]
+
+
+def truncated(text: str) -> str:
+    return text[: len(text) // 2]
+
+
+def without(key: str) -> Callable[[str], str]:
+    return lambda text: json.dumps({name: value for name, value in json.loads(text).items() if name != key})
+
+
+@pytest.mark.parametrize(
+    ("damage", "message"),
+    [
+        (truncated, "the record of the run is damaged"),
+        (lambda _: "[]", "the record of the run is damaged"),
+        (lambda _: "", "the record of the run is damaged"),
+        (without("launcher"), "the record of the run is damaged"),
+        (
+            lambda text: text.replace('"version":1', '"version":2').replace('"version": 1', '"version": 2'),
+            "another ver",
+        ),
+    ],
+)
+def test_a_record_that_cannot_be_read_is_one_message_and_no_obstacle(
+    damage: Callable[[str], str], message: str, state: Path
+) -> None:
+    records = Records()
+    name, whole = remember(records), remember(records)
+    path = state / "runs" / f"{name}.json"
+    path.write_text(damage(path.read_text()))
+    with pytest.raises(ConfigError, match=message) as caught:
+        records.get(name)
+    assert caught.value.hint == f"throwcollect down --run {name} ends what is left of it, and forgets it"
+    assert [each.record.run for each in records.all()] == [whole]
+    records.new("small")
+
+
+def test_runs_come_in_the_order_of_their_start(state: Path) -> None:
+    records = Records()
+    late, early = remember(records, started=NOW), remember(records, started=NOW - timedelta(hours=1))
+    assert [each.record.run for each in records.all()] == [early, late]
+
+
+def test_by_default_the_state_is_the_users_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(STATE_VARIABLE, raising=False)
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    Records()
+    directory = tmp_path / f"throwcollect-{os.getuid()}"
+    assert directory.stat().st_mode & 0o777 == 0o700
+    directory.chmod(0o777)
+    with pytest.raises(ConfigError, match="belongs to somebody else, or others may write there"):
+        Records()
+
+
+def test_all_that_is_remembered_is_for_its_owner_alone(state: Path) -> None:
+    state.mkdir(mode=0o755)
+    (state / "runs").mkdir(mode=0o755)
+    before = os.umask(0)
+    try:
+        run = Records().new("small")
+        run.write(record(run))
+    finally:
+        os.umask(before)
+    runs = state / "runs"
+    assert (mode(runs), mode(run.directory), mode(run.key.directory)) == (0o700, 0o700, 0o700)
+    files = [path for path in runs.rglob("*") if path.is_file()]
+    assert sorted(path.name for path in files) == ["certificate.pem", "key.pem", f"{run.run}.json", f"{run.run}.lock"]
+    assert {mode(path) for path in files} == {0o600}
+
+
+def test_every_run_has_a_key_of_its_own_which_those_who_find_it_and_take_it_over_get(state: Path) -> None:
+    records = Records()
+    names = [remember(records), remember(records)]
+    keys = [records.get(name).key for name in names]
+    assert len({key.private_key.read_bytes() for key in keys}) == 2
+    taken = records.take(names[0])
+    assert taken is not None
+    assert (taken.key, taken.key.exists) == (keys[0], True)
+    taken.forget()
+    assert (keys[0].exists, keys[1].exists) == (False, True)
+
+
+def test_a_run_that_can_have_no_key_is_none(state: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(_: RunKey) -> None:
+        raise ConfigError("the key of the run cannot be written: No space left on device")
+
+    monkeypatch.setattr(RunKey, "create", fail)
+    with pytest.raises(ConfigError, match="cannot be written"):
+        Records().new("small")
+    assert list((state / "runs").iterdir()) == []
+
+
+@pytest.mark.parametrize(("permissions", "taken"), [(0o755, True), (0o775, False), (0o757, False), (0o1777, False)])
+def test_a_named_directory_may_be_read_by_others_but_not_written(state: Path, permissions: int, taken: bool) -> None:
+    state.mkdir()
+    state.chmod(permissions)
+    if taken:
+        Records()
+    else:
+        with pytest.raises(ConfigError, match="belongs to somebody else, or others may write there"):
+            Records()
+
+
+def test_a_link_that_the_user_has_named_is_followed(state: Path, tmp_path: Path) -> None:
+    (tmp_path / "elsewhere").mkdir(mode=0o700)
+    state.symlink_to(tmp_path / "elsewhere")
+    Records()
+    assert (tmp_path / "elsewhere" / "runs").is_dir()
+
+
+def test_a_link_that_somebody_else_has_laid_is_not_followed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(STATE_VARIABLE, raising=False)
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    (tmp_path / "elsewhere").mkdir(mode=0o700)
+    (tmp_path / f"throwcollect-{os.getuid()}").symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(ConfigError, match="belongs to somebody else, or others may write there"):
+        Records()
+
+
+def test_a_state_directory_that_is_none_is_named_with_a_way_out(state: Path) -> None:
+    state.write_text("a file")
+    with pytest.raises(ConfigError, match=f"{state}.*: runs cannot be remembered there: ") as caught:
+        Records()
+    assert "name another directory in THROWCOLLECT_STATE" in str(caught.value)
+
+
+def test_a_full_disk_is_named(state: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    run = Records().new("small")
+
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("throwcollect.files.os.write", full)
+    with pytest.raises(ConfigError, match="runs cannot be remembered there: No space left on device") as caught:
+        run.write(record(run))
+    assert "free space there" in str(caught.value)
+
+
+def test_the_error_of_an_earlier_version_is_still_told(state: Path) -> None:
+    name = remember(Records(), exit_code=3)
+    path = state / "runs" / f"{name}.json"
+    written = json.loads(path.read_text())
+    del written["failure"]
+    path.write_text(json.dumps({**written, "message": "no luck\n  evidence: none"}))
+    assert str(Records().get(name).record.error) == "no luck\n  evidence: none"

@@ -1,0 +1,295 @@
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from datetime import datetime, timedelta, timezone
+from pathlib import Path
+
+import pytest
+from tests.unit.runtimes.docker.engine import Engine, engine_at
+
+from throwcollect.errors import ConfigError, DatasetError, Interrupted, ThrowcollectError, WorkerError
+from throwcollect.runs.record import Failure, Record
+from throwcollect.runs.records import STATE_VARIABLE, Records, Run
+from throwcollect.runs.selection import died, held_elsewhere, left_in, require_living, to_change, to_watch
+from throwcollect.runtimes.docker import engine as docker_engine
+from throwcollect.runtimes.docker.options import NODE_LABEL, RUN_LABEL
+
+NOW = datetime.now(timezone.utc)
+Make = Callable[..., Record]
+
+
+def find(records: Records, named: str | None) -> Run:
+    return to_change(records, named, command="stop")
+
+
+def watched(records: Records) -> tuple[Record, list[str]]:
+    """The run that is looked at without being named, and what is said of it."""
+    said: list[str] = []
+    return to_watch(records, None, say=said.append).record, said
+
+
+@pytest.fixture
+def records(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Records:
+    monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "state"))
+    # Runs are made in directories below.
+    monkeypatch.chdir(tmp_path)
+    return Records()
+
+
+@pytest.fixture
+def make(records: Records, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Make]:
+    """Makes a run: ``lives``, ``died`` or ``ended``, in directories of its own unless told otherwise."""
+    held = ExitStack()
+
+    def make(name: str, status: str, *, age_h: int = 0, **fields: object) -> Record:
+        monkeypatch.setattr("throwcollect.runs.records.secrets.token_hex", lambda _: "0123")
+        run = records.new(name)
+        values = {
+            "name": name,
+            "runtime": "local",
+            "directory": str(tmp_path / name),
+            "volume": None,
+            "logs": "logs",
+            "domain_id": 0,
+            "started": NOW - timedelta(hours=age_h),
+            "launcher": 1,
+            "simulations": 2,
+            "ended": NOW if status == "ended" else None,
+        }
+        run.write(Record(run=run.run, **{**values, **fields}))  # type: ignore[arg-type]
+        if status == "lives":
+            held.callback(run.close)
+        else:
+            run.close()
+        return run.record
+
+    with held:
+        yield make
+
+
+@pytest.mark.parametrize("named", ["b-0123", "b", "b-0"])
+def test_a_run_is_found_by_its_id_or_the_beginning_of_it(named: str, records: Records, make: Make) -> None:
+    make("a", "lives")
+    record = make("b", "ended")
+    assert find(records, named).record == record
+
+
+def test_a_run_is_found_by_the_directory_of_its_dataset(
+    records: Records, make: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    make("a", "ended", age_h=2, directory=str(tmp_path / "data"))
+    latest = make("b", "ended", age_h=1, directory=str(tmp_path / "data"))
+    make("c", "ended", directory=str(tmp_path / "data"), volume="other")
+    monkeypatch.chdir(tmp_path)
+    assert find(records, "data").record == latest
+    assert find(records, str(tmp_path / "data")).record == latest
+
+
+def test_an_exact_id_wins_over_longer_ones(records: Records, make: Make) -> None:
+    make("a-0123", "ended")
+    short = make("a", "ended")
+    assert find(records, "a-0123").record == short
+
+
+def test_a_name_of_several_or_of_none_is_refused_with_what_there_is(records: Records, make: Make) -> None:
+    with pytest.raises(ConfigError, match="no run 'x'"):
+        find(records, "x")
+    make("ab", "ended")
+    make("ac", "ended")
+    with pytest.raises(ConfigError, match=r"2 runs begin with 'a'\n  expected: one of ab-0123, ac-0123"):
+        find(records, "a")
+    with pytest.raises(ConfigError, match=r"no run 'x'\n  expected: one of ac-0123, ab-0123\n  try: .* ps -a"):
+        find(records, "x")
+
+
+def test_of_many_runs_the_latest_are_named(records: Records, make: Make) -> None:
+    for age_h in range(8):
+        make(f"a{age_h}", "ended", age_h=age_h)
+    latest = "a0-0123, a1-0123, a2-0123, a3-0123, a4-0123 and 3 more"
+    for named, said in (("x", f"one of {latest}\n"), ("a", f"one of {latest}$"), (None, f"there is {latest}\n")):
+        with pytest.raises(ConfigError, match=said):
+            find(records, named)
+
+
+def test_without_a_name_it_is_the_only_one_that_lives(records: Records, make: Make) -> None:
+    with pytest.raises(ConfigError, match=r"no run lives\n  try: throwcollect up -d starts one"):
+        find(records, None)
+    make("a", "ended")
+    make("b", "died")
+    with pytest.raises(ConfigError, match="no run lives; of those that are over, there is b-0123, a-0123"):
+        find(records, None)
+    only = make("c", "lives")
+    assert find(records, None).record == only
+    make("d", "lives")
+    with pytest.raises(ConfigError, match=r"2 runs live\n  expected: d-0123, c-0123\n  try: name one of them"):
+        find(records, None)
+
+
+def test_what_is_looked_at_may_have_ended(records: Records, make: Make) -> None:
+    latest = make("a", "ended")
+    make("b", "ended", age_h=1)
+    assert watched(records) == (latest, [])
+    living = make("c", "lives", age_h=9)
+    assert watched(records) == (living, [])
+
+
+@pytest.mark.parametrize(
+    "elsewhere", [{"begun_in": "/other", "directory": "/other/data"}, {"directory": "/other/data"}]
+)
+def test_a_run_of_another_directory_is_not_changed_without_its_name(
+    elsewhere: dict[str, str], records: Records, make: Make
+) -> None:
+    record = make("a", "lives", **elsewhere)
+    origin = "was begun in /other" if "begun_in" in elsewhere else "collects into /other/data"
+    with pytest.raises(ConfigError) as caught:
+        to_change(records, None, command="scale 4")
+    assert str(caught.value) == (
+        f"no run of this directory lives; a-0123 {origin}\n"
+        "  try: throwcollect scale 4 --run a-0123, if that one is meant"
+    )
+    assert to_change(records, "a", command="scale 4").record == record
+    assert watched(records) == (record, [f"run a-0123, which {origin}"])
+
+
+def test_a_run_belongs_to_where_it_was_begun_and_to_where_its_dataset_lies(
+    records: Records, make: Make, tmp_path: Path
+) -> None:
+    make("a", "lives", begun_in="/other", directory="/other/data")
+    begun = make("b", "lives", begun_in=str(tmp_path), directory="/other/more")
+    assert find(records, None).record == begun
+    assert watched(records) == (begun, [])
+    make("c", "lives", begun_in="/other")
+    with pytest.raises(ConfigError, match=r"2 runs live\n  expected: .-0123, .-0123\n"):
+        find(records, None)
+
+
+def test_what_ended_here_is_looked_at_before_what_lives_elsewhere(records: Records, make: Make) -> None:
+    make("a", "lives", begun_in="/other", directory="/other/data")
+    ended = make("b", "ended", age_h=1)
+    assert watched(records) == (ended, [])
+
+
+def test_a_run_whose_dataset_is_in_a_volume_belongs_to_where_it_was_begun_alone(records: Records, make: Make) -> None:
+    record = make("a", "lives", begun_in="/other", volume="v")
+    with pytest.raises(ConfigError, match=r"a-0123 was begun in /other"):
+        find(records, None)
+    assert watched(records) == (record, ["run a-0123, which was begun in /other"])
+
+
+def test_whose_launcher_died_may_be_ended(records: Records, make: Make) -> None:
+    record = make("a", "died")
+    assert to_change(records, None, command="down", died=True).record == record
+    with pytest.raises(ConfigError, match="no run lives"):
+        find(records, None)
+
+
+@pytest.mark.parametrize(
+    ("code", "kind"),
+    [(1, ThrowcollectError), (2, ConfigError), (3, WorkerError), (4, DatasetError), (130, Interrupted)],
+)
+def test_what_a_run_ended_with_is_told_with_its_exit_code(code: int, kind: type, records: Records, make: Make) -> None:
+    make("a", "ended", exit_code=code, failure=Failure("no luck", evidence="none"))
+    error = records.get("a-0123").record.error
+    assert (type(error), error and error.exit_code, str(error)) == (kind, code, "no luck\n  evidence: none")
+    assert error is not None
+    assert (error.message, error.evidence) == ("no luck", "none")
+
+
+def test_a_finished_run_has_no_error(make: Make) -> None:
+    assert make("a", "ended", exit_code=0).error is None
+
+
+def test_only_a_living_run_can_be_changed(records: Records, make: Make) -> None:
+    record = make("a", "lives")
+    assert require_living(find(records, "a")) == record
+    make("b", "ended")
+    with pytest.raises(ConfigError, match="run b-0123 has ended"):
+        require_living(find(records, "b"))
+    make("c", "died")
+    with pytest.raises(WorkerError, match="run c-0123: its launcher died; finished throws are in /"):
+        require_living(find(records, "c"))
+
+
+def test_a_directory_into_which_a_living_run_collects_is_refused(records: Records, make: Make, tmp_path: Path) -> None:
+    make("a", "lives")
+    with pytest.raises(ConfigError, match=r"/a: run a-0123 collects into it\n  try: throwcollect wait --run a-0123"):
+        left_in(records, tmp_path / "a")
+    assert left_in(records, tmp_path / "b") is None
+
+
+@pytest.fixture
+def engine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Engine]:
+    monkeypatch.setenv("DOCKER_HOST", f"unix://{tmp_path}/engine.sock")
+    with engine_at(tmp_path / "engine.sock") as engine:
+        yield engine
+
+
+@pytest.mark.parametrize(
+    ("fields", "nodes", "left"),
+    [
+        ({"runtime": "docker"}, ["router", "coordinator"], True),
+        ({"runtime": "docker"}, ["sim_0"], True),
+        ({"runtime": "docker"}, [], False),
+        ({"runtime": "local"}, ["coordinator"], False),
+        ({"runtime": "docker", "ended": NOW}, ["coordinator"], False),
+        # Its launcher gave up, and could not remove them.
+        ({"runtime": "docker", "ended": NOW, "left": True}, ["sim_0"], True),
+        ({"runtime": "docker", "ended": NOW, "left": True}, [], False),
+    ],
+)
+def test_containers_outlive_their_launcher(
+    fields: dict[str, object],
+    nodes: list[str],
+    left: bool,
+    records: Records,
+    make: Make,
+    tmp_path: Path,
+    engine: Engine,
+) -> None:
+    record = make("a", "died", **fields)
+    for name in nodes:
+        engine.create(f"throwcollect-a-0123-{name}", {RUN_LABEL: "a-0123", NODE_LABEL: name})
+    run = left_in(records, tmp_path / "a")
+    assert (run is not None) == left
+    assert run is None or run.record == record
+
+
+def test_a_directory_into_which_containers_may_still_collect_is_refused_while_the_engine_is_silent(
+    records: Records, make: Make, tmp_path: Path, engine: Engine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    make("a", "died", runtime="docker")
+    engine.withheld = "."
+    monkeypatch.setattr(docker_engine, "PATIENCE_S", 0.1)
+    with pytest.raises(
+        WorkerError, match=r"/a: containers of run a-0123 may still collect into it: .*no answer in time"
+    ):
+        left_in(records, tmp_path / "a")
+
+
+def test_an_engine_that_is_gone_holds_no_containers_that_run(
+    records: Records, make: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    make("a", "died", runtime="docker")
+    monkeypatch.setenv("DOCKER_HOST", f"unix://{tmp_path}/none.sock")
+    assert left_in(records, tmp_path / "a") is None
+
+
+def test_the_record_of_containers_that_are_left_is_kept(records: Records, make: Make) -> None:
+    left = make("a", "ended", age_h=999, ended=NOW - timedelta(hours=999), left=True)
+    make("b", "ended", age_h=999, ended=NOW - timedelta(hours=999))
+    records.new("c").close()
+    assert [(run.record.run, run.status) for run in records.all()] == [(left.run, "abandoned")]
+
+
+def test_the_way_on_after_the_death_of_a_launcher_depends_on_where_the_dataset_is(records: Records, make: Make) -> None:
+    def told(record: Record) -> str:
+        return str(died(records.get(record.run)))
+
+    again = "try: throwcollect resume /b goes on where it ended, or with its containers if they live; throwcollect down"
+    assert again in told(make("a", "died", directory="/b"))
+    assert again in told(make("b", "died", runtime="docker", directory="/b"))
+    assert "resume" not in told(make("c", "died", runtime="docker", volume="v"))
+
+
+def test_an_engine_that_is_not_there_is_not_waited_for(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("DOCKER_HOST", f"unix://{tmp_path}/none.sock")
+    assert held_elsewhere() == {}

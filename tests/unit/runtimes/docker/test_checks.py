@@ -1,0 +1,88 @@
+"""What the machine has of what a configuration asks for; links are followed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+from tests.unit.runtimes.docker.engine import Engine, engine_at
+
+from throwcollect.config.schema import Config
+from throwcollect.errors import ConfigError
+from throwcollect.runtimes.docker import checks as docker_checks
+from throwcollect.runtimes.docker.checks import check
+from throwcollect.runtimes.docker.engine import connect
+from throwcollect.runtimes.docker.options import RunPlace
+
+Check = Callable[..., list[str]]
+
+
+@pytest.fixture
+def engine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Engine]:
+    (tmp_path / "run").mkdir()
+    monkeypatch.setenv("DOCKER_HOST", f"unix://{tmp_path}/run/engine.sock")
+    with engine_at(tmp_path / "run" / "engine.sock") as engine:
+        engine.root = str(tmp_path / "engine")
+        yield engine
+
+
+@pytest.fixture
+def problems(engine: Engine) -> Check:
+    """What is wrong with options of simulations."""
+
+    def problems(**section: object) -> list[str]:
+        config = Config.model_validate({"containers": {"image": "image", "sim": section}})
+        with closing(connect()) as client:
+            try:
+                check(client, RunPlace("run", "/data"), config)
+            except ConfigError as error:
+                return [str(problem).removeprefix("containers.sim.") for problem in error.problems]
+        return []
+
+    return problems
+
+
+def test_data_may_be_mounted(problems: Check, tmp_path: Path) -> None:
+    (tmp_path / "models").mkdir()
+    assert problems(mounts=[f"{tmp_path}/models:/models:ro"]) == []
+
+
+@pytest.mark.parametrize("place", ["/etc", "/var/run", "/usr/share", "/"])
+def test_a_link_to_a_part_of_the_system_is_refused(problems: Check, tmp_path: Path, place: str) -> None:
+    (tmp_path / "link").symlink_to(place)
+    found = problems(mounts=[f"{tmp_path}/link:/x:ro"])
+    assert len(found) == 1
+    assert found[0].startswith(f"mounts.0: {tmp_path}/link, which is {(tmp_path / 'link').resolve()}, is refused, as /")
+
+
+def test_what_belongs_to_the_engine_and_what_holds_it_is_refused(problems: Check, tmp_path: Path) -> None:
+    for name in ("engine/volumes", "keys/.ssh", "other"):
+        (tmp_path / name).mkdir(parents=True)
+    wanted = ["none", "engine", "engine/volumes", "run", "", "keys", "other"]
+    system = f"is refused, as {tmp_path}/{{}} belongs to the system; mounts are for data"
+    assert problems(mounts=[f"{tmp_path}/{name}:/x{index}" for index, name in enumerate(wanted)]) == [
+        f"mounts.0: {tmp_path}/none does not exist on this machine",
+        f"mounts.1: {tmp_path}/engine {system.format('engine')}",
+        f"mounts.2: {tmp_path}/engine/volumes {system.format('engine')}",
+        f"mounts.3: {tmp_path}/run {system.format('run/engine.sock')}",
+        f"mounts.4: {tmp_path} {system.format('engine')}",
+        f"mounts.5: {tmp_path}/keys is refused, as .ssh in it holds secrets; mounts are for data",
+    ]
+
+
+def test_a_device_that_leads_to_another_one_is_refused(
+    problems: Check, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    gpus = tmp_path / "gpus"
+    gpus.mkdir()
+    (gpus / "card0").touch()
+    monkeypatch.setattr(docker_checks, "is_allowed_device", lambda path: path.startswith(str(gpus)))
+    assert docker_checks._wrong_device(gpus) is None
+    (gpus / "disk").symlink_to("/dev/null")
+    assert "leads to other devices" in (docker_checks._wrong_device(gpus) or "")
+    assert "leads to other devices" in (docker_checks._wrong_device(gpus / "disk") or "")
+    assert problems(options={"devices": ["/dev/nvidia99:/dev/nvidia99:rw"]}) == [
+        "options.devices.0: /dev/nvidia99 does not exist on this machine"
+    ]

@@ -1,0 +1,285 @@
+"""The image without an engine: what goes into the build, and what is said when it fails."""
+
+from __future__ import annotations
+
+import io
+import re
+import subprocess
+import tarfile
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from docker.errors import APIError, ImageNotFound
+
+import throwcollect
+from throwcollect.errors import ConfigError, WorkerError
+from throwcollect.runtimes.docker import image
+from throwcollect.runtimes.docker.image import DEFAULT_BASE, build, default_tag, ensure, is_outdated, source_root
+
+ROOT = Path(__file__).parents[4]
+DOCKERFILE = (ROOT / "docker" / "Dockerfile").read_text(encoding="utf-8")
+
+
+class Engine:
+    """Images by name, and the answers to a build; a build that ends well makes the image."""
+
+    def __init__(
+        self, *images: str, registry: tuple[str, ...] = (), answers: list[dict[str, str]] | None = None
+    ) -> None:
+        self.here = set(images)
+        self.registry = registry
+        self.answers = answers or [{"stream": "Step 1/1 : FROM   base\n"}]
+        self.images = self.api = self
+        self.pulled: list[str] = []
+        self.labels: dict[str, str] = {}
+        self.options: dict[str, Any] = {}
+        self.context: dict[str, tarfile.TarInfo] = {}
+
+    def get(self, name: str) -> SimpleNamespace:
+        if name not in self.here:
+            raise ImageNotFound(f"no such image: {name}")
+        return SimpleNamespace(attrs={"Size": 1234}, labels=self.labels)
+
+    def pull(self, name: str) -> None:
+        if name not in self.registry:
+            raise APIError("500 Server Error", explanation="no such host")
+        self.pulled.append(name)
+        self.here.add(name)
+
+    def build(self, fileobj: io.BufferedIOBase, **options: Any) -> Iterator[dict[str, str]]:
+        self.options = options
+        with tarfile.open(fileobj=fileobj) as archive:
+            self.context = {member.name: member for member in archive}
+        yield from self.answers
+        if not any("error" in answer for answer in self.answers):
+            self.here.add(options["tag"])
+
+
+@pytest.fixture
+def said() -> list[str]:
+    return []
+
+
+@pytest.fixture
+def wheelhouse(tmp_path: Path) -> Path:
+    directory = tmp_path / "wheels"
+    directory.mkdir()
+    (directory / "numpy-2.whl").write_bytes(b"")
+    (directory / "made-from.sha256").write_bytes(b"")
+    return directory
+
+
+def test_the_default_base_is_that_of_the_dockerfile() -> None:
+    assert re.findall(r"^ARG BASE_IMAGE=(.*)$", DOCKERFILE, re.MULTILINE) == [DEFAULT_BASE]
+
+
+def test_the_target_and_the_arguments_are_those_of_the_dockerfile(said: list[str]) -> None:
+    engine = Engine("base")
+    build(engine, "mine", base="base", say=said.append)
+    assert f" AS {engine.options['target']}\n" in DOCKERFILE
+    # The base of the target with ROS is for those who build that.
+    declared = set(re.findall(r"^ARG (\w+)", DOCKERFILE, re.MULTILINE)) - {"ROS_IMAGE"}
+    assert set(engine.options["buildargs"]) == declared
+    assert engine.options["buildargs"]["VERSION"] == throwcollect.__version__
+
+
+def test_the_context_is_what_the_dockerfile_copies_and_nothing_else(said: list[str], wheelhouse: Path) -> None:
+    engine = Engine("base")
+    build(engine, "mine", base="base", wheelhouse=wheelhouse, say=said.append)
+    copied = [
+        name for line in re.findall(r"^COPY (?!--from)(.*) \S+$", DOCKERFILE, re.MULTILINE) for name in line.split()
+    ]
+    for source in copied:
+        assert any(name.startswith(source.removesuffix("*")) for name in engine.context), source
+    files = {name for name, member in engine.context.items() if member.isfile()}
+    assert {name for name in files if name.startswith("docker/wheelhouse/")} == {"docker/wheelhouse/numpy-2.whl"}
+    above = {"configs", "docker", "packaging", "pyproject.toml", "README.md", "src"}
+    assert {name.partition("/")[0] for name in files} == above
+    assert not [name for name in files if "__pycache__" in name or ".egg-info" in name]
+    assert {member.uid for member in engine.context.values()} == {0}
+
+
+def test_each_step_is_one_line_and_the_size_is_returned(said: list[str]) -> None:
+    output = [{"stream": "Step 1/2 : RUN a  \\\n"}, {"stream": " ---> Running in 1\n"}, {"stream": "noise\n"}]
+    engine = Engine("base", answers=[*output, {"stream": "Step 2/2 : RUN " + 200 * "b" + "\n"}])
+    assert build(engine, "mine", base="base", say=said.append) == 1234
+    assert said[0] == "step 1/2: RUN a \\"
+    assert [line[:9] for line in said] == ["step 1/2:", "step 2/2:"]
+    assert max(map(len, said)) < 120
+
+
+def test_a_step_that_fails_brings_the_end_of_its_output_without_colours(said: list[str]) -> None:
+    output = [{"stream": f"\x1b[91mline {number}\n\x1b[0m"} for number in range(100)]
+    engine = Engine("base", answers=[*output, {"stream": "Removing intermediate container 1\n"}, {"error": "code: 1"}])
+    with pytest.raises(WorkerError, match="mine: cannot be built: code: 1") as caught:
+        build(engine, "mine", base="base", say=said.append)
+    assert caught.value.evidence is not None
+    assert caught.value.evidence.splitlines()[-1] == "line 99"
+    assert "line 0" not in caught.value.evidence.splitlines()
+
+
+def test_a_wheel_that_is_missing_is_named_together_with_the_place_that_lacks_it(
+    said: list[str], wheelhouse: Path
+) -> None:
+    answers = [{"stream": "ERROR: No matching distribution found for scipy>=1.11\n"}, {"error": "code: 1"}]
+    with pytest.raises(WorkerError, match=rf"{wheelhouse} lacks scipy>=1.11") as caught:
+        build(Engine("base", answers=answers), "mine", base="base", wheelhouse=wheelhouse, say=said.append)
+    assert caught.value.hint == f"python docker/wheelhouse.py {wheelhouse}"
+    with pytest.raises(WorkerError, match=r"the package index gives no scipy>=1.11") as caught:
+        build(Engine("base", answers=answers), "mine", base="base", say=said.append)
+    assert caught.value.hint is not None
+    assert "--wheelhouse DIR" in caught.value.hint
+
+
+@pytest.mark.parametrize("exists", [True, False])
+def test_a_wheelhouse_without_wheels_is_refused_before_anything_is_built(
+    said: list[str], tmp_path: Path, exists: bool
+) -> None:
+    engine = Engine("base")
+    with pytest.raises(ConfigError, match="holds no wheels"):
+        build(engine, "mine", base="base", wheelhouse=tmp_path if exists else tmp_path / "none", say=said.append)
+    assert not engine.options
+
+
+def test_a_base_image_that_is_missing_is_pulled(said: list[str]) -> None:
+    engine = Engine(registry=("base",))
+    build(engine, "mine", base="base", say=said.append)
+    assert engine.pulled == ["base"]
+    assert said[0] == "pulling base"
+
+
+def test_a_base_image_that_cannot_be_had_is_named_with_a_way_out(said: list[str]) -> None:
+    with pytest.raises(WorkerError, match="base image base is not here and cannot be pulled: no such host") as caught:
+        build(Engine(), "mine", base="base", say=said.append)
+    assert caught.value.hint is not None
+    assert "--base" in caught.value.hint
+
+
+def test_a_package_outside_a_clone_cannot_be_built_from(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr("throwcollect.runtimes.docker.image._PACKAGE", tmp_path / "lib" / "throwcollect")
+    with pytest.raises(ConfigError, match="is not in a clone of the project"):
+        source_root()
+
+
+def test_an_image_that_is_there_is_neither_built_nor_pulled(said: list[str]) -> None:
+    engine = Engine("mine")
+    ensure(engine, "mine", say=said.append)
+    assert (engine.options, engine.pulled, said) == ({}, [], [])
+
+
+def test_the_default_image_is_built_when_it_is_missing_after_one_line_that_says_so(said: list[str]) -> None:
+    engine = Engine(DEFAULT_BASE)
+    ensure(engine, default_tag(), say=said.append)
+    assert engine.options["tag"] == default_tag()
+    assert len(said) == 1
+    assert default_tag() in said[0]
+
+
+def test_any_other_image_is_pulled_when_it_is_missing(said: list[str]) -> None:
+    engine = Engine(registry=("lab/throws:2",))
+    ensure(engine, "lab/throws:2", say=said.append)
+    assert engine.pulled == ["lab/throws:2"]
+    assert said == ["image lab/throws:2 is not here; pulling it"]
+
+
+def test_an_image_that_cannot_be_pulled_is_an_error_of_the_runtime(said: list[str]) -> None:
+    with pytest.raises(WorkerError, match="lab/throws:2 is not here and cannot be pulled: no such host"):
+        ensure(Engine(), "lab/throws:2", say=said.append)
+
+
+def test_without_a_clone_the_default_image_cannot_be_had(
+    monkeypatch: pytest.MonkeyPatch, said: list[str], tmp_path: Path
+) -> None:
+    monkeypatch.setattr("throwcollect.runtimes.docker.image._PACKAGE", tmp_path / "lib" / "throwcollect")
+    with pytest.raises(WorkerError, match=f"{default_tag()} is not here and cannot be built: .* not in a clone"):
+        ensure(Engine(), default_tag(), say=said.append)
+
+
+def git(root: Path, *arguments: str) -> str:
+    identity = ["-c", "user.name=t", "-c", "user.email=t@example.org"]
+    return subprocess.run(["git", "-C", root, *identity, *arguments], check=True, capture_output=True, text=True).stdout
+
+
+def test_the_revision_is_the_commit_and_says_when_files_differ_from_it(tmp_path: Path) -> None:
+    assert image._revision(tmp_path) is None
+    git(tmp_path, "init", "-q")
+    (tmp_path / "pyproject.toml").write_text("")
+    git(tmp_path, "add", ".")
+    git(tmp_path, "commit", "-qm", "first")
+    commit = git(tmp_path, "rev-parse", "HEAD").strip()
+    assert image._revision(tmp_path) == commit
+    (tmp_path / "notes").write_text("not part of the image")
+    assert image._revision(tmp_path) == commit
+    (tmp_path / "src").mkdir()
+    (tmp_path / "src" / "new.py").write_text("")
+    assert image._revision(tmp_path) == f"{commit}-dirty"
+
+
+@pytest.mark.parametrize(
+    ("origin", "address"),
+    [
+        ("https://me:token@example.org/lab/throws.git", "https://example.org/lab/throws.git"),
+        ("https://example.org/lab/throws.git?token=1#x", "https://example.org/lab/throws.git"),
+        ("ssh://git@example.org:2222/lab/throws.git", "ssh://example.org:2222/lab/throws.git"),
+        ("git@example.org:lab/throws.git", "ssh://example.org/lab/throws.git"),
+        # Nobody else can do anything with a place on this machine.
+        ("/work/throws.git", None),
+        ("../throws", None),
+        ("file:///work/throws.git", None),
+        (None, None),
+    ],
+)
+def test_the_source_is_an_address_for_others_without_what_is_secret_in_it(
+    tmp_path: Path, origin: str | None, address: str | None
+) -> None:
+    assert image._address(tmp_path) is None
+    git(tmp_path, "init", "-q")
+    if origin is not None:
+        git(tmp_path, "remote", "add", "origin", origin)
+    assert image._address(tmp_path) == address
+
+
+def test_an_image_without_an_address_has_no_such_label(said: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    for address, labels in (("https://example.org/x", {image.SOURCE_LABEL: "https://example.org/x"}), (None, {})):
+        monkeypatch.setattr(image, "_address", lambda _, address=address: address)
+        engine = Engine("base")
+        build(engine, "mine", base="base", say=said.append)
+        assert engine.options["labels"] == labels
+
+
+def test_every_build_in_the_documents_names_the_target() -> None:
+    pages = [ROOT / "README.md", *(ROOT / "docs").glob("*.md")]
+    text = "\n".join(page.read_text(encoding="utf-8") for page in pages)
+    builds = re.findall(r"docker build [^`\n]*(?:\n[^`\n]*)?", text)
+    assert builds
+    # The last stage of the file is the one with ROS.
+    assert not [build for build in builds if "--target" not in build]
+
+
+def test_an_image_is_outdated_if_its_label_names_other_sources_than_those_of_the_clone(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    engine = Engine("base")
+    build(engine, "mine", base="base", say=lambda _line: None)
+    own = engine.options["buildargs"]["SOURCES"]
+    for labels, outdated in (({}, False), ("unknown", False), (own, False), ("0" * 64, True)):
+        engine.labels = labels and {image.SOURCES_LABEL: labels}
+        assert is_outdated(engine, "mine") == outdated
+    monkeypatch.setattr("throwcollect.runtimes.docker.image._PACKAGE", tmp_path / "lib" / "throwcollect")
+    assert not is_outdated(engine, "mine")
+
+
+def test_whatever_is_installed_changes_the_label_of_the_sources(said: list[str], tmp_path: Path) -> None:
+    (tmp_path / "src" / "__pycache__").mkdir(parents=True)
+    changes = {"pyproject.toml": "a", "src/a.py": "a", "src/b.py": "a", "src/__pycache__/a.pyc": "a"}
+    for name, content in changes.items():
+        (tmp_path / name).write_text(content)
+    digests = [image._digest_of(tmp_path)]
+    for name in changes:
+        (tmp_path / name).write_text("b")
+        digests.append(image._digest_of(tmp_path))
+    assert len(set(digests)) == 4
+    assert digests[-1] == digests[-2]

@@ -1,0 +1,31 @@
+import pytest
+
+from throwcollect.runtimes.docker.containers import end_in_words
+from throwcollect.runtimes.docker.watch import ContainerState
+
+
+@pytest.mark.parametrize(
+    ("state", "memory", "words"),
+    [
+        (ContainerState("exited", 3), None, "exit code 3"),
+        (ContainerState("exited", 0), None, "exit code 0"),
+        (ContainerState("exited", 137), "512m", "ended by SIGKILL"),
+        (ContainerState("exited", 139), None, "ended by SIGSEGV"),
+        (ContainerState("exited", 137, out_of_memory=True), "512m", "ran out of memory (limit 512m)"),
+        (ContainerState("exited", 137, out_of_memory=True), None, "ran out of memory"),
+        # Of its processes another one was ended.
+        (ContainerState("exited", 5, out_of_memory=True), "512m", "exit code 5"),
+        # What our own commands exit with after an interruption.
+        (ContainerState("exited", 130), None, "exit code 130"),
+        (ContainerState("exited", 255), None, "exit code 255"),
+        (ContainerState("removed"), None, "its container was removed"),
+    ],
+)
+def test_ends_are_told_in_words(state: ContainerState, memory: str | None, words: str) -> None:
+    assert state.ended
+    assert end_in_words(state, memory) == words
+
+
+@pytest.mark.parametrize("status", ["created", "running", "paused", "restarting"])
+def test_what_may_run_on_has_not_ended(status: str) -> None:
+    assert not ContainerState(status).ended

@@ -1,0 +1,138 @@
+"""Runs in one process: the dataset of a run with nodes, and every way to its end."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from throwcollect import load, runs
+from throwcollect.coordinator.progress import Progress
+from throwcollect.dataset.inspect import digest, info
+from throwcollect.errors import Interrupted, WorkerError
+from throwcollect.replay.throw import Replayer
+from throwcollect.runs.records import STATE_VARIABLE, Records
+from throwcollect.simulator import Simulator
+
+YAML = """\
+name: small
+trials: 3
+seed: 7
+run: {runtime: inprocess, replay: 0}
+sweep: {sampler: uniform, parameters: {task.duration_s: {min: 1.0, max: 1.2}}}
+"""
+
+
+class Onlooker(runs.Onlooker):
+    """Remembers what it is told."""
+
+    def __init__(self) -> None:
+        self.reports: list[Progress] = []
+        self.warnings: list[str] = []
+
+    def update(self, progress: Progress) -> None:
+        self.reports.append(progress)
+
+    def warn(self, line: str) -> None:
+        self.warnings.append(line)
+
+
+@pytest.fixture
+def yaml(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "state"))
+    (tmp_path / "small.yaml").write_text(YAML)
+    return tmp_path / "small.yaml"
+
+
+def collect(
+    yaml: Path, *overrides: str, onlooker: runs.Onlooker | None = None, interruptions: Callable[[], int] = lambda: 0
+) -> runs.Summary:
+    output = yaml.parent / "data"
+    with runs.prepare(yaml, output=output, overrides=overrides, onlooker=onlooker or Onlooker()) as run:
+        return run.collect(interruptions=interruptions)
+
+
+def test_the_episodes_are_those_of_the_plan_and_the_environment_stays(yaml: Path) -> None:
+    before = dict(os.environ)
+    onlooker = Onlooker()
+    summary = collect(yaml, onlooker=onlooker)
+    assert dict(os.environ) == before
+    assert (summary.episodes, summary.digest) == (3, digest(yaml.parent / "data"))
+    with Simulator(yaml) as simulator:
+        for throw in load(yaml.parent / "data"):
+            again = simulator.throw({"task.duration_s": throw.row["task.duration_s"]}, trial=throw.trial)
+            assert throw.row["digest"] == again.row["digest"]
+    assert onlooker.reports[-1].ended == 3
+    assert onlooker.warnings == []
+
+
+def test_the_record_and_the_events_tell_of_it(yaml: Path) -> None:
+    summary = collect(yaml)
+    run = runs.find(yaml.parent / "data")
+    assert (run.status, run.record.runtime, run.record.simulations) == ("ended", "inprocess", 1)
+    assert (run.record.summary, run.record.error, run.record.trials_ended) == (summary, None, 3)
+    assert runs.wait(run) == summary
+    events = [json.loads(line) for line in (yaml.parent / "data" / "logs" / "events.jsonl").read_text().splitlines()]
+    assert [(each.get("node"), each["event"]) for each in events] == [
+        (None, "started"),
+        ("sim_0", "started"),
+        ("coordinator", "started"),
+        (None, "finished"),
+    ]
+
+
+def test_what_is_interrupted_goes_on_later_to_the_same_dataset(yaml: Path) -> None:
+    reports: list[Progress] = []
+
+    class Impatient(Onlooker):
+        def update(self, progress: Progress) -> None:
+            reports.append(progress)
+
+    with pytest.raises(Interrupted, match=r"finished throws are in .*/data, the dataset is not complete") as caught:
+        collect(yaml, onlooker=Impatient(), interruptions=lambda: len(reports))
+    assert caught.value.hint == f"throwcollect resume {yaml.parent / 'data'}"
+    assert 0 < reports[-1].ended < 3
+    assert not (yaml.parent / "data" / "metadata.yaml").exists()
+    resumed = runs.resume(yaml.parent / "data")
+    assert resumed is not None
+    with resumed as run:
+        summary = run.collect()
+    (yaml.parent / "other").mkdir()
+    (yaml.parent / "other" / "small.yaml").write_text(YAML)
+    assert collect(yaml.parent / "other" / "small.yaml").digest == summary.digest
+    assert runs.resume(yaml.parent / "data") is None
+
+
+def test_a_plan_grows_with_what_came_of_it(yaml: Path) -> None:
+    summary = collect(yaml, "until.landed=4", "trials=8")
+    assert summary.outcomes["landed"] >= 4
+
+
+def test_a_trial_that_is_refused_again_and_again_is_lost_with_the_reason(
+    yaml: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    simulate = Replayer.delivery
+
+    def delivery(self: Replayer, trial: object) -> object:
+        if trial.number == 1:  # type: ignore[attr-defined]
+            raise WorkerError("no luck")
+        return simulate(self, trial)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(Replayer, "delivery", delivery)
+    onlooker = Onlooker()
+    summary = collect(yaml, "run.retries=1", onlooker=onlooker)
+    assert summary.outcomes == {"landed": 2, "lost": 1}
+    assert info(yaml.parent / "data").outcomes["lost"] == 1
+    assert onlooker.warnings == ["sim_0: trial 1 is given to another simulation: no luck"] * 2
+    assert runs.find(yaml.parent / "data").record.exit_code == 5
+
+
+def test_a_run_that_is_prepared_and_not_launched_leaves_nothing(yaml: Path) -> None:
+    with runs.prepare(yaml, output=yaml.parent / "data") as run:
+        assert (yaml.parent / "data" / "plan.parquet").exists()
+        assert Records().ids() == [run.record.run]
+    assert not (yaml.parent / "data").exists()
+    assert Records().ids() == []

@@ -1,0 +1,123 @@
+import signal
+import socket
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import psutil
+import pytest
+
+from throwcollect.config.schema import Config
+from throwcollect.errors import ConfigError, WorkerError
+from throwcollect.ros.middleware import Middleware
+from throwcollect.run_key import RunKey
+from throwcollect.runtimes.local import LocalNodes
+from throwcollect.runtimes.nodes import NodeExit, NodeSpec, Role
+from throwcollect.runtimes.runtime import Place
+
+
+def nodes(directory: Path, **run: object) -> LocalNodes:
+    place = Place("run", directory, None, directory / "logs", 1, Middleware(), RunKey(directory / "key"))
+    return LocalNodes(place, Config.model_validate({"run": run}))
+
+
+def node(code: str, name: str = "node") -> NodeSpec:
+    return NodeSpec(name, (code,), Role.WORKER)
+
+
+@pytest.fixture
+def runtime(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[LocalNodes]:
+    """A runtime whose nodes are small scripts: the first argument is run instead of a command."""
+    package = tmp_path / "fake" / "throwcollect"
+    package.mkdir(parents=True)
+    (package / "__init__.py").write_text("")
+    (package / "__main__.py").write_text("import sys\nexec(sys.argv[1])\n")
+    monkeypatch.chdir(tmp_path / "fake")
+    monkeypatch.setenv("ANSWER", "42")
+    local = nodes(tmp_path, domain_id=7)
+    yield local
+    local.stop(local.running(), grace_s=0.0)
+    local.close()
+
+
+def until(condition: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + 20
+    while not condition():
+        assert time.monotonic() < deadline, "did not happen"
+        time.sleep(0.01)
+
+
+def ended(runtime: LocalNodes) -> NodeExit:
+    found: list[NodeExit] = []
+    until(lambda: bool(found.extend(runtime.exits()) or found))
+    return found[0]
+
+
+def test_a_node_that_ends_is_reported_once_with_its_code_and_last_lines(runtime: LocalNodes) -> None:
+    runtime.start(
+        node("import os; print(*range(50), os.environ['ANSWER'], os.environ['ROS_DOMAIN_ID'], sep='\\n'); sys.exit(7)")
+    )
+    assert runtime.running() == ("node",)
+    end = ended(runtime)
+    assert (end.name, end.code, end.reason) == ("node", 7, "exit code 7")
+    assert end.log.splitlines() == [*map(str, range(12, 50)), "42", "7"]
+    assert (runtime.exits(), runtime.running()) == ([], ())
+
+
+def test_a_signal_is_named(runtime: LocalNodes) -> None:
+    runtime.start(node("import time; time.sleep(60)"))
+    runtime.signal("node", signal.SIGKILL)
+    assert ended(runtime).reason == "ended by SIGKILL"
+    runtime.signal("node", signal.SIGKILL)  # gone, so left alone
+
+
+def test_what_a_node_has_said_outlives_it(runtime: LocalNodes) -> None:
+    assert not runtime.ready("node")
+    runtime.start(node("print('node is ready', flush=True); import time; time.sleep(60)"))
+    until(lambda: runtime.ready("node"))
+    runtime.signal("node", signal.SIGTERM)
+    ended(runtime)
+    assert runtime.ready("node")
+    assert runtime.log_tail("node") == "node is ready"
+
+
+def test_a_node_that_is_stopped_in_its_tracks_is_frozen(runtime: LocalNodes) -> None:
+    runtime.start(node("import time; time.sleep(60)"))
+    assert runtime.frozen() == frozenset()
+    runtime.signal("node", signal.SIGSTOP)
+    until(lambda: runtime.frozen() == {"node"})
+    runtime.signal("node", signal.SIGCONT)
+    until(lambda: not runtime.frozen())
+
+
+def test_a_node_that_ignores_requests_is_ended_by_force(runtime: LocalNodes) -> None:
+    deaf = "import signal, time; signal.signal(signal.SIGTERM, signal.SIG_IGN); print('deaf', flush=True)"
+    runtime.start(node(f"{deaf}; time.sleep(60)"))
+    until(lambda: runtime.log_tail("node") == "deaf")
+    process = psutil.Process(int(runtime.handle("node") or 0))
+    runtime.stop(["node"], grace_s=0.1)
+    assert not process.is_running()
+    assert (runtime.running(), runtime.handle("node")) == ((), None)
+
+
+def test_a_log_that_cannot_be_written_is_an_error(tmp_path: Path) -> None:
+    (tmp_path / "logs").write_text("a file")
+    with pytest.raises(WorkerError, match=r"node: cannot be started: .*File exists"):
+        nodes(tmp_path).start(node(""))
+
+
+def test_a_busy_port_is_refused_with_a_way_out(tmp_path: Path) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        with pytest.raises(ConfigError, match=f"run.router_port: port {port} of 127.0.0.1 cannot be used") as caught:
+            nodes(tmp_path, router_port=port)
+    assert caught.value.hint == "--set run.router_port=0 takes a free one"
+
+
+def test_the_port_is_kept_until_the_router_needs_it(runtime: LocalNodes) -> None:
+    host, port = runtime.router_address()
+    with socket.socket() as other, pytest.raises(OSError, match="Address already in use"):
+        other.bind((host, port))
+    runtime.start(node(f"import socket; socket.create_server(('{host}', {port})); print('bound')", "router"))
+    ended(runtime)
+    assert runtime.log_tail("router") == "bound"

@@ -1,0 +1,35 @@
+from types import SimpleNamespace
+from unittest.mock import Mock
+
+import pytest
+
+from throwcollect.coordinator.progress import Progress
+from throwcollect.errors import WorkerError
+from throwcollect.runtimes import node_collection
+from throwcollect.runtimes.node_collection import NodeCollection
+from throwcollect.runtimes.runtime import NodeState
+
+BLIND = Progress(total=4, ended=0, outcomes={}, simulations=0, throws_per_s=0.0, hung=[])
+
+
+def test_nodes_that_are_started_again_have_as_much_time_to_meet_as_before(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = [0.0]
+    monkeypatch.setattr(node_collection.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(node_collection, "Supervisor", Mock())
+    monkeypatch.setattr(node_collection, "RunListener", Mock())
+    monkeypatch.setattr(node_collection, "roster", Mock())
+    place = SimpleNamespace(simulations=1, middleware=SimpleNamespace(rmw="rmw_fastrtps_cpp"))
+    host = SimpleNamespace(place=place, config=SimpleNamespace(run=None), connection=None)
+    session = Mock()
+    collection = NodeCollection(host, session)
+    supervisor = collection._supervisor
+    supervisor.states.return_value = [NodeState("sim_0", "running", 0, "1", None)]
+    for now[0] in (0.0, 11.0, 13.0):
+        collection._report(BLIND)
+    assert "started again" in session.warn.call_args.args[0]
+    # The coordinator was started again, too, so the next report is late, and finds simulations that are ready.
+    for now[0] in (23.0, 34.0):
+        collection._report(BLIND)
+    now[0] = 36.0
+    with pytest.raises(WorkerError, match="for 12 s, twice"):
+        collection._report(BLIND)

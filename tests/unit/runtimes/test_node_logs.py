@@ -1,0 +1,59 @@
+import shutil
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from throwcollect.runtimes.node_logs import NodeLogs, Tail
+
+
+@pytest.mark.parametrize(("printed", "before"), [("", ""), ("at work\n", "at work\n")])
+def test_a_log_that_a_full_disk_has_cut_off_ends_with_the_reason(
+    printed: str, before: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    logs = NodeLogs(tmp_path)
+    logs.path("sim_0").write_text(printed)
+    assert logs.tail("sim_0") == printed.strip()
+    monkeypatch.setattr(shutil, "disk_usage", lambda path: SimpleNamespace(free=512) if path == tmp_path else None)
+    assert logs.tail("sim_0") == (f"{before}the disk of {tmp_path} is full: 512 bytes are free; free space, and resume")
+
+
+def test_a_node_without_a_log_has_said_nothing(tmp_path: Path) -> None:
+    assert NodeLogs(tmp_path / "none").tail("sim_0") == ""
+
+
+def append(path: Path, data: bytes) -> None:
+    with path.open("ab") as file:
+        file.write(data)
+
+
+def test_lines_come_once_and_whole(tmp_path: Path) -> None:
+    path = tmp_path / "sim_0.log"
+    tail = Tail(path)
+    assert list(tail.lines()) == []
+    append(path, b"one\ntw")
+    assert list(tail.lines()) == ["one"]
+    assert list(tail.lines()) == []
+    append(path, b"o\n\nthr\xffee")
+    assert list(tail.lines()) == ["two", ""]
+    assert list(tail.lines(torn=True)) == ["thr\ufffdee"]
+    assert list(tail.lines(torn=True)) == []
+
+
+def test_what_is_there_can_be_skipped(tmp_path: Path) -> None:
+    path = tmp_path / "sim_0.log"
+    Tail(path).skip()
+    append(path, b"old\n")
+    tail = Tail(path)
+    tail.skip()
+    append(path, b"new\n")
+    assert list(tail.lines()) == ["new"]
+
+
+def test_logs_come_in_the_order_in_which_nodes_are_started(tmp_path: Path) -> None:
+    names = ["launcher", "router", "coordinator", "sim_0", "sim_2", "sim_10"]
+    for name in reversed(names):
+        (tmp_path / f"{name}.log").touch()
+    (tmp_path / "events.jsonl").touch()
+    assert list(NodeLogs(tmp_path).files()) == names
+    assert NodeLogs(tmp_path / "none").files() == {}

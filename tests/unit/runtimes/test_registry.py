@@ -1,0 +1,99 @@
+"""The table of runtimes, and what each member promises."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from throwcollect import extras
+from throwcollect.config.loader import load
+from throwcollect.config.schema import Config
+from throwcollect.errors import ConfigError
+from throwcollect.extras import MissingExtraError
+from throwcollect.ros.middleware import Middleware
+from throwcollect.run_key import RunKey
+from throwcollect.runs.choice import choose
+from throwcollect.runtimes.registry import AUTOMATIC, get_runtime, runtime_names
+from throwcollect.runtimes.runtime import Host, Place, Runtime
+
+
+class Cluster(Runtime):
+    """A runtime of somebody else's."""
+
+    def in_words(self, config: Config) -> str:
+        return "a cluster"
+
+    def host(self, place: Place, config: Config, *, warn: Callable[[str], None]) -> Host:
+        raise ConfigError("no cluster here")
+
+
+@pytest.fixture
+def added(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A package that adds the runtime `cluster`, as pip would have installed it."""
+    package = tmp_path / "cluster-1.0.dist-info"
+    package.mkdir()
+    (package / "METADATA").write_text("Metadata-Version: 2.1\nName: cluster\nVersion: 1.0\n")
+    (package / "entry_points.txt").write_text(f"[throwcollect.runtimes]\ncluster = {__name__}:Cluster\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    importlib.invalidate_caches()
+
+
+def test_the_table_has_the_runtimes_of_the_configuration() -> None:
+    assert runtime_names() == ["docker", "local", "inprocess"]
+    assert set(AUTOMATIC) < set(runtime_names())
+    for name in runtime_names():
+        assert Config.model_validate({"run": {"runtime": name}}).run.runtime == name
+
+
+@pytest.mark.parametrize("name", ["docker", "local", "inprocess"])
+def test_a_member_says_what_it_is_and_holds_nothing_of_a_run_that_never_was(
+    name: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("DOCKER_HOST", f"unix://{tmp_path}/none.sock")
+    member = get_runtime(name)
+    assert member.in_words(Config())
+    assert member.simulations(Config()) in (1, Config().run.simulations)
+    assert member.held() == []
+    assert member.is_left("never-0000") is False
+    assert member.outlives_launcher == (name == "docker")
+
+
+@pytest.mark.parametrize("name", ["local", "inprocess"])
+def test_a_host_that_was_never_used_leaves_nothing(name: str, tmp_path: Path) -> None:
+    place = Place("run", tmp_path, None, tmp_path / "logs", 1, Middleware(), RunKey(tmp_path / "key"))
+    host = get_runtime(name).host(place, Config(), warn=print)
+    host.close()
+    assert host.cleared
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_package_of_somebody_else_adds_a_runtime(added: None, tmp_path: Path) -> None:
+    (tmp_path / "far.yaml").write_text("name: far\nrun: {runtime: cluster}\n")
+    config = load(tmp_path / "far.yaml")
+    said: list[str] = []
+    assert choose(config, say=said.append, warn=said.append).name == "cluster"
+    assert said == ["runtime: a cluster"]
+    assert type(get_runtime("cluster")).__name__ == "Cluster"
+
+
+def test_a_runtime_that_is_not_there_is_refused_with_those_that_are(tmp_path: Path) -> None:
+    (tmp_path / "far.yaml").write_text("name: far\nrun: {runtime: cluster}\n")
+    with pytest.raises(ConfigError, match=r"far.yaml:2: run.runtime: .*'inprocess', got 'cluster'"):
+        load(tmp_path / "far.yaml")
+    with pytest.raises(ConfigError, match="there is no runtime cluster\n  expected: docker, local or inprocess"):
+        get_runtime("cluster")
+
+
+@pytest.mark.parametrize("name", ["local", "inprocess"])
+def test_simulations_on_this_python_need_its_engine_before_anything_starts(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(extras, "is_installed", lambda package: package != "pybullet")
+    middleware = Middleware("embedded", "zenoh")
+    bullet, ballistic = Config(), Config.model_validate({"sim": {"engine": "ballistic"}})
+    with pytest.raises(MissingExtraError, match="pybullet"):
+        get_runtime(name).prepare(bullet, middleware, say=print, warn=print)
+    assert get_runtime(name).prepare(ballistic, middleware, say=print, warn=print) is middleware
