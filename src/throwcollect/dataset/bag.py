@@ -16,11 +16,11 @@ from ruamel.yaml.composer import Composer, ComposerError
 from ruamel.yaml.error import YAMLError
 from ruamel.yaml.events import AliasEvent
 
-from throwcollect.dataset.directory import FORMAT
+from rclzenoh.interfaces import type_hash
+from throwcollect.dataset.directory import FORMAT, METADATA, PLAN
 from throwcollect.episode.channels import Channel
 from throwcollect.errors import DatasetError
 from throwcollect.files import read_text
-from throwcollect.interfaces import type_hash
 
 VERSION = 9
 _MOST_BYTES = 10_000_000
@@ -132,10 +132,27 @@ def from_yaml(path: Path) -> Mapping[str, Any]:
     try:
         document = yaml.load(text)
     except RecursionError as error:
-        raise DatasetError(f"{path}: cannot be read: values are nested too deeply") from error
+        raise DatasetError("cannot be read: values are nested too deeply", path=path) from error
     except (YAMLError, ValueError) as error:
-        raise DatasetError(f"{path}: cannot be read: {error}") from error
+        raise DatasetError(f"cannot be read: {error}", path=path) from error
     return document if isinstance(document, dict) else {}
+
+
+def read_bag_metadata(directory: Path) -> Mapping[str, Any]:
+    """Fields of the rosbag2 metadata of a finished dataset.
+
+    Raises:
+        DatasetError: If the directory holds no dataset or an unfinished one, or ``metadata.yaml`` is damaged.
+    """
+    path = directory / METADATA
+    if not path.exists():
+        if (directory / PLAN).is_file():
+            raise DatasetError(f"the dataset is not finished: it has no {METADATA}", path=directory)
+        raise DatasetError("holds no dataset", path=directory)
+    bag = from_yaml(path).get("rosbag2_bagfile_information")
+    if not isinstance(bag, dict):
+        raise DatasetError("not the metadata of a rosbag2 bag", path=path)
+    return bag
 
 
 def to_yaml(data: Mapping[str, Any]) -> str:

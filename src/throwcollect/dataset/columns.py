@@ -14,18 +14,19 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.dataset.mcap_reader import McapContents, opened
+from throwcollect.dataset.mcap_reader import McapContents, open_mcap
 from throwcollect.episode.chunk import CHUNK_HEADER_BYTES, Chunk
-from throwcollect.episode.record import EpisodeHeader
+from throwcollect.episode.message import Episode
+from throwcollect.episode.record import NS_PER_S
 from throwcollect.episode.topics import rotate
 from throwcollect.episode.trajectory_rows import (
     BALL_ORIENTATION,
     BALL_VELOCITIES,
     STAMPS,
-    as_bytes,
-    places,
+    column_widths,
     to_nanoseconds,
     trajectory_rows,
+    view_as_bytes,
 )
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.robots.talos import JOINTS
@@ -46,7 +47,6 @@ Column = NDArray[Any]
 """float64, or int64 for stamps."""
 
 _LARGE_BYTES = 4 << 20
-_NS_PER_S = 1_000_000_000
 
 
 class Recorded(Protocol):
@@ -60,23 +60,23 @@ class Recorded(Protocol):
     def samples(self) -> int:
         """Number of samples."""
 
+    def read(self) -> Episode:
+        """The episode.
+
+        Raises:
+            DatasetError: If it is not where it should be, or its records are damaged; the samples are not looked at.
+        """
+
     def read_rows(self) -> NDArray[np.void]:
-        """The rows of the episode; see `trajectory_rows`.
+        """The rows of its samples; see `trajectory_rows`.
 
         Raises:
             DatasetError: If the episode is not where it should be, or its chunk is damaged.
         """
 
-    def read_header(self) -> EpisodeHeader:
-        """What is known of the episode besides its samples.
-
-        Raises:
-            DatasetError: If the episode is not where it should be, or it is damaged.
-        """
-
 
 @dataclass(frozen=True)
-class Place:
+class StoredThrow:
     """Where the episode of a throw lies in a file.
 
     Attributes:
@@ -93,17 +93,24 @@ class Place:
     offset: int
     samples: int
 
+    def read(self) -> Episode:
+        """The episode, from its file; see `Recorded`."""
+        with open_mcap(self.path) as contents:
+            try:
+                episode = contents.episode(self.offset).episode
+            except DatasetError as error:
+                raise error.located(self.path) from error
+        if (found := episode.header.trial) != self.trial:
+            expected = f"trial {self.trial}"
+            raise DatasetError(f"trial {found}", path=self.path, place=f"byte {self.offset}", expected=expected)
+        return episode
+
     def read_rows(self) -> NDArray[np.void]:
-        """The rows of the episode, from its file; see `Recorded`."""
-        (rows,) = stored_rows([self])
+        """The rows of its samples, from its file; see `Recorded`."""
+        (rows,) = read_stored_rows([self])
         return rows
 
-    def read_header(self) -> EpisodeHeader:
-        """What is known of the episode besides its samples, from its file; see `Recorded`."""
-        with opened(self.path) as contents:
-            return contents.episode(self.offset).episode.header
-
-    def rows(self, contents: McapContents) -> NDArray[np.void]:
+    def rows_in(self, contents: McapContents) -> NDArray[np.void]:
         """The rows of the episode; see `trajectory_rows`.
 
         Args:
@@ -121,7 +128,7 @@ class Place:
                 )
             return trajectory_rows(chunk.decompress(), self.samples)
         except DatasetError as error:
-            raise DatasetError(f"{self.path}: byte {self.offset}: {error}") from error
+            raise error.located(self.path, f"byte {self.offset}") from error
 
 
 def check_columns(columns: Sequence[str], joints: Sequence[str]) -> None:
@@ -146,7 +153,7 @@ def empty_columns(columns: Iterable[str], samples: int, joints: Sequence[str] = 
         samples: Number of samples.
         joints: Joints that the columns of joints have.
     """
-    shapes = {name: (samples, place.width) if place.width else (samples,) for name, place in places().items()}
+    shapes = {name: (samples, width) if width else (samples,) for name, width in column_widths().items()}
     shapes |= {TIMES: (samples,), **dict.fromkeys(_JOINT_COLUMNS, (samples, len(joints)))}
     return {name: _empty(shapes[name], np.int64 if name == STAMPS else np.float64) for name in columns}
 
@@ -161,16 +168,16 @@ def _empty(shape: tuple[int, ...], dtype: type[np.generic]) -> Column:
     return np.frombuffer(memory, dtype).reshape(shape)
 
 
-def stored_rows(throws: Iterable[Place]) -> Iterator[NDArray[np.void]]:
+def read_stored_rows(throws: Iterable[StoredThrow]) -> Iterator[NDArray[np.void]]:
     """The rows of episodes, one after the other; each file is open while its throws follow each other.
 
     Raises:
         DatasetError: If an episode is not where it should be, or its chunk is damaged; its CRC is compared.
     """
     for path, group in groupby(throws, attrgetter("path")):
-        with opened(path) as contents:
+        with open_mcap(path) as contents:
             for place in group:
-                yield place.rows(contents)
+                yield place.rows_in(contents)
 
 
 def fill(
@@ -184,7 +191,7 @@ def fill(
     Args:
         columns: Arrays with as many rows as the throws have samples, by name, as `empty_columns` makes them.
         throws: The throws.
-        tables: Their rows, as `stored_rows` gives them.
+        tables: Their rows, as `read_stored_rows` gives them.
         joints: Joints that the columns of joints have.
 
     Raises:
@@ -196,7 +203,7 @@ def fill(
     missing = {source for name, source in needed.items() if name in columns} - columns.keys()
     recorded = {**columns, **empty_columns(missing, sum(lengths))}
     chosen = [] if tuple(joints) == JOINTS else [name for name in _JOINT_COLUMNS if name in columns]
-    targets = [(as_bytes(recorded[name]), name) for name in recorded if name != TIMES and name not in chosen]
+    targets = [(view_as_bytes(recorded[name]), name) for name in recorded if name != TIMES and name not in chosen]
     indexes = np.array([JOINTS.index(joint) for joint in joints], np.intp)
     every = np.empty((max(lengths), len(JOINTS)))
     filled = 0
@@ -205,7 +212,7 @@ def fill(
         for target, name in targets:
             target[span] = rows[name]
         for name in chosen:
-            as_bytes(every)[: len(rows)] = rows[name]
+            view_as_bytes(every)[: len(rows)] = rows[name]
             np.take(every[: len(rows)], indexes, axis=1, out=columns[name][span], mode="clip")
         filled += len(rows)
         del rows  # the next ones then take its place in the caches
@@ -219,7 +226,7 @@ def _derive(
     if STAMPS in recorded:
         to_nanoseconds(recorded[STAMPS])
     if TIMES in columns:
-        np.divide(recorded[STAMPS] - starts, _NS_PER_S, out=columns[TIMES])
+        np.divide(recorded[STAMPS] - starts, NS_PER_S, out=columns[TIMES])
     if velocities:
         turned = rotate(recorded[BALL_ORIENTATION], *(columns[name] for name in velocities), inverse=False)
         for name, values in zip(velocities, turned, strict=True):

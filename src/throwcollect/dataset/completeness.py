@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import os
-import stat
 from collections.abc import Iterator
 from pathlib import Path
 
 from throwcollect.dataset.directory import CONFIG, MANIFEST, METADATA, PLAN, THROWS
 from throwcollect.dataset.findings import Finding
-from throwcollect.dataset.manifest import FileEntry, entry_of_file, read_manifest
+from throwcollect.dataset.manifest import entry_of_file, read_manifest
 from throwcollect.dataset.mcap_file import MAGIC
 from throwcollect.dataset.throws_table import read_throws_table
 from throwcollect.dataset.verify import verify
+from throwcollect.dataset.verify_manifest import find_changed_files
 from throwcollect.errors import DatasetError
 from throwcollect.files import is_there, open_regular
 from throwcollect.sweep.plan import Plan
 
 
-def missing_or_damaged(directory: Path, plan: Plan | None, *, in_full: bool) -> list[Finding]:
+def find_damage(directory: Path, plan: Plan | None, *, in_full: bool) -> list[Finding]:
     """What of a finished dataset is not as it was written.
 
     Files are compared with the manifest. A dataset of a version that wrote none has to have the recordings that its
@@ -36,8 +36,8 @@ def missing_or_damaged(directory: Path, plan: Plan | None, *, in_full: bool) -> 
     try:
         entries = read_manifest(directory)
     except DatasetError as error:
-        return [Finding(MANIFEST, "", str(error).removeprefix(f"{directory / MANIFEST}: "))]
-    return list(_changed(directory, entries, in_full=in_full))
+        return [Finding.of(MANIFEST, error)]
+    return list(find_changed_files(directory, entries, in_full=in_full))
 
 
 def is_as_written(directory: Path, name: str) -> bool:
@@ -53,27 +53,11 @@ def is_as_written(directory: Path, name: str) -> bool:
         return False
 
 
-def _changed(directory: Path, entries: tuple[FileEntry, ...], *, in_full: bool) -> Iterator[Finding]:
-    for entry in entries:
-        path = directory / entry.path
-        try:
-            found = path.lstat()
-        except OSError:
-            yield Finding(entry.path, "", "is missing")
-            continue
-        if not stat.S_ISREG(found.st_mode):
-            yield Finding(entry.path, "", "is not a file")
-        elif found.st_size != entry.bytes:
-            yield Finding(entry.path, "", f"has {found.st_size} bytes instead of {entry.bytes}")
-        elif in_full and entry_of_file(path) != entry:
-            yield Finding(entry.path, "", "has other contents than were written")
-
-
 def _without_manifest(directory: Path, plan: Plan, *, in_full: bool) -> Iterator[Finding]:
     try:
         shards = set(read_throws_table(directory / THROWS, plan)["shard"].drop_null().to_pylist())
     except DatasetError as error:
-        yield Finding(THROWS, "", str(error).removeprefix(f"{directory / THROWS}: "))
+        yield Finding.of(THROWS, error)
         return
     if in_full:
         promised = {CONFIG, PLAN, THROWS, METADATA, *shards}

@@ -1,18 +1,6 @@
-"""The data card of a dataset: what it holds for whoever finds it, and where it came from.
-
-It is the only file that may differ between two collections of the same configuration.
-"""
+"""The data card of a dataset: what it holds and where it came from, for people who find it."""
 
 from __future__ import annotations
-
-import os
-import platform
-import socket
-from collections.abc import Mapping
-from contextlib import suppress
-from dataclasses import dataclass
-from datetime import datetime, timezone
-from importlib.metadata import PackageNotFoundError, version
 
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -20,64 +8,11 @@ import pyarrow.compute as pc
 from throwcollect.config.schema import Config
 from throwcollect.dataset.bag import to_yaml
 from throwcollect.dataset.directory import TRIALS
+from throwcollect.dataset.provenance import Provenance
 from throwcollect.sweep.plan import FIRST_TRIALS
-from throwcollect.version import __version__
 
-HOST_VARIABLE = "THROWCOLLECT_HOST"
-"""Name of the machine for processes that cannot know it; empty if nobody does."""
-
-_LIBRARIES = ("pybullet", "numpy", "rosbags", "mcap", "zstandard", "pyarrow", "pin", "example-robot-data")
 _SIZES = ((1_000, "n<1K"), (10_000, "1K<n<10K"), (100_000, "10K<n<100K"), (1_000_000, "100K<n<1M"))
 _MORE = "1M<n<10M"
-
-
-@dataclass(frozen=True)
-class Provenance:
-    """How one collection was run.
-
-    Attributes:
-        finished: When it ended.
-        host: Name of the machine that wrote the dataset; None if it is not known, as in a container.
-        platform: Its system and processor.
-        python: Version of Python.
-        libraries: Versions of the libraries that the data pass through.
-        simulations: Number of simulations; None if not known.
-        wall_s: Real time that it took [s]; None if not known.
-        was_open: Whether anybody who reached its router could join it.
-    """
-
-    finished: datetime
-    host: str | None
-    platform: str
-    python: str
-    libraries: Mapping[str, str]
-    simulations: int | None
-    wall_s: float | None
-    was_open: bool
-
-    @classmethod
-    def of_this_machine(cls, *, simulations: int | None, wall_s: float | None, was_open: bool) -> Provenance:
-        """Provenance of a collection that ends now, here."""
-        return cls(
-            finished=datetime.now(timezone.utc),
-            # Of itself, a container knows nothing but a random id.
-            host=os.environ.get(HOST_VARIABLE, socket.gethostname()) or None,
-            platform=platform.platform(),
-            python=platform.python_version(),
-            libraries={"throwcollect": __version__, **_versions()},
-            simulations=simulations,
-            wall_s=wall_s,
-            was_open=was_open,
-        )
-
-
-def _versions() -> dict[str, str]:
-    found = {}
-    for name in _LIBRARIES:
-        # Not every machine that collects also simulates.
-        with suppress(PackageNotFoundError):
-            found[name] = version(name)
-    return found
 
 
 def count_outcomes(throws: pa.Table) -> dict[str, int]:
@@ -132,17 +67,31 @@ def data_card(config: Config, throws: pa.Table, provenance: Provenance) -> str:
         *_ranges(config, throws),
         "## Limits",
         "",
-        "Simulated with Bullet: rigid bodies, the base of the robot fixed, ideal motors within effort limits, no "
-        "sensor noise. Throws that failed are kept; `outcome` says how.",
+        _limits(config.sim.engine) + " Throws that failed are kept; `outcome` says how.",
         "",
         "## Provenance",
         "",
         "| | |",
         "|---|---|",
-        *(f"| {name} | {value} |" for name, value in _provenance(provenance).items()),
+        *(f"| {name} | {value} |" for name, value in provenance.facts().items()),
         "",
     ]
     return "\n".join(lines)
+
+
+def _limits(engine: str) -> str:
+    """What a physics engine leaves out; of those of other packages nothing is known."""
+    if engine == "bullet":
+        return (
+            "Simulated with Bullet: rigid bodies, the base of the robot fixed, ideal motors within effort limits, no "
+            "sensor noise."
+        )
+    if engine == "ballistic":
+        return (
+            "Computed without contacts (`sim.engine: ballistic`): the arm is always where it is told to be, and the "
+            "ball leaves the tool when the tool would have to pull it. No robot throws like that."
+        )
+    return f"Simulated with the physics engine `{engine}`, without sensor noise."
 
 
 def _ranges(config: Config, throws: pa.Table) -> list[str]:
@@ -153,7 +102,7 @@ def _ranges(config: Config, throws: pa.Table) -> list[str]:
     return [
         "## What varies",
         "",
-        *_drawn(config),
+        *_tell_drawing(config),
         "",
         "| key | lowest | highest |",
         "|---|---|---|",
@@ -162,7 +111,7 @@ def _ranges(config: Config, throws: pa.Table) -> list[str]:
     ]
 
 
-def _drawn(config: Config) -> list[str]:
+def _tell_drawing(config: Config) -> list[str]:
     """How the values came about, one sentence a line."""
     lines = [f"Drawn by the sampler `{config.sweep.sampler}` with seed {config.seed}."]
     if config.sweep.target is not None:
@@ -174,20 +123,3 @@ def _drawn(config: Config) -> list[str]:
     if config.until is not None:
         lines.append(f"Collected until {config.until.landed} throws had landed, or all trials had been used up.")
     return lines
-
-
-def _provenance(provenance: Provenance) -> dict[str, str]:
-    facts = {
-        "finished": provenance.finished.isoformat(timespec="seconds"),
-        **({"host": provenance.host} if provenance.host else {}),
-        "platform": provenance.platform,
-        "Python": provenance.python,
-        **provenance.libraries,
-    }
-    if provenance.simulations is not None:
-        facts["simulations"] = str(provenance.simulations)
-    if provenance.wall_s is not None:
-        facts["wall time"] = f"{provenance.wall_s:.1f} s"
-    if provenance.was_open:
-        facts["open"] = "anybody who reached the router could join, read and disturb the collection"
-    return facts

@@ -99,15 +99,15 @@ class Expression:
 
     def rows(self, table: pa.Table) -> list[int]:
         """Numbers of the rows that fulfil the expression as a condition."""
-        found = self._evaluated(table, "a condition")
+        found = self._evaluate(table, "a condition")
         return [number for number, holds in enumerate(found.to_pylist()) if holds]
 
     def numbers(self, table: pa.Table) -> list[float | None]:
         """The expression's number in each row; None where it is null."""
-        values: list[float | None] = self._evaluated(table, "a number").to_pylist()
+        values: list[float | None] = self._evaluate(table, "a number").to_pylist()
         return values
 
-    def _evaluated(self, table: pa.Table, kind: _Kind) -> Any:
+    def _evaluate(self, table: pa.Table, kind: _Kind) -> Any:
         try:
             value = _Evaluation(table, self._error_at).value(self._tree)
         except RecursionError as error:
@@ -153,7 +153,7 @@ class _Evaluation:
                 return self._column(node)
             case ast.BoolOp():
                 combine = pc.and_kleene if isinstance(node.op, ast.And) else pc.or_kleene
-                return self._combined(combine, [self._of(part, "a condition") for part in node.values])
+                return self._combine(combine, [self._of(part, "a condition") for part in node.values])
             case ast.UnaryOp(op=ast.Not()):
                 return _Value("a condition", pc.invert(self._of(node.operand, "a condition")))
             case ast.UnaryOp(op=ast.USub()):
@@ -179,7 +179,7 @@ class _Evaluation:
             raise self._error(node, f"should be {kind}, is {value.kind}")
         return value.data
 
-    def _combined(self, combine: Callable[..., Any], parts: Sequence[Any]) -> _Value:
+    def _combine(self, combine: Callable[..., Any], parts: Sequence[Any]) -> _Value:
         whole = parts[0]
         for part in parts[1:]:
             whole = combine(whole, part)
@@ -229,10 +229,10 @@ class _Evaluation:
                 found = self._membership(left, right)
                 parts.append(pc.invert(found) if isinstance(operator, ast.NotIn) else found)
             else:
-                parts.append(self._compared(left, operator, right))
-        return self._combined(pc.and_kleene, parts)
+                parts.append(self._compare(left, operator, right))
+        return self._combine(pc.and_kleene, parts)
 
-    def _compared(self, left: ast.expr, operator: ast.cmpop, right: ast.expr) -> Any:
+    def _compare(self, left: ast.expr, operator: ast.cmpop, right: ast.expr) -> Any:
         a, b = self.value(left), self.value(right)
         if b.kind == "None":
             if isinstance(operator, ast.Is | ast.IsNot | ast.Eq | ast.NotEq):
@@ -249,5 +249,5 @@ class _Evaluation:
     def _membership(self, left: ast.expr, right: ast.expr) -> Any:
         if not isinstance(right, ast.List | ast.Tuple | ast.Set) or not right.elts:
             raise self._error(right, "should be a list, such as ['landed', 'recaught']")
-        equal = [self._compared(left, ast.Eq(), element) for element in right.elts]
-        return self._combined(pc.or_kleene, equal).data
+        equal = [self._compare(left, ast.Eq(), element) for element in right.elts]
+        return self._combine(pc.or_kleene, equal).data

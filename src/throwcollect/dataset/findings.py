@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 
+from throwcollect.errors import DatasetError
+
 
 @dataclass(frozen=True)
 class Finding:
@@ -18,6 +20,16 @@ class Finding:
     file: str
     place: str
     problem: str
+
+    @classmethod
+    def of(cls, file: str, error: DatasetError) -> Finding:
+        """What an error says of a file.
+
+        Args:
+            file: Name of the file in the dataset's directory.
+            error: The error.
+        """
+        return cls(file, error.place, error.details)
 
     def __str__(self) -> str:
         return ": ".join(part for part in (self.file, self.place, self.problem) if part)

@@ -22,7 +22,7 @@ from throwcollect.files import open_log, unwritable, write_all
 Event = Literal["opened", "exposed", "recovered", "planned", "lease", "commit", "fail", "lost", "shard", "finished"]
 """
 - ``opened``: a process began to collect into the directory: `pid`.
-- ``exposed``: whoever reaches its router may join it, as it was wanted so (`run.open`) or nothing protects it.
+- ``exposed``: any process that reaches the router may join, because of `run.open` or because nothing protects it.
 - ``recovered``: what earlier ones had left was taken in: `episodes`.
 - ``planned``: trials were added to the plan: `trials` in all.
 - ``lease``: a trial was given to a simulation: `trial`, `simulation`.
@@ -59,7 +59,7 @@ class Journal:
         self._opened = time.time()
         size = os.fstat(self._descriptor).st_size
         if size and os.pread(self._descriptor, 1, size - 1) != b"\n":
-            # Whoever wrote last was killed within a line.
+            # The process that wrote last was killed within a line.
             self._append(b"\n")
         self.note("opened", pid=os.getpid())
 

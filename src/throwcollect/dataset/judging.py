@@ -7,12 +7,12 @@ import numpy as np
 from throwcollect.config.schema import Config
 from throwcollect.episode.message import Episode
 from throwcollect.errors import DatasetError
-from throwcollect.robots.model import joint_limits
-from throwcollect.tasks.throw import ThrowResult, judge
+from throwcollect.tasks.throw.judge import judge
+from throwcollect.tasks.throw.outcome import ThrowResult
 from throwcollect.tasks.trajectory import throw_trajectory
 
 
-def judged(config: Config, episode: Episode) -> ThrowResult:
+def judge_episode(config: Config, episode: Episode) -> ThrowResult:
     """What came of a trial.
 
     Args:
@@ -30,5 +30,4 @@ def judged(config: Config, episode: Episode) -> ThrowResult:
         episode.header,
         config=config,
         trajectory=throw_trajectory(config),
-        limits=joint_limits(),
     )

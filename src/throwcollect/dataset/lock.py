@@ -1,10 +1,10 @@
 """Keeps two processes from changing one dataset: a lock on its directory, wherever the second of them runs.
 
-Whoever prepares a dataset, goes on with it or makes files of it anew holds the lock alone, before it looks at anything.
+A process that prepares a dataset, resumes it or rebuilds files of it holds the lock alone, before it reads anything.
 The launcher and the coordinator of a run hold it together as long as they live. So nobody can prepare the dataset while
 it is collected into, not even while a coordinator that was lost is started again.
 
-Between its preparation and its launch a run lets go for a moment. If somebody else takes the lock just then, the run
+Between its preparation and its launch a run lets go for a moment. If another process takes the lock just then, the run
 ends before anything is started; and should that other one be ready by then and launch a run, too, then the journal,
 which only one coordinator can hold (see `journal`), decides between the two. Whichever that is, it reads configuration
 and plan when nobody can change them any more, and they fit each other.
@@ -26,7 +26,7 @@ from throwcollect.errors import DatasetError
 from throwcollect.files import unreadable
 
 PATIENCE_S = 5.0
-"""Whoever was killed a moment ago may still hold a lock."""
+"""How long to wait for a lock [s]: a process that was killed a moment ago may still hold it."""
 _RETRY_S = 0.05
 
 
@@ -64,7 +64,7 @@ def lock(descriptor: int, directory: Path, *, alone: bool = True) -> None:
     Args:
         descriptor: Its descriptor.
         directory: Directory of the dataset, for messages.
-        alone: Whether nobody else may hold the lock.
+        alone: Whether no other process may hold the lock.
 
     Raises:
         DatasetError: If another process holds it, or it cannot be locked.
@@ -77,13 +77,15 @@ def lock(descriptor: int, directory: Path, *, alone: bool = True) -> None:
         except BlockingIOError as error:
             if time.monotonic() >= deadline:
                 raise DatasetError(
-                    f"{directory}: another process collects into it, or changes it",
+                    "another process collects into it, or changes it",
+                    path=directory,
                     hint="throwcollect ps lists the runs of this machine",
                 ) from error
             time.sleep(_RETRY_S)
         except OSError as error:
             raise DatasetError(
-                f"{directory}: cannot be locked: {error.strerror}",
+                f"cannot be locked: {error.strerror}",
+                path=directory,
                 hint="choose a directory on a file system that has locks (flock)",
             ) from error
         else:

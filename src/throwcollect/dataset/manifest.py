@@ -10,7 +10,6 @@ import hashlib
 import json
 import os
 import re
-import stat
 from collections.abc import Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
@@ -67,6 +66,19 @@ def entry_of_file(path: Path) -> FileEntry:
     except OSError as error:
         raise unreadable(path, error) from error
     return FileEntry(path.name, size, digest.hexdigest())
+
+
+def size_of_file(path: Path) -> int:
+    """Size of a file as it lies on disk [bytes].
+
+    Raises:
+        DatasetError: If it cannot be opened, or is no plain file.
+    """
+    try:
+        with open(open_regular(path), "rb") as file:
+            return os.fstat(file.fileno()).st_size
+    except OSError as error:
+        raise unreadable(path, error) from error
 
 
 class RunningHash:
@@ -148,40 +160,16 @@ def named_manifest(directory: Path) -> tuple[str, tuple[FileEntry, ...]]:
     """Name of the collection that a manifest has, and its entries; see `read_manifest`."""
     path = directory / MANIFEST
     if not os.path.lexists(path):
-        raise DatasetError(f"{path}: is missing", hint=command("dataset", "rebuild", directory))
+        raise DatasetError("is missing", path=path, hint=command("dataset", "rebuild", directory))
     text = read_text(path, most_bytes=_MOST_BYTES)
     try:
         document = json.loads(text)
         name, entries = str(document["name"]), tuple(map(_entry, document["resources"]))
     except (ValueError, KeyError, TypeError, RecursionError) as error:
-        raise DatasetError(f"{path}: is not the manifest of a dataset") from error
+        raise DatasetError("is not the manifest of a dataset", path=path) from error
     if text != manifest_text(name, entries) or len({entry.path for entry in entries}) < len(entries):
-        raise DatasetError(f"{path}: is not written as the manifest of a dataset is")
+        raise DatasetError("is not written as the manifest of a dataset is", path=path)
     return name, entries
-
-
-def changed_sizes(directory: Path) -> list[str]:
-    """Names of the files that are missing, have another size than the manifest says, or are not in it; cheap.
-
-    Args:
-        directory: Directory of a dataset.
-
-    Raises:
-        DatasetError: If the manifest is missing or damaged.
-    """
-    said = {entry.path: entry.bytes for entry in read_manifest(directory)}
-    return [
-        name for name in sorted({*said, *promised_names(directory)}) if _size(directory / name) != said.get(name, -1)
-    ]
-
-
-def _size(path: Path) -> int | None:
-    """Size of a plain file [bytes]; None if there is none."""
-    try:
-        found = path.lstat()
-    except OSError:
-        return None
-    return found.st_size if stat.S_ISREG(found.st_mode) else None
 
 
 def _entry(resource: Any) -> FileEntry:

@@ -5,16 +5,16 @@ from __future__ import annotations
 import struct
 import zlib
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 from mcap import records
 from mcap.opcode import Opcode
 
+from rclzenoh.interfaces import message_definition, type_hash
 from throwcollect.dataset.bag import FileSummary
 from throwcollect.episode.channels import Channel
-from throwcollect.episode.chunk import encode_records
-from throwcollect.interfaces import message_definition, type_hash
+from throwcollect.episode.chunk import Chunk, count_indexed, encode_records
 
 Groups = Mapping[Opcode, Sequence[records.McapRecord]]
 
@@ -38,6 +38,75 @@ def declarations(channels: Sequence[Channel]) -> tuple[list[records.Schema], lis
     ]
 
 
+@dataclass(frozen=True)
+class Run:
+    """Records that follow each other without a gap, wherever they lie: chunks with their indexes, and what ends them.
+
+    Attributes:
+        data: The bytes.
+        chunk_indexes: Index of each chunk, as if the run began at offset 0.
+        counts: Number of messages on each channel, by its number.
+        metadata_length: Size of the Metadata record at its end [bytes]; 0 if there is none.
+    """
+
+    data: bytes
+    chunk_indexes: tuple[records.ChunkIndex, ...]
+    counts: Mapping[int, int]
+    metadata_length: int
+
+    @property
+    def length(self) -> int:
+        """Size of the records [bytes]."""
+        return _end_of(self.chunk_indexes[-1]) + self.metadata_length
+
+    @property
+    def start_ns(self) -> int:
+        """Time of the first message of its first chunk [ns]."""
+        return int(self.chunk_indexes[0].message_start_time)
+
+    @classmethod
+    def of(cls, chunks: Iterable[tuple[Chunk, Mapping[int, bytes]]], metadata: bytes = b"") -> Run:
+        """The run of some chunks.
+
+        Args:
+            chunks: Each chunk with the Message Index records that follow it, by channel.
+            metadata: The Metadata record at the end.
+        """
+        parts: list[bytes | memoryview] = []
+        places: list[records.ChunkIndex] = []
+        counts: dict[int, int] = {}
+        for chunk, indexes in chunks:
+            parts += (chunk.record_header(), chunk.data, *indexes.values())
+            places.append(_index_chunk(chunk, indexes, _end_of(places[-1]) if places else 0))
+            counts |= {channel: count_indexed(index) for channel, index in indexes.items()}
+        return cls(b"".join((*parts, metadata)), tuple(places), counts, len(metadata))
+
+
+def _index_chunk(chunk: Chunk, indexes: Mapping[int, bytes], start: int) -> records.ChunkIndex:
+    """Index of a chunk that begins at `start` [bytes] and is followed by its message indexes."""
+    end = start + chunk.record_size
+    offsets, offset = {}, end
+    for channel, index in indexes.items():
+        offsets[channel] = offset
+        offset += len(index)
+    return records.ChunkIndex(
+        chunk_length=chunk.record_size,
+        chunk_start_offset=start,
+        compression="zstd",
+        compressed_size=len(chunk.data),
+        message_end_time=chunk.end_ns,
+        message_index_length=offset - end,
+        message_index_offsets=offsets,
+        message_start_time=chunk.start_ns,
+        uncompressed_size=chunk.uncompressed_size,
+    )
+
+
+def _end_of(index: records.ChunkIndex) -> int:
+    """Where the message indexes of a chunk end [bytes]."""
+    return int(index.chunk_start_offset + index.chunk_length + index.message_index_length)
+
+
 class FileContents:
     """Keeps count of what a file holds.
 
@@ -57,17 +126,21 @@ class FileContents:
         self._metadata_indexes: list[records.MetadataIndex] = []
         self._counts: Counter[int] = Counter()
 
-    def add_chunk(self, index: records.ChunkIndex, start: int, messages: int) -> None:
-        """Count a chunk with its message indexes.
+    def add_run(self, run: Run, start: int, name: str = "") -> None:
+        """Count a run of records.
 
         Args:
-            index: Its index as if it began at offset 0.
-            start: Where it begins [bytes].
-            messages: Number of messages on each of its channels.
+            run: The run.
+            start: Where it begins in the file [bytes].
+            name: Name of the Metadata record at its end, if there is one.
         """
-        offsets = {channel: start + offset for channel, offset in index.message_index_offsets.items()}
-        self._chunk_indexes.append(replace(index, chunk_start_offset=start, message_index_offsets=offsets))
-        self._counts.update(dict.fromkeys(offsets, messages))
+        for index in run.chunk_indexes:
+            offsets = {channel: start + offset for channel, offset in index.message_index_offsets.items()}
+            begins = start + index.chunk_start_offset
+            self._chunk_indexes.append(replace(index, chunk_start_offset=begins, message_index_offsets=offsets))
+        self._counts.update(run.counts)
+        if run.metadata_length:
+            self.add_metadata(name, start + run.length - run.metadata_length, run.metadata_length)
 
     def add_metadata(self, name: str, start: int, length: int) -> None:
         """Count a Metadata record."""

@@ -6,7 +6,7 @@ import io
 import mmap
 import os
 import struct
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,13 +17,16 @@ from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
 
-from throwcollect.dataset.mcap_file import EPISODE, MAGIC
+from throwcollect.dataset.mcap_contents import Run
+from throwcollect.dataset.mcap_file import EPISODE, MAGIC, SENSORS_SHA256
 from throwcollect.episode.chunk import CHUNK_HEADER_BYTES, CHUNK_MARK, CHUNK_MARK_OFFSET, Chunk
 from throwcollect.episode.message import Episode, make_episode
 from throwcollect.errors import DatasetError
 from throwcollect.files import open_regular, unreadable
 
 _RECORD_HEADER = struct.Struct("<BQ")
+MOST_CHUNKS = 64
+"""Chunks of one episode; without an end to them, a file of chunks alone would take forever."""
 _R = TypeVar("_R", covariant=True)
 
 
@@ -68,7 +71,20 @@ class Record(NamedTuple):
         try:
             return kind.read(ReadDataStream(io.BytesIO(self.data[_RECORD_HEADER.size :])))
         except (EndOfFile, struct.error, UnicodeDecodeError) as error:
-            raise DatasetError(f"byte {self.offset}: {self.kind} record is not readable") from error
+            raise DatasetError(f"{self.kind} record is not readable", place=f"byte {self.offset}") from error
+
+
+@dataclass(frozen=True)
+class StoredChunk:
+    """A chunk of an episode as it lies in a file.
+
+    Attributes:
+        record: Its record.
+        indexes: Records of its message indexes, by channel.
+    """
+
+    record: Record
+    indexes: Mapping[int, Record]
 
 
 @dataclass(frozen=True)
@@ -77,15 +93,53 @@ class StoredEpisode:
 
     Attributes:
         episode: The episode.
-        chunk: Record of its chunk.
-        indexes: Records of the chunk's message indexes, by channel.
+        chunks: Its chunks, the state chunk first.
         facts: The Metadata record at its end.
     """
 
     episode: Episode
-    chunk: Record
-    indexes: Mapping[int, Record]
+    chunks: tuple[StoredChunk, ...]
     facts: Record
+
+    @property
+    def offset(self) -> int:
+        """Where it begins in the file [bytes]."""
+        return self.chunks[0].record.offset
+
+    @property
+    def end(self) -> int:
+        """Where it ends in the file [bytes]; the file may be cut there."""
+        return self.facts.end
+
+    @classmethod
+    def of(cls, chunks: Sequence[StoredChunk], facts: Record) -> StoredEpisode:
+        """The episode of chunks and of the metadata that follow them.
+
+        Raises:
+            DatasetError: If the metadata are not those of an episode with so many chunks; the contents of the chunks
+                are not looked at.
+        """
+        said = facts.parse(records.Metadata).metadata
+        hashes = [said.get("records_sha256", ""), *said.get(SENSORS_SHA256, "").split()]
+        episode = make_episode(said.get("header", ""), hashes, [Chunk.parse(each.record.data) for each in chunks])
+        return cls(episode, tuple(chunks), facts)
+
+    def run(self) -> Run:
+        """Its records as they lie there, whether or not they fit each other."""
+        chunks = zip(self.episode.chunks, self.chunks, strict=True)
+        runs = [(each.chunk, {channel: index.data for channel, index in at.indexes.items()}) for each, at in chunks]
+        return Run.of(runs, self.facts.data)
+
+    def check_whole(self) -> None:
+        """Compare everything that is hashed with its hashes.
+
+        Raises:
+            DatasetError: If a chunk is damaged, or what is said of it or of the header is not so.
+        """
+        self.episode.check_records()
+        if self.facts.parse(records.Metadata).metadata.get("digest") != self.episode.digest:
+            place, expected = f"byte {self.facts.offset}", self.episode.digest
+            raise DatasetError("the digest is not that of the header", place=place, expected=expected)
 
 
 class McapContents:
@@ -113,11 +167,11 @@ class McapContents:
         """
         header = self._data[offset : offset + _RECORD_HEADER.size]
         if offset < 0 or len(header) < _RECORD_HEADER.size:
-            raise DatasetError(f"byte {offset}: the file is cut off")
+            raise DatasetError("the file is cut off", place=f"byte {offset}")
         opcode, length = _RECORD_HEADER.unpack(header)
         end = offset + _RECORD_HEADER.size + length
         if end > len(self._data):
-            raise DatasetError(f"byte {offset}: a record of {length} bytes goes beyond the end of the file")
+            raise DatasetError(f"a record of {length} bytes goes beyond the end of the file", place=f"byte {offset}")
         return Record(offset, opcode, self._data[offset:end])
 
     def find(self, pattern: bytes, start: int) -> int:
@@ -162,35 +216,36 @@ class McapContents:
         while record.opcode == Opcode.MESSAGE_INDEX:
             channel = int.from_bytes(record.data[_RECORD_HEADER.size : _RECORD_HEADER.size + 2], "little")
             if channel in indexes:
-                raise DatasetError(f"byte {record.offset}: a second message index of channel {channel}")
+                raise DatasetError(f"a second message index of channel {channel}", place=f"byte {record.offset}")
             indexes[channel] = record
             record = self.record(record.end)
         return indexes, record
 
     def episode(self, offset: int) -> StoredEpisode:
-        """The episode whose chunk begins at an offset.
+        """The episode whose first chunk begins at an offset.
 
         Raises:
             DatasetError: If none does, or its records are damaged; the contents of the chunk are not looked at.
         """
-        chunk = self.record(offset)
-        if chunk.opcode != Opcode.CHUNK:
-            raise DatasetError(f"byte {offset}: a {chunk.kind} where the chunk of an episode should be")
-        indexes, record = self.message_indexes(chunk.end)
-        if record.opcode != Opcode.METADATA or (facts := record.parse(records.Metadata)).name != EPISODE:
-            raise DatasetError(f"byte {record.offset}: a {record.kind} where the metadata of an episode should be")
+        chunks: list[StoredChunk] = []
+        record = self.record(offset)
+        while record.opcode == Opcode.CHUNK and len(chunks) < MOST_CHUNKS:
+            indexes, following = self.message_indexes(record.end)
+            chunks.append(StoredChunk(record, indexes))
+            record = following
+        if not chunks:
+            raise DatasetError(f"a {record.kind} where the chunk of an episode should be", place=f"byte {offset}")
+        if record.opcode != Opcode.METADATA or record.parse(records.Metadata).name != EPISODE:
+            place = f"byte {record.offset}"
+            raise DatasetError(f"a {record.kind} where the metadata of an episode should be", place=place)
         try:
-            said = facts.metadata
-            episode = make_episode(
-                said.get("header", ""), said.get("records_sha256", "").encode(), Chunk.parse(chunk.data)
-            )
+            return StoredEpisode.of(chunks, record)
         except DatasetError as error:
-            raise DatasetError(f"byte {offset}: {error}") from error
-        return StoredEpisode(episode, chunk, indexes, record)
+            raise error.located(place=f"byte {offset}") from error
 
 
 @contextmanager
-def mapped(path: Path) -> Iterator[McapContents]:
+def map_file(path: Path) -> Iterator[McapContents]:
     """The contents of a file, mapped into memory while the block lasts, whatever they are.
 
     Raises:
@@ -213,13 +268,13 @@ def mapped(path: Path) -> Iterator[McapContents]:
 
 
 @contextmanager
-def opened(path: Path) -> Iterator[McapContents]:
+def open_mcap(path: Path) -> Iterator[McapContents]:
     """The contents of an MCAP file, mapped into memory while the block lasts.
 
     Raises:
         DatasetError: If the file is missing, cannot be read, or is no MCAP file.
     """
-    with mapped(path) as contents:
+    with map_file(path) as contents:
         if contents.slice(0, len(MAGIC)) != MAGIC:
-            raise DatasetError(f"{path}: not an MCAP file")
+            raise DatasetError("not an MCAP file", path=path)
         yield contents

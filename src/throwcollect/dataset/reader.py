@@ -1,47 +1,67 @@
-"""Reads a finished dataset."""
+"""The way into a finished dataset: a sequence of throws beside the table of throws, and their episodes."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, overload
 
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from throwcollect.config.loader import load
+from rclzenoh.interfaces import deserialize, get_message
+from throwcollect.config.loader import load as load_config
 from throwcollect.config.schema import Config
-from throwcollect.dataset.bag import from_yaml
-from throwcollect.dataset.directory import METADATA, PLAN, THROWS, config_path
-from throwcollect.dataset.mcap_reader import opened
-from throwcollect.dataset.throws_table import read_throws_table
+from throwcollect.dataset.bag import read_bag_metadata
+from throwcollect.dataset.columns import COLUMNS, StoredThrow
+from throwcollect.dataset.data_card import count_outcomes
+from throwcollect.dataset.directory import METADATA, PLAN, config_path
+from throwcollect.dataset.expression import Expression
+from throwcollect.dataset.mcap_reader import open_mcap
+from throwcollect.dataset.throw import Throw
+from throwcollect.dataset.throws_table import read_throws
+from throwcollect.dataset.trajectories import Trajectories, read_trajectories
+from throwcollect.episode.channels import ROBOT_DESCRIPTION_ID
+from throwcollect.episode.chunk import Chunk
 from throwcollect.episode.message import Episode
-from throwcollect.errors import DatasetError
+from throwcollect.episode.message_table import MessageTable
+from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.files import StrPath
+from throwcollect.robots.talos import JOINTS
 from throwcollect.sweep.plan import Plan
+from throwcollect.wording import counted
+
+_SELECTION = "a condition, an Arrow expression, a mask, or numbers of trials"
 
 
-@dataclass(frozen=True)
-class Dataset:
-    """A finished dataset.
+@dataclass(frozen=True, eq=False, repr=False)
+class Dataset(Sequence[Throw]):
+    """Throws of a dataset, in order of trials unless they were selected in another one.
+
+    ``dataset[i]`` is the throw of row i of `throws`. A dataset as it is loaded has every trial of the plan, so there i
+    is the number of the trial; trials that were refused or lost have a row, too, but no trajectory (see `recorded`).
+
+    May be shared by threads and sent to other processes. No file stays open.
 
     Attributes:
-        directory: Where it is.
-        config: Its configuration.
-        plan: Its trials.
-        throws: One row a trial, in order; see ``docs/dataset.md``.
-        bag: Fields of the rosbag2 metadata.
+        directory: Where the dataset is.
+        plan: All its trials, also of those that were not selected.
+        throws: One row a throw; ``docs/dataset.md`` describes the columns.
+        bag: Fields of its rosbag2 metadata.
     """
 
     directory: Path
-    config: Config
     plan: Plan
     throws: pa.Table
     bag: Mapping[str, Any]
 
     @classmethod
-    def open(cls, directory: Path) -> Dataset:
-        """Open a dataset.
+    def open(cls, directory: StrPath) -> Dataset:
+        """Open a finished dataset for reading.
+
+        Its tables are read and checked against each other; recordings are opened when they are looked at.
 
         Args:
             directory: Its directory.
@@ -50,77 +70,197 @@ class Dataset:
             DatasetError: If the directory holds no dataset, an unfinished one, or one whose tables are damaged.
             ConfigError: If its ``config.yaml`` is wrong.
         """
-        bag = read_bag_metadata(directory)
-        config = load(config_path(directory))
-        plan = Plan.read(directory / PLAN, config)
-        return cls(directory, config, plan, read_throws(directory, plan), bag)
+        path = Path(directory)
+        bag = read_bag_metadata(path)
+        plan = Plan.read(path / PLAN, load_config(config_path(path)))
+        return cls(path, plan, read_throws(path, plan), bag)
 
     def __len__(self) -> int:
-        return int(pc.count(self.throws["digest"]).as_py())
+        return len(self.throws)
 
-    def __iter__(self) -> Iterator[Episode]:
-        """Episodes in order of trials, without the trials that have none.
+    @overload
+    def __getitem__(self, which: int) -> Throw: ...
+    @overload
+    def __getitem__(self, which: slice) -> Dataset: ...
+    def __getitem__(self, which: int | slice) -> Throw | Dataset:
+        """A throw by its position, or the throws of a slice.
 
         Raises:
-            DatasetError: If an episode is not where the table says.
+            IndexError: If there are not so many.
         """
-        for row in self.throws.select(["trial", "shard", "chunk_offset"]).to_pylist():
-            if row["shard"] is not None:
-                yield self._read(**row)
+        if isinstance(which, slice):
+            return self._take(range(len(self))[which])
+        if not -len(self) <= which < len(self):
+            raise IndexError(f"{self.directory}: no throw {which} of {len(self)}")
+        position = which % len(self)
+        return Throw(self.throws, position, self.parameters, self._stored[position], str(self.directory))
+
+    def __iter__(self) -> Iterator[Throw]:
+        return (self[position] for position in range(len(self)))
+
+    def __repr__(self) -> str:
+        outcomes = ", ".join(f"{count} {outcome}" for outcome, count in count_outcomes(self.throws).items())
+        swept = ", ".join(self.parameters)
+        return f"Dataset({str(self.directory)!r}: {counted(len(self), 'throw')}: {outcomes}; swept: {swept})"
+
+    @property
+    def config(self) -> Config:
+        """Its configuration; that of a single trial has `Throw.parameters` in it."""
+        return self.plan.config
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Swept dotted configuration keys, which are columns of `throws`."""
+        return self.plan.keys
+
+    @property
+    def digest(self) -> str:
+        """Hash over all episodes in order of trials, as it was written.
+
+        Raises:
+            DatasetError: If the metadata do not have it.
+        """
+        custom = self.bag.get("custom_data")
+        digest = custom.get("throwcollect.digest") if isinstance(custom, dict) else None
+        if not isinstance(digest, str):
+            raise DatasetError("throwcollect.digest is missing", path=self.directory / METADATA)
+        return digest
+
+    @property
+    def recorded(self) -> Dataset:
+        """The throws that have a trajectory: all but the refused and the lost."""
+        return self._with(self.throws.filter(pc.is_valid(self.throws["shard"])))
 
     def episode(self, trial: int) -> Episode:
-        """The episode of a trial.
+        """The episode of a trial, with everything that was recorded.
 
         Args:
             trial: Its number.
 
         Raises:
-            DatasetError: If the trial has no episode, or it is not where the table says.
+            DatasetError: If the trial is not among the throws, has no episode, or it is not where the table says.
         """
-        if not 0 <= trial < len(self.throws):
-            raise DatasetError(f"{self.directory}: no trial {trial}", expected=f"0 to {len(self.throws) - 1}")
-        row = self.throws.slice(trial, 1).to_pylist()[0]
-        if row["shard"] is None:
-            raise DatasetError(f"{self.directory}: trial {trial} has no episode: {row['outcome']}: {row['reason']}")
-        return self._read(trial, row["shard"], row["chunk_offset"])
+        position = int(pc.index(self.throws["trial"], trial).as_py())
+        if position < 0:
+            raise DatasetError(f"no trial {trial}", path=self.directory, expected=f"0 to {len(self.plan.trials) - 1}")
+        return self[position].episode.read()
 
-    def _read(self, trial: int, shard: str, chunk_offset: int) -> Episode:
-        path = self.directory / Path(shard).name
-        with opened(path) as contents:
+    def robot_description(self) -> str | None:
+        """URDF text of the robot as the first recording has it; None if there is no recording.
+
+        Raises:
+            DatasetError: If that recording is missing or damaged.
+        """
+        first = next((stored.path for stored in self._stored if stored is not None), None)
+        if first is None:
+            return None
+        with open_mcap(first) as contents:
             try:
-                episode = contents.episode(chunk_offset).episode
-            except DatasetError as error:
-                raise DatasetError(f"{path}: {error}") from error
-        if episode.header.trial != trial:
-            raise DatasetError(f"{path}: byte {chunk_offset}: trial {episode.header.trial}", expected=f"trial {trial}")
-        return episode
+                # Messages that every file begins with have a chunk of their own.
+                latched = Chunk.parse(contents.record(contents.next_chunk(0)).data)
+                message = MessageTable(latched.decompress(), 1).messages(ROBOT_DESCRIPTION_ID)[0].tobytes()
+                text: str = deserialize(message, get_message("std_msgs/msg/String")).data
+            except (DatasetError, KeyError, ValueError) as error:
+                raise DatasetError(f"/robot_description is not readable: {error}", path=first) from error
+        return text
+
+    def episodes(self) -> Iterator[Episode]:
+        """The episodes of the throws that have one, in the order of the throws.
+
+        Raises:
+            DatasetError: If an episode is not where the table says.
+        """
+        return (stored.read() for stored in self._stored if stored is not None)
+
+    def select(self, which: str | Iterable[Any]) -> Dataset:
+        """Some of the throws.
+
+        Args:
+            which: A condition on the columns of `throws` as `throwcollect dataset filter` takes it, such as
+                ``"outcome == 'landed' and landing_x_m > 1.5"``; an Arrow expression on them; a mask with one boolean
+                for each throw; or numbers of trials, in the order in which they are wanted.
+
+        Raises:
+            ConfigError: If it is none of these.
+            DatasetError: If a trial is not among the throws.
+        """
+        if isinstance(which, str):
+            return self._take(Expression(which, place="select").rows(self.throws))
+        if isinstance(which, pc.Expression):
+            try:
+                return self._with(self.throws.filter(which))
+            except pa.ArrowException as error:
+                raise ConfigError(f"select: {str(error).splitlines()[0]}") from error
+        values = _as_array(which)
+        if pa.types.is_boolean(values.type):
+            if len(values) != len(self):
+                raise ConfigError(
+                    f"select: a mask of {len(values)}", expected=f"one boolean for each of {len(self)} throws"
+                )
+            return self._with(self.throws.filter(values))
+        rows = pc.index_in(values.cast(pa.int64()), value_set=self.throws["trial"].combine_chunks())
+        if rows.null_count:
+            missing = values.filter(pc.is_null(rows))[0]
+            raise DatasetError(f"no trial {missing} among the {len(self)} throws", path=self.directory)
+        return self._with(self.throws.take(rows))
+
+    def trajectories(
+        self, columns: Iterable[str] = COLUMNS, *, joints: Iterable[str] = JOINTS, threads: int | None = None
+    ) -> Trajectories:
+        """Read the trajectories of all throws into one array for each column.
+
+        Args:
+            columns: Which of `COLUMNS`; nothing else is copied.
+            joints: Joints that the columns of joints have, in this order; `moving_joints` leaves out the constant ones.
+            threads: How many of them work; None for one a core, up to 4.
+
+        Raises:
+            ConfigError: If there is no such column or joint.
+            DatasetError: If an episode is not where the table says, or it is damaged; CRCs are compared.
+        """
+        trials = self.throws["trial"].to_pylist()
+        return read_trajectories(trials, self._stored, tuple(columns), tuple(joints), threads=threads)
+
+    @property
+    def moving_joints(self) -> tuple[str, ...]:
+        """Joints that the task moves; all others hold still."""
+        return tuple(self.config.task.end)
+
+    @cached_property
+    def _stored(self) -> Sequence[StoredThrow | None]:
+        """Where the episode of each throw lies; None where there is none."""
+        columns = (self.throws[name].to_pylist() for name in ("trial", "shard", "chunk_offset", "samples"))
+        rows = list(zip(*columns, strict=True))
+        # The table may come from anybody: only names of files in the directory itself are followed.
+        paths = {
+            name: self.directory / Path(name).name for name in {shard for _, shard, *_ in rows} if name is not None
+        }
+        start_ns = self.config.trial_start_ns
+        return [
+            None if shard is None else StoredThrow(trial, start_ns(trial), paths[shard], offset, samples)
+            for trial, shard, offset, samples in rows
+        ]
+
+    def _take(self, rows: Iterable[int]) -> Dataset:
+        return self._with(self.throws.take(pa.array(rows, pa.int64())))
+
+    def _with(self, throws: pa.Table) -> Dataset:
+        return replace(self, throws=throws)
 
 
-def read_bag_metadata(directory: Path) -> Mapping[str, Any]:
-    """Fields of the rosbag2 metadata of a finished dataset.
-
-    Raises:
-        DatasetError: If the directory holds no dataset or an unfinished one, or ``metadata.yaml`` is damaged.
-    """
-    path = directory / METADATA
-    if not path.exists():
-        if (directory / PLAN).is_file():
-            raise DatasetError(f"{directory}: the dataset is not finished: it has no {METADATA}")
-        raise DatasetError(f"{directory}: holds no dataset")
-    bag = from_yaml(path).get("rosbag2_bagfile_information")
-    if not isinstance(bag, dict):
-        raise DatasetError(f"{path}: not the metadata of a rosbag2 bag")
-    return bag
+def _as_array(which: Any) -> pa.Array:
+    """An Arrow array of booleans or integers, whatever holds them."""
+    if isinstance(which, pa.ChunkedArray):
+        which = which.combine_chunks()
+    try:
+        values = which if isinstance(which, pa.Array) else pa.array(which if hasattr(which, "__len__") else list(which))
+    except (pa.ArrowException, TypeError) as error:
+        raise ConfigError(f"select: {error}", expected=_SELECTION) from error
+    if not len(values):
+        return pa.array([], pa.int64())
+    if not (pa.types.is_boolean(values.type) or pa.types.is_integer(values.type)):
+        raise ConfigError(f"select: values of type {values.type}", expected=_SELECTION)
+    return values
 
 
-def read_throws(directory: Path, plan: Plan) -> pa.Table:
-    """The table of throws.
-
-    Raises:
-        DatasetError: If the table is missing or damaged, or is not one of this plan.
-    """
-    path = directory / THROWS
-    table = read_throws_table(path, plan)
-    if table["trial"].to_pylist() != [trial.number for trial in plan.trials]:
-        raise DatasetError(f"{path}: its rows are not the {len(plan.trials)} trials of the plan in order")
-    return table
+load = Dataset.open

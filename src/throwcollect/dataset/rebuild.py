@@ -2,34 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import pyarrow as pa
 
 from throwcollect.config.loader import load
-from throwcollect.dataset.bag import FileSummary, dataset_metadata
-from throwcollect.dataset.data_card import Provenance, data_card, outcome_lines
-from throwcollect.dataset.digest import combined_digest
-from throwcollect.dataset.directory import CARD, MANIFEST, METADATA, PLAN, SHARD_SUFFIX, THROWS, config_path
+from throwcollect.dataset.bag import FileSummary
+from throwcollect.dataset.data_card import data_card, outcome_lines
+from throwcollect.dataset.description import WRITTEN, write_description
+from throwcollect.dataset.directory import CARD, PLAN, THROWS, config_path
+from throwcollect.dataset.findings import Finding
 from throwcollect.dataset.journal import was_open
 from throwcollect.dataset.lock import held_alone
-from throwcollect.dataset.manifest import entry_of, entry_of_file, manifest_text, promised_names
+from throwcollect.dataset.manifest import entry_of_file
 from throwcollect.dataset.mcap_reader import StoredEpisode
+from throwcollect.dataset.provenance import Provenance, read_provenance, write_provenance
 from throwcollect.dataset.recovery import remove_unfinished
-from throwcollect.dataset.throws_table import Row, ThrowsTable, encode_table, read_throws_table
-from throwcollect.dataset.verify_episode import EpisodeCheck, RowJudge
+from throwcollect.dataset.throws_table import Row, ThrowsTable, read_throws_table
+from throwcollect.dataset.verify_episode import EpisodeCheck
 from throwcollect.dataset.verify_shard import ShardCheck
-from throwcollect.dataset.verify_tables import shard_of, wrong_trials
+from throwcollect.dataset.verify_tables import find_wrong_trials, shard_of
 from throwcollect.episode.channels import Channels
 from throwcollect.errors import DatasetError
 from throwcollect.files import read_text, write_file
 from throwcollect.robots.description import full_description
 from throwcollect.sweep.plan import Plan, Trial
-from throwcollect.tasks.throw import Outcome, ThrowResult
+from throwcollect.tasks.throw.outcome import Outcome, ThrowResult
 from throwcollect.wording import command
 
 NO_EPISODE = "no file holds an episode of it"
@@ -87,41 +88,44 @@ def rebuild(directory: Path) -> Rebuilt:
         ConfigError: If the ``config.yaml`` is wrong.
     """
     with held_alone(directory):
-        return _rebuilt(directory)
+        return _rebuild(directory)
 
 
-def _rebuilt(directory: Path) -> Rebuilt:
+def _rebuild(directory: Path) -> Rebuilt:
     config = load(config_path(directory))
     plan = Plan.read(directory / PLAN, config)
     repair = command("dataset", "repair", directory, "OUTPUT")
     remove_unfinished(directory)
     if unfinished := sorted(path.name for path in directory.glob("*.part")):
         raise DatasetError(
-            f"{directory}: holds {unfinished[0]}: it is not collected to its end",
+            f"holds {unfinished[0]}: it is not collected to its end",
+            path=directory,
             hint=f"{command('resume', directory)}, or {repair}",
         )
-    if wrong := wrong_trials(plan):
-        raise DatasetError(f"{directory / PLAN}: trial {min(wrong)}: was changed since the plan was made", hint=repair)
-    earlier = earlier_rows(directory, plan)
+    if wrong := find_wrong_trials(plan):
+        raise DatasetError(
+            "was changed since the plan was made", path=directory / PLAN, place=f"trial {min(wrong)}", hint=repair
+        )
+    earlier = read_earlier_rows(directory, plan)
     recordings = _Recordings(plan)
     for name in dict.fromkeys(shard_of(plan, trial.number) for trial in plan.trials):
         if (directory / name).exists():
             if findings := recordings.read(directory / name):
-                raise DatasetError(f"{directory}: {findings[0]}", hint=repair)
+                raise DatasetError(str(findings[0]), path=directory, hint=repair)
         elif any(row["shard"] == name for row in earlier.values()):
-            raise DatasetError(f"{directory}: {name} is missing", hint=repair)
-    table = ThrowsTable(plan.keys, tuple(config.task.end))
+            raise DatasetError(f"{name} is missing", path=directory, hint=repair)
+    table = ThrowsTable.of(plan)
     rows = [
-        recordings.rows.get(trial.number) or row_without_episode(table, trial, earlier.get(trial.number), NO_EPISODE)
+        recordings.rows.get(trial.number) or _row_without_episode(table, trial, earlier.get(trial.number))
         for trial in plan.trials
     ]
     throws = table.table(rows)
-    digest = combined_digest(row["digest"] for row in recordings.rows.values())
-    channels = recordings.channels or Channels(config, full_description(config))
-    written = [THROWS, MANIFEST, METADATA]
-    write_file(directory / THROWS, encode_table(throws))
+    written = [*WRITTEN]
     if not (directory / CARD).exists():
-        provenance = Provenance.of_this_machine(simulations=None, wall_s=None, was_open=was_open(directory))
+        provenance = read_provenance(directory)
+        if provenance is None:
+            provenance = Provenance.of_this_machine(simulations=None, wall_s=None, was_open=was_open(directory))
+            write_provenance(directory, provenance)
         write_file(directory / CARD, data_card(config.without_run(), throws, provenance).encode())
         written.append(CARD)
     rejudged = tuple(
@@ -132,9 +136,9 @@ def _rebuilt(directory: Path) -> Rebuilt:
     if rejudged and CARD not in written:
         _correct_card(directory / CARD, table.table(earlier.values()), throws)
         written.append(CARD)
-    metadata = dataset_metadata(recordings.summaries, channels.all, digest).encode()
-    write_file(directory / MANIFEST, _manifest(directory, config.name, recordings.summaries, metadata).encode())
-    write_file(directory / METADATA, metadata)
+    channels = recordings.channels or Channels(config, full_description(config))
+    files = [(summary, entry_of_file(directory / summary.path)) for summary in recordings.summaries]
+    write_description(directory, config.name, throws, channels, files)
     lost = tuple(row["trial"] for row in rows if row["outcome"] == Outcome.LOST.value)
     return Rebuilt(len(rows), len(recordings.rows), lost, rejudged, tuple(written))
 
@@ -146,15 +150,7 @@ def _correct_card(path: Path, before: pa.Table, after: pa.Table) -> None:
     write_file(path, card.replace(lines, instead, 1).encode())
 
 
-def _manifest(directory: Path, name: str, recordings: Sequence[FileSummary], metadata: bytes) -> str:
-    """Text of the manifest: of these recordings, of these bag's metadata, and of the tables as they lie there."""
-    held = {each.path for each in recordings}
-    others = [path for path in promised_names(directory) if path != METADATA and not path.endswith(SHARD_SUFFIX)]
-    files = [entry_of_file(directory / path) for path in (*others, *held)]
-    return manifest_text(name, [*files, entry_of(METADATA, metadata)])
-
-
-def earlier_rows(directory: Path, plan: Plan) -> Mapping[int, Row]:
+def read_earlier_rows(directory: Path, plan: Plan) -> Mapping[int, Row]:
     """Rows of the table of throws that is there, by trial; none if it cannot be read.
 
     Args:
@@ -166,19 +162,11 @@ def earlier_rows(directory: Path, plan: Plan) -> Mapping[int, Row]:
     return {}
 
 
-def row_without_episode(table: ThrowsTable, trial: Trial, earlier: Row | None, reason: str) -> Row:
-    """Row of a trial that has no episode.
-
-    Args:
-        table: Makes it.
-        trial: The trial.
-        earlier: The row that the trial had, if that is known; one that was lost keeps its reason.
-        reason: Why there is no episode, if nothing else says so.
-    """
+def _row_without_episode(table: ThrowsTable, trial: Trial, earlier: Row | None) -> Row:
+    """Row of a trial that has no episode; one that was lost before keeps its reason."""
     if trial.refused is not None:
-        return table.refused_row(trial.number, trial.values, trial.refused)
-    result = ThrowResult(Outcome.LOST, reason=reason_lost(earlier) or reason)
-    return table.row(trial.number, trial.values, result, None)
+        return table.refused_row(trial)
+    return table.row(trial, ThrowResult(Outcome.LOST, reason=reason_lost(earlier) or NO_EPISODE), None)
 
 
 def reason_lost(earlier: Row | None) -> str | None:
@@ -206,21 +194,20 @@ class _Recordings:
         self.channels: Channels | None = None
         self._plan = plan
         self._check = EpisodeCheck(plan, {})
-        self._judge = RowJudge(plan)
 
-    def read(self, path: Path) -> list[Any]:
+    def read(self, path: Path) -> list[Finding]:
         """Read a file; returns what is wrong with it, and if nothing is, it counts."""
         checked = ShardCheck(path, self._plan.config, None, self._problems)
         if not checked.findings and checked.summary is not None:
             self.summaries.append(checked.summary)
             self.channels = checked.channels
-        return list(checked.findings)
+        return checked.findings
 
     def _problems(self, stored: StoredEpisode, shard: str, channels: Channels | None) -> Iterator[str]:
-        problems = list(self._check.problems(stored, shard, channels))
+        problems = list(self._check.find_problems(stored, shard, channels))
         yield from problems
         if not problems:
             trial = self._plan.trials[stored.episode.header.trial]
             if trial.refused is not None or shard != shard_of(self._plan, trial.number):
                 yield "its episode does not belong into this file"
-            self.rows[trial.number] = self._judge.row(stored, shard)
+            self.rows[trial.number] = self._check.row(stored, shard)

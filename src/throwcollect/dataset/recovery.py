@@ -12,17 +12,18 @@ from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from throwcollect.dataset.directory import CARD, CONFIG, MANIFEST, METADATA, PLAN, SOURCES, THROWS, TRIALS
-from throwcollect.dataset.judging import judged
-from throwcollect.dataset.mcap_file import EpisodeRun, McapFile, episode_run
-from throwcollect.dataset.mcap_reader import mapped
-from throwcollect.dataset.salvage import salvage
-from throwcollect.dataset.shard import FinishedShard, OpenShard
+from throwcollect.dataset.directory import CARD, CONFIG, MANIFEST, METADATA, PLAN, PROVENANCE, SOURCES, THROWS, TRIALS
+from throwcollect.dataset.judging import judge_episode
+from throwcollect.dataset.mcap_contents import Run
+from throwcollect.dataset.mcap_file import episode_run
+from throwcollect.dataset.mcap_reader import map_file
+from throwcollect.dataset.scan import scan_whole
+from throwcollect.dataset.shard import FinishedShard, OpenShard, write_in_order
 from throwcollect.episode.channels import Channels
 from throwcollect.errors import DatasetError
 from throwcollect.files import is_there, remove, unwritable
 from throwcollect.sweep.plan import Plan
-from throwcollect.tasks.throw import ThrowResult
+from throwcollect.tasks.throw.outcome import ThrowResult
 
 
 @dataclass(frozen=True)
@@ -61,7 +62,7 @@ class _Found:
 
     episode: RecoveredEpisode
     offset: int
-    run: EpisodeRun
+    run: Run
 
 
 def remove_unfinished(directory: Path) -> None:
@@ -70,7 +71,7 @@ def remove_unfinished(directory: Path) -> None:
     Raises:
         DatasetError: If something cannot be removed.
     """
-    for name in (CONFIG, PLAN, TRIALS, SOURCES, THROWS, CARD, MANIFEST, METADATA):
+    for name in (CONFIG, PLAN, TRIALS, SOURCES, THROWS, CARD, PROVENANCE, MANIFEST, METADATA):
         remove(directory / f"{name}.new")
     # So were plans called by earlier versions.
     remove(directory / f"{PLAN}.part")
@@ -90,13 +91,13 @@ def recover_shard(shard: OpenShard, plan: Plan, channels: Channels, *, keep: boo
     """
     remove(shard.path.with_name(f"{shard.path.name}.new"))
     wanted = frozenset(shard.missing)
-    final = _whole_episodes(shard.path, plan, channels, wanted)
+    final = _find_episodes(shard.path, plan, channels, wanted)
     if keep and final and final.keys() == wanted:
-        finished = _finished(shard.path, channels, final)
+        finished = _check_finished(shard.path, channels, final)
         if finished is not None:
             remove(shard.part)
-            return RecoveredShard(_in_order(final.values()), finished)
-    begun = _whole_episodes(shard.part, plan, channels, wanted)
+            return RecoveredShard(_sort(final.values()), finished)
+    begun = _find_episodes(shard.part, plan, channels, wanted)
     if final and not begun:
         try:
             os.replace(shard.path, shard.part)
@@ -108,62 +109,58 @@ def recover_shard(shard: OpenShard, plan: Plan, channels: Channels, *, keep: boo
     else:
         runs = [(trial, found.offset, found.run) for trial, found in begun.items()]
         shard.adopt(runs, size=max(offset + run.length for _, offset, run in runs))
-    begun |= _moved(shard, {trial: found for trial, found in final.items() if trial not in begun})
+    begun |= _append_moved(shard, {trial: found for trial, found in final.items() if trial not in begun})
     remove(shard.path)
-    return RecoveredShard(_in_order(begun.values()), None)
+    return RecoveredShard(_sort(begun.values()), None)
 
 
-def _whole_episodes(path: Path, plan: Plan, channels: Channels, wanted: Collection[int]) -> dict[int, _Found]:
+def _find_episodes(path: Path, plan: Plan, channels: Channels, wanted: Collection[int]) -> dict[int, _Found]:
     """Episodes of a file that are as they would be if they were collected again, by trial."""
     found: dict[int, _Found] = {}
     if not is_there(path):
         return found
-    for salvaged in salvage(path):
-        episode = salvaged.stored.episode
+    for each in scan_whole(path):
+        episode = each.stored.episode
         trial = episode.header.trial
-        if not salvaged.intact or trial not in wanted or trial in found:
+        if not each.intact or trial not in wanted or trial in found:
             continue
         try:
-            result = judged(plan.config_of(plan.trials[episode.header.trial]), episode)
+            result = judge_episode(plan.config_of(plan.trials[trial]), episode)
         except DatasetError:
             continue
-        columns = [channel.id for channel in channels.recorded]
-        if list(episode.table.columns) == columns and episode.header.start_ns == plan.config.trial_start_ns(trial):
+        if channels.fit(episode.channels()) and episode.header.start_ns == plan.config.trial_start_ns(trial):
             recovered = RecoveredEpisode(trial, episode.header.samples, episode.digest, result)
-            found[trial] = _Found(recovered, salvaged.offset, replace(episode_run(episode), data=b""))
+            found[trial] = _Found(recovered, each.stored.offset, replace(episode_run(episode), data=b""))
     return found
 
 
-def _finished(path: Path, channels: Channels, found: Mapping[int, _Found]) -> FinishedShard | None:
+def _check_finished(path: Path, channels: Channels, found: Mapping[int, _Found]) -> FinishedShard | None:
     """The shard that a file is; None if it is not what its episodes call for."""
-    offsets = {}
     written = 0
     same = True
-    with mapped(path) as contents:
+    with map_file(path) as contents:
 
         def compare(data: bytes) -> None:
             nonlocal written, same
             same = same and contents.slice(written, written + len(data)) == data
             written += len(data)
 
-        first = found[min(found)].run.chunk_index.message_start_time
-        file = McapFile(compare, channels, start_ns=first)
-        for trial in sorted(found):
-            offset, run = found[trial].offset, found[trial].run
-            offsets[trial] = file.size
-            file.append(replace(run, data=contents.slice(offset, offset + run.length)))
-        summary = file.finish(path.name)
-        return FinishedShard(summary, offsets, file.entry(path.name)) if same and written == len(contents) else None
+        def read(offset: int, length: int) -> bytes:
+            return contents.slice(offset, offset + length)
+
+        runs = {trial: (each.offset, each.run) for trial, each in found.items()}
+        finished = write_in_order(compare, channels, runs, read, name=path.name)
+        return finished if same and written == len(contents) else None
 
 
-def _moved(shard: OpenShard, found: Mapping[int, _Found]) -> dict[int, _Found]:
+def _append_moved(shard: OpenShard, found: Mapping[int, _Found]) -> dict[int, _Found]:
     """Append episodes of the shard's final file to the unfinished one."""
     if found:
-        with mapped(shard.path) as contents:
+        with map_file(shard.path) as contents:
             for each in found.values():
                 shard.append(contents.episode(each.offset).episode)
     return dict(found)
 
 
-def _in_order(found: Iterable[_Found]) -> tuple[RecoveredEpisode, ...]:
+def _sort(found: Iterable[_Found]) -> tuple[RecoveredEpisode, ...]:
     return tuple(sorted((each.episode for each in found), key=lambda each: each.trial))

@@ -12,17 +12,17 @@ from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
 from throwcollect.config.values import reason_not_sweepable
 from throwcollect.dataset.directory import CONFIG, PLAN, SHARD_SUFFIX, THROWS, config_path
-from throwcollect.dataset.judging import judged
-from throwcollect.dataset.new_directory import new_directory
-from throwcollect.dataset.rebuild import earlier_rows, reason_lost
-from throwcollect.dataset.salvage import Salvaged, salvage
+from throwcollect.dataset.judging import judge_episode
+from throwcollect.dataset.rebuild import read_earlier_rows, reason_lost
+from throwcollect.dataset.scan import Found, scan_whole
 from throwcollect.dataset.throws_table import REFUSED, Row, ThrowsTable
 from throwcollect.dataset.verify_episode import EpisodeCheck
-from throwcollect.dataset.verify_tables import wrong_trials
+from throwcollect.dataset.verify_tables import find_wrong_trials
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.message import Episode
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError
+from throwcollect.files import new_directory
 from throwcollect.robots.description import full_description
 from throwcollect.sweep.parquet_file import read_parquet
 from throwcollect.sweep.plan import Plan, make_trials
@@ -106,7 +106,7 @@ def repair(directory: Path, output: Path, *, remake: Remake) -> Repaired:
     config = _configuration(directory)
     remarks: list[str] = []
     plan = _plan(directory, config, remake, remarks)
-    earlier = earlier_rows(directory, plan)
+    earlier = read_earlier_rows(directory, plan)
     with new_directory(output) as beside:
         writer = DatasetWriter.create(beside, plan)
         try:
@@ -128,7 +128,8 @@ def _configuration(directory: Path) -> Config:
         return load(config_path(directory))
     except ConfigError as error:
         raise DatasetError(
-            f"{directory}: {CONFIG} cannot be read, and nothing else holds the configuration",
+            f"{CONFIG} cannot be read, and nothing else holds the configuration",
+            path=directory,
             evidence=str(error),
             hint=f"copy the YAML file that the dataset was collected with to {directory / CONFIG}",
         ) from error
@@ -138,7 +139,7 @@ def _plan(directory: Path, config: Config, remake: Remake, remarks: list[str]) -
     path = directory / PLAN
     try:
         plan = Plan.read(path, config)
-        if not (wrong := wrong_trials(plan)):
+        if not (wrong := find_wrong_trials(plan)):
             return plan
         reason = f"trial {min(wrong)} has another digest than its values and seed"
     except ForeignPlanError as error:
@@ -147,18 +148,20 @@ def _plan(directory: Path, config: Config, remake: Remake, remarks: list[str]) -
             hint=f"restore {CONFIG}, or remove {PLAN} if it is the one that is wrong",
         ) from error
     except DatasetError as error:
-        reason = str(error).removeprefix(f"{path}: ")
+        reason = error.details
     try:
         plan, source = _plan_of_table(directory / THROWS, config), THROWS
     except DatasetError as error:
         if config.grows:
             raise DatasetError(
-                f"{path}: {reason}; it grew with the results, so only {THROWS} could replace it", evidence=str(error)
+                f"{reason}; it grew with the results, so only {THROWS} could replace it", path=path, evidence=str(error)
             ) from error
         try:
             plan, source = remake(config), CONFIG
         except ConfigError as failure:
-            raise DatasetError(f"{path}: {reason}; it cannot be drawn again either", evidence=str(failure)) from failure
+            raise DatasetError(
+                f"{reason}; it cannot be drawn again either", path=path, evidence=str(failure)
+            ) from failure
     remarks.append(f"{PLAN}: {reason}; made again from {source}")
     return plan
 
@@ -180,7 +183,7 @@ def _plan_of_table(path: Path, config: Config) -> Plan:
         or [row["trial"] for row in rows] != list(range(len(rows)))
         or any(row[key] is None for row in rows for key in keys)
     ):
-        raise DatasetError(f"{path}: not the table of this configuration, or not of all trials in order")
+        raise DatasetError("not the table of this configuration, or not of all trials in order", path=path)
     points = Points(keys, np.array([[row[key] for key in keys] for row in rows]))
     trials = zip(make_trials(config, points), rows, strict=True)
     return Plan(
@@ -191,7 +194,7 @@ def _plan_of_table(path: Path, config: Config) -> Plan:
 
 @dataclass
 class _Sorting:
-    """Sorts salvaged episodes into those that are written and those that are not.
+    """Sorts whole episodes into those that are written and those that are not.
 
     Attributes:
         digests: Digests of the right episodes, by trial, as far as they are known.
@@ -216,28 +219,28 @@ class _Sorting:
     def take(self, path: Path) -> None:
         """Write all right episodes of a file, each trial's first one; those that are not the table's wait."""
         try:
-            for salvaged in salvage(path):
-                self._take(path.name, salvaged)
+            for found in scan_whole(path):
+                self._take(path.name, found)
         except DatasetError as error:
-            if not str(error).startswith(f"{path}: "):
+            if error.path != path:
                 raise
-            self.remarks.append(str(error).replace(str(path), path.name, 1))
+            self.remarks.append(str(error.located(Path(path.name))))
 
-    def _take(self, name: str, salvaged: Salvaged) -> None:
-        episode = salvaged.stored.episode
+    def _take(self, name: str, found: Found) -> None:
+        episode = found.stored.episode
         trial = episode.header.trial
-        place = f"{name}: byte {salvaged.offset}"
+        place = f"{name}: byte {found.stored.offset}"
         if trial >= len(self.plan.trials) or self.plan.trials[trial].refused is not None:
             self.remarks.append(f"{place}: an episode of trial {trial}, which the plan does not run")
         elif trial in self.taken:
             where, digest = self.taken[trial]
             kind = "the same" if digest == episode.digest else "another"
             self.remarks.append(f"{place}: {kind} episode of trial {trial} was taken from {where} already")
-        elif problem := next(self._check.content_problems(episode, self._channels), None):
+        elif problem := next(self._check.find_content_problems(episode, self._channels), None):
             self.rejected[trial] = f"{place}: {problem}"
         elif (right := self.digests.get(trial, episode.digest)) != episode.digest:
-            found = DifferingEpisode(trial, name, digest=episode.digest, expected=right)
-            self.waiting.setdefault(trial, []).append(found)
+            differing = DifferingEpisode(trial, name, digest=episode.digest, expected=right)
+            self.waiting.setdefault(trial, []).append(differing)
         else:
             self._write(name, episode)
 
@@ -256,12 +259,12 @@ class _Sorting:
                     kind = "right" if digest == each.expected else "first"
                     self.remarks.append(f"{told}; the {kind} one was taken from {where}")
                 else:
-                    self._write(each.file, _found_again(directory / each.file, each))
+                    self._write(each.file, _find_again(directory / each.file, each))
                     self.differing.append(each)
                     self.remarks.append(f"{told}; kept, as nothing else speaks against it")
 
     def _write(self, name: str, episode: Episode) -> None:
-        self.writer.append(episode, judged(self.plan.config_of(self.plan.trials[episode.header.trial]), episode))
+        self.writer.append(episode, judge_episode(self.plan.config_of(self.plan.trials[episode.header.trial]), episode))
         self.taken[episode.header.trial] = (name, episode.digest)
 
     def give_up(self, earlier: Mapping[int, Row]) -> tuple[LostTrial, ...]:
@@ -278,10 +281,10 @@ class _Sorting:
         return tuple(lost)
 
 
-def _found_again(path: Path, wanted: DifferingEpisode) -> Episode:
+def _find_again(path: Path, wanted: DifferingEpisode) -> Episode:
     """An episode that was found in a file before; one at a time is in memory."""
-    for salvaged in salvage(path):
-        episode = salvaged.stored.episode
+    for found in scan_whole(path):
+        episode = found.stored.episode
         if (episode.header.trial, episode.digest) == (wanted.trial, wanted.digest):
             return episode
-    raise DatasetError(f"{path}: was changed while it was read")
+    raise DatasetError("was changed while it was read", path=path)

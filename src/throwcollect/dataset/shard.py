@@ -8,14 +8,17 @@ file ``<name>_00000.mcap``, and the other vanishes.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
+from operator import itemgetter
 from pathlib import Path
 
 from throwcollect.dataset.bag import FileSummary
 from throwcollect.dataset.manifest import FileEntry
-from throwcollect.dataset.mcap_file import EpisodeRun, McapFile, episode_run
+from throwcollect.dataset.mcap_contents import Run
+from throwcollect.dataset.mcap_file import McapFile, episode_run
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.message import Episode
 from throwcollect.errors import DatasetError
@@ -35,6 +38,32 @@ class FinishedShard:
     summary: FileSummary | None
     offsets: dict[int, int]
     entry: FileEntry | None
+
+
+def write_in_order(
+    write: Callable[[bytes], None],
+    channels: Channels,
+    runs: Mapping[int, tuple[int, Run]],
+    read: Callable[[int, int], bytes],
+    *,
+    name: str,
+) -> FinishedShard:
+    """Write the finished file of some episodes, which depends on nothing but them.
+
+    Args:
+        write: Called with the bytes of the file, in order.
+        channels: What is recorded.
+        runs: By trial, where the run of an episode begins in another file [bytes], and its records without their bytes.
+        read: Gives the bytes of that other file from an offset on, so many.
+        name: Name of the file.
+    """
+    _, first = runs[min(runs)]
+    file = McapFile(write, channels, start_ns=first.start_ns)
+    offsets = {}
+    for trial, (offset, run) in sorted(runs.items(), key=itemgetter(0)):
+        offsets[trial] = file.size
+        file.append(replace(run, data=read(offset, run.length)))
+    return FinishedShard(file.finish(name), offsets, file.entry(name))
 
 
 class OpenShard:
@@ -58,13 +87,13 @@ class OpenShard:
         self._descriptor: int | None = None
         self._size = 0
         self._synced = True
-        self._runs: dict[int, tuple[int, EpisodeRun]] = {}
+        self._runs: dict[int, tuple[int, Run]] = {}
 
     def expect(self, trials: Iterable[int]) -> None:
         """Wait for the episodes or losses of more trials."""
         self.missing.update(trials)
 
-    def adopt(self, runs: Iterable[tuple[int, int, EpisodeRun]], *, size: int) -> None:
+    def adopt(self, runs: Iterable[tuple[int, int, Run]], *, size: int) -> None:
         """Go on with the unfinished file of a shard.
 
         Args:
@@ -114,28 +143,15 @@ class OpenShard:
         """
         if self._descriptor is None or not self._runs:
             return FinishedShard(None, {}, None)
-        offsets = {}
-        first = min(self._runs)
         with replacing(self.path) as descriptor:
-            file = McapFile(
-                lambda data: write_all(descriptor, data),
-                self._channels,
-                start_ns=self._runs[first][1].chunk_index.message_start_time,
-            )
-            for trial in sorted(self._runs):
-                offset, run = self._runs[trial]
-                offsets[trial] = file.size
-                data = os.pread(self._descriptor, run.length, offset)
-                if len(data) != run.length:
-                    raise DatasetError(f"{self.part}: was cut off by somebody else while it was written")
-                file.append(replace(run, data=data))
-            summary = file.finish(self.path.name)
+            write = partial(write_all, descriptor)
+            finished = write_in_order(write, self._channels, self._runs, self._read, name=self.path.name)
         self.close()
         try:
             self.part.unlink()
         except OSError as error:
             raise unwritable(self.part, error) from error
-        return FinishedShard(summary, offsets, file.entry(self.path.name))
+        return finished
 
     def sync(self) -> None:
         """Have what was appended survive a power cut.
@@ -157,10 +173,18 @@ class OpenShard:
             os.close(self._descriptor)
             self._descriptor = None
 
-    def _remember(self, trial: int, offset: int, run: EpisodeRun) -> None:
+    def _remember(self, trial: int, offset: int, run: Run) -> None:
         # The bytes are in the file; keeping them in memory too would hold whole shards there.
         self._runs[trial] = (offset, replace(run, data=b""))
         self.missing.discard(trial)
+
+    def _read(self, offset: int, length: int) -> bytes:
+        if self._descriptor is None:
+            raise ValueError("the shard is closed")
+        data = os.pread(self._descriptor, length, offset)
+        if len(data) != length:
+            raise DatasetError("was cut off by another process while it was written", path=self.part)
+        return data
 
     def _write(self, data: bytes) -> None:
         if self._descriptor is None:

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
 from throwcollect.dataset.columns import TIMES, Column, Recorded, empty_columns, fill
+from throwcollect.dataset.throws_table import Row, ball_state
+from throwcollect.episode.record import NS_PER_S
 from throwcollect.episode.trajectory_rows import STAMPS
 from throwcollect.errors import DatasetError
 from throwcollect.robots.talos import JOINTS
-
-_NS_PER_S = 1_000_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,9 +154,9 @@ class Events:
         landing: When it crossed the landing plane; None if it never did.
     """
 
-    def __init__(self, row: Mapping[str, Any], throw: Throw) -> None:
+    def __init__(self, row: Row, throw: Throw) -> None:
         self._throw = throw
-        self.release, self.apex, self.landing = (_event(row, name) for name in ("release", "apex", "landing"))
+        self.release, self.apex, self.landing = (_make_event(row, name) for name in ("release", "apex", "landing"))
 
     def __repr__(self) -> str:
         times = {"release": self.release, "apex": self.apex, "landing": self.landing}
@@ -170,25 +169,20 @@ class Events:
         Raises:
             DatasetError: If the throw has no episode, or it is damaged.
         """
-        header = self._throw.episode.read_header()
+        header = self._throw.episode.read().header
         return tuple(
             ContactInterval(
                 contact.body,
-                (contact.start_ns - header.start_ns) / _NS_PER_S,
-                None if contact.end_ns is None else (contact.end_ns - header.start_ns) / _NS_PER_S,
+                (contact.start_ns - header.start_ns) / NS_PER_S,
+                None if contact.end_ns is None else (contact.end_ns - header.start_ns) / NS_PER_S,
             )
             for contact in header.contacts
         )
 
 
-def _event(row: Mapping[str, Any], name: str) -> BallEvent | None:
-    if row[f"{name}_time_s"] is None:
-        return None
-    return BallEvent(
-        time_s=row[f"{name}_time_s"],
-        position=np.array([row[f"{name}_{axis}_m"] for axis in "xyz"]),
-        velocity=np.array([row[f"{name}_v{axis}_mps"] for axis in "xyz"]),
-    )
+def _make_event(row: Row, name: str) -> BallEvent | None:
+    state = ball_state(row, name)
+    return None if state is None else BallEvent(state.time_s, np.array(state.position), np.array(state.velocity))
 
 
 class Throw:
@@ -226,9 +220,9 @@ class Throw:
         return Throw, (table, 0, self._keys, self._episode, self._source)
 
     @cached_property
-    def row(self) -> Mapping[str, Any]:
+    def row(self) -> Row:
         """Its row in the table of throws, by column; ``docs/dataset.md`` describes them."""
-        row: dict[str, Any] = self._table.slice(self._position, 1).to_pylist()[0]
+        row: Row = self._table.slice(self._position, 1).to_pylist()[0]
         return row
 
     @property
@@ -272,7 +266,8 @@ class Throw:
         if self._episode is None:
             why = self.outcome if self.reason is None else f"{self.outcome}: {self.reason}"
             raise DatasetError(
-                f"{self._source}: trial {self.trial} has no episode: {why}",
+                f"trial {self.trial} has no episode: {why}",
+                path=Path(self._source),
                 hint="leave such trials out: dataset.recorded",
             )
         return self._episode

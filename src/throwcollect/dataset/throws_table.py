@@ -2,24 +2,34 @@
 
 from __future__ import annotations
 
-import io
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
-import pyarrow.parquet as pq
 
+from throwcollect.dataset.directory import THROWS
 from throwcollect.errors import DatasetError
 from throwcollect.sweep.parquet_file import read_parquet
-from throwcollect.sweep.plan import Plan
-from throwcollect.tasks.throw import Outcome, ThrowResult
+from throwcollect.sweep.plan import Plan, Trial
+from throwcollect.tasks.throw.outcome import BallState, Outcome, Peak, ThrowResult
 
 REFUSED = "refused"
 """Outcome of a trial that the plan refused; all others are those of `Outcome`."""
 
 Row = dict[str, Any]
+"""A row of the table, by column; what is null there is None."""
+
+_NUMBERS = (
+    "release_speed_mps",
+    "release_elevation_rad",
+    "flight_time_s",
+    "hit_angle_rad",
+    "recontacts",
+    "effort_saturated_share",
+)
+"""Columns that hold a field of `ThrowResult` of the same name."""
 
 
 @dataclass(frozen=True)
@@ -48,11 +58,12 @@ def _number(name: str, description: str) -> pa.Field:
 
 
 def _state_fields(name: str, when: str) -> list[pa.Field]:
-    return [
-        _number(f"{name}_time_s", f"Time since the start of the trial {when} [s]."),
-        *(_number(f"{name}_{axis}_m", f"Ball centre in world {when}, {axis} [m].") for axis in "xyz"),
-        *(_number(f"{name}_v{axis}_mps", f"Velocity of the ball in world {when}, {axis} [m/s].") for axis in "xyz"),
+    descriptions = [
+        f"Time since the start of the trial {when} [s].",
+        *(f"Ball centre in world {when}, {axis} [m]." for axis in "xyz"),
+        *(f"Velocity of the ball in world {when}, {axis} [m/s]." for axis in "xyz"),
     ]
+    return list(map(_number, _state_columns(name), descriptions))
 
 
 def _peak_fields(name: str, of: str) -> list[pa.Field]:
@@ -78,30 +89,60 @@ def _result_fields(joints: Sequence[str]) -> list[pa.Field]:
         *_peak_fields("effort", "Largest torque of a joint over its limit"),
         _number("effort_saturated_share", "Share of samples in which some joint's torque is at its limit [-]."),
         *(
-            _number(f"{joint}_tracking_error_rad", f"Largest distance of {joint} from its commanded trajectory [rad].")
+            _number(_error_column(joint), f"Largest distance of {joint} from its commanded trajectory [rad].")
             for joint in joints
         ),
     ]
 
 
-def _result_values(result: ThrowResult, joints: Sequence[str]) -> Iterator[object]:
-    """Values of `_result_fields`, in their order."""
-    for state in (result.release, result.apex, result.landing):
-        yield from (None,) * 7 if state is None else (state.time_s, *state.position, *state.velocity)
-    yield result.release_speed_mps
-    yield result.release_elevation_rad
-    yield result.flight_time_s
-    yield result.hit_angle_rad
-    yield result.recontacts
-    for peak in (result.position_peak, result.velocity_peak, result.effort_peak):
-        yield from (None, None) if peak is None else (peak.share, peak.joint)
-    yield result.effort_saturated_share
+def _result_values(result: ThrowResult, joints: Sequence[str]) -> dict[str, object]:
+    """Values of `_result_fields`, by column; what is missing in the result is missing here."""
+    values: dict[str, object] = {name: getattr(result, name) for name in _NUMBERS}
+    for name, state in (("release", result.release), ("apex", result.apex), ("landing", result.landing)):
+        if state is not None:
+            numbers = (state.time_s, *state.position, *state.velocity)
+            values |= zip(_state_columns(name), numbers, strict=True)
+    for name, peak in (
+        ("position", result.position_peak),
+        ("velocity", result.velocity_peak),
+        ("effort", result.effort_peak),
+    ):
+        if peak is not None:
+            values |= {f"{name}_peak_share": peak.share, f"{name}_peak_joint": peak.joint}
     errors = result.tracking_error_rad or {}
-    yield from map(errors.get, joints)
+    return values | {_error_column(joint): errors.get(joint) for joint in joints}
+
+
+def ball_state(row: Row, name: str) -> BallState | None:
+    """The ball as a row has it; None if the throw came to no such event.
+
+    Args:
+        row: A row of the table of throws.
+        name: ``release``, ``apex`` or ``landing``.
+    """
+    time_s, *numbers = (row[column] for column in _state_columns(name))
+    return None if time_s is None else BallState(time_s, tuple(numbers[:3]), tuple(numbers[3:]))
+
+
+def _peak(row: Row, name: str) -> Peak | None:
+    joint = row[f"{name}_peak_joint"]
+    return None if joint is None else Peak(joint, row[f"{name}_peak_share"])
+
+
+def _state_columns(name: str) -> list[str]:
+    return [
+        f"{name}_time_s",
+        *(f"{name}_{axis}_m" for axis in "xyz"),
+        *(f"{name}_v{axis}_mps" for axis in "xyz"),
+    ]
+
+
+def _error_column(joint: str) -> str:
+    return f"{joint}_tracking_error_rad"
 
 
 class ThrowsTable:
-    """Makes the rows and the schema of one collection's table.
+    """Schema of one collection's table; makes rows of results, and results of rows.
 
     Attributes:
         schema: Columns with their types and descriptions.
@@ -130,27 +171,53 @@ class ThrowsTable:
             ]
         )
 
-    def row(self, trial: int, values: Mapping[str, float], result: ThrowResult, place: Place | None) -> Row:
+    @classmethod
+    def of(cls, plan: Plan) -> ThrowsTable:
+        """The table of a plan's trials."""
+        return cls(plan.keys, tuple(plan.config.task.end))
+
+    def row(self, trial: Trial, result: ThrowResult, place: Place | None) -> Row:
         """Row of a trial that was run.
 
         Args:
-            trial: Number of the trial.
-            values: Its swept values.
+            trial: The trial.
             result: What came of it.
             place: Where its episode lies; None if there is none.
         """
-        row = self._known(trial, values, result.outcome.value, result.reason)
-        row.update(zip(self._names, _result_values(result, self._joints), strict=True))
+        values = _result_values(result, self._joints)
+        row = self._start_row(trial, result.outcome.value, result.reason)
+        row.update((name, values.get(name)) for name in self._names)
         if place is not None:
             row.update(vars(place))
         return row
 
-    def refused_row(self, trial: int, values: Mapping[str, float], reason: str) -> Row:
+    def refused_row(self, trial: Trial) -> Row:
         """Row of a trial that the plan refused."""
-        return self._known(trial, values, REFUSED, reason)
+        return self._start_row(trial, REFUSED, trial.refused)
 
-    def _known(self, trial: int, values: Mapping[str, float], outcome: str, reason: str | None) -> Row:
-        return {"trial": trial, **{key: values[key] for key in self._parameters}, "outcome": outcome, "reason": reason}
+    def result(self, row: Row) -> ThrowResult:
+        """The result that `row` made a row of.
+
+        Args:
+            row: The row of a trial that was run.
+        """
+        errors = {joint: row[_error_column(joint)] for joint in self._joints}
+        return ThrowResult(
+            outcome=Outcome(row["outcome"]),
+            reason=row["reason"],
+            release=ball_state(row, "release"),
+            apex=ball_state(row, "apex"),
+            landing=ball_state(row, "landing"),
+            position_peak=_peak(row, "position"),
+            velocity_peak=_peak(row, "velocity"),
+            effort_peak=_peak(row, "effort"),
+            tracking_error_rad=None if None in errors.values() else errors,
+            **{name: row[name] for name in _NUMBERS},
+        )
+
+    def _start_row(self, trial: Trial, outcome: str, reason: str | None) -> Row:
+        values = {key: trial.values[key] for key in self._parameters}
+        return {"trial": trial.number, **values, "outcome": outcome, "reason": reason}
 
     def table(self, rows: Iterable[Row]) -> pa.Table:
         """Rows, in the given order, as an Arrow table; what a row lacks is null."""
@@ -168,15 +235,21 @@ def read_throws_table(path: Path, plan: Plan) -> pa.Table:
         DatasetError: If the table is missing or damaged, or has other columns.
     """
     table = read_parquet(path)
-    schema = ThrowsTable(plan.keys, tuple(plan.config.task.end)).schema
+    schema = ThrowsTable.of(plan).schema
     if not table.schema.equals(schema):
         wrong = sorted(set(table.schema.names) ^ set(schema.names)) or "types of columns"
-        raise DatasetError(f"{path}: not the table of this plan: differs in {wrong}")
+        raise DatasetError(f"not the table of this plan: differs in {wrong}", path=path)
     return table
 
 
-def encode_table(table: pa.Table) -> bytes:
-    """Parquet bytes of a table; equal tables give equal bytes."""
-    buffer = io.BytesIO()
-    pq.write_table(table.combine_chunks(), buffer, compression="zstd", write_page_checksum=True)
-    return buffer.getvalue()
+def read_throws(directory: Path, plan: Plan) -> pa.Table:
+    """The table of throws of a dataset, whose rows are the trials of its plan in order.
+
+    Raises:
+        DatasetError: If the table is missing or damaged, or is not one of this plan.
+    """
+    path = directory / THROWS
+    table = read_throws_table(path, plan)
+    if table["trial"].to_pylist() != [trial.number for trial in plan.trials]:
+        raise DatasetError(f"its rows are not the {len(plan.trials)} trials of the plan in order", path=path)
+    return table

@@ -12,7 +12,7 @@ from typing import overload
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.dataset.columns import Column, Place, check_columns, empty_columns, fill, stored_rows
+from throwcollect.dataset.columns import Column, StoredThrow, check_columns, empty_columns, fill, read_stored_rows
 from throwcollect.wording import counted
 
 _BLOCK = 16
@@ -95,7 +95,7 @@ class Trajectories:
 
 def read_trajectories(
     trials: Sequence[int],
-    places: Sequence[Place | None],
+    places: Sequence[StoredThrow | None],
     columns: Sequence[str],
     joints: tuple[str, ...],
     *,
@@ -122,8 +122,8 @@ def read_trajectories(
     blocks = [stored[first : first + _BLOCK] for first in range(0, len(stored), _BLOCK)]
     starts = np.cumsum([0, *(sum(place.samples for place in block) for block in blocks)]).tolist()
 
-    def read(block: Sequence[Place], start: int, stop: int) -> None:
-        fill({name: column[start:stop] for name, column in found.items()}, block, stored_rows(block), joints)
+    def read(block: Sequence[StoredThrow], start: int, stop: int) -> None:
+        fill({name: column[start:stop] for name, column in found.items()}, block, read_stored_rows(block), joints)
 
     threads = threads or min(_MOST_THREADS, os.cpu_count() or 1)
     with nullcontext() if threads == 1 else ThreadPoolExecutor(threads) as pool:

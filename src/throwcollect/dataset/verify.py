@@ -1,6 +1,6 @@
 """Checks a finished dataset: every file against the others, against itself, and against physics.
 
-What cannot be read is reported, and everything that does not depend on it is checked all the same.
+A file that cannot be read is reported, and everything that does not depend on it is still checked.
 """
 
 from __future__ import annotations
@@ -10,17 +10,18 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from throwcollect.dataset.bag import FileSummary, bag_information
+from throwcollect.config.schema import Config
+from throwcollect.dataset.bag import FileSummary, bag_information, read_bag_metadata
 from throwcollect.dataset.digest import combined_digest, is_digest
 from throwcollect.dataset.directory import CARD, FORMAT, METADATA, SHARD_SUFFIX, THROWS
 from throwcollect.dataset.findings import Finding
-from throwcollect.dataset.reader import read_bag_metadata
 from throwcollect.dataset.verify_episode import EpisodeCheck
-from throwcollect.dataset.verify_manifest import manifest_findings
-from throwcollect.dataset.verify_plan import CheckOf, drawing_findings, refusal_findings
+from throwcollect.dataset.verify_manifest import find_manifest_problems
+from throwcollect.dataset.verify_plan import CheckOf, can_draw, find_drawing_problems, find_refusal_problems
 from throwcollect.dataset.verify_shard import ShardCheck
 from throwcollect.dataset.verify_tables import Tables, check_tables, shard_of
 from throwcollect.errors import DatasetError
+from throwcollect.robots.description import is_available as robot_is_available
 
 _UNFINISHED = (".part", ".new")
 _short = reprlib.Repr()
@@ -36,7 +37,7 @@ def verify(directory: Path, *, check_of: CheckOf | None = None) -> list[Finding]
     plan is drawn again; the bag's metadata against the files; of each file every record, index, count and CRC, the
     latched topics and the order of trials; of each episode its digest, layout and stamps, and that the simulation can
     have recorded it; the table of throws against the episodes, which are judged again, and against the plan; and the
-    dataset's digest.
+    dataset's digest. What takes packages that are not installed is left out, and `unchecked` names it.
 
     Args:
         directory: Its directory.
@@ -54,26 +55,38 @@ def verify(directory: Path, *, check_of: CheckOf | None = None) -> list[Finding]
     except DatasetError as error:
         if not (directory / METADATA).exists():
             raise
-        findings.append(Finding(METADATA, "", str(error).removeprefix(f"{directory / METADATA}: ")))
+        findings.append(Finding.of(METADATA, error))
     tables = check_tables(directory)
-    findings += manifest_findings(directory, tables.config.name if tables.config else None)
+    findings += find_manifest_problems(directory, tables.config.name if tables.config else None)
     findings += tables.findings
     findings += _plan_findings(directory, tables, check_of)
     checks = _check_shards(directory, tables)
     findings += [finding for check in checks.values() for finding in check.findings]
     if bag is not None:
-        findings += _bag_findings(bag, checks)
-        findings += _digest_findings(bag, tables, checks)
-    findings += _stray_findings(directory, checks)
+        findings += _find_bag_problems(bag, checks)
+        findings += _find_digest_problems(bag, tables, checks)
+    findings += _find_stray_files(directory, checks)
     return findings
+
+
+def unchecked(config: Config) -> tuple[str, ...]:
+    """What `verify` leaves out of a dataset, as packages of the extra ``collect`` are not installed; empty if nothing.
+
+    Args:
+        config: Configuration of the dataset.
+    """
+    left_out: tuple[str, ...] = () if can_draw(config) else ("whether the configuration draws these trials",)
+    if not robot_is_available(config):
+        left_out += ("whether the robot can do them", "how its joints moved", "what came of the throws")
+    return left_out
 
 
 def _plan_findings(directory: Path, tables: Tables, check_of: CheckOf | None) -> Iterator[Finding]:
     if tables.plan is None:
         return
-    yield from drawing_findings(directory, tables.plan, tables.rows)
-    if check_of is not None:
-        yield from refusal_findings(tables.plan, tables.doubtful, check_of)
+    yield from find_drawing_problems(directory, tables.plan, tables.rows)
+    if check_of is not None and robot_is_available(tables.plan.config):
+        yield from find_refusal_problems(tables.plan, tables.doubtful, check_of)
 
 
 def _check_shards(directory: Path, tables: Tables) -> dict[str, ShardCheck]:
@@ -88,14 +101,17 @@ def _check_shards(directory: Path, tables: Tables) -> dict[str, ShardCheck]:
             # A trial whose row is missing most likely has an episode.
             if (trial not in refused and name in names) if row is None else row["shard"] == name:
                 expected.setdefault(name, []).append(trial)
-    check = EpisodeCheck(tables.plan, tables.rows or {}, doubtful=tables.doubtful)
+    robot = tables.config is not None and robot_is_available(tables.config)
+    check = EpisodeCheck(tables.plan, tables.rows or {}, doubtful=tables.doubtful, robot=robot)
     return {
-        name: ShardCheck(directory / name, tables.config, None if expected is None else expected[name], check.problems)
+        name: ShardCheck(
+            directory / name, tables.config, None if expected is None else expected[name], check.find_problems
+        )
         for name in sorted(names if expected is None else expected)
     }
 
 
-def _bag_findings(bag: Mapping[str, Any], checks: Mapping[str, ShardCheck]) -> Iterator[Finding]:
+def _find_bag_problems(bag: Mapping[str, Any], checks: Mapping[str, ShardCheck]) -> Iterator[Finding]:
     summaries = [check.summary for check in checks.values() if check.summary is not None]
     channels = next((check.channels for check in checks.values() if check.channels is not None), None)
     whole = len(summaries) == len(checks)
@@ -103,36 +119,38 @@ def _bag_findings(bag: Mapping[str, Any], checks: Mapping[str, ShardCheck]) -> I
         summaries, channels.all if channels else (), {"throwcollect.format": FORMAT, "throwcollect.digest": ""}
     )
     if unknown := sorted(map(str, set(bag) - set(expected))):
-        yield Finding(METADATA, "", f"has unknown keys: {_shortened(unknown)}")
+        yield Finding(METADATA, "", f"has unknown keys: {_shorten(unknown)}")
     del expected["custom_data"]
     if not channels:
         del expected["topics_with_message_count"]
     if not whole:
         # Some files cannot be read, which is reported above, so totals over all files cannot be checked.
-        yield from _file_findings(bag, summaries)
+        yield from _find_file_problems(bag, summaries)
         return
     for key, value in expected.items():
         if bag.get(key) != value:
-            yield Finding(METADATA, key, f"is {_shortened(bag.get(key))}, the files give {_shortened(value)}")
+            yield Finding(METADATA, key, f"is {_shorten(bag.get(key))}, the files give {_shorten(value)}")
 
 
-def _file_findings(bag: Mapping[str, Any], summaries: list[FileSummary]) -> Iterator[Finding]:
+def _find_file_problems(bag: Mapping[str, Any], summaries: list[FileSummary]) -> Iterator[Finding]:
     entries = bag.get("files")
     said = {each.get("path"): each for each in entries if isinstance(each, dict)} if isinstance(entries, list) else {}
     for summary in summaries:
         (expected,) = bag_information([summary], (), {})["files"]
         if said.get(summary.path) != expected:
-            found = _shortened(said.get(summary.path))
-            yield Finding(METADATA, f"files: {summary.path}", f"is {found}, the file gives {_shortened(expected)}")
+            found = _shorten(said.get(summary.path))
+            yield Finding(METADATA, f"files: {summary.path}", f"is {found}, the file gives {_shorten(expected)}")
 
 
-def _digest_findings(bag: Mapping[str, Any], tables: Tables, checks: Mapping[str, ShardCheck]) -> Iterator[Finding]:
+def _find_digest_problems(
+    bag: Mapping[str, Any], tables: Tables, checks: Mapping[str, ShardCheck]
+) -> Iterator[Finding]:
     custom = bag.get("custom_data")
     said = custom if isinstance(custom, dict) else {}
     if said.get("throwcollect.format") != FORMAT:
-        yield Finding(METADATA, "custom_data: throwcollect.format", f"is {_shortened(said.get('throwcollect.format'))}")
+        yield Finding(METADATA, "custom_data: throwcollect.format", f"is {_shorten(said.get('throwcollect.format'))}")
     if unknown := sorted(map(str, set(said) - {"throwcollect.format", "throwcollect.digest"})):
-        yield Finding(METADATA, "custom_data", f"has unknown keys: {_shortened(unknown)}")
+        yield Finding(METADATA, "custom_data", f"has unknown keys: {_shorten(unknown)}")
     digests = {trial: digest for check in checks.values() for trial, digest in check.digests.items()}
     damaged = any(check.summary is None for check in checks.values())
     if damaged:
@@ -146,11 +164,11 @@ def _digest_findings(bag: Mapping[str, Any], tables: Tables, checks: Mapping[str
         yield Finding(
             METADATA,
             "custom_data: throwcollect.digest",
-            f"is {_shortened(written)}, {giver} give{'s' * damaged} {digest}",
+            f"is {_shorten(written)}, {giver} give{'s' * damaged} {digest}",
         )
 
 
-def _stray_findings(directory: Path, checks: Mapping[str, ShardCheck]) -> Iterator[Finding]:
+def _find_stray_files(directory: Path, checks: Mapping[str, ShardCheck]) -> Iterator[Finding]:
     for path in sorted(directory.iterdir()):
         if path.suffix in _UNFINISHED:
             yield Finding(path.name, "", "a file that was not written to its end")
@@ -160,5 +178,5 @@ def _stray_findings(directory: Path, checks: Mapping[str, ShardCheck]) -> Iterat
         yield Finding(CARD, "", "is missing")
 
 
-def _shortened(value: object) -> str:
+def _shorten(value: object) -> str:
     return _short.repr(value)

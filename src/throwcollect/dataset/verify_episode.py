@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from throwcollect.config.schema import Config
-from throwcollect.dataset.judging import judged
-from throwcollect.dataset.mcap_file import EpisodeRun, episode_run
+from throwcollect.dataset.judging import judge_episode
+from throwcollect.dataset.mcap_contents import Run
+from throwcollect.dataset.mcap_file import episode_run
 from throwcollect.dataset.mcap_reader import StoredEpisode
-from throwcollect.dataset.throws_table import Place, ThrowsTable
-from throwcollect.dataset.verify_header import header_problems
-from throwcollect.dataset.verify_motion import ball_problems, infinite_columns, joint_problems
+from throwcollect.dataset.recorded_trial import RecordedTrial
+from throwcollect.dataset.throws_table import Place, Row, ThrowsTable
+from throwcollect.dataset.verify_header import find_header_problems
+from throwcollect.dataset.verify_motion import find_ball_problems, find_infinite_columns, find_joint_problems
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.message import Episode
-from throwcollect.episode.record import Samples
+from throwcollect.episode.record import NS_PER_S, Samples
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.robots.description import touchable_bodies
 from throwcollect.sweep.plan import Plan
@@ -26,36 +28,8 @@ from throwcollect.wording import counted
 
 _RELATIVE_TOLERANCE = 1e-9
 """Numbers that are judged again on another machine may differ in their last bits."""
-_MOST_TOLD = 3
-"""Columns of a row that are told one by one."""
-_NS_PER_S = 1_000_000_000
-
-
-class RowJudge:
-    """Makes the rows of the table of throws anew, from episodes as they lie in their files.
-
-    Args:
-        plan: The plan that has their trials.
-    """
-
-    def __init__(self, plan: Plan) -> None:
-        self._plan = plan
-        self._table = ThrowsTable(plan.keys, tuple(plan.config.task.end))
-
-    def row(self, stored: StoredEpisode, shard: str) -> dict[str, Any]:
-        """The row of an episode.
-
-        Args:
-            stored: The episode.
-            shard: Name of its file.
-
-        Raises:
-            DatasetError: If the episode is damaged.
-        """
-        episode = stored.episode
-        trial = self._plan.trials[episode.header.trial]
-        place = Place(shard, stored.chunk.offset, episode.header.samples, episode.digest)
-        return self._table.row(trial.number, trial.values, judged(self._plan.config_of(trial), episode), place)
+_MOST_NAMED = 3
+"""Differing columns of a row that are named; the others are counted."""
 
 
 class EpisodeCheck:
@@ -65,18 +39,21 @@ class EpisodeCheck:
         plan: Its trials; None if they are not known, and then neither rows nor physics are looked at.
         rows: Rows of the table of throws, by trial; where there is none, the episode is not compared with it.
         doubtful: Trials that the plan has wrong; neither rows nor physics of theirs are looked at.
+        robot: Whether to look at what only the robot's model tells: the motion of the joints, the names of bodies that
+            the ball touches, and what came of the throw.
     """
 
     def __init__(
-        self, plan: Plan | None, rows: Mapping[int, Mapping[str, Any]], *, doubtful: Collection[int] = ()
+        self, plan: Plan | None, rows: Mapping[int, Row], *, doubtful: Collection[int] = (), robot: bool = True
     ) -> None:
         self._plan = plan
         self._rows = rows
         self._doubtful = doubtful
-        self._judge = RowJudge(plan) if plan else None
-        self._bodies = touchable_bodies() if plan else frozenset()
+        self._table = ThrowsTable.of(plan) if plan else None
+        self._robot = robot
+        self._bodies = touchable_bodies(plan.config) if plan and robot else None
 
-    def problems(self, stored: StoredEpisode, shard: str, channels: Channels | None) -> Iterator[str]:
+    def find_problems(self, stored: StoredEpisode, shard: str, channels: Channels | None) -> Iterator[str]:
         """Everything that is wrong with an episode.
 
         Args:
@@ -89,24 +66,38 @@ class EpisodeCheck:
         """
         episode = stored.episode
         try:
-            yield from _record_problems(stored, episode_run(episode))
+            yield from _find_record_problems(stored, episode_run(episode))
         except DatasetError as error:
             yield str(error)
             return
-        unreadable = list(self._layout_problems(episode, channels))
-        yield from unreadable or self._physics_problems(episode)
+        unreadable = list(self._find_layout_problems(episode, channels))
+        yield from unreadable or self._find_physics_problems(episode)
         row = self._rows.get(episode.header.trial)
-        if (
-            self._judge is not None
-            and row is not None
-            and not unreadable
-            and episode.header.trial not in self._doubtful
-        ):
-            # Swept values were compared with the plan, and that is where they come from here.
-            judged_row = self._judge.row(stored, shard)
-            yield from _row_problems({name: judged_row[name] for name in judged_row if "." not in name}, row)
+        if row is not None and not unreadable and episode.header.trial not in self._doubtful:
+            expected = vars(Place(shard, stored.offset, episode.header.samples, episode.digest))
+            if self._robot:
+                # Swept values were compared with the plan, and that is where they come from here.
+                expected = {name: value for name, value in self.row(stored, shard).items() if "." not in name}
+            yield from _find_row_problems(expected, row)
 
-    def content_problems(self, episode: Episode, channels: Channels | None) -> Iterator[str]:
+    def row(self, stored: StoredEpisode, shard: str) -> Row:
+        """The row that an episode should have in the table of throws; the plan is known.
+
+        Args:
+            stored: The episode.
+            shard: Name of its file.
+
+        Raises:
+            DatasetError: If the episode is damaged, or the plan is not known.
+        """
+        if self._plan is None or self._table is None:
+            raise DatasetError("no plan says which trial it is")
+        episode = stored.episode
+        trial = self._plan.trials[episode.header.trial]
+        place = Place(shard, stored.offset, episode.header.samples, episode.digest)
+        return self._table.row(trial, judge_episode(self._plan.config_of(trial), episode), place)
+
+    def find_content_problems(self, episode: Episode, channels: Channels | None) -> Iterator[str]:
         """Everything that is wrong with an episode wherever it lies.
 
         Args:
@@ -116,10 +107,10 @@ class EpisodeCheck:
         Yields:
             What is wrong, a sentence each.
         """
-        problems = list(self._layout_problems(episode, channels))
-        yield from problems or self._physics_problems(episode)
+        problems = list(self._find_layout_problems(episode, channels))
+        yield from problems or self._find_physics_problems(episode)
 
-    def _layout_problems(self, episode: Episode, channels: Channels | None) -> Iterator[str]:
+    def _find_layout_problems(self, episode: Episode, channels: Channels | None) -> Iterator[str]:
         """What keeps an episode from being measured: by its records, its layout, its trial or its stamps."""
         try:
             samples = episode.samples()
@@ -128,7 +119,7 @@ class EpisodeCheck:
             yield str(error)
             return
         if channels is not None:
-            yield from _message_problems(episode, channels)
+            yield from _find_message_problems(episode, channels)
         if self._plan is None or episode.header.trial in self._doubtful:
             return
         if episode.header.trial >= len(self._plan.trials):
@@ -139,41 +130,43 @@ class EpisodeCheck:
         except ConfigError as error:
             yield f"the plan has values that cannot be: {error}"
             return
-        yield from stamp_problems(episode, samples, config)
+        yield from find_stamp_problems(episode, samples, config)
+        yield from find_sensor_problems(episode)
 
-    def _physics_problems(self, episode: Episode) -> Iterator[str]:
+    def _find_physics_problems(self, episode: Episode) -> Iterator[str]:
         """What the simulation cannot have recorded."""
         if self._plan is None or episode.header.trial in self._doubtful:
             return
         config = self._plan.config_of(self._plan.trials[episode.header.trial])
         samples = episode.samples()
-        if infinite := list(infinite_columns(samples)):
+        if infinite := list(find_infinite_columns(samples)):
             yield from infinite
             return
-        trajectory, header = throw_trajectory(config), episode.header
+        trial = RecordedTrial(samples, episode.header, config, throw_trajectory(config))
         # Numbers of a forger may be as large as they like.
         with np.errstate(all="ignore"):
-            problems = [
-                *header_problems(samples, header, config=config, trajectory=trajectory, bodies=self._bodies),
-                *joint_problems(samples, header, config=config, trajectory=trajectory),
-                *ball_problems(samples, header, config=config),
-            ]
+            problems = list(find_header_problems(trial, self._bodies))
+            if self._robot:
+                problems += find_joint_problems(trial)
+            problems += find_ball_problems(trial)
         yield from problems
 
 
-def _row_problems(expected: Mapping[str, Any], row: Mapping[str, Any]) -> Iterator[str]:
+def _find_row_problems(expected: Mapping[str, Any], row: Mapping[str, Any]) -> Iterator[str]:
     wrong = [name for name, value in expected.items() if not _same(value, row[name])]
     if wrong:
-        told = ", ".join(f"{name} = {row[name]!r}, the episode gives {expected[name]!r}" for name in wrong[:_MOST_TOLD])
-        more = f"; {len(wrong) - _MOST_TOLD} more columns differ" if len(wrong) > _MOST_TOLD else ""
+        told = ", ".join(
+            f"{name} = {row[name]!r}, the episode gives {expected[name]!r}" for name in wrong[:_MOST_NAMED]
+        )
+        more = f"; {len(wrong) - _MOST_NAMED} more columns differ" if len(wrong) > _MOST_NAMED else ""
         hint = "; to have it judged anew: throwcollect dataset rebuild" if "outcome" in wrong else ""
         yield f"throws.parquet has {told}{more}{hint}"
 
 
-def _message_problems(episode: Episode, channels: Channels) -> Iterator[str]:
+def _find_message_problems(episode: Episode, channels: Channels) -> Iterator[str]:
     expected = {channel.id: topic for channel, topic in channels.recorded.items()}
-    if list(episode.table.columns) != list(expected):
-        yield f"has the channels {list(episode.table.columns)} instead of {list(expected)}"
+    if problems := list(find_channel_problems(episode, channels)):
+        yield from problems
         return
     for channel, topic in expected.items():
         messages = episode.table.messages(channel)
@@ -183,23 +176,42 @@ def _message_problems(episode: Episode, channels: Channels) -> Iterator[str]:
         rows = messages.view(topic.layout.dtype)[:, 0]
         for name in topic.layout.dtype.names or ():
             if name.endswith(("stamp.sec", "clock.sec")):
-                stamps = rows[name].astype(np.int64) * _NS_PER_S + rows[name.replace(".sec", ".nanosec")]
+                stamps = rows[name].astype(np.int64) * NS_PER_S + rows[name.replace(".sec", ".nanosec")]
                 if not np.array_equal(stamps, episode.table.log_times):
                     yield f"stamps of {topic.name} ({name.removesuffix('.sec')}) differ from the times of its records"
 
 
-def _record_problems(stored: StoredEpisode, run: EpisodeRun) -> Iterator[str]:
-    """Differences between the records around a chunk and what its contents call for."""
-    start = stored.chunk.offset
-    indexes = b"".join(record.data for record in stored.indexes.values())
-    first = len(stored.chunk.data)
-    if indexes != run.data[first : first + run.chunk_index.message_index_length]:
-        yield f"the message indexes from byte {start + first} on do not fit the chunk"
+def _find_record_problems(stored: StoredEpisode, run: Run) -> Iterator[str]:
+    """Differences between the records around chunks and what the contents of these call for."""
+    for chunk, expected in zip(stored.chunks, run.chunk_indexes, strict=True):
+        first = expected.chunk_start_offset + expected.chunk_length
+        indexes = b"".join(record.data for record in chunk.indexes.values())
+        if indexes != run.data[first : first + expected.message_index_length]:
+            yield f"the message indexes from byte {chunk.record.end} on do not fit the chunk"
     if stored.facts.data != run.data[len(run.data) - run.metadata_length :]:
         yield f"the metadata at byte {stored.facts.offset} do not fit the chunk (digest, trial or header)"
 
 
-def stamp_problems(episode: Episode, samples: Samples, config: Config) -> Iterator[str]:
+def find_sensor_problems(episode: Episode) -> Iterator[str]:
+    """What chunks of sensors cannot have recorded, a sentence each."""
+    last_ns = episode.chunk.end_ns
+    for number, sensor in enumerate(episode.sensors, start=1):
+        messages, times = sensor.messages, sensor.messages.headers["log_time"]
+        if (np.diff(times.astype(np.int64)) < 0).any():
+            yield f"chunk {number}: the messages are not in order of their times"
+        if times.min() < episode.header.start_ns or times.max() > last_ns:
+            yield f"chunk {number}: has messages from {times.min()} to {times.max()} ns, the trial ends at {last_ns} ns"
+        if (sensor.chunk.start_ns, sensor.chunk.end_ns) != (times.min(), times.max()):
+            yield f"chunk {number}: its times differ from those of its messages"
+        if not (np.array_equal(messages.stamps_ns, times) and np.array_equal(messages.headers["publish_time"], times)):
+            yield f"chunk {number}: stamps differ from the times of the records"
+        for channel in messages.channels:
+            counted_up = messages.headers["sequence"][messages.headers["channel"] == channel]
+            if not np.array_equal(counted_up, np.arange(len(counted_up))):
+                yield f"chunk {number}: the messages of channel {channel} are not numbered from 0"
+
+
+def find_stamp_problems(episode: Episode, samples: Samples, config: Config) -> Iterator[str]:
     """Everything that is wrong with the times of an episode.
 
     Args:
@@ -219,8 +231,19 @@ def stamp_problems(episode: Episode, samples: Samples, config: Config) -> Iterat
     if stamps[0] != config.trial_start_ns(header.trial):
         yield f"starts at {stamps[0]} ns, the trial's slot of time at {config.trial_start_ns(header.trial)} ns"
     steps = np.diff(stamps)
-    if len(steps) and np.abs(steps - _NS_PER_S / config.record.rate_hz).max() > 1:
+    if len(steps) and np.abs(steps - NS_PER_S / config.record.rate_hz).max() > 1:
         yield f"stamps are not spaced by 1/{config.record.rate_hz} s: {steps.min()} to {steps.max()} ns"
+
+
+def find_channel_problems(episode: Episode, channels: Channels) -> Iterator[str]:
+    """Whether the chunks of an episode have other channels than are recorded; a sentence if so."""
+    if not channels.fit(episode.channels()):
+        yield f"has the channels {_list(episode.channels())} instead of {_list(channels.numbers)}"
+
+
+def _list(numbers: Sequence[Sequence[int]]) -> str:
+    """The channels of each chunk, in words."""
+    return " and ".join(str(list(chunk)) for chunk in numbers)
 
 
 def _same(value: object, other: object) -> bool:

@@ -13,14 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
-from throwcollect.dataset.verify_header import Steps, contact_name
-from throwcollect.episode.record import EpisodeHeader, Samples
-from throwcollect.robots.description import locked_joints, start_posture
-from throwcollect.robots.model import joint_limits
+from throwcollect.dataset.recorded_trial import RecordedTrial
+from throwcollect.episode.record import Samples
+from throwcollect.robots.description import locked_joints, robot_of, start_posture
+from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.quintic_curve import sample_positions
-from throwcollect.robots.talos import JOINTS
-from throwcollect.robots.trajectory import JointTrajectory
-from throwcollect.tasks.flight import NS_PER_S, ballistic_steps
+from throwcollect.tasks.throw.flight import ballistic_steps
 
 _POSITION_M = 1e-11
 _VELOCITY_MPS = 1e-10
@@ -41,7 +39,7 @@ _AT_LIMIT = 0.999
 _FAILED_GOALS = (5, 6)
 
 
-def infinite_columns(samples: Samples) -> Iterator[str]:
+def find_infinite_columns(samples: Samples) -> Iterator[str]:
     """Columns that hold numbers that are not finite, a sentence each."""
     for field in fields(samples):
         finite = np.isfinite(getattr(samples, field.name))
@@ -50,42 +48,32 @@ def infinite_columns(samples: Samples) -> Iterator[str]:
             yield f"{field.name} holds numbers that are not finite, first in sample {row}"
 
 
-def joint_problems(
-    samples: Samples, header: EpisodeHeader, *, config: Config, trajectory: JointTrajectory
-) -> Iterator[str]:
-    """What the joints did that they cannot have done.
-
-    Args:
-        samples: The trial; finite, with the stamps that belong to it.
-        header: Its header.
-        config: Its configuration.
-        trajectory: What its controllers were sent.
-
-    Yields:
-        What is wrong, a sentence each.
-    """
+def find_joint_problems(trial: RecordedTrial) -> Iterator[str]:
+    """What the joints did that they cannot have done, a sentence each."""
+    samples, config, trajectory = trial.samples, trial.config, trial.trajectory
+    robot = robot_of(config)
     for joint, angle in locked_joints(config).items():
-        column = JOINTS.index(joint)
+        column = robot.joints.index(joint)
         if (samples.position[:, column] != angle).any():
             yield f"{joint} is locked at {angle:.6g} rad and is somewhere else"
         if samples.velocity[:, column].any() or samples.effort[:, column].any():
             yield f"{joint} is locked, and moves or has a torque"
-    shares = np.abs(samples.effort) / (joint_limits().effort * config.robot.effort_scale)
+    shares = np.abs(samples.effort) / (joint_limits(robot).effort * config.robot.effort_scale)
     if shares.max() > 1 + 1e-6:
-        joint = JOINTS[int(shares.max(axis=0).argmax())]
+        joint = robot.joints[int(shares.max(axis=0).argmax())]
         yield f"the torque of {joint} is {shares.max():.4f} of the most that its motor has"
     tolerance = _following_tolerance(config)
     apart = np.abs(samples.position[0] - list(start_posture(config).values()))
     if apart.max() > tolerance:
-        joint = JOINTS[int(apart.argmax())]
+        joint = robot.joints[int(apart.argmax())]
         yield f"{joint} starts {apart.max():.3g} rad away from the start posture of the trial"
-    if any(goal.status in _FAILED_GOALS for goal in header.goals):
+    if any(goal.status in _FAILED_GOALS for goal in trial.header.goals):
         return
     saturated = (shares >= _AT_LIMIT).any(axis=1)
     followed = int(saturated.argmax()) if saturated.any() else len(samples)
-    times = (samples.stamps_ns[:followed] - header.start_ns) / NS_PER_S - config.sim.command_delay_s
+    times = trial.times_s[:followed] - config.sim.command_delay_s
     wanted = sample_positions(trajectory, np.maximum(times, 0.0))
-    moving = [JOINTS.index(joint) for joint in trajectory.joints]
+    moving = [robot.joints.index(joint) for joint in trajectory.joints]
     errors = np.abs(samples.position[:followed, moving] - wanted)
     if followed and errors.max() > tolerance:
         joint = trajectory.joints[int(errors.max(axis=0).argmax())]
@@ -100,86 +88,82 @@ def _following_tolerance(config: Config) -> float:
     return _FOLLOW_RAD * weak * max(1.0, 10 / config.sim.solver_iterations)
 
 
-def ball_problems(samples: Samples, header: EpisodeHeader, *, config: Config) -> Iterator[str]:
+def find_ball_problems(trial: RecordedTrial) -> Iterator[str]:
     """What the ball did that it cannot have done, given its contacts.
 
     From one sample to the next, a ball that nothing touches follows exactly from the physics, bit for bit but for
     rounding; and one that something presses on does not.
 
-    Args:
-        samples: The trial; finite, with the stamps that belong to it.
-        header: Its header.
-        config: Its configuration.
-
     Yields:
         What is wrong, a sentence each.
     """
+    samples = trial.samples
     off_unit = np.abs(np.linalg.norm(samples.ball_orientation_xyzw, axis=1) - 1).max()
     if not off_unit <= _UNIT:
         yield f"the ball's orientation is no unit quaternion: its length is off by {off_unit:.3g}"
         return
     if len(samples) < 2:
         return
-    steps = Steps(samples, header, config)
-    times = (samples.stamps_ns - header.start_ns) / NS_PER_S
-    departures = _departures(samples, steps.stride, config)
-    free = _free_intervals(header, steps, config)
+    departures = _measure_departures(trial)
+    free = _find_free_intervals(trial)
     for what, (values, tolerance, unit) in departures.items():
         # What is too large to be computed departs, too.
         wrong = free & ~(values <= tolerance)
         if wrong.any():
-            place = f"first at {times[int(wrong.argmax()) + 1]:.3f} s, where no contact is"
+            place = f"first at {trial.times_s[int(wrong.argmax()) + 1]:.3f} s, where no contact is"
             yield f"the ball's {what} departs from ballistic motion by {values[wrong].max():.3g} {unit}, {place}"
     velocity, tolerance, _ = departures["velocity"]
-    for contact in header.contacts:
-        interval = steps.of(contact)
+    for contact in trial.header.contacts:
+        interval = trial.steps_of(contact)
         if interval is None:
             continue
-        first, touched, held = _intervals(interval, steps)
+        first, touched, held = _find_intervals(interval, trial)
         # Of a contact that is shorter than a sample, one of the intervals that it lies in must show it.
         moved = (
             velocity[held] > tolerance if held.stop > held.start else np.array([velocity[touched].max()]) > tolerance
         )
-        what = contact_name(contact, header)
+        what = trial.name_contact(contact)
         if interval[1] > 1 and not moved.all():
             yield f"{what}: the ball moves as if nothing touched it"
-        if contact.body == "ground" and (problem := _off_ground(samples, first, steps, config)):
+        if contact.body == "ground" and (problem := _explain_off_ground(trial, first)):
             yield f"{what}: {problem}"
 
 
-def _intervals(contact: tuple[int, int], steps: Steps) -> tuple[int, slice, slice]:
+def _find_intervals(contact: tuple[int, int], trial: RecordedTrial) -> tuple[int, slice, slice]:
     """Of a contact in steps: the sample at or after its start, and the intervals between samples it touches, and fills.
 
     Interval k has the steps after sample k, up to and with that of sample k + 1.
     """
+    stride = trial.stride
     first, end = max(contact[0], 1), max(contact[1], 2)
-    last = steps.last // steps.stride
-    touched = slice((first - 1) // steps.stride, min(last, (end - 2) // steps.stride + 1))
-    held = slice(-(-(first - 1) // steps.stride), (end - 1) // steps.stride)
-    return min(-(-contact[0] // steps.stride), last), touched, held
+    last = trial.last_step // stride
+    touched = slice((first - 1) // stride, min(last, (end - 2) // stride + 1))
+    held = slice(-(-(first - 1) // stride), (end - 1) // stride)
+    return min(-(-contact[0] // stride), last), touched, held
 
 
-def _free_intervals(header: EpisodeHeader, steps: Steps, config: Config) -> NDArray[np.bool_]:
+def _find_free_intervals(trial: RecordedTrial) -> NDArray[np.bool_]:
     """Intervals between samples that no contact acts in, shape ``(n_samples - 1,)``."""
-    after = max(math.ceil(_AFTER_CONTACT_S * config.sim.physics_hz), _AFTER_CONTACT_STEPS)
-    begins = np.arange(0, steps.last, steps.stride)
+    after = max(math.ceil(_AFTER_CONTACT_S * trial.config.sim.physics_hz), _AFTER_CONTACT_STEPS)
+    begins = np.arange(0, trial.last_step, trial.stride)
     free = np.ones(len(begins), dtype=bool)
-    for interval in map(steps.of, header.contacts):
+    for interval in map(trial.steps_of, trial.header.contacts):
         if interval is not None:
-            free &= (begins + steps.stride < interval[0]) | (begins >= interval[1] + after)
+            free &= (begins + trial.stride < interval[0]) | (begins >= interval[1] + after)
     return free
 
 
-def _departures(
-    samples: Samples, stride: int, config: Config
+def _measure_departures(
+    trial: RecordedTrial,
 ) -> dict[str, tuple[NDArray[np.float64], NDArray[np.float64] | float, str]]:
     """How far each sample is from where ballistic motion leads from the one before; with tolerance and unit."""
+    samples, stride, config = trial.samples, trial.stride, trial.config
     position, velocity = ballistic_steps(
         samples.ball_position[:-1], samples.ball_linear_velocity[:-1], steps=stride, config=config
     )
     spin = samples.ball_angular_velocity
     rate = np.linalg.norm(spin[:-1], axis=1)
-    turned = _turned(samples.ball_orientation_xyzw[:-1], spin[:-1], stride / config.sim.physics_hz)
+    turned = _turn(samples.ball_orientation_xyzw[:-1], spin[:-1], stride / config.sim.physics_hz)
     # A quaternion and its negative are the same orientation.
     cosine = np.sum(turned * samples.ball_orientation_xyzw[1:], axis=1)
     apart = 2 * np.linalg.norm(turned * np.sign(cosine)[:, np.newaxis] - samples.ball_orientation_xyzw[1:], axis=1)
@@ -192,7 +176,7 @@ def _departures(
     }
 
 
-def _turned(orientation: NDArray[np.float64], spin: NDArray[np.float64], duration_s: float) -> NDArray[np.float64]:
+def _turn(orientation: NDArray[np.float64], spin: NDArray[np.float64], duration_s: float) -> NDArray[np.float64]:
     """Unit quaternions (xyzw) after turning with constant angular velocities in world [rad/s], shape ``(n, 4)``."""
     rate = np.linalg.norm(spin, axis=1, keepdims=True)
     half = rate * (duration_s / 2)
@@ -204,10 +188,11 @@ def _turned(orientation: NDArray[np.float64], spin: NDArray[np.float64], duratio
     return np.hstack([turned, turn * scalar - np.sum(axis * vector, axis=1, keepdims=True)])
 
 
-def _off_ground(samples: Samples, first: int, steps: Steps, config: Config) -> str | None:
+def _explain_off_ground(trial: RecordedTrial, first: int) -> str | None:
     """Why a contact with the ground cannot begin by this sample; None if nothing is against it."""
+    config, samples = trial.config, trial.samples
     if not config.scene.landing_height_m > 0:
         return "the ground stops nothing, as the landing plane is on it"
     gap = float(samples.ball_position[first, 2]) - config.ball.radius_m
-    moved = abs(float(samples.ball_linear_velocity[first, 2])) * steps.stride / config.sim.physics_hz
+    moved = abs(float(samples.ball_linear_velocity[first, 2])) * trial.stride / config.sim.physics_hz
     return f"the ball is {gap:.3g} m above the ground" if gap > moved + _REACH_M else None

@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Callable, Collection, Iterator, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from throwcollect.config.schema import Config
 from throwcollect.dataset.directory import PLAN
 from throwcollect.dataset.findings import Finding
-from throwcollect.dataset.row_result import row_result
-from throwcollect.dataset.throws_table import REFUSED
+from throwcollect.dataset.throws_table import REFUSED, Row, ThrowsTable
 from throwcollect.errors import ConfigError
+from throwcollect.extras import is_installed
 from throwcollect.sweep.plan import Check, Plan, make_trials, refusal
 from throwcollect.sweep.points import Points
 from throwcollect.sweep.rounds import Rounds
@@ -24,23 +24,26 @@ from throwcollect.sweep.samplers import draw_points
 from throwcollect.wording import counted
 
 CHECKED_AGAIN = 100
-"""Trials that the plan does not refuse and that are checked again all the same, at 5 ms each."""
+"""How many of the trials that the plan does not refuse are checked again as a sample; each takes 5 ms."""
 
 _RELATIVE_TOLERANCE = 1e-9
 """Values that are drawn again on another machine may differ in their last bits."""
 _NUMBER = re.compile(r"-?\d[\d.]*(?:e[-+]?\d+)?")
 
-Row = Mapping[str, Any]
-
 CheckOf = Callable[[Config], Check]
 """Makes the check of the trials of a configuration."""
 
 
-def drawing_findings(directory: Path, plan: Plan, rows: Mapping[int, Row] | None) -> Iterator[Finding]:
+def can_draw(config: Config) -> bool:
+    """Whether the trials of a configuration can be drawn here: SciPy, which some samplers take, may be missing."""
+    return is_installed("scipy") or not (config.grows or config.sweep.sampler in ("latin_hypercube", "sobol"))
+
+
+def find_drawing_problems(directory: Path, plan: Plan, rows: Mapping[int, Row] | None) -> Iterator[Finding]:
     """Trials that are not those that the configuration draws.
 
     The rounds of a plan that grows are drawn from the results in the table of throws, which is compared with the
-    episodes elsewhere.
+    episodes elsewhere. What cannot be drawn here (see `can_draw`) is not compared.
 
     Args:
         directory: Directory of the dataset.
@@ -48,8 +51,10 @@ def drawing_findings(directory: Path, plan: Plan, rows: Mapping[int, Row] | None
         rows: Rows of the table of throws, by trial; None if they are not known, and then only what depends on no
             result is drawn again.
     """
+    if not can_draw(plan.config):
+        return
     try:
-        drawing = _grown(plan, rows) if plan.config.grows else _drawn(directory, plan)
+        drawing = _draw_rounds(plan, rows) if plan.config.grows else _draw(directory, plan)
     except ConfigError as error:
         yield Finding(PLAN, "", f"cannot be drawn again from the configuration: {error.problems[0]}")
         return
@@ -64,7 +69,7 @@ def drawing_findings(directory: Path, plan: Plan, rows: Mapping[int, Row] | None
             yield _of_trial(again.number, f"has seed {trial.seed}, the configuration gives {again.seed}")
 
 
-def refusal_findings(plan: Plan, doubtful: Collection[int], check_of: CheckOf) -> Iterator[Finding]:
+def find_refusal_problems(plan: Plan, doubtful: Collection[int], check_of: CheckOf) -> Iterator[Finding]:
     """Refusals that the plan should not have, and ones that it lacks.
 
     All refused trials are checked again, and `CHECKED_AGAIN` others that the seed of the configuration chooses.
@@ -97,7 +102,7 @@ class _Drawing(NamedTuple):
     problem: str | None
 
 
-def _drawn(directory: Path, plan: Plan) -> _Drawing:
+def _draw(directory: Path, plan: Plan) -> _Drawing:
     """The drawing of a plan that is fixed before anything runs.
 
     Raises:
@@ -113,13 +118,13 @@ def _drawn(directory: Path, plan: Plan) -> _Drawing:
     )
 
 
-def _grown(plan: Plan, rows: Mapping[int, Row] | None) -> _Drawing:
+def _draw_rounds(plan: Plan, rows: Mapping[int, Row] | None) -> _Drawing:
     """The drawing of a plan that grew, round by round from the results of its trials.
 
     Raises:
         ConfigError: If it cannot be drawn.
     """
-    rounds, joints, there = Rounds(plan.config), tuple(plan.config.task.end), len(plan.trials)
+    rounds, table, there = Rounds(plan.config), ThrowsTable.of(plan), len(plan.trials)
     values: list[NDArray[np.float64]] = []
     while rounds.due and not rounds.over and rounds.planned < there:
         points = rounds.draw()
@@ -131,7 +136,7 @@ def _grown(plan: Plan, rows: Mapping[int, Row] | None) -> _Drawing:
         for trial in added:
             row = None if rows is None else rows.get(trial.number)
             if row is not None and row["outcome"] != REFUSED:
-                rounds.tell(trial.number, row_result(row, joints))
+                rounds.tell(trial.number, table.result(row))
     problem, count = None, sum(map(len, values))
     if count > there or (rounds.over and count < there):
         problem = f"has {counted(there, 'trial')}, the configuration draws {count}"

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -13,17 +12,15 @@ from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
 from throwcollect.dataset.directory import CONFIG, PLAN, THROWS, TRIALS, config_path, shard_name
 from throwcollect.dataset.findings import Finding
-from throwcollect.dataset.throws_table import REFUSED, read_throws_table
+from throwcollect.dataset.throws_table import REFUSED, Row, read_throws_table
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError
 from throwcollect.sweep.digest import trial_digests
 from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.point_file import read_points
 from throwcollect.sweep.points import Points
-from throwcollect.tasks.throw import Outcome
+from throwcollect.tasks.throw.outcome import Outcome
 
 WITHOUT_EPISODE = (REFUSED, Outcome.LOST.value)
-
-Row = Mapping[str, Any]
 
 
 @dataclass
@@ -68,30 +65,26 @@ def check_tables(directory: Path) -> Tables:
             # Nothing says which of them is right, so nothing is checked that follows from one.
             tables.config = None
         except DatasetError as error:
-            tables.findings.append(_finding(directory, PLAN, error))
+            tables.findings.append(Finding.of(PLAN, error))
     if tables.plan is not None and tables.plan.config.sweep.file == TRIALS:
-        tables.findings += _list_findings(directory, tables.plan)
+        tables.findings += _find_list_problems(directory, tables.plan)
     if tables.plan is not None:
-        for trial, digest in wrong_trials(tables.plan).items():
+        for trial, digest in find_wrong_trials(tables.plan).items():
             problem = f"has digest {tables.plan.trials[trial].digest}, its values and seed give {digest}"
             tables.findings.append(Finding(PLAN, f"trial {trial}", problem))
             tables.doubtful.add(trial)
         try:
             rows = read_throws_table(directory / THROWS, tables.plan).to_pylist()
         except DatasetError as error:
-            tables.findings.append(_finding(directory, THROWS, error))
+            tables.findings.append(Finding.of(THROWS, error))
         else:
-            tables.findings += _row_findings(tables.plan, rows)
+            tables.findings += _find_row_problems(tables.plan, rows)
             tables.rows = {row["trial"]: row for row in rows if row["trial"] is not None}
             tables.findings += _plan_findings(tables.plan, tables.rows, tables.doubtful)
     return tables
 
 
-def _finding(directory: Path, name: str, error: DatasetError) -> Finding:
-    return Finding(name, "", str(error).removeprefix(f"{directory / name}: "))
-
-
-def _list_findings(directory: Path, plan: Plan) -> Iterator[Finding]:
+def _find_list_problems(directory: Path, plan: Plan) -> Iterator[Finding]:
     """Whether a plan takes the first points of the list that lies beside it."""
     if not (directory / TRIALS).exists():
         yield Finding(TRIALS, "", "is missing")
@@ -106,7 +99,7 @@ def _list_findings(directory: Path, plan: Plan) -> Iterator[Finding]:
         yield Finding(TRIALS, "", f"begins with other points than those of {PLAN}")
 
 
-def wrong_trials(plan: Plan) -> dict[int, str]:
+def find_wrong_trials(plan: Plan) -> dict[int, str]:
     """Trials that are not what a plan was made with, and the digests that their values and seeds give.
 
     Args:
@@ -117,7 +110,7 @@ def wrong_trials(plan: Plan) -> dict[int, str]:
     return {trial.number: digest for trial, digest in zip(plan.trials, digests, strict=True) if trial.digest != digest}
 
 
-def _row_findings(plan: Plan, rows: list[dict[str, Any]]) -> Iterator[Finding]:
+def _find_row_problems(plan: Plan, rows: list[Row]) -> Iterator[Finding]:
     numbers = [row["trial"] for row in rows if row["trial"] is not None]
     if len(numbers) < len(rows):
         yield Finding(THROWS, "", f"{len(rows) - len(numbers)} rows are of no trial")

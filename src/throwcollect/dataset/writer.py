@@ -17,16 +17,15 @@ import pyarrow as pa
 
 from throwcollect.config.loader import load, resolved_yaml
 from throwcollect.config.schema import Config
-from throwcollect.dataset.bag import FileSummary, dataset_metadata
-from throwcollect.dataset.data_card import Provenance, data_card
-from throwcollect.dataset.digest import combined_digest
+from throwcollect.dataset.bag import FileSummary
+from throwcollect.dataset.data_card import data_card
+from throwcollect.dataset.description import write_description
 from throwcollect.dataset.directory import (
     CARD,
     CONFIG,
     MANIFEST,
     METADATA,
     PLAN,
-    SOURCES,
     THROWS,
     TRIALS,
     config_path,
@@ -34,10 +33,11 @@ from throwcollect.dataset.directory import (
 )
 from throwcollect.dataset.journal import Event, Journal, was_open
 from throwcollect.dataset.lock import held_alone, held_together
-from throwcollect.dataset.manifest import FileEntry, entry_of, entry_of_file, manifest_text
+from throwcollect.dataset.manifest import FileEntry
+from throwcollect.dataset.provenance import Provenance, write_provenance
 from throwcollect.dataset.recovery import recover_shard, remove_unfinished
 from throwcollect.dataset.shard import FinishedShard, OpenShard
-from throwcollect.dataset.throws_table import Place, Row, ThrowsTable, encode_table
+from throwcollect.dataset.throws_table import Place, Row, ThrowsTable
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.message import Episode
 from throwcollect.errors import ConfigError, DatasetError
@@ -46,11 +46,11 @@ from throwcollect.robots.description import full_description
 from throwcollect.sweep.plan import Plan, Trial
 from throwcollect.sweep.point_file import encode_points
 from throwcollect.sweep.points import Points
-from throwcollect.tasks.throw import Outcome, ThrowResult
+from throwcollect.tasks.throw.outcome import Outcome, ThrowResult
 from throwcollect.wording import command, counted
 
 Tell = Callable[[int, ThrowResult], None]
-"""Told a trial and what came of it."""
+"""Receives the number of a trial and its result."""
 
 
 def create(directory: Path, plan: Plan, *, listed: Points | None = None) -> None:
@@ -125,18 +125,27 @@ class DatasetWriter:
     Args:
         directory: A directory as `create` leaves it.
         plan: The plan that lies there.
-        journal: Told what happens; None for datasets that are written in one go.
+        journal: Receives what happens; None for datasets that are written in one go.
         growing: Whether trials may still be added to the plan, until `close_plan`.
+        channels: What is recorded; None for what the robot that is installed here gives.
     """
 
-    def __init__(self, directory: Path, plan: Plan, *, journal: Journal | None = None, growing: bool = False) -> None:
+    def __init__(
+        self,
+        directory: Path,
+        plan: Plan,
+        *,
+        journal: Journal | None = None,
+        growing: bool = False,
+        channels: Channels | None = None,
+    ) -> None:
         self.plan = plan
         self._directory = directory
         self._config: Config = plan.config
         self._journal = journal
         self._growing = growing
-        self._channels = Channels(self._config, full_description(self._config))
-        self._table = ThrowsTable(plan.keys, tuple(self._config.task.end))
+        self._channels = channels or Channels(self._config, full_description(self._config))
+        self._table = ThrowsTable.of(plan)
         self._shards: dict[int, OpenShard] = {}
         self._rows: dict[int, dict[int, Row]] = {}
         self._finished: dict[int, _Finished] = {}
@@ -164,7 +173,7 @@ class DatasetWriter:
         """
         for name in (CONFIG, PLAN):
             if not (directory / name).is_file():
-                raise DatasetError(f"{directory}: holds no {name}", expected="a dataset that was created")
+                raise DatasetError(f"holds no {name}", path=directory, expected="a dataset that was created")
         with ExitStack() as held:
             held.enter_context(held_together(directory))
             journal = held.enter_context(Journal(directory))
@@ -176,11 +185,11 @@ class DatasetWriter:
     def recover(self, tell: Tell | None = None) -> int:
         """Take in what earlier writers have left: every episode that is whole stays, everything else is removed.
 
-        A finished dataset becomes an unfinished one by that, whose trials may all have ended; `finish` writes the same
+        This makes a finished dataset an unfinished one, even if all its trials have ended; `finish` writes the same
         files again.
 
         Args:
-            tell: Told each trial that has an episode, in order of shards.
+            tell: Called for each trial that has an episode, in order of shards.
 
         Returns:
             Number of episodes.
@@ -227,7 +236,7 @@ class DatasetWriter:
         """No trial will be added any more.
 
         Raises:
-            DatasetError: If a shard that is complete by that cannot be written.
+            DatasetError: If a shard that is now complete cannot be written.
         """
         self._growing = False
         for number in list(self._shards):
@@ -297,11 +306,8 @@ class DatasetWriter:
     def finish(self, *, wall_s: float | None = None, simulations: int | None = None) -> None:
         """Write everything that describes the dataset as a whole.
 
-        The manifest comes last but one, and ``metadata.yaml`` last, as it is the mark of a finished dataset.
-
         Args:
-            wall_s: Real time that it took to make the dataset [s], for the data card; None if it is not known, or a
-                journal tells.
+            wall_s: Real time that the dataset took [s], for the data card; None if not known, or if a journal tells.
             simulations: Number of simulations that took part, for the data card; None if that is not known.
 
         Raises:
@@ -310,32 +316,21 @@ class DatasetWriter:
         if self._shards:
             missing = sorted(number for shard in self._shards.values() for number in shard.missing)
             example = f", such as {missing[0]}" if missing else ""
-            raise DatasetError(f"{self._directory}: lacks {counted(len(missing), 'trial')}{example}")
+            raise DatasetError(f"lacks {counted(len(missing), 'trial')}{example}", path=self._directory)
         finished = [self._finished[shard] for shard in sorted(self._finished)]
         throws = pa.concat_tables([each.rows for each in finished])
-        digest = combined_digest(throws["digest"].drop_null().to_pylist())
-        files = [each.summary for each in finished if each.summary]
         if self._journal is not None:
             wall_s = self._journal.collected_s()
         provenance = Provenance.of_this_machine(
             simulations=simulations, wall_s=wall_s, was_open=was_open(self._directory)
         )
-        # How it was run may not change the dataset, so what is kept of that is in the data card alone.
+        # How it was run may not change the dataset, so what is kept of that stands outside of what the manifest covers.
         config = self._config.without_run()
+        write_provenance(self._directory, provenance)
         write_file(self._directory / CARD, data_card(config, throws, provenance).encode())
-        described = {
-            THROWS: encode_table(throws),
-            CONFIG: resolved_yaml(config).encode(),
-            METADATA: dataset_metadata(files, self._channels.all, digest).encode(),
-        }
-        entries = [
-            *(entry_of(name, data) for name, data in described.items()),
-            *(entry_of_file(self._directory / name) for name in (PLAN, TRIALS, SOURCES) if self._has(name)),
-            *(each.entry for each in finished if each.entry),
-        ]
-        described[MANIFEST] = manifest_text(config.name, entries).encode()
-        for name in (THROWS, CONFIG, MANIFEST, METADATA):
-            write_file(self._directory / name, described[name])
+        write_file(self._directory / CONFIG, resolved_yaml(config).encode())
+        recordings = [(each.summary, each.entry) for each in finished if each.summary and each.entry]
+        write_description(self._directory, config.name, throws, self._channels, recordings)
         self.note("finished", wall_s=wall_s)
 
     def close(self) -> None:
@@ -344,9 +339,6 @@ class DatasetWriter:
             shard.close()
         self._held.close()
         self._journal = None
-
-    def _has(self, name: str) -> bool:
-        return (self._directory / name).exists()
 
     def _expect(self, trials: Sequence[Trial]) -> None:
         members: dict[int, list[Trial]] = {}
@@ -360,17 +352,16 @@ class DatasetWriter:
             self._shards[number].expect(trial.number for trial in added if trial.refused is None)
             for trial in added:
                 if trial.refused is not None:
-                    row = self._table.refused_row(trial.number, trial.values, trial.refused)
-                    self._rows[number][trial.number] = row
+                    self._rows[number][trial.number] = self._table.refused_row(trial)
             self._finish_shard_if_complete(number)
 
     def _row(self, trial: int, result: ThrowResult, place: Place | None) -> Row:
-        return self._table.row(trial, self.plan.trials[trial].values, result, place)
+        return self._table.row(self.plan.trials[trial], result, place)
 
     def _waiting_shard(self, trial: int) -> int:
         shard = trial // self._config.record.trials_per_shard
         if shard not in self._shards or trial not in self._shards[shard].missing:
-            raise DatasetError(f"{self._directory}: no episode of trial {trial} is waited for")
+            raise DatasetError(f"no episode of trial {trial} is waited for", path=self._directory)
         return shard
 
     def _settled(self, number: int) -> bool:

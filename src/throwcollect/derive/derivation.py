@@ -12,13 +12,11 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from throwcollect.config.schema import Config
 from throwcollect.dataset.directory import CARD, SOURCES
 from throwcollect.dataset.inspect import info
-from throwcollect.dataset.new_directory import new_directory
 from throwcollect.dataset.reader import Dataset
-from throwcollect.dataset.row_result import row_result
-from throwcollect.dataset.writer import DatasetWriter
+from throwcollect.dataset.throws_table import Row, ThrowsTable
+from throwcollect.dataset.writer import DatasetWriter, create
 from throwcollect.derive.origins import encode_sources, sources_section
 from throwcollect.derive.source import Source
 from throwcollect.derive.trial_list import list_of_trials
@@ -26,7 +24,7 @@ from throwcollect.episode.channels import Channels
 from throwcollect.episode.message import Episode
 from throwcollect.episode.restamp import Restamper
 from throwcollect.errors import ConfigError, DatasetError
-from throwcollect.files import write_file
+from throwcollect.files import new_directory, write_file
 from throwcollect.robots.description import full_description
 from throwcollect.sweep.plan import Plan, make_trials
 from throwcollect.wording import command
@@ -34,8 +32,6 @@ from throwcollect.wording import command
 _ROWS_AT_ONCE = 256
 _MOST_WORKERS = 4
 """Compressing and hashing run side by side; what stays with the interpreter keeps more of them from being of use."""
-
-Row = dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -94,11 +90,14 @@ def write(sources: Sequence[Source], directory: Path, *, name: str | None = None
         config = config.model_copy(update={"name": name})
     # Every trial has been run before, so none is to be checked.
     plan = Plan(config, tuple(make_trials(config, points)))
-    with closing(DatasetWriter.create(directory, plan, listed=points)) as writer:
+    # The robot is the one that the sources were recorded with, so nothing of it has to be installed.
+    channels = Channels(config, sources[0].dataset.robot_description() or full_description(config))
+    create(directory, plan, listed=points)
+    with closing(DatasetWriter(directory, plan, channels=channels)) as writer:
         write_file(directory / SOURCES, encode_sources(sources))
-        joints = tuple(config.task.end)
-        for episode, row in _episodes(sources, config):
-            writer.append(episode, row_result(row, joints))
+        table = ThrowsTable.of(plan)
+        for episode, row in _episodes(sources, Restamper(config, channels)):
+            writer.append(episode, table.result(row))
         writer.finish(wall_s=time.monotonic() - began)
     card = (directory / CARD).read_text(encoding="utf-8")
     write_file(directory / CARD, (card + sources_section(sources)).encode())
@@ -111,14 +110,13 @@ def write(sources: Sequence[Source], directory: Path, *, name: str | None = None
     )
 
 
-def _episodes(sources: Sequence[Source], config: Config) -> Iterator[tuple[Episode, Row]]:
+def _episodes(sources: Sequence[Source], restamper: Restamper) -> Iterator[tuple[Episode, Row]]:
     """Episodes under their new numbers, in order, each with its row in the table of its source."""
-    restamper = Restamper(config, Channels(config, full_description(config)))
     workers = min(_MOST_WORKERS, os.cpu_count() or 1)
     pending: deque[tuple[Future[Episode], Row]] = deque()
     with ThreadPoolExecutor(workers) as pool:
         for number, (dataset, row) in enumerate(_rows(sources)):
-            pending.append((pool.submit(_restamped, restamper, dataset, row, number), row))
+            pending.append((pool.submit(_restamp, restamper, dataset, row, number), row))
             if len(pending) > 2 * workers:
                 yield _result(pending)
         while pending:
@@ -138,14 +136,14 @@ def _rows(sources: Sequence[Source]) -> Iterator[tuple[Dataset, Row]]:
                 yield each.dataset, row
 
 
-def _restamped(restamper: Restamper, dataset: Dataset, row: Row, number: int) -> Episode:
+def _restamp(restamper: Restamper, dataset: Dataset, row: Row, number: int) -> Episode:
     trial = row["trial"]
     episode = dataset.episode(trial)
     try:
         if episode.digest != row["digest"]:
             raise DatasetError(f"digest {episode.digest}", expected=f"{row['digest']} as throws.parquet says")
-        return restamper.restamped(episode, number)
+        return restamper.restamp(episode, number)
     except DatasetError as error:
         raise DatasetError(
-            f"{dataset.directory}: trial {trial}: {error}", hint=command("dataset", "verify", dataset.directory)
+            f"trial {trial}: {error}", path=dataset.directory, hint=command("dataset", "verify", dataset.directory)
         ) from error

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import pyarrow as pa
 
-from throwcollect.dataset.throws_table import encode_table
 from throwcollect.derive.source import Source
+from throwcollect.sweep.parquet_file import encode_table
 
 
 def encode_sources(sources: Sequence[Source]) -> bytes:
@@ -22,7 +22,7 @@ def encode_sources(sources: Sequence[Source]) -> bytes:
                     "trial": len(rows),
                     "source_name": dataset.config.name,
                     "source_directory": str(dataset.directory),
-                    "source_digest": source.digest,
+                    "source_digest": dataset.digest,
                     "source_trial": number,
                     "source_trial_digest": dataset.plan.trials[number].digest,
                     "source_episode_digest": digest,
@@ -45,7 +45,7 @@ def sources_section(sources: Sequence[Source]) -> str:
     ]
     for source in sources:
         dataset = source.dataset
-        cells = (dataset.config.name, dataset.directory, len(source.trials), len(dataset.throws), source.digest)
+        cells = (dataset.config.name, dataset.directory, len(source.trials), len(dataset.throws), dataset.digest)
         lines.append(f"| {' | '.join(str(cell).replace('|', chr(92) + '|') for cell in cells)} |")
     return "\n".join([*lines, ""])
 

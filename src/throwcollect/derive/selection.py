@@ -12,9 +12,10 @@ from throwcollect.dataset.reader import Dataset
 from throwcollect.derive.derivation import Derived, derive
 from throwcollect.derive.source import source
 from throwcollect.errors import ConfigError, Problem
+from throwcollect.files import StrPath
 
 
-def merge(directories: Sequence[Path], output: Path) -> Derived:
+def merge(directories: Sequence[StrPath], output: StrPath) -> Derived:
     """Put the trials of several datasets one after the other.
 
     Args:
@@ -25,10 +26,10 @@ def merge(directories: Sequence[Path], output: Path) -> Derived:
         ConfigError: If the datasets differ in keys that cannot be swept, or the directory cannot be used.
         DatasetError: If a dataset is damaged, or the new one cannot be written.
     """
-    return derive([source(Dataset.open(directory)) for directory in directories], output)
+    return derive([source(Dataset.open(Path(directory))) for directory in directories], Path(output))
 
 
-def filtered(directory: Path, output: Path, *, where: str) -> Derived:
+def filter_trials(directory: StrPath, output: StrPath, *, where: str) -> Derived:
     """Take the trials that fulfil a condition.
 
     Args:
@@ -41,15 +42,15 @@ def filtered(directory: Path, output: Path, *, where: str) -> Derived:
         DatasetError: If the dataset is damaged, or the new one cannot be written.
     """
     condition = Expression(where, place="--where")
-    dataset = Dataset.open(directory)
+    dataset = Dataset.open(Path(directory))
     chosen = source(dataset, condition.rows(dataset.throws))
     if not chosen.trials:
         problem = f"no trial of {directory} that has an episode fulfils {where!r}"
         raise ConfigError([Problem(problem, "--where")])
-    return derive([chosen], output)
+    return derive([chosen], Path(output))
 
 
-def sample(directory: Path, output: Path, *, count: int, seed: int = 0) -> Derived:
+def sample(directory: StrPath, output: StrPath, *, count: int, seed: int = 0) -> Derived:
     """Take trials at random, all equally likely and none twice; they stay in their order.
 
     With the same seed, fewer trials are some of more.
@@ -64,10 +65,10 @@ def sample(directory: Path, output: Path, *, count: int, seed: int = 0) -> Deriv
         ConfigError: If the dataset has fewer episodes, or the directory cannot be used.
         DatasetError: If the dataset is damaged, or the new one cannot be written.
     """
-    dataset = Dataset.open(directory)
+    dataset = Dataset.open(Path(directory))
     candidates = source(dataset).trials
     if not 1 <= count <= len(candidates):
         problem = f"should be from 1 to {len(candidates)}, the number of episodes of {directory}, got {count}"
         raise ConfigError([Problem(problem, "--count")])
     order = np.random.default_rng(seed).permutation(len(candidates))
-    return derive([source(dataset, [candidates[place] for place in order[:count]])], output)
+    return derive([source(dataset, [candidates[place] for place in order[:count]])], Path(output))

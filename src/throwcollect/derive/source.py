@@ -6,9 +6,7 @@ from collections import Counter
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
-from throwcollect.dataset.directory import METADATA
 from throwcollect.dataset.reader import Dataset
-from throwcollect.errors import DatasetError
 
 
 @dataclass(frozen=True)
@@ -24,19 +22,6 @@ class Source:
     dataset: Dataset
     trials: tuple[int, ...]
     without_episode: Mapping[str, int]
-
-    @property
-    def digest(self) -> str:
-        """Digest of the dataset, as it was written.
-
-        Raises:
-            DatasetError: If its metadata do not have it.
-        """
-        custom = self.dataset.bag.get("custom_data")
-        digest = custom.get("throwcollect.digest") if isinstance(custom, dict) else None
-        if not isinstance(digest, str):
-            raise DatasetError(f"{self.dataset.directory / METADATA}: throwcollect.digest is missing")
-        return digest
 
 
 def source(dataset: Dataset, wanted: Collection[int] | None = None) -> Source:

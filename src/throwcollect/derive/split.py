@@ -22,12 +22,12 @@ from pydantic import TypeAdapter, ValidationError
 
 from throwcollect.config.kinds import Name
 from throwcollect.dataset.expression import Expression
-from throwcollect.dataset.new_directory import new_directory
 from throwcollect.dataset.reader import Dataset
 from throwcollect.derive.derivation import Derived, write
 from throwcollect.derive.source import Source, source
 from throwcollect.derive.trial_list import list_of_trials
 from throwcollect.errors import ConfigError, Problem
+from throwcollect.files import StrPath, new_directory
 from throwcollect.sweep.digest import trial_digests
 
 SQUARES = ("landing_x_m=0.05", "landing_y_m=0.05")
@@ -73,7 +73,9 @@ class Split:
         return asdict(self)
 
 
-def split(directory: Path, output: Path, *, fractions: str, cells: Sequence[str] = SQUARES, seed: int = 0) -> Split:
+def split(
+    directory: StrPath, output: StrPath, *, fractions: str, cells: Sequence[str] = SQUARES, seed: int = 0
+) -> Split:
     """Split a dataset into parts, each a dataset of its own.
 
     Args:
@@ -92,7 +94,7 @@ def split(directory: Path, output: Path, *, fractions: str, cells: Sequence[str]
     everything = source(dataset)
     members = assign(everything, fractions=fractions, cells=cells, seed=seed)
     parts = {}
-    with new_directory(output) as beside:
+    with new_directory(Path(output)) as beside:
         for name, places in members.items():
             derived = write([source(dataset, places)], beside / name, name=_part_name(dataset.config.name, name))
             held = list(places.values())

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from itertools import islice
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,8 +12,10 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from throwcollect.dataset.data_card import count_outcomes
+from throwcollect.dataset.moments import Moments
 from throwcollect.dataset.reader import Dataset
 from throwcollect.episode.record import Samples
+from throwcollect.files import StrPath
 from throwcollect.robots.talos import JOINTS
 
 QUANTILES = (0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99)
@@ -100,7 +100,7 @@ class Statistics:
         return asdict(self)
 
 
-def statistics(directory: Path) -> Statistics:
+def statistics(directory: StrPath) -> Statistics:
     """Statistics of a dataset; episodes are read one at a time.
 
     Args:
@@ -111,17 +111,22 @@ def statistics(directory: Path) -> Statistics:
         ConfigError: If its ``config.yaml`` is wrong.
     """
     dataset = Dataset.open(directory)
-    moments = _Moments(sum(len(names) for _, _, names in _CHANNELS))
-    for episode in dataset:
-        moments.add(_table(episode.samples()))
+    moments, left_out = None, 0
+    for episode in dataset.episodes():
+        rows = _table(episode.samples())
+        finite = rows[np.isfinite(rows).all(axis=1)]
+        left_out += len(rows) - len(finite)
+        if len(finite):
+            more = Moments.of(finite)
+            moments = moments.with_more(more) if moments else more
     return Statistics(
         trials=len(dataset.throws),
         outcomes=count_outcomes(dataset.throws),
         columns=dict(_columns(dataset.throws)),
-        episodes=len(dataset),
-        samples=moments.count,
-        samples_not_finite=moments.left_out,
-        signals=_signals(moments) if moments.count else {},
+        episodes=len(dataset.recorded),
+        samples=moments.count if moments else 0,
+        samples_not_finite=left_out,
+        signals=_signals(moments) if moments else {},
     )
 
 
@@ -154,48 +159,12 @@ def _table(samples: Samples) -> NDArray[np.float64]:
     return np.hstack([getattr(samples, attribute) for _, attribute, _ in _CHANNELS])
 
 
-class _Moments:
-    """Extrema, means and squared deviations of columns that come in pieces (Chan, Golub and LeVeque, 1979).
-
-    Args:
-        width: Number of columns.
-    """
-
-    def __init__(self, width: int) -> None:
-        self.count = 0
-        self.left_out = 0
-        self.min = np.full(width, math.inf)
-        self.max = np.full(width, -math.inf)
-        self.mean = np.zeros(width)
-        self._squares = np.zeros(width)
-
-    @property
-    def std(self) -> NDArray[np.float64]:
-        """Standard deviations of the population, shape ``(width,)``."""
-        return np.sqrt(self._squares / self.count)
-
-    def add(self, rows: NDArray[np.float64]) -> None:
-        """Take in rows, shape ``(n_rows, width)``; those with a number that is not finite are left out."""
-        finite = np.isfinite(rows).all(axis=1)
-        self.left_out += int(np.count_nonzero(~finite))
-        rows = rows[finite]
-        if not len(rows):
-            return
-        mean = rows.mean(axis=0)
-        apart, total = mean - self.mean, self.count + len(rows)
-        self._squares += ((rows - mean) ** 2).sum(axis=0) + apart**2 * (self.count * len(rows) / total)
-        self.mean += apart * (len(rows) / total)
-        self.count = total
-        self.min = np.minimum(self.min, rows.min(axis=0))
-        self.max = np.maximum(self.max, rows.max(axis=0))
-
-
-def _signals(moments: _Moments) -> dict[str, dict[str, SignalStatistics]]:
-    columns = (moments.min, moments.max, moments.mean, moments.std)
+def _signals(moments: Moments) -> dict[str, dict[str, SignalStatistics]]:
+    columns = (moments.minimum, moments.maximum, moments.mean, moments.std)
     each = (_signal(*numbers) for numbers in zip(*(column.tolist() for column in columns), strict=True))
     return {group: dict(zip(names, islice(each, len(names)), strict=True)) for group, _, names in _CHANNELS}
 
 
 def _signal(low: float, high: float, mean: float, std: float) -> SignalStatistics:
-    # Rounding must not make noise of a constant: whoever normalises divides by its deviation.
+    # Rounding must not turn a constant into noise, because people divide by the deviation when they normalise.
     return SignalStatistics(low, high, low, 0.0) if low == high else SignalStatistics(low, high, mean, std)

@@ -14,7 +14,6 @@ from throwcollect.dataset.directory import TRIALS
 from throwcollect.dataset.reader import Dataset
 from throwcollect.derive.source import Source
 from throwcollect.errors import ConfigError, Problem
-from throwcollect.sweep.digest import determines_samples
 from throwcollect.sweep.points import Points
 
 _ABSENT = object()
@@ -62,7 +61,7 @@ def list_of_trials(sources: Sequence[Source]) -> tuple[Config, Points]:
 
 
 def _fixed_values(dataset: Dataset) -> dict[str, Any]:
-    return {key: value for key, value in leaves(dataset.config) if key != "seed" and determines_samples(key)}
+    return {leaf.name: leaf.value for leaf in leaves(dataset.config) if leaf.key.determines_samples}
 
 
 def _differences(sources: Sequence[Source], values: Sequence[Any]) -> str:

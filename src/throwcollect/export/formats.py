@@ -3,40 +3,42 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 from throwcollect.dataset.directory import CARD, CONFIG
-from throwcollect.dataset.new_directory import new_directory
 from throwcollect.errors import ConfigError
 from throwcollect.export import hdf5, lerobot, mat, npz, parquet
-from throwcollect.export.readme import Layout, card
+from throwcollect.export.readme import Layout, render_card
 from throwcollect.export.throw_source import Source
+from throwcollect.extras import require
+from throwcollect.files import StrPath, new_directory
 
 
-@dataclass(frozen=True)
-class Format:
-    """One format.
+class Format(Protocol):
+    """One format: a module of this room."""
 
-    Attributes:
-        write: Writes the data files of a source into a directory. Raises `DatasetError` if an episode is damaged or
-            what it writes would be too large for the format, `ConfigError` if a library that it needs is not
-            installed, `OSError` if a file cannot be written.
-        layout: Says how they are laid out.
-    """
+    def write(self, source: Source, directory: Path) -> None:
+        """Write the data files of a source.
 
-    write: Callable[[Source, Path], None]
-    layout: Callable[[Source], Layout]
+        Args:
+            source: What to export.
+            directory: Where the files go; it exists and is empty.
+
+        Raises:
+            DatasetError: If an episode is damaged, or what it would write is too large for the format.
+            OSError: If a file cannot be written.
+        """
+
+    def describe(self, source: Source) -> Layout:
+        """Say how these files are laid out."""
 
 
-FORMATS = {
-    "parquet": Format(parquet.write, parquet.layout),
-    "npz": Format(npz.write, npz.layout),
-    "lerobot": Format(lerobot.write, lerobot.layout),
-    "hdf5": Format(hdf5.write, hdf5.layout),
-    "mat": Format(mat.write, mat.layout),
-}
+FORMATS: Mapping[str, Format] = {"parquet": parquet, "npz": npz, "lerobot": lerobot, "hdf5": hdf5, "mat": mat}
+_NEEDS = {"hdf5": ("h5py",), "mat": ("scipy",)}
+"""Packages of the extra ``export`` that a format imports."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +66,7 @@ class Exported:
     digest: str
 
 
-def export(directory: Path, output: Path, *, to: str, rate_hz: int | None = None) -> Exported:
+def export(directory: StrPath, output: StrPath, *, to: str, rate_hz: int | None = None) -> Exported:
     """Write a dataset in another format, with a data card and its configuration.
 
     Args:
@@ -74,18 +76,20 @@ def export(directory: Path, output: Path, *, to: str, rate_hz: int | None = None
         rate_hz: Samples per second; the recorded ones when None.
 
     Raises:
-        ConfigError: If there is no such format, the rate is above the recorded one, `output` exists, or a library that
-            the format needs is not installed.
+        ConfigError: If there is no such format, the rate is above the recorded one, or `output` exists.
+        MissingExtraError: If a library that the format needs is not installed.
         DatasetError: If the dataset is unfinished, damaged or without episodes, or `output` cannot be written.
     """
     if to not in FORMATS:
         raise ConfigError(f"--to: unknown format {to!r}", expected=f"one of {', '.join(FORMATS)}")
     chosen = FORMATS[to]
+    require(*_NEEDS.get(to, ()), extra="export")
+    directory, output = Path(directory), Path(output)
     source = Source.open(directory, rate_hz=rate_hz)
     with new_directory(output) as beside:
         chosen.write(source, beside)
         shutil.copyfile(directory / CONFIG, beside / CONFIG)
-        (beside / CARD).write_text(card(source, chosen.layout(source)), encoding="utf-8")
+        (beside / CARD).write_text(render_card(source, chosen.describe(source)), encoding="utf-8")
         size = sum(path.stat().st_size for path in beside.rglob("*") if path.is_file())
     return Exported(
         directory=str(output),

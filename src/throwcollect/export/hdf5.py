@@ -5,18 +5,19 @@ from __future__ import annotations
 import io
 import json
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
 
-from throwcollect.errors import ConfigError
-from throwcollect.export.npz import as_array
-from throwcollect.export.readme import Layout, signal_lines
+from throwcollect.export.npz import to_array
+from throwcollect.export.readme import Layout, tabulate_signals
 from throwcollect.export.signals import Signal
 from throwcollect.export.throw_source import Source, Throw
+from throwcollect.extras import lazily
 from throwcollect.files import write_all
+
+h5py = lazily("h5py")
 
 ACTION = "command_position_rad"
 _BESIDE = ("time_s", "command_velocity_radps", "command_acceleration_radps2")
@@ -26,8 +27,8 @@ _GYM = 2
 """robomimic's number for environments that are not of robosuite."""
 
 
-def layout(source: Source) -> Layout:
-    """How `write` lays a source out."""
+def describe(source: Source) -> Layout:
+    """Say how `write` lays a source out."""
     return Layout(
         files={
             "throws.hdf5": "the throw of trial N is the group `data/demo_N`; `mask/landed` lists those that landed; "
@@ -48,13 +49,12 @@ landing_x_m = file["throws/landing_x_m"][:]""",
             "In robomimic, set `train.hdf5_load_next_obs` to false, as next observations are not stored twice. "
             "`env_args` names no environment that robomimic could make.",
         ),
-        over_time=signal_lines(source),
+        over_time=tabulate_signals(source),
     )
 
 
 def write(source: Source, directory: Path) -> None:
-    """Write a dataset as one HDF5 file; see `formats.Format`."""
-    h5py = _h5py()
+    """Write a dataset as one HDF5 file; see `formats.Format.write`."""
     config = source.dataset.config
     with _Output(directory / "throws.hdf5") as output, h5py.File(output, "w") as file:
         file.attrs["digest_of_dataset"] = source.digest
@@ -72,7 +72,7 @@ def write(source: Source, directory: Path) -> None:
 
 
 class _Output(io.FileIO):
-    """A file whose write errors wait until they are asked for: in the middle of a write HDF5 does not survive them."""
+    """A file that keeps write errors until `check` raises them: the HDF5 library crashes on errors within a write."""
 
     def __init__(self, path: Path) -> None:
         super().__init__(path, "w+")
@@ -93,10 +93,10 @@ class _Output(io.FileIO):
             return size or 0
 
     def flush(self) -> None:
-        """Nothing is held back."""
+        """Do nothing, as nothing is held back."""
 
     def check(self) -> None:
-        """Raise what has gone wrong so far.
+        """Raise the first write error so far.
 
         Raises:
             OSError: If something could not be written.
@@ -106,17 +106,8 @@ class _Output(io.FileIO):
 
     def __exit__(self, kind: type[BaseException] | None, *rest: Any) -> None:
         super().__exit__(kind, *rest)
-        # Whatever HDF5 said on the way out, this is why.
+        # This error is the cause of whatever error HDF5 raised.
         self.check()
-
-
-def _h5py() -> ModuleType:
-    try:
-        import h5py
-    except ImportError as error:
-        raise ConfigError("--to hdf5: h5py is not installed", hint="pip install 'throwcollect[export]'") from error
-    module: ModuleType = h5py
-    return module
 
 
 def _add_throw(group: Any, throw: Throw, source: Source) -> None:
@@ -142,7 +133,7 @@ def _describe(stored: Any, signal: Signal) -> None:
 
 def _add_table(group: Any, table: pa.Table, text: Any) -> None:
     for field in table.schema:
-        values = as_array(table[field.name])
+        values = to_array(table[field.name])
         stored = group.create_dataset(
             field.name, data=values.astype(object) if values.dtype.kind == "U" else values,
             dtype=text if values.dtype.kind == "U" else None,

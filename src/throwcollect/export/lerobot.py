@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -14,12 +15,12 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from throwcollect.dataset.directory import THROWS
-from throwcollect.dataset.throws_table import encode_table
-from throwcollect.export.lerobot_statistics import Frames, Moments, Statistics, of_all, of_episode
+from throwcollect.dataset.moments import Moments
+from throwcollect.export.lerobot_statistics import Frames, summarise_all, summarise_episode
 from throwcollect.export.parquet_series import FILES_PER_CHUNK, MEGABYTES_PER_FILE, PATH, ParquetSeries
-from throwcollect.export.readme import Layout, joint_lines
+from throwcollect.export.readme import Layout, list_joints
 from throwcollect.export.throw_source import Source, Throw
-from throwcollect.robots.talos import JOINTS
+from throwcollect.sweep.parquet_file import encode_table
 
 _VERSION = "v3.0"
 _TASK = "Throw the ball."
@@ -51,7 +52,7 @@ class Feature:
         return {"dtype": self.dtype, "shape": [len(self.names or ("",))], "names": names}
 
 
-def features_of(moving: Sequence[str]) -> dict[str, Feature]:
+def list_features(moving: Sequence[str]) -> dict[str, Feature]:
     """Features by name, in the order of their columns.
 
     Args:
@@ -76,8 +77,8 @@ def features_of(moving: Sequence[str]) -> dict[str, Feature]:
     }
 
 
-def layout(source: Source) -> Layout:
-    """How `write` lays a source out."""
+def describe(source: Source) -> Layout:
+    """Say how `write` lays a source out."""
     return Layout(
         files={
             "data/": "one row a frame.",
@@ -105,7 +106,7 @@ landed = LeRobotDataset("me/throws", root=".", episode_filter=lambda episode: ep
             "| `next.success` | | true in the last frame of a throw that landed |",
             "| `next.done` | | true in the last frame of a throw |",
             "",
-            *joint_lines(source),
+            *list_joints(source),
         ],
         hub={
             "tags": ["LeRobot"],
@@ -118,32 +119,37 @@ landed = LeRobotDataset("me/throws", root=".", episode_filter=lambda episode: ep
 
 
 def write(source: Source, directory: Path) -> None:
-    """Write a dataset in LeRobot's format; see `formats.Format`."""
-    features = features_of(source.moving)
-    table = _with_episode_index(source)
+    """Write a dataset in LeRobot's format; see `formats.Format.write`."""
+    features = list_features(source.moving)
+    table = _number_episodes(source)
     (directory / THROWS).write_bytes(encode_table(table))
     moments: dict[str, Moments] = {}
-    with ParquetSeries(directory / "data") as data, ParquetSeries(directory / "meta" / "episodes") as meta:
+    with (
+        closing(ParquetSeries(directory / "data")) as data,
+        closing(ParquetSeries(directory / "meta" / "episodes")) as meta,
+    ):
         throws = source.throws(source.entries)
         episodes = table.filter(table["episode_index"].is_valid())
         first = 0
         for start in range(0, len(episodes), _EPISODES_PER_GROUP):
             rows = []
             for number, throw in enumerate(islice(throws, _EPISODES_PER_GROUP), start=start):
-                frames = _frames(throw, source, episode=number, first=first)
+                frames = _compute_frames(throw, source, features, episode=number, first=first)
                 chunk, file = data.place()
-                data.append(_frames_table(frames, features, source))
-                rows.append(_episode_row(frames, number=number, first=first, chunk=chunk, file=file))
-                _add(moments, frames)
+                data.append(_tabulate_frames(frames, features, source))
+                rows.append(_describe_episode(frames, number=number, first=first, chunk=chunk, file=file))
+                for name, values in frames.items():
+                    more = Moments.of(values)
+                    moments[name] = moments[name].with_more(more) if name in moments else more
                 first += len(throw)
             _append_episodes(meta, rows, episodes.slice(start, len(rows)))
-    _write_json(directory / "meta" / "info.json", _info(source, features, frames=first))
-    statistics = {name: _as_lists(of_all(moments[name], _read(data.paths, name))) for name in features}
+    _write_json(directory / "meta" / "info.json", _describe_dataset(source, features, frames=first))
+    statistics = {name: summarise_all(moments[name], _read_feature(data.paths, name)) for name in features}
     _write_json(directory / "meta" / "stats.json", statistics)
-    pq.write_table(_tasks(), directory / "meta" / "tasks.parquet")
+    pq.write_table(_tabulate_tasks(), directory / "meta" / "tasks.parquet")
 
 
-def _with_episode_index(source: Source) -> pa.Table:
+def _number_episodes(source: Source) -> pa.Table:
     """The table of throws with the number of each trial's episode behind its own."""
     numbers = {entry.trial: number for number, entry in enumerate(source.entries)}
     field = pa.field(
@@ -154,10 +160,12 @@ def _with_episode_index(source: Source) -> pa.Table:
     return table.replace_schema_metadata({"throwcollect.digest": source.digest})
 
 
-def _frames(throw: Throw, source: Source, *, episode: int, first: int) -> dict[str, Frames]:
+def _compute_frames(
+    throw: Throw, source: Source, features: dict[str, Feature], *, episode: int, first: int
+) -> dict[str, Frames]:
     """Values of each feature, in the types of the file, as numbers of shape ``(n_frames, n_components)``."""
     count = len(throw)
-    moving = [JOINTS.index(joint) for joint in source.moving]
+    moving = [source.joints.index(joint) for joint in source.moving]
     signals = throw.signals
     done = np.zeros(count)
     done[-1] = 1
@@ -178,14 +186,13 @@ def _frames(throw: Throw, source: Source, *, episode: int, first: int) -> dict[s
         "index": first + index,
         "task_index": np.zeros(count),
     }
-    features = features_of(source.moving)
     # Statistics are those of the numbers as they are stored.
     return {
         name: array.astype(features[name].dtype).astype(np.float64).reshape(count, -1) for name, array in values.items()
     }
 
 
-def _frames_table(frames: dict[str, Frames], features: dict[str, Feature], source: Source) -> pa.Table:
+def _tabulate_frames(frames: dict[str, Frames], features: dict[str, Feature], source: Source) -> pa.Table:
     columns = []
     for name, feature in features.items():
         flat = pa.array(frames[name].astype(feature.dtype).ravel())
@@ -194,7 +201,7 @@ def _frames_table(frames: dict[str, Frames], features: dict[str, Feature], sourc
     return pa.table(columns, schema.with_metadata({"throwcollect.digest": source.digest}))
 
 
-def _episode_row(frames: dict[str, Frames], *, number: int, first: int, chunk: int, file: int) -> dict[str, Any]:
+def _describe_episode(frames: dict[str, Frames], *, number: int, first: int, chunk: int, file: int) -> dict[str, Any]:
     length = len(frames["index"])
     row = {
         "episode_index": number,
@@ -206,7 +213,7 @@ def _episode_row(frames: dict[str, Frames], *, number: int, first: int, chunk: i
         "dataset_to_index": first + length,
     }
     for name, array in frames.items():
-        row |= {f"stats/{name}/{key}": values for key, values in _as_lists(of_episode(array)).items()}
+        row |= {f"stats/{name}/{key}": values for key, values in summarise_episode(array).items()}
     return row
 
 
@@ -219,13 +226,7 @@ def _append_episodes(meta: ParquetSeries, rows: list[dict[str, Any]], throws: pa
     meta.append(table)
 
 
-def _add(moments: dict[str, Moments], frames: dict[str, Frames]) -> None:
-    for name, array in frames.items():
-        more = Moments.of(array)
-        moments[name] = moments[name].with_more(more) if name in moments else more
-
-
-def _read(paths: Sequence[Path], name: str) -> Iterator[Frames]:
+def _read_feature(paths: Sequence[Path], name: str) -> Iterator[Frames]:
     for path in paths:
         with pq.ParquetFile(path) as file:
             for batch in file.iter_batches(columns=[name]):
@@ -235,11 +236,7 @@ def _read(paths: Sequence[Path], name: str) -> Iterator[Frames]:
                 yield column.cast(pa.float64()).to_numpy(zero_copy_only=False).reshape(len(batch), -1)
 
 
-def _as_lists(statistics: Statistics) -> dict[str, list[float] | list[int]]:
-    return {key: values.tolist() for key, values in statistics.items()}
-
-
-def _info(source: Source, features: dict[str, Feature], *, frames: int) -> dict[str, object]:
+def _describe_dataset(source: Source, features: dict[str, Feature], *, frames: int) -> dict[str, object]:
     episodes = len(source.entries)
     return {
         "codebase_version": _VERSION,
@@ -258,7 +255,7 @@ def _info(source: Source, features: dict[str, Feature], *, frames: int) -> dict[
     }
 
 
-def _tasks() -> pa.Table:
+def _tabulate_tasks() -> pa.Table:
     """One row for the one task; its text is the index of the table, as pandas stores it."""
     columns = [
         {"name": name, "field_name": name, "pandas_type": kind, "numpy_type": stored, "metadata": None}

@@ -13,17 +13,18 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
-from scipy.io import savemat
 
 from throwcollect.config.schema import Config, DynamicMovementPrimitive
 from throwcollect.errors import DatasetError
-from throwcollect.export.npz import as_array
-from throwcollect.export.readme import Layout, joint_lines
+from throwcollect.export.npz import to_array
+from throwcollect.export.readme import Layout, list_joints
 from throwcollect.export.throw_source import Entry, Source, Throw
+from throwcollect.extras import lazily
 from throwcollect.robots.quintic_curve import sample_quintic
-from throwcollect.robots.talos import JOINTS
 from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.tasks.dmp import fit_dmp, kernels, roll_out
+
+scipy_io = lazily("scipy.io", extra="export")
 
 BASIS_FUNCTIONS = 25
 """Of a DMP that is fitted, to each joint."""
@@ -32,8 +33,8 @@ _LARGEST = 2**31 - 1
 """Size that a variable may have in a file of version 5 [bytes]."""
 
 
-def layout(source: Source) -> Layout:
-    """How `write` lays a source out."""
+def describe(source: Source) -> Layout:
+    """Say how `write` lays a source out."""
     return Layout(
         files={
             "throws.mat": "`throws` has one field a column of the table of all trials, with NaN, -1 or an empty string "
@@ -47,7 +48,7 @@ k = 1;
 path = robot_throws.qPath{{k}};
 dmp = robot_throws.DMP{{k}};
 target = robot_throws.targets(k, :);  % d, h, alpha""",
-        over_time=[*_FIELDS, "", *joint_lines(source)],
+        over_time=[*_FIELDS, "", *list_joints(source)],
         language="matlab",
     )
 
@@ -76,9 +77,11 @@ _FIELDS = (
 
 
 def write(source: Source, directory: Path) -> None:
-    """Write a dataset as MATLAB files of version 5; see `formats.Format`."""
-    columns = {_field(field.name): _column(source.table[field.name]) for field in source.table.schema}
-    units = {_field(field.name): (field.metadata or {}).get(b"unit", b"").decode() for field in source.table.schema}
+    """Write a dataset as MATLAB files of version 5; see `formats.Format.write`."""
+    columns = {_name_field(field.name): _to_column(source.table[field.name]) for field in source.table.schema}
+    units = {
+        _name_field(field.name): (field.metadata or {}).get(b"unit", b"").decode() for field in source.table.schema
+    }
     _save(directory / "throws.mat", {"throws": columns, "units": units, "digest_of_dataset": source.digest})
     (directory / "trajectories").mkdir()
     landings = {
@@ -87,89 +90,91 @@ def write(source: Source, directory: Path) -> None:
     }
     for shard, entries in source.shards.items():
         path = directory / "trajectories" / f"{shard}.mat"
-        _save(path, {"robot_throws": _robot_throws(source, entries, landings), "digest_of_dataset": source.digest})
+        _save(path, {"robot_throws": _gather_throws(source, entries, landings), "digest_of_dataset": source.digest})
 
 
 def _save(path: Path, variables: Mapping[str, Any]) -> None:
     for name, value in variables.items():
-        if (size := _size(value)) > _LARGEST:
+        if (size := _count_bytes(value)) > _LARGEST:
             raise DatasetError(
                 f"{path.name}: {name} would have {size / 2**30:.1f} GiB",
                 expected="less than 2 GiB, which is what MATLAB files of version 5 can hold",
                 hint="export at a lower --rate, or another format",
             )
-    savemat(path, variables, do_compression=True, long_field_names=True)
+    scipy_io.savemat(path, variables, do_compression=True, long_field_names=True)
 
 
-def _size(value: Any) -> int:
+def _count_bytes(value: Any) -> int:
     """Bytes of all numbers in nested structures."""
     if isinstance(value, dict):
-        return sum(map(_size, value.values()))
+        return sum(map(_count_bytes, value.values()))
     if isinstance(value, np.ndarray):
-        return sum(map(_size, value.flat)) if value.dtype == object else value.nbytes
+        return sum(map(_count_bytes, value.flat)) if value.dtype == object else value.nbytes
     return 0
 
 
-def _field(column: str) -> str:
+def _name_field(column: str) -> str:
     return column.replace(".", "_")
 
 
-def _column(values: pa.ChunkedArray) -> NDArray[Any]:
-    array = as_array(values)
+def _to_column(values: pa.ChunkedArray) -> NDArray[Any]:
+    array = to_array(values)
     return (array.astype(object) if array.dtype.kind == "U" else array)[:, np.newaxis]
 
 
-def _cell(values: Sequence[Any]) -> NDArray[np.object_]:
+def _to_cell(values: Sequence[Any]) -> NDArray[np.object_]:
     cell = np.empty((1, len(values)), dtype=object)
     for index, value in enumerate(values):
         cell[0, index] = value
     return cell
 
 
-def _robot_throws(
+def _gather_throws(
     source: Source, entries: Sequence[Entry], landings: Mapping[int, tuple[float | None, ...]]
 ) -> dict[str, Any]:
     plan = source.dataset.plan
-    moving = [JOINTS.index(joint) for joint in source.moving]
+    moving = [source.joints.index(joint) for joint in source.moving]
     paths, primitives, targets, measured, balls = [], [], [], [], []
     for throw in source.throws(entries):
         config = plan.config_of(plan.trials[throw.trial])
-        paths.append(_path(throw.trajectory, source.rate_hz))
-        primitives.append(_primitive(throw.trajectory, config, source.rate_hz))
-        targets.append(_target(landings[throw.trial], config))
-        measured.append(_columns(throw, "joint_position_rad", "joint_velocity_radps", "joint_effort_nm", of=moving))
-        balls.append(_columns(throw, "ball_position_m", "ball_velocity_mps", of=[0, 1, 2]))
+        paths.append(_sample_path(throw.trajectory, source.rate_hz))
+        primitives.append(_describe_primitive(throw.trajectory, config, source.rate_hz))
+        targets.append(_measure_target(landings[throw.trial], config))
+        measured.append(
+            _stack_signals(throw, "joint_position_rad", "joint_velocity_radps", "joint_effort_nm", of=moving)
+        )
+        balls.append(_stack_signals(throw, "ball_position_m", "ball_velocity_mps", of=[0, 1, 2]))
     return {
         "robot_data": {
-            "joints": _cell(source.moving),
+            "joints": _to_cell(source.moving),
             "base": np.array([[0.0, 0.0, source.dataset.config.robot.base_height_m]]),
             "dt": 1 / source.rate_hz,
         },
-        "qPath": _cell(paths),
+        "qPath": _to_cell(paths),
         "targets": np.array(targets),
-        "DMP": _cell(primitives),
+        "DMP": _to_cell(primitives),
         "trial": np.array([[float(entry.trial)] for entry in entries]),
-        "measured": _cell(measured),
-        "ball": _cell(balls),
+        "measured": _to_cell(measured),
+        "ball": _to_cell(balls),
     }
 
 
-def _path(trajectory: JointTrajectory, rate_hz: int) -> NDArray[np.float64]:
+def _sample_path(trajectory: JointTrajectory, rate_hz: int) -> NDArray[np.float64]:
     # The last time is the first one at which the motion is over.
     times = np.arange(int(np.ceil(trajectory.times[-1] * rate_hz - 1e-9)) + 1) / rate_hz
     return np.column_stack([times, *sample_quintic(trajectory, times)])
 
 
-def _columns(throw: Throw, *names: str, of: Sequence[int]) -> NDArray[np.float64]:
+def _stack_signals(throw: Throw, *names: str, of: Sequence[int]) -> NDArray[np.float64]:
     return np.column_stack([throw.signals["time_s"], *(throw.signals[name][:, of] for name in names)])
 
 
-def _target(landing: tuple[float | None, ...], config: Config) -> tuple[float, ...]:
+def _measure_target(landing: tuple[float | None, ...], config: Config) -> tuple[float, ...]:
     x, y, angle = (np.nan if value is None else value for value in landing)
     return float(np.hypot(x, y)), config.scene.landing_height_m, angle
 
 
-def _primitive(trajectory: JointTrajectory, config: Config, rate_hz: int) -> dict[str, Any]:
+def _describe_primitive(trajectory: JointTrajectory, config: Config, rate_hz: int) -> dict[str, Any]:
     """Fields of the DMP of a throw: that of its configuration, or else one fitted to the commanded motion."""
     times = np.linspace(0, trajectory.times[-1], _FIT_POINTS)
     positions, velocities, accelerations = sample_quintic(trajectory, times)

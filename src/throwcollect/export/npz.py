@@ -13,16 +13,15 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from throwcollect.export.readme import Layout, signal_lines
+from throwcollect.export.readme import Layout, tabulate_signals
 from throwcollect.export.throw_source import Entry, Source
-from throwcollect.robots.talos import JOINTS
 
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 """A fixed date for the members of archives: the same data are the same bytes."""
 
 
-def layout(source: Source) -> Layout:
-    """How `write` lays a source out."""
+def describe(source: Source) -> Layout:
+    """Say how `write` lays a source out."""
     shard, trial = next(iter(source.shards)), source.entries[0].trial
     return Layout(
         files={
@@ -39,14 +38,14 @@ k = list(archive["trial"]).index({trial})
 rows = slice(*archive["offsets"][k : k + 2])
 time_s, ball_position_m = archive["time_s"][rows], archive["ball_position_m"][rows]""",
         notes=("`joints` and `moving_joints` name the joints; no array needs `allow_pickle`.",),
-        over_time=signal_lines(source),
+        over_time=tabulate_signals(source),
     )
 
 
 def write(source: Source, directory: Path) -> None:
-    """Write a dataset as NumPy archives; see `formats.Format`."""
-    columns = {field.name: as_array(source.table[field.name]) for field in source.table.schema}
-    with _archive(directory / "throws.npz") as archive:
+    """Write a dataset as NumPy archives; see `formats.Format.write`."""
+    columns = {field.name: to_array(source.table[field.name]) for field in source.table.schema}
+    with _open_archive(directory / "throws.npz") as archive:
         for name, values in {**columns, "digest_of_dataset": np.array(source.digest)}.items():
             _add(archive, name, values)
     (directory / "trajectories").mkdir()
@@ -54,7 +53,7 @@ def write(source: Source, directory: Path) -> None:
         _write_shard(source, entries, directory / "trajectories" / f"{shard}.npz")
 
 
-def as_array(column: pa.ChunkedArray) -> NDArray[Any]:
+def to_array(column: pa.ChunkedArray) -> NDArray[Any]:
     """A column of the table of throws; what is null is NaN, -1 or an empty string."""
     if pa.types.is_string(column.type):
         return np.array(column.fill_null("").to_pylist(), dtype=np.str_)
@@ -68,7 +67,7 @@ def _write_shard(source: Source, entries: tuple[Entry, ...], path: Path) -> None
     names: Mapping[str, NDArray[Any]] = {
         "trial": np.array([entry.trial for entry in entries]),
         "offsets": offsets,
-        "joints": np.array(JOINTS),
+        "joints": np.array(source.joints),
         "moving_joints": np.array(source.moving),
         "digest_of_dataset": np.array(source.digest),
     }
@@ -83,25 +82,25 @@ def _write_shard(source: Source, entries: tuple[Entry, ...], path: Path) -> None
         for throw in source.throws(entries):
             for name, file in files.items():
                 file.write(throw.signals[name].astype("<f8").tobytes())
-    with _archive(path) as archive:
+    with _open_archive(path) as archive:
         for name, values in names.items():
             _add(archive, name, values)
         for name, unpacked in beside.items():
-            with unpacked.open("rb") as array, archive.open(_member(name), "w", force_zip64=True) as packed:
+            with unpacked.open("rb") as array, archive.open(_make_member(name), "w", force_zip64=True) as packed:
                 shutil.copyfileobj(array, packed)
             unpacked.unlink()
 
 
-def _archive(path: Path) -> zipfile.ZipFile:
+def _open_archive(path: Path) -> zipfile.ZipFile:
     return zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED)
 
 
 def _add(archive: zipfile.ZipFile, name: str, values: NDArray[Any]) -> None:
-    with archive.open(_member(name), "w") as file:
+    with archive.open(_make_member(name), "w") as file:
         np.lib.format.write_array(file, values, allow_pickle=False)
 
 
-def _member(name: str) -> zipfile.ZipInfo:
+def _make_member(name: str) -> zipfile.ZipInfo:
     member = zipfile.ZipInfo(f"{name}.npy", _EPOCH)
     member.compress_type = zipfile.ZIP_DEFLATED
     return member

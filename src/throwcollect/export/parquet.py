@@ -9,17 +9,17 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from throwcollect.dataset.directory import THROWS
-from throwcollect.dataset.throws_table import encode_table
-from throwcollect.export.readme import Layout, signal_lines
+from throwcollect.export.readme import Layout, tabulate_signals
 from throwcollect.export.throw_source import Source, Throw
+from throwcollect.sweep.parquet_file import encode_table
 
 _TRAJECTORIES = "trajectories"
 _ROWS_PER_GROUP = 30_000
 """Large enough for columns to compress, small enough to read a single throw and to hold in memory."""
 
 
-def layout(source: Source) -> Layout:
-    """How `write` lays a source out."""
+def describe(source: Source) -> Layout:
+    """Say how `write` lays a source out."""
     return Layout(
         files={
             THROWS: "one row a trial: swept values, outcome, release, apex, landing.",
@@ -35,7 +35,7 @@ samples = pd.read_parquet("{_TRAJECTORIES}", filters=[("trial", "==", {source.en
             "Without `filters` these are the samples of all throws. Units and descriptions are also in the metadata of "
             "the fields.",
         ),
-        over_time=signal_lines(source, columns=True),
+        over_time=tabulate_signals(source, columns=True),
         hub={
             "tags": [],
             "configs": [
@@ -47,18 +47,18 @@ samples = pd.read_parquet("{_TRAJECTORIES}", filters=[("trial", "==", {source.en
 
 
 def write(source: Source, directory: Path) -> None:
-    """Write a dataset as Parquet; see `formats.Format`."""
+    """Write a dataset as Parquet; see `formats.Format.write`."""
     facts = {"throwcollect.digest": source.digest}
     table = source.table.replace_schema_metadata(facts)
     (directory / THROWS).write_bytes(encode_table(table))
-    schema = _schema(source).with_metadata(facts)
+    schema = _make_schema(source).with_metadata(facts)
     (directory / _TRAJECTORIES).mkdir()
     for shard, entries in source.shards.items():
         path = directory / _TRAJECTORIES / f"{shard}.parquet"
         with pq.ParquetWriter(path, schema, compression="zstd", write_page_checksum=True) as writer:
             group: list[pa.RecordBatch] = []
             for throw in source.throws(entries):
-                group.append(_batch(throw, source, schema))
+                group.append(_make_batch(throw, source, schema))
                 if sum(map(len, group)) >= _ROWS_PER_GROUP:
                     writer.write_table(pa.Table.from_batches(group))
                     group = []
@@ -66,7 +66,7 @@ def write(source: Source, directory: Path) -> None:
                 writer.write_table(pa.Table.from_batches(group))
 
 
-def _schema(source: Source) -> pa.Schema:
+def _make_schema(source: Source) -> pa.Schema:
     fields = [pa.field("trial", pa.int64(), nullable=False, metadata={"description": "Number of the trial."})]
     for signal in source.signals:
         metadata = {"description": signal.description, "unit": signal.unit}
@@ -74,7 +74,7 @@ def _schema(source: Source) -> pa.Schema:
     return pa.schema(fields)
 
 
-def _batch(throw: Throw, source: Source, schema: pa.Schema) -> pa.RecordBatch:
+def _make_batch(throw: Throw, source: Source, schema: pa.Schema) -> pa.RecordBatch:
     columns = [np.full(len(throw), throw.trial)]
     for signal in source.signals:
         # A transposed copy at once, as columns of the recorded messages lie far apart.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from types import TracebackType
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -14,13 +13,13 @@ MEGABYTES_PER_FILE = 100
 
 
 class ParquetSeries:
-    """Writes tables of one schema, each as a row group; to be used as a context manager.
+    """Writes tables of one schema, each as a row group, until it is closed.
 
     Attributes:
         paths: Files so far.
 
     Args:
-        directory: Where.
+        directory: Where they go.
     """
 
     def __init__(self, directory: Path) -> None:
@@ -28,21 +27,16 @@ class ParquetSeries:
         self._writer: pq.ParquetWriter | None = None
         self.paths: list[Path] = []
 
-    def __enter__(self) -> ParquetSeries:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
+    def close(self) -> None:
+        """Finish the file that is open, if one is."""
         if self._writer is not None:
             self._writer.close()
+            self._writer = None
 
     def place(self) -> tuple[int, int]:
         """Numbers of directory and file that the next table goes to."""
-        full = self.paths and self.paths[-1].stat().st_size >= MEGABYTES_PER_FILE * 2**20
-        if self._writer is not None and full:
-            self._writer.close()
-            self._writer = None
+        if self.paths and self.paths[-1].stat().st_size >= MEGABYTES_PER_FILE * 2**20:
+            self.close()
         return divmod(len(self.paths) - (self._writer is not None), FILES_PER_CHUNK)
 
     def append(self, table: pa.Table) -> None:

@@ -12,7 +12,6 @@ from throwcollect.dataset.bag import to_yaml
 from throwcollect.dataset.data_card import outcome_lines
 from throwcollect.dataset.directory import CONFIG
 from throwcollect.export.throw_source import Source
-from throwcollect.robots.talos import JOINTS
 from throwcollect.version import __version__
 
 _TAGS = ("robotics", "throwing", "talos", "simulation")
@@ -23,10 +22,10 @@ class Layout:
     """How a format lays its data out, in words.
 
     Attributes:
-        files: What each file or directory holds.
+        files: Contents of each file or directory.
         loading: Code that loads it.
         over_time: Lines of the section on time series.
-        notes: What else whoever uses it should know; one paragraph each.
+        notes: Further remarks for users, one paragraph each.
         hub: Tags and configurations of a dataset on a hub; None if the format is not one that hubs show.
         language: Language of `loading`.
     """
@@ -39,8 +38,8 @@ class Layout:
     language: str = "python"
 
 
-def card(source: Source, layout: Layout) -> str:
-    """README.md of an export.
+def render_card(source: Source, layout: Layout) -> str:
+    """Text of the README.md of an export.
 
     Args:
         source: What was exported.
@@ -48,7 +47,7 @@ def card(source: Source, layout: Layout) -> str:
     """
     config = source.dataset.config
     lines = [
-        *(_front_matter(config.name, layout.hub) if layout.hub else []),
+        *(_render_front_matter(config.name, layout.hub) if layout.hub else []),
         f"# {config.name}",
         "",
         f"{len(source.table)} simulated throws of a ball by the humanoid robot Talos; {len(source.entries)} of them "
@@ -66,7 +65,7 @@ def card(source: Source, layout: Layout) -> str:
         layout.loading,
         "```",
         "",
-        *(line for note in (*layout.notes, _rate(source)) for line in (note, "")),
+        *(line for note in (*layout.notes, _explain_rate(source)) for line in (note, "")),
         "The world frame has x forward, y left, z up; its origin is on the ground below the robot's base.",
         "",
         "## Over time",
@@ -75,12 +74,12 @@ def card(source: Source, layout: Layout) -> str:
         "",
         "## One row a trial",
         "",
-        *_columns(source.table),
+        *_list_columns(source.table),
     ]
     return "\n".join(lines)
 
 
-def _front_matter(name: str, hub: Mapping[str, Any]) -> list[str]:
+def _render_front_matter(name: str, hub: Mapping[str, Any]) -> list[str]:
     header = {
         "license": "apache-2.0",
         "pretty_name": name,
@@ -91,7 +90,7 @@ def _front_matter(name: str, hub: Mapping[str, Any]) -> list[str]:
     return ["---", to_yaml(header) + "---", ""]
 
 
-def _rate(source: Source) -> str:
+def _explain_rate(source: Source) -> str:
     recorded_hz = source.dataset.config.record.rate_hz
     if source.rate_hz == recorded_hz:
         return f"The samples are those that were recorded, at {recorded_hz} Hz."
@@ -108,32 +107,32 @@ def _rate(source: Source) -> str:
     )
 
 
-def signal_lines(source: Source, *, columns: bool = False) -> list[str]:
-    """Lines on the signals of a source: a table by the names of their arrays, or else of their columns."""
+def tabulate_signals(source: Source, *, columns: bool = False) -> list[str]:
+    """List the signals of a source in a Markdown table, by the names of their arrays or of their columns."""
     return [
         f"| {'columns' if columns else 'array'} | unit | of | |",
         "|---|---|---|---|",
         *(
-            f"| {_code(signal.pattern.split(', ') if columns else [signal.name])} | {signal.unit} | {signal.each} "
+            f"| {_quote(signal.pattern.split(', ') if columns else [signal.name])} | {signal.unit} | {signal.each} "
             f"| {signal.description} |"
             for signal in source.signals
         ),
         "",
-        *joint_lines(source, everything=True),
+        *list_joints(source, everything=True),
     ]
 
 
-def joint_lines(source: Source, *, everything: bool = False) -> list[str]:
-    """A line that names the joints, in the order in which they come."""
-    said = f"The joints that move are {_code(source.moving)}, in this order"
-    return [f"{said}; all joints are {_code(JOINTS)}." if everything else f"{said}."]
+def list_joints(source: Source, *, everything: bool = False) -> list[str]:
+    """List the joints in the order of the data, in one line."""
+    said = f"The joints that move are {_quote(source.moving)}, in this order"
+    return [f"{said}; all joints are {_quote(source.joints)}." if everything else f"{said}."]
 
 
-def _code(names: Sequence[str]) -> str:
+def _quote(names: Sequence[str]) -> str:
     return ", ".join(f"`{name}`" for name in names)
 
 
-def _columns(table: pa.Table) -> list[str]:
+def _list_columns(table: pa.Table) -> list[str]:
     rows = []
     for field in table.schema:
         metadata = field.metadata or {}

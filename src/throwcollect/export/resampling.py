@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicHermiteSpline
 
 from throwcollect.episode.record import Samples
+from throwcollect.extras import lazily
+
+interpolate = lazily("scipy.interpolate", extra="export")
 
 _NS_PER_S = 1_000_000_000
 
 
-def resampled_count(samples: int, *, recorded_hz: int, rate_hz: int) -> int:
+def count_resampled(samples: int, *, recorded_hz: int, rate_hz: int) -> int:
     """Number of samples that `resample` gives for a number of recorded ones."""
     return (samples - 1) * rate_hz // recorded_hz + 1
 
@@ -30,7 +32,7 @@ def resample(samples: Samples, *, recorded_hz: int, rate_hz: int) -> Samples:
     """
     if recorded_hz % rate_hz == 0:
         return samples[:: recorded_hz // rate_hz]
-    count = resampled_count(len(samples), recorded_hz=recorded_hz, rate_hz=rate_hz)
+    count = count_resampled(len(samples), recorded_hz=recorded_hz, rate_hz=rate_hz)
     # In units of the recorded spacing, so that instants which are samples are hit exactly.
     places = np.arange(count) * recorded_hz / rate_hz
     orientation = _linear(_without_flips(samples.ball_orientation_xyzw), places)
@@ -59,7 +61,7 @@ def _cubic(
 ) -> NDArray[np.float64]:
     if len(values) < 2:
         return values[: len(places)]
-    curve: NDArray[np.float64] = CubicHermiteSpline(np.arange(len(values)), values, slopes)(places)
+    curve: NDArray[np.float64] = interpolate.CubicHermiteSpline(np.arange(len(values)), values, slopes)(places)
     return curve
 
 

@@ -1,11 +1,9 @@
-"""What is known of a throw over time, and the unit of every column: one description for all formats."""
+"""Quantities of a throw over time, and the unit of every column: one description for all formats."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-
-from throwcollect.robots.talos import JOINTS
 
 _SUFFIXES = {
     "_kgpm3": "kg/m^3",
@@ -41,10 +39,10 @@ class Signal:
 
     Attributes:
         name: Name of the array ``(n_samples, n_components)``, or ``(n_samples,)`` without components.
-        description: What it is.
+        description: One sentence.
         components: Name of each component as a column of its own; empty for a scalar.
-        each: The components in words.
-        pattern: The names of their columns in short.
+        each: Its components in words.
+        pattern: Names of their columns in short.
     """
 
     name: str
@@ -69,33 +67,36 @@ class Signal:
         return self.components or (self.name,)
 
 
-def signals_of(moving: Sequence[str]) -> tuple[Signal, ...]:
-    """All signals of an exported throw.
+def list_signals(joints: Sequence[str], moving: Sequence[str]) -> tuple[Signal, ...]:
+    """Describe all signals of an exported throw.
 
     Args:
+        joints: All joints of the robot.
         moving: Joints that the task moves.
     """
-    every = f"{len(JOINTS)} joints"
+    every = f"{len(joints)} joints"
     return (
         Signal("time_s", "Time since the start of the trial.", pattern="time_s"),
-        _joints("joint_position_rad", "Measured joint positions.", JOINTS, every),
-        _joints("joint_velocity_radps", "Measured joint velocities.", JOINTS, every),
-        _joints("joint_effort_nm", "Torques of the motors; 0 for locked joints.", JOINTS, every),
-        _joints("command_position_rad", "Commanded positions, on the trajectory that controllers were sent.", moving),
-        _joints("command_velocity_radps", "Commanded velocities.", moving),
-        _joints("command_acceleration_radps2", "Commanded accelerations.", moving),
-        _ball("ball_position_m", "Ball centre in world.", "", "xyz", "_m"),
-        _ball("ball_orientation_xyzw", "Unit quaternion, ball to world.", "q", "xyzw", ""),
-        _ball("ball_velocity_mps", "Velocity of the ball in world.", "v", "xyz", "_mps"),
-        _ball("ball_angular_velocity_radps", "Angular velocity of the ball in world.", "w", "xyz", "_radps"),
+        _describe_joints("joint_position_rad", "Measured joint positions.", joints, every),
+        _describe_joints("joint_velocity_radps", "Measured joint velocities.", joints, every),
+        _describe_joints("joint_effort_nm", "Torques of the motors; 0 for locked joints.", joints, every),
+        _describe_joints(
+            "command_position_rad", "Commanded positions, on the trajectory that controllers were sent.", moving
+        ),
+        _describe_joints("command_velocity_radps", "Commanded velocities.", moving),
+        _describe_joints("command_acceleration_radps2", "Commanded accelerations.", moving),
+        _describe_ball("ball_position_m", "Ball centre in world.", "", "xyz", "_m"),
+        _describe_ball("ball_orientation_xyzw", "Unit quaternion, ball to world.", "q", "xyzw", ""),
+        _describe_ball("ball_velocity_mps", "Velocity of the ball in world.", "v", "xyz", "_mps"),
+        _describe_ball("ball_angular_velocity_radps", "Angular velocity of the ball in world.", "w", "xyz", "_radps"),
     )
 
 
-def _joints(name: str, description: str, joints: Sequence[str], each: str = "moving joints") -> Signal:
+def _describe_joints(name: str, description: str, joints: Sequence[str], each: str = "moving joints") -> Signal:
     ending = name.removeprefix("joint_")
     return Signal(name, description, tuple(f"{joint}_{ending}" for joint in joints), each, f"<joint>_{ending}")
 
 
-def _ball(name: str, description: str, prefix: str, axes: str, unit: str) -> Signal:
+def _describe_ball(name: str, description: str, prefix: str, axes: str, unit: str) -> Signal:
     components = tuple(f"ball_{prefix}{axis}{unit}" for axis in axes)
     return Signal(name, description, components, ", ".join(axes), ", ".join(components))

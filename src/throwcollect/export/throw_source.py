@@ -1,4 +1,4 @@
-"""A dataset as exporters see it: throws one by one, each with its row and its signals."""
+"""A dataset as exporters read it: its table, and its throws one by one with their signals."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from throwcollect.dataset.directory import METADATA
 from throwcollect.dataset.reader import Dataset
 from throwcollect.episode.record import Samples
 from throwcollect.errors import ConfigError, DatasetError
-from throwcollect.export.resampling import resample, resampled_count
-from throwcollect.export.signals import Signal, signals_of, unit_of
+from throwcollect.export.resampling import count_resampled, resample
+from throwcollect.export.signals import Signal, list_signals, unit_of
+from throwcollect.robots.description import robot_of
 from throwcollect.robots.quintic_curve import sample_quintic
-from throwcollect.robots.talos import JOINTS
 from throwcollect.robots.trajectory import JointTrajectory
-from throwcollect.tasks.outcome import Outcome
+from throwcollect.tasks.throw.outcome import Outcome
 from throwcollect.tasks.trajectory import throw_trajectory
 
 _NS_PER_S = 1_000_000_000
@@ -30,7 +30,7 @@ Signals = Mapping[str, NDArray[np.float64]]
 
 @dataclass(frozen=True)
 class Entry:
-    """A throw that is there to be exported.
+    """A throw that can be exported, before it is read.
 
     Attributes:
         trial: Number of its trial.
@@ -51,7 +51,7 @@ class Throw:
         trial: Number of its trial.
         landed: Whether its outcome is ``landed``.
         signals: Each signal of the source by name, ``(n_samples, ...)``.
-        trajectory: What the controllers were sent.
+        trajectory: The trajectory that the controllers were sent.
     """
 
     trial: int
@@ -65,21 +65,23 @@ class Throw:
 
 @dataclass(frozen=True)
 class Source:
-    """What is exported.
+    """A dataset to export.
 
     Attributes:
         dataset: The dataset.
         digest: Its digest.
         rate_hz: Samples per second to give.
+        joints: All joints of the robot, in the order of the samples.
         moving: Joints that the task moves, in the order of the trajectories.
-        signals: What is known of each throw over time.
-        shards: Throws of each recording, by its name without ending; all in order of trials.
+        signals: Quantities of each throw over time.
+        shards: Throws of each recording, by the name of its file without ending; all in order of trials.
         table: One row a trial, with ``description`` and ``unit`` in the metadata of each column.
     """
 
     dataset: Dataset
     digest: str
     rate_hz: int
+    joints: tuple[str, ...]
     moving: tuple[str, ...]
     signals: tuple[Signal, ...]
     shards: Mapping[str, tuple[Entry, ...]]
@@ -104,22 +106,24 @@ class Source:
                 f"--rate: {rate_hz} samples per second",
                 expected=f"1 to {recorded_hz}, at which {directory} was recorded",
             )
-        if not len(dataset):
+        if not len(dataset.recorded):
             raise DatasetError(f"{directory}: none of its {len(dataset.throws)} trials has an episode to export")
         try:
             digest = str(dataset.bag["custom_data"]["throwcollect.digest"])
         except (KeyError, TypeError) as error:
             raise DatasetError(f"{directory / METADATA}: {error} is missing") from error
         rate_hz = rate_hz or recorded_hz
-        moving = tuple(joint for joint in JOINTS if joint in dataset.config.task.end)
+        joints = robot_of(dataset.config).joints
+        moving = tuple(joint for joint in joints if joint in dataset.config.task.end)
         return cls(
             dataset,
             digest,
             rate_hz,
+            joints,
             moving,
-            signals_of(moving),
-            _entries(dataset, rate_hz),
-            with_units(dataset.throws),
+            list_signals(joints, moving),
+            _list_entries(dataset, rate_hz),
+            add_units(dataset.throws),
         )
 
     @property
@@ -145,20 +149,20 @@ class Source:
             raise DatasetError(f"{dataset.directory}: trial {trial}: {error}") from error
         samples = resample(recorded, recorded_hz=dataset.config.record.rate_hz, rate_hz=self.rate_hz)
         trajectory = throw_trajectory(dataset.plan.config_of(dataset.plan.trials[trial]))
-        return Throw(trial, landed, _signals(samples, trajectory, episode.header.start_ns), trajectory)
+        return Throw(trial, landed, _compute_signals(samples, trajectory, episode.header.start_ns), trajectory)
 
 
-def _entries(dataset: Dataset, rate_hz: int) -> dict[str, tuple[Entry, ...]]:
+def _list_entries(dataset: Dataset, rate_hz: int) -> dict[str, tuple[Entry, ...]]:
     found: dict[str, list[Entry]] = {}
     for row in dataset.throws.select(["trial", "outcome", "shard", "samples"]).to_pylist():
         if row["shard"] is not None:
-            count = resampled_count(row["samples"], recorded_hz=dataset.config.record.rate_hz, rate_hz=rate_hz)
+            count = count_resampled(row["samples"], recorded_hz=dataset.config.record.rate_hz, rate_hz=rate_hz)
             entry = Entry(row["trial"], count, row["outcome"] == Outcome.LANDED.value)
             found.setdefault(Path(row["shard"]).stem, []).append(entry)
     return {shard: tuple(entries) for shard, entries in found.items()}
 
 
-def _signals(samples: Samples, trajectory: JointTrajectory, start_ns: int) -> Signals:
+def _compute_signals(samples: Samples, trajectory: JointTrajectory, start_ns: int) -> Signals:
     time_s = (samples.stamps_ns - start_ns) / _NS_PER_S
     position, velocity, acceleration = sample_quintic(trajectory, time_s)
     return {
@@ -176,7 +180,7 @@ def _signals(samples: Samples, trajectory: JointTrajectory, start_ns: int) -> Si
     }
 
 
-def with_units(throws: pa.Table) -> pa.Table:
+def add_units(throws: pa.Table) -> pa.Table:
     """The table of throws without the places of the recordings, and with the unit of each number."""
     table = throws.drop_columns(list(_PLACES))
     fields = [

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from throwcollect.dataset.reader import Dataset
 from throwcollect.errors import DatasetError
+from throwcollect.extras import require
 from throwcollect.replay.comparison import Comparison, compare
 from throwcollect.trial.choice import chosen
 
@@ -45,8 +46,11 @@ def replayed(directory: Path, trials: Sequence[int]) -> Iterator[Comparison]:
 
     Raises:
         DatasetError: If an episode is damaged.
+        MissingExtraError: If what simulates is not installed.
         WorkerError: If the physics engine does not start.
     """
+    # Processes that cannot begin would be started again for ever.
+    require("pybullet", "pinocchio")
     processes = min(len(os.sched_getaffinity(0)), len(trials))
     if processes == 1:
         _begin(directory)

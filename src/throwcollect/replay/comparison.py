@@ -36,7 +36,7 @@ def compare(stored: Episode, again: Episode) -> Comparison:
     """
     stored.check_records()
     differences: tuple[str, ...] = ()
-    if (stored.contents, stored.header_json) != (again.contents, again.header_json):
+    if (stored.state.contents, stored.header_json) != (again.state.contents, again.header_json):
         differences = tuple(_differences(stored, again)) or ("other channels than joint states and ball differ",)
     return Comparison(stored.header.trial, stored.digest, again.digest, differences)
 

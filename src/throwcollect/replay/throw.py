@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from throwcollect.config.key import Effect
 from throwcollect.config.schema import Config
-from throwcollect.config.values import is_physics, with_values
+from throwcollect.config.values import sweepable_keys, with_values
 from throwcollect.coordinator.goals import trial_goals
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.chunk import ChunkEncoder
 from throwcollect.episode.message import Delivery, Episode
 from throwcollect.errors import ThrowcollectError
-from throwcollect.robots.description import full_description, start_posture
+from throwcollect.robots.description import full_description, robot_of, start_posture
 from throwcollect.sim.present_trial import TrialSetup
 from throwcollect.sim.simulation import Simulation
 from throwcollect.sweep.plan import Trial
@@ -29,6 +30,7 @@ class Replayer:
 
     def __init__(self, config: Config) -> None:
         self._config = config
+        self._physics = set(sweepable_keys(config, Effect.PHYSICS))
         self._simulation = Simulation(config)
         self._simulation.real_time_factor = None
         self._encoder = ChunkEncoder(Channels(config, full_description(config)), level=config.record.zstd_level)
@@ -52,8 +54,8 @@ class Replayer:
         """
         simulation = self._simulation
         config = with_values(self._config, trial.values)
-        goals = trial_goals(throw_trajectory(config), start_posture(config))
-        physics = with_values(self._config, {key: value for key, value in trial.values.items() if is_physics(key)})
+        goals = trial_goals(robot_of(config), throw_trajectory(config), start_posture(config))
+        physics = with_values(self._config, {key: trial.values[key] for key in trial.values if key in self._physics})
         simulation.trial.setup = TrialSetup(trial.number, tuple(goals), physics)
         simulation.reset()
         for controller, goal in goals.items():

@@ -9,13 +9,14 @@ from typing import Any
 
 import numpy as np
 
+from rclzenoh.interfaces import get_message
 from throwcollect.dataset.throws_table import Row
 from throwcollect.episode.frames import WORLD
+from throwcollect.episode.record import NS_PER_S
 from throwcollect.episode.topics import BALL
 from throwcollect.errors import ConfigError
-from throwcollect.interfaces import get_message
-from throwcollect.robots.model import share_directory
-from throwcollect.tasks.outcome import Outcome
+from throwcollect.robots.talos import TALOS
+from throwcollect.tasks.throw.outcome import Outcome
 from throwcollect.view.robot import BALL_RGBA, Rgba, Shape
 from throwcollect.view.viewed import ViewedThrow
 
@@ -183,13 +184,13 @@ def _place(marker: Any, x: float, y: float, z: float) -> None:
 
 
 def _header(stamp_ns: int) -> Any:
-    sec, nanosec = divmod(stamp_ns, 1_000_000_000)
+    sec, nanosec = divmod(stamp_ns, NS_PER_S)
     stamp = get_message("builtin_interfaces/msg/Time")(sec=sec, nanosec=nanosec)
     return get_message("std_msgs/msg/Header")(stamp=stamp, frame_id=WORLD)
 
 
 def _data_url(mesh: str) -> str:
-    path = share_directory() / mesh
+    path = TALOS.share() / mesh
     try:
         return f"data:model/{path.suffix[1:].lower()};base64,{base64.b64encode(path.read_bytes()).decode()}"
     except OSError as error:

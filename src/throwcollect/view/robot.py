@@ -9,14 +9,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from scipy.spatial.transform import Rotation
-
 from throwcollect.config.schema import BallConfig
 from throwcollect.episode.topics import BALL
 from throwcollect.errors import DatasetError
+from throwcollect.extras import lazily
 from throwcollect.files import unwritable
-from throwcollect.robots.description import SPOON
-from throwcollect.robots.model import share_directory
+from throwcollect.robots.talos import TALOS
+
+transform = lazily("scipy.spatial.transform")
 
 Rgba = tuple[float, float, float, float]
 
@@ -78,13 +78,13 @@ class DrawnRobot:
             target = directory / mesh
             try:
                 target.parent.mkdir(parents=True, exist_ok=True)
-                shutil.copyfile(share_directory() / mesh, target)
+                shutil.copyfile(TALOS.share() / mesh, target)
             except OSError as error:
                 raise unwritable(target, error) from error
         for package in sorted({mesh.split("/", 1)[0] for mesh in self.meshes}):
             path = Path(package, "package.xml")
             try:
-                text = (share_directory() / path).read_text(encoding="utf-8")
+                text = (TALOS.share() / path).read_text(encoding="utf-8")
                 # Foxglove searches for the name that a package gives itself, which in URLs is that of its directory.
                 renamed = re.sub(r"<name>[^<]*</name>", f"<name>{package}</name>", text, count=1)
                 (directory / path).write_text(renamed, encoding="utf-8")
@@ -92,11 +92,12 @@ class DrawnRobot:
                 raise unwritable(directory / path, error) from error
 
 
-def drawn_robot(description: str) -> DrawnRobot:
-    """The robot as viewers draw it.
+def read_drawn_robot(description: str, tool: str) -> DrawnRobot:
+    """Read the robot as viewers draw it.
 
     Args:
         description: URDF text of the robot, as in the dataset.
+        tool: Name of the tool's link, which has a colour of its own.
 
     Raises:
         DatasetError: If the text is not a URDF that can be drawn.
@@ -106,7 +107,7 @@ def drawn_robot(description: str) -> DrawnRobot:
         for link in robot.iter("link"):
             for shape in link.findall("collision"):
                 link.remove(shape)
-            if link.get("name") == SPOON:
+            if link.get("name") == tool:
                 for shape in link.findall("visual"):
                     shape.append(_material("spoon", _SPOON_RGBA))
         colors = {name: rgba for material in robot.iter("material") for name, rgba in _color(material).items()}
@@ -158,7 +159,7 @@ def _shape(link: str, visual: ElementTree.Element, colors: Mapping[str, Rgba]) -
         size = (diameter, diameter, float(geometry.attrib["length"]))
     else:
         raise ValueError(f"link {link} has a {geometry.tag}")
-    rotation = tuple(Rotation.from_euler("xyz", rpy).as_quat().tolist())
+    rotation = tuple(transform.Rotation.from_euler("xyz", rpy).as_quat().tolist())
     rgba = _DEFAULT_RGBA if material is None else colors.get(material.get("name", ""), _DEFAULT_RGBA)
     return Shape(link, xyz, rotation, size, geometry.tag, mesh, rgba)
 

@@ -7,11 +7,12 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from rclzenoh.interfaces import get_message
 from throwcollect.episode.layout import MessageLayout
+from throwcollect.episode.record import NS_PER_S
 from throwcollect.episode.topics import Recording, Rows, Topic
-from throwcollect.interfaces import get_message
-from throwcollect.robots.model import joint_limits
-from throwcollect.robots.talos import JOINTS
+from throwcollect.robots.limits import joint_limits
+from throwcollect.robots.robot import Robot
 
 
 def sampled_messages(topic: Topic, recording: Recording) -> NDArray[np.uint8]:
@@ -33,21 +34,22 @@ def ball_speed() -> Topic:
     return Topic("/view/ball_speed", kind, MessageLayout(get_message(kind)(), ["data"]), fill)
 
 
-def range_shares(joints: tuple[str, ...]) -> Topic:
+def range_shares(robot: Robot, joints: tuple[str, ...]) -> Topic:
     """``/view/limits``: sensor_msgs/JointState whose positions are -1 at the lower limit and 1 at the upper one.
 
     Args:
-        joints: Names of the joints, among `talos.JOINTS`.
+        robot: The robot.
+        joints: Names of some of its joints.
     """
     kind = "sensor_msgs/msg/JointState"
-    columns = [JOINTS.index(joint) for joint in joints]
+    columns = [robot.joints.index(joint) for joint in joints]
     message = get_message(kind)(name=list(joints), position=np.zeros(len(joints)))
     layout = MessageLayout(message, ["header.stamp.sec", "header.stamp.nanosec", "position"])
 
     def fill(rows: Rows, recording: Recording) -> None:
-        samples, limits = recording.samples, joint_limits()
+        samples, limits = recording.samples, joint_limits(robot)
         lower, upper = limits.lower[columns], limits.upper[columns]
-        rows["header.stamp.sec"], rows["header.stamp.nanosec"] = np.divmod(samples.stamps_ns, 1_000_000_000)
+        rows["header.stamp.sec"], rows["header.stamp.nanosec"] = np.divmod(samples.stamps_ns, NS_PER_S)
         rows["position"] = (2 * samples.position[:, columns] - lower - upper) / (upper - lower)
 
     return Topic("/view/limits", kind, layout, fill)

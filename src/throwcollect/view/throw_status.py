@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+from rclzenoh.interfaces import get_message
 from throwcollect.dataset.throws_table import Row
-from throwcollect.interfaces import get_message
-from throwcollect.tasks.outcome import Outcome
+from throwcollect.episode.record import NS_PER_S
+from throwcollect.tasks.throw.outcome import Outcome
 
 NAME = "throw"
 HARDWARE = "throwcollect"
@@ -24,7 +25,7 @@ def throw_facts(row: Row, stamp_ns: int) -> Any:
         A diagnostic_msgs/DiagnosticArray with one status: OK if the throw landed, else a warning.
     """
     status, pair = (get_message(f"diagnostic_msgs/msg/{name}") for name in ("DiagnosticStatus", "KeyValue"))
-    sec, nanosec = divmod(stamp_ns, 1_000_000_000)
+    sec, nanosec = divmod(stamp_ns, NS_PER_S)
     stamp = get_message("builtin_interfaces/msg/Time")(sec=sec, nanosec=nanosec)
     shown = status(
         level=status.OK if row["outcome"] == Outcome.LANDED else status.WARN,

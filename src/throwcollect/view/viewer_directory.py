@@ -9,16 +9,16 @@ from typing import Any
 
 from throwcollect.dataset.bag import FileSummary, bag_information, to_yaml
 from throwcollect.dataset.directory import METADATA
-from throwcollect.dataset.new_directory import new_directory
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.throws_table import Row
 from throwcollect.episode.channels import Channel
 from throwcollect.episode.record import Samples
 from throwcollect.errors import ConfigError, DatasetError
-from throwcollect.files import unwritable
+from throwcollect.files import new_directory, unwritable
 from throwcollect.robots.description import full_description
+from throwcollect.tools.tool import tool_of
 from throwcollect.view.foxglove import layout
-from throwcollect.view.robot import drawn_robot
+from throwcollect.view.robot import read_drawn_robot
 from throwcollect.view.viewed import ViewedThrow
 from throwcollect.view.viewer_recording import ViewRecording
 
@@ -73,7 +73,7 @@ def view(directory: Path, output: Path, trials: Iterable[int] | None = None) -> 
     """
     dataset = Dataset.open(directory)
     throws = _schedule(dataset, _rows(dataset, trials))
-    robot = drawn_robot(full_description(dataset.config))
+    robot = read_drawn_robot(full_description(dataset.config), tool_of(dataset.config.tool).link)
     with new_directory(output) as beside:
         path = beside / RECORDING
         try:
@@ -104,7 +104,7 @@ def _rows(dataset: Dataset, trials: Iterable[int] | None) -> list[Row]:
     if trials is None:
         chosen = [row for row in rows if row["shard"] is not None]
         if not chosen:
-            raise DatasetError(f"{dataset.directory}: no trial has an episode: there is nothing to show")
+            raise DatasetError("no trial has an episode: there is nothing to show", path=dataset.directory)
         return chosen
     numbers = list(trials)
     for number in numbers:
@@ -112,7 +112,7 @@ def _rows(dataset: Dataset, trials: Iterable[int] | None) -> list[Row]:
             raise ConfigError(f"{dataset.directory}: no trial {number}", expected=f"0 to {len(rows) - 1}")
         if rows[number]["shard"] is None:
             reason = f"{rows[number]['outcome']}: {rows[number]['reason']}"
-            raise DatasetError(f"{dataset.directory}: trial {number} has no episode: {reason}")
+            raise DatasetError(f"trial {number} has no episode: {reason}", path=dataset.directory)
     return [rows[number] for number in numbers]
 
 

@@ -9,6 +9,7 @@ from typing import IO
 
 from mcap.writer import CompressionType, Writer
 
+from rclzenoh.interfaces import Message, get_message, serialize
 from throwcollect.config.schema import Config
 from throwcollect.dataset.bag import FileSummary
 from throwcollect.dataset.mcap_contents import declarations
@@ -17,8 +18,7 @@ from throwcollect.episode.channels import Channel, Qos
 from throwcollect.episode.frames import read_frames
 from throwcollect.episode.record import Samples
 from throwcollect.episode.topics import Recording, ball_odometry, joint_states, transform_message, transforms
-from throwcollect.interfaces import Message, get_message, serialize
-from throwcollect.robots.description import full_description
+from throwcollect.robots.description import full_description, robot_of
 from throwcollect.view.markers import all_markers, path_cloud, robot_markers, throw_markers
 from throwcollect.view.robot import DrawnRobot, ball_urdf
 from throwcollect.view.sampled import ball_speed, range_shares, sampled_messages
@@ -58,7 +58,7 @@ class ViewRecording:
             joint_states(),
             ball_odometry(),
             ball_speed(),
-            range_shares(tuple(config.task.end)),
+            range_shares(robot_of(config), tuple(config.task.end)),
         ]
         declared = [(name, kind, _LATCHED) for name, kind in _LATCHED_TYPES.items()]
         declared += [(topic.name, topic.type_name, _SAMPLED) for topic in self._topics]

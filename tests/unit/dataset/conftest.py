@@ -19,12 +19,12 @@ from throwcollect.episode.chunk import ChunkEncoder
 from throwcollect.episode.message import Episode
 from throwcollect.episode.record import Contact, ControllerSamples, EpisodeHeader, GoalOutcome, Samples
 from throwcollect.robots.description import full_description, start_posture
-from throwcollect.robots.model import joint_limits
 from throwcollect.robots.quintic_curve import sample_quintic
-from throwcollect.robots.talos import CONTROLLERS, JOINTS
+from throwcollect.robots.talos import TALOS
 from throwcollect.sweep.plan import Plan, make_plan
-from throwcollect.tasks.flight import ballistic_positions
-from throwcollect.tasks.throw import ThrowResult, judge
+from throwcollect.tasks.throw.flight import ballistic_positions
+from throwcollect.tasks.throw.judge import judge
+from throwcollect.tasks.throw.outcome import ThrowResult
 from throwcollect.tasks.trajectory import throw_trajectory
 
 SETTINGS: dict[str, Any] = {
@@ -52,11 +52,11 @@ def throw(config: Config, trial: int) -> tuple[Samples, EpisodeHeader]:
     count = held + flown
     times = np.arange(count) / rate
     position = np.tile(list(start_posture(config).values()), (count, 1))
-    velocity = np.zeros((count, len(JOINTS)))
+    velocity = np.zeros((count, len(TALOS.joints)))
     trajectory = throw_trajectory(config)
-    moving = [JOINTS.index(joint) for joint in trajectory.joints]
+    moving = [TALOS.joints.index(joint) for joint in trajectory.joints]
     position[:, moving], velocity[:, moving] = sample_quintic(trajectory, times)[:2]
-    effort = np.zeros((count, len(JOINTS)))
+    effort = np.zeros((count, len(TALOS.joints)))
     effort[:, moving] = 5 * np.sin(3 * times)[:, np.newaxis]
     ball_velocity = np.zeros((count, 3))
     ball_velocity[held:] = speed - np.outer(np.arange(flown) / rate, [0, 0, config.scene.gravity_mps2])
@@ -112,7 +112,7 @@ class Collection:
         targets = {
             name: ControllerSamples(
                 samples.stamps_ns - header.start_ns,
-                *(np.zeros((len(samples), len(CONTROLLERS[name]))) for _ in range(4)),
+                *(np.zeros((len(samples), len(TALOS.controllers[name]))) for _ in range(4)),
             )
             for name in ("arm_right_controller", "torso_controller")
         }
@@ -125,7 +125,6 @@ class Collection:
             episode.header,
             config=config,
             trajectory=throw_trajectory(config),
-            limits=joint_limits(),
         )
 
     def fill(

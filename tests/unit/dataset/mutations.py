@@ -24,7 +24,7 @@ from throwcollect.dataset.manifest import entry_of_file, manifest_text, named_ma
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.rebuild import rebuild
 from throwcollect.dataset.repair import repair
-from throwcollect.dataset.salvage import salvage
+from throwcollect.dataset.scan import scan_whole
 from throwcollect.dataset.verify import verify
 from throwcollect.errors import ConfigError, ThrowcollectError
 from throwcollect.sweep.plan import Plan
@@ -84,7 +84,7 @@ def no_plan(config: object) -> Plan:
 
 def use(directory: Path) -> None:
     """Read all that a user of the library reads."""
-    for episode in Dataset.open(directory):
+    for episode in Dataset.open(directory).episodes():
         episode.samples()
         episode.check_records()
 
@@ -98,7 +98,7 @@ def outcomes(directory: Path, scratch: Path, name: str) -> list[Callable[[], Any
         lambda: repair(directory, scratch / "repaired", remake=no_plan),
         lambda: rebuild(directory),
     ]
-    return [lambda: list(salvage(directory / name)), *calls] if name.endswith(".mcap") else calls
+    return [lambda: list(scan_whole(directory / name)), *calls] if name.endswith(".mcap") else calls
 
 
 def drawn(source: random.Random) -> list[Mutation]:
@@ -123,7 +123,7 @@ def main(count: int, seed: int) -> int:
     with tempfile.TemporaryDirectory() as scratch:
         original = Collection(SETTINGS).collect(Path(scratch) / "original")
         resource.setrlimit(resource.RLIMIT_AS, (4 << 30, 4 << 30))
-        names = sorted(path.name for path in original.iterdir() if path.name != "README.md")
+        names = sorted(path.name for path in original.iterdir() if path.name not in ("README.md", "provenance.json"))
         for number in range(seed, seed + count):
             source = random.Random(number)
             name, mutations = source.choice(names), drawn(source)

@@ -16,8 +16,8 @@ from rosbags.interfaces import QosDurability, QosReliability
 from rosbags.rosbag2 import Reader
 from ruamel.yaml import YAML
 
-from throwcollect.interfaces import type_hash
-from throwcollect.robots.talos import JOINTS
+from rclzenoh.interfaces import type_hash
+from throwcollect.robots.talos import TALOS
 
 ALL_TOPICS = ["joint_states", "ball/odometry", "controller_state", "tf", "clock"]
 TYPES = {
@@ -65,7 +65,7 @@ def test_every_message_decodes_to_what_was_recorded(full: Path, make_collection:
             connection.topic: reader.deserialize(data, connection.msgtype) for connection, _, data in reader.messages()
         }
     assert [stamp for stamp, _ in states] == samples.stamps_ns.tolist()
-    assert all(state.name == list(JOINTS) for _, state in states)
+    assert all(state.name == list(TALOS.joints) for _, state in states)
     assert np.array_equal(np.array([state.position for _, state in states]), samples.position)
     assert others["/clock"].clock.sec == 65
     assert "<robot" in others["/robot_description"].data
@@ -73,7 +73,7 @@ def test_every_message_decodes_to_what_was_recorded(full: Path, make_collection:
     fixed = {(each.header.frame_id, each.child_frame_id) for each in others["/tf_static"].transforms}
     assert ("world", "ball") in frames
     assert ("world", "base_link") in fixed
-    assert len(frames) == 1 + len(JOINTS)
+    assert len(frames) == 1 + len(TALOS.joints)
     # Together they are one tree: each frame has one parent, and all hang from the world.
     children = [child for _, child in frames | fixed]
     assert len(children) == len(set(children))

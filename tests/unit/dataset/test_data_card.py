@@ -10,7 +10,8 @@ from ruamel.yaml import YAML
 
 import throwcollect
 from throwcollect.config.loader import load
-from throwcollect.dataset.data_card import HOST_VARIABLE, Provenance, data_card
+from throwcollect.dataset.data_card import data_card
+from throwcollect.dataset.provenance import HOST_VARIABLE, Provenance
 
 
 def test_the_card_has_the_header_that_hubs_read(dataset: Path) -> None:

@@ -17,22 +17,22 @@ from throwcollect.coordinator.prepare import checked_plan, feasibility_check
 from throwcollect.dataset.throws_table import ThrowsTable
 from throwcollect.dataset.verify import verify
 from throwcollect.dataset.verify_episode import EpisodeCheck
-from throwcollect.dataset.verify_plan import drawing_findings, refusal_findings
+from throwcollect.dataset.verify_plan import find_drawing_problems, find_refusal_problems
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.record import Contact, EpisodeHeader, Samples
 from throwcollect.robots.description import full_description
-from throwcollect.robots.talos import JOINTS
+from throwcollect.robots.talos import TALOS
 from throwcollect.sweep.digest import trial_digests
 from throwcollect.sweep.plan import Plan, make_trials
 from throwcollect.sweep.points import Points
 from throwcollect.sweep.samplers import draw_points
-from throwcollect.tasks.throw import Outcome, ThrowResult
+from throwcollect.tasks.throw.outcome import Outcome, ThrowResult
 
 FORGED = 2
 """The trial that is forged."""
 FLIGHT = 150
 """A sample of its flight."""
-ELBOW, LOCKED = JOINTS.index("arm_right_4_joint"), JOINTS.index("head_1_joint")
+ELBOW, LOCKED = TALOS.joints.index("arm_right_4_joint"), TALOS.joints.index("head_1_joint")
 
 Forgery = Callable[[Samples, EpisodeHeader], tuple[Samples, EpisodeHeader]]
 
@@ -165,7 +165,7 @@ def test_a_forged_episode_is_found(collection: Collection, name: str) -> None:
 
 def problems(collection: Collection, forge: Change | None) -> Iterator[str]:
     channels = Channels(collection.config, full_description(collection.config))
-    return EpisodeCheck(collection.plan, {}).content_problems(collection.episode(FORGED, forge), channels)
+    return EpisodeCheck(collection.plan, {}).find_content_problems(collection.episode(FORGED, forge), channels)
 
 
 def test_verify_names_the_trial(collection: Collection, tmp_path: Path) -> None:
@@ -196,14 +196,14 @@ def test_a_plan_that_the_configuration_does_not_draw_is_found(collection: Collec
 def test_seeds_that_the_configuration_does_not_give_are_found(collection: Collection, tmp_path: Path) -> None:
     points = draw_points(collection.config, directory=tmp_path)
     plan = replanned(collection.plan, points, seed=8)
-    found = list(drawing_findings(tmp_path, plan, None))
+    found = list(find_drawing_problems(tmp_path, plan, None))
     assert len(found) == len(plan.trials)
     assert "has seed" in found[0].problem
 
 
 def test_a_plan_with_fewer_trials_is_found(collection: Collection, tmp_path: Path) -> None:
     plan = replace(collection.plan, trials=collection.plan.trials[:6])
-    (finding,) = drawing_findings(tmp_path, plan, None)
+    (finding,) = find_drawing_problems(tmp_path, plan, None)
     assert finding.problem == "has 6 trials, the configuration draws 7"
 
 
@@ -213,11 +213,11 @@ def test_refusals_that_are_invented_or_dropped_are_found(tmp_path: Path) -> None
     )
     honest = checked_plan(collection.config, directory=tmp_path)
     assert [trial.refused is None for trial in honest.trials] == [False, True]
-    assert list(refusal_findings(honest, (), feasibility_check)) == []
+    assert list(find_refusal_problems(honest, (), feasibility_check)) == []
     forged = replace(
         honest, trials=tuple(replace(trial, refused="too fast" if trial.number else None) for trial in honest.trials)
     )
-    dropped, invented = refusal_findings(forged, (), feasibility_check)
+    dropped, invented = find_refusal_problems(forged, (), feasibility_check)
     assert dropped.problem.startswith("is refused as None, the check says 'arm_right_7_joint moves at")
     assert invented.problem == "is refused as 'too fast', the check says None"
 
@@ -226,9 +226,9 @@ def test_what_depends_on_results_is_not_judged_without_them(tmp_path: Path) -> N
     config = Config.model_validate({**SETTINGS, "trials": None, "until": {"landed": 60}})
     points = draw_points(config, directory=tmp_path)
     plan = Plan(config, tuple(make_trials(config, points.first(192))))
-    assert list(drawing_findings(tmp_path, plan, None)) == []
+    assert list(find_drawing_problems(tmp_path, plan, None)) == []
     plan = Plan(config, tuple(make_trials(config, Points(points.keys, points.values[::-1].copy()).first(192))))
-    found = list(drawing_findings(tmp_path, plan, None))
+    found = list(find_drawing_problems(tmp_path, plan, None))
     assert len(found) == 128
 
 
@@ -246,8 +246,10 @@ def test_the_rounds_of_a_plan_that_grew_follow_from_the_results(
 ) -> None:
     config = Config.model_validate({**SETTINGS, "trials": None, "until": {"landed": 60}})
     plan = Plan(config, tuple(make_trials(config, draw_points(config, directory=tmp_path).first(trials))))
-    table = ThrowsTable(plan.keys, tuple(config.task.end))
+    table = ThrowsTable.of(plan)
     outcomes = [Outcome.LANDED if number < landed else Outcome.TIMEOUT for number in range(trials)]
-    made = [table.row(trial.number, trial.values, ThrowResult(outcomes[trial.number]), None) for trial in plan.trials]
+    made = [table.row(trial, ThrowResult(outcomes[trial.number]), None) for trial in plan.trials]
     rows = {row["trial"]: row for row in table.table(made).to_pylist()}
-    assert [finding.problem for finding in drawing_findings(tmp_path, plan, rows)] == ([problem] if problem else [])
+    assert [finding.problem for finding in find_drawing_problems(tmp_path, plan, rows)] == (
+        [problem] if problem else []
+    )

@@ -17,7 +17,7 @@ from throwcollect.dataset.rebuild import rebuild
 from throwcollect.dataset.repair import repair
 from throwcollect.dataset.verify import verify
 from throwcollect.dataset.writer import DatasetWriter
-from throwcollect.derive.selection import filtered
+from throwcollect.derive.selection import filter_trials
 from throwcollect.errors import DatasetError, ThrowcollectError
 
 BEGUN = "quick_00001.mcap.part"
@@ -29,7 +29,7 @@ UNFINISHED = (
     "metadata.yaml.new",
     "quick_00000.mcap.new",
 )
-REPLACED = ("plan.parquet", "throws.parquet", "metadata.yaml", "README.md", "config.yaml")
+REPLACED = ("plan.parquet", "throws.parquet", "metadata.yaml", "README.md", "provenance.json", "config.yaml")
 REFUSED = ("quick_00000.mcap", BEGUN, "logs", "logs/journal.jsonl")
 
 
@@ -61,7 +61,7 @@ USES: dict[str, Callable[[Path, Collection, Path], object]] = {
     "resume": lambda directory, source, _: go_on(directory, source),
     "rebuild": lambda directory, _source, _: rebuild(directory),
     "repair": lambda directory, _source, output: repair(directory, output, remake=no_plan),
-    "filter": lambda directory, _source, output: filtered(directory, output, where="outcome == 'landed'"),
+    "filter": lambda directory, _source, output: filter_trials(directory, output, where="outcome == 'landed'"),
     "verify": lambda directory, _source, _: verify(directory),
 }
 
@@ -115,7 +115,7 @@ def test_a_link_in_the_place_of_a_file_that_can_be_made_again_is_replaced_by_it(
     USES[use](directory, source, tmp_path / "output")
     assert contents(tmp_path / "outside") == before
     assert use == "rebuild" or not (directory / name).is_symlink()
-    assert name == "README.md" or (directory / name).read_bytes() == (sound / name).read_bytes()
+    assert name in ("README.md", "provenance.json") or (directory / name).read_bytes() == (sound / name).read_bytes()
 
 
 @pytest.mark.parametrize(

@@ -16,13 +16,13 @@ from mcap.opcode import Opcode
 from tests.unit.dataset.conftest import Collection
 from tests.unit.dataset.mutations import SETTINGS, no_plan
 
-from throwcollect.dataset.manifest import RunningHash, changed_sizes, entry_of_file, promised_names, read_manifest
-from throwcollect.dataset.mcap_reader import opened
+from throwcollect.dataset.manifest import RunningHash, entry_of_file, promised_names, read_manifest
+from throwcollect.dataset.mcap_reader import open_mcap
 from throwcollect.dataset.rebuild import rebuild
 from throwcollect.dataset.repair import repair
 from throwcollect.dataset.verify import verify
-from throwcollect.dataset.verify_manifest import manifest_findings
-from throwcollect.derive.selection import filtered
+from throwcollect.dataset.verify_manifest import find_changed_files, find_manifest_problems
+from throwcollect.derive.selection import filter_trials
 from throwcollect.errors import DatasetError
 
 MANIFEST = "datapackage.json"
@@ -35,7 +35,7 @@ FLIPS_PER_CLASS = 100
 def derived(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A small dataset with every kind of file that there is."""
     scratch = tmp_path_factory.mktemp("derived")
-    filtered(Collection(SETTINGS).collect(scratch / "source"), scratch / "dataset", where="trial >= 0")
+    filter_trials(Collection(SETTINGS).collect(scratch / "source"), scratch / "dataset", where="trial >= 0")
     return scratch / "dataset"
 
 
@@ -47,7 +47,7 @@ def classes(directory: Path) -> Iterator[tuple[str, str, list[range]]]:
     shard = next(name for name in promised_names(directory) if name.endswith(".mcap"))
     size = (directory / shard).stat().st_size
     kinds: dict[str, list[range]] = {"magic": [range(8), range(size - 8, size)]}
-    with opened(directory / shard) as contents:
+    with open_mcap(directory / shard) as contents:
         for record in contents.records():
             kinds.setdefault(Opcode(record.opcode).name, []).append(range(record.offset, record.end))
     yield from ((f"MCAP {kind}", shard, places) for kind, places in kinds.items())
@@ -69,7 +69,7 @@ def test_every_flipped_bit_is_seen(derived: Path, tmp_path: Path) -> None:
             byte = source.choice(source.choice(places))
             (directory / name).write_bytes(flipped(whole, byte, source.randrange(8)))
             flips += 1
-            assert any(manifest_findings(directory, "quick")), (kind, byte)
+            assert any(find_manifest_problems(directory, "quick")), (kind, byte)
             if not number:
                 assert verify(directory), (kind, byte)
         (directory / name).write_bytes(whole)
@@ -124,12 +124,17 @@ def test_rebuild_does_not_cover_a_file_that_is_none_of_the_dataset(dataset: Path
     assert {finding.file for finding in verify(dataset)} == {"other.mcap"}
 
 
+def find_resized(directory: Path) -> list[str]:
+    return [finding.file for finding in find_changed_files(directory, read_manifest(directory), in_full=False)]
+
+
 def test_sizes_alone_tell_what_is_cut_missing_or_added(dataset: Path) -> None:
-    assert changed_sizes(dataset) == []
+    assert find_resized(dataset) == []
     os.truncate(dataset / SHARDS[0], 100)
     (dataset / SHARDS[1]).unlink()
     (dataset / "sources.parquet").write_bytes(b"")
-    assert changed_sizes(dataset) == [SHARDS[0], SHARDS[1], "sources.parquet"]
+    assert find_resized(dataset) == [SHARDS[0], SHARDS[1]]
+    assert "sources.parquet" in {finding.file for finding in find_manifest_problems(dataset, "quick")}
 
 
 @pytest.mark.parametrize(
@@ -182,5 +187,5 @@ def test_a_hash_that_runs_beside_the_writing_is_that_of_all_bytes_in_order() -> 
 def test_links_are_not_followed(dataset: Path, tmp_path: Path) -> None:
     (dataset / SHARDS[0]).rename(tmp_path / SHARDS[0])
     (dataset / SHARDS[0]).symlink_to(tmp_path / SHARDS[0])
-    assert changed_sizes(dataset) == [SHARDS[0]]
+    assert find_resized(dataset) == [SHARDS[0]]
     assert any("symbolic link" in finding.problem for finding in verify(dataset))

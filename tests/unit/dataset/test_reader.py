@@ -1,28 +1,204 @@
 from __future__ import annotations
 
+import multiprocessing
+import pickle
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
 import pytest
 
-from throwcollect.dataset.mcap_reader import opened
+import throwcollect
+from throwcollect.dataset.mcap_reader import open_mcap
 from throwcollect.dataset.reader import Dataset
-from throwcollect.errors import DatasetError
+from throwcollect.errors import ConfigError, DatasetError
+
+
+@pytest.fixture(scope="module")
+def loaded(collected: Path) -> Dataset:
+    return throwcollect.load(str(collected))
+
+
+@pytest.fixture
+def with_gaps(collection: Any, tmp_path: Path) -> Dataset:
+    """Trial 2 was refused, trial 4 lost."""
+    collection.refuse(2, "an elbow needs 30 Nm")
+    return throwcollect.load(collection.collect(tmp_path / "dataset", [0, 1, 3, 4, 5, 6], lost=[4]))
+
+
+def trials(dataset: Dataset) -> list[int]:
+    return [throw.trial for throw in dataset]
+
+
+def last_position(throw_dataset: Dataset, index: int) -> list[float]:
+    return [float(each) for each in throw_dataset[index].ball.position[-1]]
+
+
+def test_importing_the_package_loads_nothing_heavy() -> None:
+    heavy = {"numpy", "pyarrow", "pydantic", "mcap", "rosbags"}
+    code = f"import sys, throwcollect; print(sorted({heavy} & set(sys.modules)))"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
+
+
+def test_throws_stand_beside_the_table(loaded: Dataset, collected: Path) -> None:
+    assert loaded.throws.equals(pq.read_table(collected / "throws.parquet"))
+    assert len(loaded) == len(loaded.throws) == 7
+    assert trials(loaded) == list(range(7))
+    assert (loaded[-1].trial, loaded[3].trial) == (6, 3)
+    assert loaded.parameters == ("task.duration_s",)
+    assert loaded[3].parameters == {"task.duration_s": loaded.throws["task.duration_s"][3].as_py()}
+    assert loaded.config.name == "quick"
+
+
+def test_there_are_no_throws_beyond_the_last(loaded: Dataset) -> None:
+    for index in (7, -8):
+        with pytest.raises(IndexError, match=f"no throw {index} of 7"):
+            loaded[index]
+
+
+def test_trials_without_an_episode_have_a_row_and_say_why_they_have_no_more(with_gaps: Dataset) -> None:
+    assert len(with_gaps) == 7
+    refused, lost = with_gaps[2], with_gaps[4]
+    assert (refused.outcome, refused.reason, refused.recorded) == ("refused", "an elbow needs 30 Nm", False)
+    assert refused.events.landing is None
+    assert "refused: an elbow needs 30 Nm; not recorded" in repr(refused)
+    for look in (lambda: refused.ball, lambda: refused.joints, lambda: refused.events.contacts):
+        with pytest.raises(DatasetError, match="trial 2 has no episode: refused: an elbow needs 30 Nm") as caught:
+            look()
+        assert "dataset.recorded" in str(caught.value)
+    with pytest.raises(DatasetError, match="trial 4 has no episode: lost: two simulations were lost"):
+        _ = lost.ball
+    assert trials(with_gaps.recorded) == [0, 1, 3, 5, 6]
+    assert with_gaps.recorded[2].ball.position[-1].tolist() == last_position(with_gaps, 3)
+
+
+@pytest.mark.parametrize(
+    ("which", "found"),
+    [
+        ("trial >= 4", [4, 5, 6]),
+        ("trial > 7", []),
+        (pc.field("trial") < 2, [0, 1]),
+        ([True, False, False, True, False, False, False], [0, 3]),
+        (np.arange(7) % 3 == 0, [0, 3, 6]),
+        (pd.Series(range(7)) > 4, [5, 6]),
+        (pa.array([True, None, False, False, False, False, True]), [0, 6]),
+        (pa.chunked_array([[True] * 3, [False] * 4]), [0, 1, 2]),
+        ([5, 2], [5, 2]),
+        (np.array([1, 1]), [1, 1]),
+        (range(2, 4), [2, 3]),
+        ((number for number in (3, 1)), [3, 1]),
+        (pa.array([6]), [6]),
+        ([], []),
+    ],
+)
+def test_selecting(loaded: Dataset, which: Any, found: list[int]) -> None:
+    some = loaded.select(which)
+    assert trials(some) == found == some.throws["trial"].to_pylist()
+    assert [last_position(some, number) for number in range(len(some))] == [last_position(loaded, n) for n in found]
+
+
+def test_selecting_from_a_selection_goes_by_trial_and_slices_by_position(loaded: Dataset) -> None:
+    some = loaded.select([6, 1, 4])
+    assert trials(some.select([4])) == [4]
+    assert trials(some[1:]) == [1, 4]
+    assert trials(loaded[::-3]) == [6, 3, 0]
+    with pytest.raises(DatasetError, match="no trial 3 among the 3 throws"):
+        some.select([4, 3])
+
+
+@pytest.mark.parametrize(
+    ("which", "message"),
+    [
+        ("trial >", "cannot be understood"),
+        (pc.field("height") > 1, r"select: No match for FieldRef.Name\(height\)"),
+        ([True, False], "a mask of 2"),
+        ([1.5], "values of type double"),
+        (["landed"], "values of type string"),
+        ([1, "a"], "select: "),
+        (3, "not iterable"),
+    ],
+)
+def test_what_selects_nothing_is_named(loaded: Dataset, which: Any, message: str) -> None:
+    with pytest.raises(ConfigError, match=message):
+        loaded.select(which)
+
+
+def test_it_says_what_it_is(with_gaps: Dataset) -> None:
+    text = repr(with_gaps)
+    for part in (str(with_gaps.directory), "7 throws", "5 landed", "1 refused", "1 lost", "task.duration_s"):
+        assert part in text
+    assert repr(with_gaps[0]).startswith("Throw(0: landed at x = ")
+
+
+@pytest.mark.parametrize(("method", "processes"), [("fork", 3), ("spawn", 1)])
+def test_other_processes_read_it_too(loaded: Dataset, method: str, processes: int) -> None:
+    expected = [last_position(loaded, number) for number in range(7)]
+    with multiprocessing.get_context(method).Pool(processes) as pool:
+        assert pool.starmap(last_position, [(loaded, number) for number in range(7)]) == expected
+
+
+def test_threads_share_it(loaded: Dataset) -> None:
+    expected = [last_position(loaded, number) for number in range(7)]
+    with ThreadPoolExecutor(8) as pool:
+        found = list(pool.map(lambda number: last_position(loaded, number % 7), range(70)))
+    assert found == expected * 10
+
+
+def test_a_pickled_copy_is_the_same(loaded: Dataset) -> None:
+    copy = pickle.loads(pickle.dumps(loaded.select([2, 5])))  # noqa: S301
+    assert copy.throws.equals(loaded.throws.take([2, 5]))
+    assert last_position(copy, 1) == last_position(loaded, 5)
+
+
+def test_a_throw_travels_alone(loaded: Dataset) -> None:
+    throw = loaded[5]
+    position = throw.ball.position
+    packed = pickle.dumps(throw)
+    assert len(packed) < throw.joints.position.nbytes
+    copy = pickle.loads(packed)  # noqa: S301
+    assert copy.row == throw.row
+    assert np.array_equal(copy.ball.position, position)
+    assert repr(copy) == repr(throw)
+
+
+def test_no_file_stays_open(loaded: Dataset) -> None:
+    throw = loaded[1]
+    assert throw.ball.position.shape
+    assert loaded.trajectories(threads=2)
+    assert ".mcap" not in Path("/proc/self/maps").read_text()
+    assert not [link for link in Path("/proc/self/fd").iterdir() if link.resolve().suffix == ".mcap"]
+
+
+@pytest.mark.parametrize("problem", ["missing", "unfinished"])
+def test_only_finished_datasets_are_loaded(dataset: Path, tmp_path: Path, problem: str) -> None:
+    if problem == "unfinished":
+        (dataset / "metadata.yaml").unlink()
+        with pytest.raises(DatasetError, match="is not finished"):
+            throwcollect.load(dataset)
+    else:
+        with pytest.raises(DatasetError, match="holds no dataset"):
+            throwcollect.load(tmp_path / "nowhere")
 
 
 def test_an_episode_comes_back_as_it_went_in(collection: Any, dataset: Path) -> None:
-    opened_dataset = Dataset.open(dataset)
+    loaded = Dataset.open(dataset)
     for trial in (5, 0, 6):
-        sent, stored = collection.episode(trial), opened_dataset.episode(trial)
+        sent, stored = collection.episode(trial), loaded.episode(trial)
         assert (stored.header, stored.chunk, stored.digest) == (sent.header, sent.chunk, sent.digest)
         assert np.array_equal(stored.samples().position, sent.samples().position)
 
 
 def test_iteration_is_in_order_and_skips_what_was_lost(collection: Any, tmp_path: Path) -> None:
     dataset = Dataset.open(collection.collect(tmp_path / "dataset", [6, 3, 5, 0, 4, 1, 2], lost=[0, 4]))
-    assert len(dataset) == 5
-    assert [episode.header.trial for episode in dataset] == [1, 2, 3, 5, 6]
+    assert len(dataset.recorded) == 5
+    assert [episode.header.trial for episode in dataset.episodes()] == [1, 2, 3, 5, 6]
     assert dataset.plan == collection.plan
     assert dataset.config == collection.config
 
@@ -57,24 +233,24 @@ def test_a_damaged_file_is_named(dataset: Path, name: str) -> None:
 
 
 def test_a_missing_shard_is_named(dataset: Path) -> None:
-    opened_dataset = Dataset.open(dataset)
+    loaded = Dataset.open(dataset)
     (dataset / "quick_00001.mcap").unlink()
     with pytest.raises(DatasetError, match=r"quick_00001\.mcap: cannot be read"):
-        opened_dataset.episode(4)
+        loaded.episode(4)
 
 
 @pytest.mark.parametrize("size", [0, 5, 100])
 def test_a_file_that_is_no_mcap_is_refused(tmp_path: Path, size: int) -> None:
     (tmp_path / "x.mcap").write_bytes(bytes(size))
-    with pytest.raises(DatasetError, match="not an MCAP file"), opened(tmp_path / "x.mcap"):
+    with pytest.raises(DatasetError, match="not an MCAP file"), open_mcap(tmp_path / "x.mcap"):
         pass
 
 
 def test_a_cut_within_a_record_is_an_error(dataset: Path, tmp_path: Path) -> None:
     whole = (dataset / "quick_00002.mcap").read_bytes()
-    with opened(dataset / "quick_00002.mcap") as contents:
+    with open_mcap(dataset / "quick_00002.mcap") as contents:
         ends = {record.end for record in contents.records()}
     for size in set(range(9, len(whole) - 8, 997)) - ends:
         (tmp_path / "cut.mcap").write_bytes(whole[:size])
-        with opened(tmp_path / "cut.mcap") as contents, pytest.raises(DatasetError, match=r"cut off|beyond the end"):
+        with open_mcap(tmp_path / "cut.mcap") as contents, pytest.raises(DatasetError, match=r"cut off|beyond the end"):
             list(contents.records())

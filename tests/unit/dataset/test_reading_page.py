@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from throwcollect.dataset import throw, throw_dataset, trajectories
+from throwcollect.dataset import reader, throw, trajectories
 from throwcollect.dataset.columns import COLUMNS
 
 PAGE = (Path(__file__).parents[3] / "docs" / "reading.md").read_text(encoding="utf-8")
@@ -54,7 +54,7 @@ def test_the_page_names_all_columns_and_nothing_that_is_not_there() -> None:
     for column in COLUMNS:
         assert f"`{column}`" in PAGE
     for owner, kind in (
-        ("dataset", throw_dataset.ThrowDataset),
+        ("dataset", reader.Dataset),
         ("throw", throw.Throw),
         ("trajectories", trajectories.Trajectories),
     ):

@@ -41,6 +41,7 @@ def spoiled(mixed: Path, tmp_path: Path) -> Path:
 def test_derived_files_come_back_byte_for_byte(mixed: Path, spoiled: Path) -> None:
     (spoiled / "metadata.yaml").unlink()
     (spoiled / "README.md").unlink()
+    (spoiled / "provenance.json").unlink()
     rebuilt = rebuild(spoiled)
     assert (rebuilt.trials, rebuilt.episodes, rebuilt.lost) == (7, 4, (4, 6))
     assert rebuilt.written == (*DERIVED, "README.md")
@@ -48,6 +49,12 @@ def test_derived_files_come_back_byte_for_byte(mixed: Path, spoiled: Path) -> No
         assert (spoiled / name).read_bytes() == (mixed / name).read_bytes()
     assert "wall time" not in (spoiled / "README.md").read_text()
     assert verify(spoiled) == []
+
+
+def test_the_data_card_comes_back_with_what_is_known_of_the_collection(mixed: Path, spoiled: Path) -> None:
+    (spoiled / "README.md").unlink()
+    rebuild(spoiled)
+    assert (spoiled / "README.md").read_bytes() == (mixed / "README.md").read_bytes()
 
 
 def test_a_stale_table_is_made_right_and_the_data_card_stays(mixed: Path, spoiled: Path) -> None:

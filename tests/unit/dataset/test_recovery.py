@@ -18,7 +18,7 @@ from throwcollect.dataset.verify import verify
 from throwcollect.dataset.writer import DatasetWriter, create
 from throwcollect.errors import DatasetError
 from throwcollect.sweep.plan import Plan
-from throwcollect.tasks.throw import ThrowResult
+from throwcollect.tasks.throw.outcome import ThrowResult
 
 from .conftest import Collection
 
@@ -75,7 +75,8 @@ def abandon(writer: DatasetWriter) -> None:
 
 
 def files_of(directory: Path) -> dict[str, bytes]:
-    return {p.name: p.read_bytes() for p in directory.iterdir() if p.is_file() and p.name != "README.md"}
+    others = ("README.md", "provenance.json")
+    return {p.name: p.read_bytes() for p in directory.iterdir() if p.is_file() and p.name not in others}
 
 
 class Trials:

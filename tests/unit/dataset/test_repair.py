@@ -12,15 +12,16 @@ import pyarrow.parquet as pq
 import pytest
 
 from throwcollect.config.schema import Config
-from throwcollect.dataset.mcap_reader import opened
+from throwcollect.dataset.mcap_reader import open_mcap
 from throwcollect.dataset.repair import DifferingEpisode, LostTrial, repair
-from throwcollect.dataset.salvage import salvage
+from throwcollect.dataset.scan import scan_whole
 from throwcollect.dataset.verify import verify
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.sweep.plan import Plan, make_plan
 
 SHARD = "quick_00001.mcap"
+MAY_DIFFER = {"README.md", "provenance.json"}
 NO_PLAN = "there is no such file to draw from"
 
 
@@ -52,8 +53,8 @@ def digest_of(directory: Path, trial: int) -> str:
 
 
 def same_files(one: Path, other: Path) -> bool:
-    names = {path.name for path in one.iterdir()} - {"README.md"}
-    return names == {path.name for path in other.iterdir()} - {"README.md"} and all(
+    names = {path.name for path in one.iterdir()} - MAY_DIFFER
+    return names == {path.name for path in other.iterdir()} - MAY_DIFFER and all(
         (one / name).read_bytes() == (other / name).read_bytes() for name in names
     )
 
@@ -64,8 +65,8 @@ def no_summary(directory: Path) -> None:
 
 
 def damaged_index(directory: Path) -> None:
-    with opened(directory / SHARD) as contents:
-        index = contents.episode(chunk_of(directory, 4)).indexes[4]
+    with open_mcap(directory / SHARD) as contents:
+        index = contents.episode(chunk_of(directory, 4)).chunks[0].indexes[4]
     spoil(directory / SHARD, index.offset + 100)
 
 
@@ -291,6 +292,6 @@ def test_what_is_there_already_is_not_touched(dataset: Path, output: Path) -> No
 def test_all_that_salvage_finds_is_kept(dataset: Path, output: Path) -> None:
     data = (dataset / SHARD).read_bytes()
     (dataset / SHARD).write_bytes(data[: len(data) * 2 // 3])
-    found = [each.stored.episode.header.trial for each in salvage(dataset / SHARD)]
+    found = [each.stored.episode.header.trial for each in scan_whole(dataset / SHARD)]
     assert found == [3, 4]
     assert [lost.trial for lost in repair(dataset, output, remake=never).lost] == [5]

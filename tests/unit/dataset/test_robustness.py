@@ -23,9 +23,10 @@ from tests.unit.dataset.mutations import KINDS, SETTINGS, Mutation, mutate, outc
 
 from throwcollect.config.loader import load
 from throwcollect.dataset.bag import from_yaml
-from throwcollect.dataset.mcap_reader import opened
-from throwcollect.dataset.reader import Dataset, read_throws
-from throwcollect.dataset.salvage import salvage
+from throwcollect.dataset.mcap_reader import open_mcap
+from throwcollect.dataset.reader import Dataset
+from throwcollect.dataset.scan import scan_whole
+from throwcollect.dataset.throws_table import read_throws
 from throwcollect.dataset.verify import verify
 from throwcollect.dataset.verify_episode import EpisodeCheck
 from throwcollect.dataset.verify_shard import ShardCheck
@@ -75,12 +76,12 @@ def test_a_recording_with_any_damage_is_read_or_refused(small: Path, sound: Data
         data = mutate((small / RECORDING).read_bytes(), damage)
         path.write_bytes(data)
         if data != (small / RECORDING).read_bytes():
-            assert ShardCheck(path, sound.config, [0], check.problems).findings
-        for found in salvage(path):
+            assert ShardCheck(path, sound.config, [0], check.find_problems).findings
+        for found in scan_whole(path):
             assert found.stored.episode.digest == sound.throws["digest"][0].as_py()
 
         def read() -> None:
-            with opened(path) as contents:
+            with open_mcap(path) as contents:
                 for record in contents.records():
                     harmless(lambda offset=record.offset: contents.episode(offset).episode.samples())
 
@@ -154,6 +155,7 @@ READ_ALL = """
 import resource, sys
 from pathlib import Path
 from throwcollect.dataset.reader import Dataset
+from throwcollect.dataset.throws_table import read_throws
 from throwcollect.dataset.verify import verify
 from throwcollect.errors import ThrowcollectError
 resource.setrlimit(resource.RLIMIT_AS, (3 << 30, 3 << 30))
@@ -161,7 +163,7 @@ for name in sys.argv[1:]:
     directory = Path(name)
     assert verify(directory)
     try:
-        for episode in Dataset.open(directory):
+        for episode in Dataset.open(directory).episodes():
             episode.samples()
         print(f"{directory.name}:read")
     except ThrowcollectError:
@@ -171,12 +173,12 @@ for name in sys.argv[1:]:
 
 def _chunk_announcing(directory: Path, size: int, data: bytes) -> None:
     path = directory / RECORDING
-    with opened(path) as contents:
+    with open_mcap(path) as contents:
         offset = pq.read_table(directory / "throws.parquet")["chunk_offset"].to_pylist()[0]
         stored = contents.episode(offset)
         whole = contents.slice(0, len(contents))
     bomb = Chunk(data, size, 0, stored.episode.chunk.start_ns, stored.episode.chunk.end_ns).record()
-    path.write_bytes(whole[:offset] + bomb + whole[stored.chunk.end :])
+    path.write_bytes(whole[:offset] + bomb + whole[stored.chunks[0].record.end :])
 
 
 def zstd_bomb(directory: Path) -> None:

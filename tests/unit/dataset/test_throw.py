@@ -9,16 +9,15 @@ import pytest
 from rosbags.highlevel import AnyReader
 
 import throwcollect
-from throwcollect.dataset.columns import Place
 from throwcollect.dataset.reader import Dataset
-from throwcollect.dataset.throw_dataset import ThrowDataset
+from throwcollect.episode.chunk import Chunk
 from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.errors import DatasetError
-from throwcollect.robots.talos import JOINTS
+from throwcollect.robots.talos import TALOS
 
 
 @pytest.fixture(scope="module")
-def loaded(collected: Path) -> ThrowDataset:
+def loaded(collected: Path) -> Dataset:
     return throwcollect.load(collected)
 
 
@@ -94,17 +93,17 @@ def test_it_is_what_the_judge_saw(tumbled: Path) -> None:
         assert (found.dtype, found.flags.c_contiguous, found.flags.aligned) == (expected.dtype, True, True)
         found[0] = 7  # an array of the caller's own
     assert np.array_equal(throwcollect.load(tumbled)[2].joints.position, samples.position)
-    assert throw.joints.names == JOINTS
+    assert throw.joints.names == TALOS.joints
 
 
-def test_times_count_from_the_start_of_the_trial(loaded: ThrowDataset) -> None:
+def test_times_count_from_the_start_of_the_trial(loaded: Dataset) -> None:
     ball = loaded[5].ball
     assert ball.time_s[0] == 0
     assert np.allclose(ball.time_s, np.arange(len(ball)) / loaded.config.record.rate_hz, rtol=0, atol=1e-12)
     assert np.array_equal(loaded[5].joints.time_s, ball.time_s)
 
 
-def test_events_are_those_of_the_table(loaded: ThrowDataset) -> None:
+def test_events_are_those_of_the_table(loaded: Dataset) -> None:
     throw = loaded[1]
     for name in ("release", "apex", "landing"):
         event = getattr(throw.events, name)
@@ -116,9 +115,9 @@ def test_events_are_those_of_the_table(loaded: ThrowDataset) -> None:
     assert repr(throw.events).startswith("Events(release at 0.400 s, apex at ")
 
 
-def test_only_what_is_asked_for_is_read(loaded: ThrowDataset, monkeypatch: pytest.MonkeyPatch) -> None:
-    read, rows = [], Place.rows
-    monkeypatch.setattr(Place, "rows", lambda place, contents: read.append(place.trial) or rows(place, contents))
+def test_only_what_is_asked_for_is_read(loaded: Dataset, monkeypatch: pytest.MonkeyPatch) -> None:
+    read, decompress = [], Chunk.decompress
+    monkeypatch.setattr(Chunk, "decompress", lambda chunk: read.append(chunk.start_ns) or decompress(chunk))
     throws = list(loaded)
     assert repr(throws[1])
     assert throws[1].events.contacts
@@ -127,10 +126,10 @@ def test_only_what_is_asked_for_is_read(loaded: ThrowDataset, monkeypatch: pytes
     assert not {"position", "orientation_xyzw", "angular_velocity", "time_s"} & vars(throws[1].ball).keys()
     assert throws[1].joints.effort.shape
     assert throws[1].ball.velocity is velocity
-    assert read == [1]
+    assert read == [loaded.config.trial_start_ns(1)]
 
 
-def test_it_says_what_it_is(loaded: ThrowDataset) -> None:
+def test_it_says_what_it_is(loaded: Dataset) -> None:
     throw = loaded[0]
     assert f"{throw.row['samples']} samples" in repr(throw.ball)
     assert repr(throw.joints).startswith("Joints(")

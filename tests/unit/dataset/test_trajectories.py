@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,13 +10,13 @@ import pytest
 
 import throwcollect
 from throwcollect.dataset.columns import COLUMNS
-from throwcollect.dataset.throw_dataset import ThrowDataset
+from throwcollect.dataset.reader import Dataset
 from throwcollect.errors import ConfigError, DatasetError
-from throwcollect.robots.talos import JOINTS
+from throwcollect.robots.talos import TALOS
 
 
 @pytest.fixture(scope="module")
-def loaded(collected: Path) -> ThrowDataset:
+def loaded(collected: Path) -> Dataset:
     return throwcollect.load(collected)
 
 
@@ -25,7 +26,7 @@ def column_of(throw: Any, name: str) -> np.ndarray:
 
 
 @pytest.mark.parametrize("threads", [None, 1, 3])
-def test_they_are_the_throws_one_after_the_other(loaded: ThrowDataset, threads: int | None) -> None:
+def test_they_are_the_throws_one_after_the_other(loaded: Dataset, threads: int | None) -> None:
     many = loaded.select(list(range(7)) * 6)  # more than are read at once
     found = many.trajectories(threads=threads)
     assert tuple(found.columns) == COLUMNS
@@ -45,13 +46,13 @@ def test_they_are_the_throws_one_after_the_other(loaded: ThrowDataset, threads: 
 
 
 @pytest.mark.parametrize("name", COLUMNS)
-def test_a_column_does_not_depend_on_the_others(loaded: ThrowDataset, name: str) -> None:
+def test_a_column_does_not_depend_on_the_others(loaded: Dataset, name: str) -> None:
     alone = loaded.trajectories([name])
     assert list(alone.columns) == [name]
     assert np.array_equal(alone[name], loaded.trajectories()[name])
 
 
-def test_large_arrays_are_no_different(loaded: ThrowDataset, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_large_arrays_are_no_different(loaded: Dataset, monkeypatch: pytest.MonkeyPatch) -> None:
     small = loaded.trajectories()
     monkeypatch.setattr("throwcollect.dataset.columns._LARGE_BYTES", 1)
     large = loaded.trajectories()
@@ -60,12 +61,12 @@ def test_large_arrays_are_no_different(loaded: ThrowDataset, monkeypatch: pytest
         assert large[name].flags.writeable
 
 
-def test_columns_of_chosen_joints(loaded: ThrowDataset) -> None:
+def test_columns_of_chosen_joints(loaded: Dataset) -> None:
     every = loaded.trajectories()
     for joints in (loaded.moving_joints, ("leg_left_1_joint",), ()):
         some = loaded.trajectories(["joints.position", "joints.effort", "ball.position"], joints=joints)
         assert some.joints == joints
-        indexes = [JOINTS.index(joint) for joint in joints]
+        indexes = [TALOS.joints.index(joint) for joint in joints]
         for name in ("joints.position", "joints.effort"):
             assert np.array_equal(some[name], every[name][:, indexes])
         assert np.array_equal(some["ball.position"], every["ball.position"])
@@ -85,7 +86,7 @@ def test_trials_without_an_episode_have_no_samples(collection: Any, tmp_path: Pa
     assert len(dataset.select([]).trajectories()) == 0
 
 
-def test_padding_gives_one_shape(loaded: ThrowDataset) -> None:
+def test_padding_gives_one_shape(loaded: Dataset) -> None:
     found = loaded.trajectories(["time_s", "ball.position"])
     assert len(set(found.lengths)) > 1
     for name, rest in (("time_s", ()), ("ball.position", (3,))):
@@ -97,14 +98,14 @@ def test_padding_gives_one_shape(loaded: ThrowDataset) -> None:
     assert found.padded("time_s", fill=-1).min() == -1
 
 
-def test_it_says_what_it_is(loaded: ThrowDataset) -> None:
+def test_it_says_what_it_is(loaded: Dataset) -> None:
     found = loaded.trajectories(["time_s", "ball.position"])
     samples = sum(loaded.throws["samples"].to_pylist())
     size = samples * (8 + 3 * 8) / 1e6
     assert repr(found) == f"Trajectories(7 throws, {samples} samples, {size:.1f} MB: time_s, ball.position)"
 
 
-def test_what_is_not_there_is_named(loaded: ThrowDataset) -> None:
+def test_what_is_not_there_is_named(loaded: Dataset) -> None:
     with pytest.raises(ConfigError, match=r"no column 'ball\.colour'"):
         loaded.trajectories(["ball.colour"])
     with pytest.raises(ConfigError, match="Talos has no joint 'elbow'"):
@@ -116,14 +117,14 @@ def test_what_is_not_there_is_named(loaded: ThrowDataset) -> None:
         found[7]
 
 
-def with_column(dataset: ThrowDataset, name: str, values: list[Any]) -> ThrowDataset:
+def with_column(dataset: Dataset, name: str, values: list[Any]) -> Dataset:
     index = dataset.throws.schema.get_field_index(name)
     throws = dataset.throws.set_column(index, dataset.throws.schema.field(name), pa.array(values))
-    return ThrowDataset(dataset.directory, dataset.config, dataset.parameters, throws)
+    return replace(dataset, throws=throws)
 
 
 @pytest.mark.parametrize("threads", [1, 2])
-def test_a_row_that_leads_to_another_trial_is_an_error(loaded: ThrowDataset, threads: int) -> None:
+def test_a_row_that_leads_to_another_trial_is_an_error(loaded: Dataset, threads: int) -> None:
     offsets = loaded.throws["chunk_offset"].to_pylist()
     wrong = with_column(loaded, "chunk_offset", [offsets[1], offsets[0], *offsets[2:]])
     with pytest.raises(DatasetError, match=r"quick_00000\.mcap: byte \d+: starts at \d+ ns(.|\n)*expected: trial 0 at"):
@@ -131,13 +132,13 @@ def test_a_row_that_leads_to_another_trial_is_an_error(loaded: ThrowDataset, thr
 
 
 @pytest.mark.parametrize(("change", "message"), [(3, "chunk: "), (10**9, "chunk: ")])
-def test_a_row_that_leads_nowhere_is_an_error(loaded: ThrowDataset, change: int, message: str) -> None:
+def test_a_row_that_leads_nowhere_is_an_error(loaded: Dataset, change: int, message: str) -> None:
     offsets = loaded.throws["chunk_offset"].to_pylist()
     with pytest.raises(DatasetError, match=message):
         with_column(loaded, "chunk_offset", [offset + change for offset in offsets]).trajectories()
 
 
-def test_a_wrong_number_of_samples_is_an_error(loaded: ThrowDataset) -> None:
+def test_a_wrong_number_of_samples_is_an_error(loaded: Dataset) -> None:
     samples = loaded.throws["samples"].to_pylist()
     for change in (1, -1):
         with pytest.raises(DatasetError, match="are not the records of"):
@@ -157,9 +158,7 @@ def test_a_flipped_bit_is_an_error(dataset: Path) -> None:
 
 
 @pytest.mark.parametrize("topics", [["clock"], ["clock", "tf", "controller_state"]])
-def test_more_topics_change_nothing(
-    make_collection: Any, loaded: ThrowDataset, tmp_path: Path, topics: list[str]
-) -> None:
+def test_more_topics_change_nothing(make_collection: Any, loaded: Dataset, tmp_path: Path, topics: list[str]) -> None:
     record = {"trials_per_shard": 3, "topics": ["joint_states", "ball/odometry", *topics]}
     more = throwcollect.load(make_collection({"record": record}).collect(tmp_path / "dataset"))
     found, expected = more.trajectories(), loaded.trajectories()

@@ -24,7 +24,7 @@ from tests.unit.dataset.mutations import fit_manifest
 from throwcollect.config.loader import load
 from throwcollect.dataset.inspect import digest
 from throwcollect.dataset.mcap_file import McapFile, episode_run
-from throwcollect.dataset.mcap_reader import Record, StoredEpisode, opened
+from throwcollect.dataset.mcap_reader import Record, StoredEpisode, open_mcap
 from throwcollect.dataset.verify import verify
 from throwcollect.dataset.writer import create
 from throwcollect.episode.channels import Channels
@@ -41,12 +41,12 @@ FIRST = 3
 
 def stored(path: Path, trial: int) -> StoredEpisode:
     offset = pq.read_table(path.parent / "throws.parquet")["chunk_offset"].to_pylist()[trial]
-    with opened(path) as contents:
+    with open_mcap(path) as contents:
         return contents.episode(offset)
 
 
 def record_of(path: Path, opcode: Opcode, *, holding: bytes = b"", last: bool = False) -> Record:
-    with opened(path) as contents:
+    with open_mcap(path) as contents:
         found = [record for record in contents.records() if record.opcode == opcode and holding in record.data]
     return found[-1] if last else found[0]
 
@@ -74,19 +74,19 @@ def replace_text(path: Path, old: str, new: str) -> None:
 
 
 def chunk_contents(directory: Path) -> None:
-    flip(directory / SHARD, stored(directory / SHARD, 4).chunk.offset + 2000)
+    flip(directory / SHARD, stored(directory / SHARD, 4).offset + 2000)
 
 
 def chunk_crc(directory: Path) -> None:
-    flip(directory / SHARD, stored(directory / SHARD, 4).chunk.offset + 9 + 24)
+    flip(directory / SHARD, stored(directory / SHARD, 4).offset + 9 + 24)
 
 
 def chunk_end_time(directory: Path) -> None:
-    flip(directory / SHARD, stored(directory / SHARD, 4).chunk.offset + 9 + 8)
+    flip(directory / SHARD, stored(directory / SHARD, 4).offset + 9 + 8)
 
 
 def message_index(directory: Path) -> None:
-    flip(directory / SHARD, stored(directory / SHARD, 5).indexes[4].offset + 200)
+    flip(directory / SHARD, stored(directory / SHARD, 5).chunks[0].indexes[4].offset + 200)
 
 
 def stored_digest(directory: Path) -> None:
@@ -311,15 +311,15 @@ def latched_index(directory: Path) -> None:
 
 
 def chunk_opcode(directory: Path) -> None:
-    flip(directory / SHARD, stored(directory / SHARD, 4).chunk.offset, bit=0x10)
+    flip(directory / SHARD, stored(directory / SHARD, 4).offset, bit=0x10)
 
 
 def chunk_length(directory: Path) -> None:
-    flip(directory / SHARD, stored(directory / SHARD, 4).chunk.offset + 2)
+    flip(directory / SHARD, stored(directory / SHARD, 4).offset + 2)
 
 
 def index_length(directory: Path) -> None:
-    flip(directory / SHARD, stored(directory / SHARD, 4).indexes[4].offset + 2)
+    flip(directory / SHARD, stored(directory / SHARD, 4).chunks[0].indexes[4].offset + 2)
 
 
 def metadata_name(directory: Path) -> None:
@@ -337,7 +337,7 @@ def header_json(directory: Path) -> None:
 
 def zeroed_sector(directory: Path) -> None:
     data = bytearray((directory / SHARD).read_bytes())
-    start = stored(directory / SHARD, 4).indexes[3].offset - 100
+    start = stored(directory / SHARD, 4).chunks[0].indexes[3].offset - 100
     data[start : start + 512] = bytes(512)
     (directory / SHARD).write_bytes(data)
 
@@ -353,7 +353,7 @@ def cut_in_the_header(directory: Path) -> None:
 
 
 def cut_in_the_first_episode(directory: Path) -> None:
-    end = stored(directory / SHARD, 3).chunk.end
+    end = stored(directory / SHARD, 3).chunks[0].record.end
     (directory / SHARD).write_bytes((directory / SHARD).read_bytes()[: end - 100])
 
 
@@ -636,7 +636,7 @@ def test_a_changed_sample_is_found_even_if_all_checksums_are_made_to_fit(dataset
     data = zstandard.ZstdCompressor(level=1).compress(bytes(contents))
     chunk = replace(episode.episode.chunk, data=data, crc=zlib.crc32(contents)).record()
     whole = path.read_bytes()
-    path.write_bytes(whole[: episode.chunk.offset] + chunk + whole[episode.chunk.end :])
+    path.write_bytes(whole[: episode.offset] + chunk + whole[episode.chunks[0].record.end :])
     problems = [str(finding) for finding in verify(dataset)]
     assert any("SHA-256 of its records is" in problem for problem in problems)
     with pytest.raises(DatasetError, match="trial 4: chunk: SHA-256 of its records is"):
@@ -722,7 +722,7 @@ def test_random_damage_is_always_found_and_never_raises(make_collection: Any, tm
 
 def test_huge_announced_sizes_are_refused_without_being_believed(dataset: Path) -> None:
     path = dataset / SHARD
-    chunk = stored(path, 4).chunk
+    chunk = stored(path, 4).chunks[0].record
     data = bytearray(path.read_bytes())
     struct.pack_into("<Q", data, chunk.offset + 9 + 16, 1 << 62)
     path.write_bytes(data)

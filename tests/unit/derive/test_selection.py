@@ -12,7 +12,7 @@ from throwcollect.config.loader import load
 from throwcollect.dataset.inspect import digest
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.verify import verify
-from throwcollect.derive.selection import filtered, merge, sample
+from throwcollect.derive.selection import filter_trials, merge, sample
 from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.sweep.plan import make_plan
@@ -25,7 +25,7 @@ def sources(directory: Path) -> list[tuple[str, int]]:
 
 def test_a_filtered_dataset_has_the_trials_that_fulfil_the_condition(collected: Path, tmp_path: Path) -> None:
     before = Dataset.open(collected)
-    found = filtered(collected, tmp_path / "some", where="trial % 2 == 1")
+    found = filter_trials(collected, tmp_path / "some", where="trial % 2 == 1")
     after = Dataset.open(tmp_path / "some")
     assert verify(tmp_path / "some") == []
     assert (found.trials, found.offered, found.without_episode) == (3, 7, {})
@@ -37,27 +37,27 @@ def test_a_filtered_dataset_has_the_trials_that_fulfil_the_condition(collected: 
 
 
 def test_the_plan_is_the_one_that_its_configuration_gives(collected: Path, tmp_path: Path) -> None:
-    filtered(collected, tmp_path / "some", where="trial > 3")
+    filter_trials(collected, tmp_path / "some", where="trial > 3")
     config = load(tmp_path / "some" / "config.yaml")
     assert make_plan(config, directory=tmp_path / "some") == Dataset.open(tmp_path / "some").plan
 
 
 def test_all_trials_of_a_dataset_give_its_recordings_byte_for_byte(collected: Path, tmp_path: Path) -> None:
-    filtered(collected, tmp_path / "all", where="True")
+    filter_trials(collected, tmp_path / "all", where="True")
     names = {path.name for path in (tmp_path / "all").iterdir()} - {"sources.parquet", "trials.parquet"}
     assert names == {path.name for path in collected.iterdir()}
-    for name in names - {"README.md", "config.yaml", "plan.parquet", "datapackage.json"}:
+    for name in names - {"README.md", "provenance.json", "config.yaml", "plan.parquet", "datapackage.json"}:
         assert (tmp_path / "all" / name).read_bytes() == (collected / name).read_bytes(), name
 
 
 def test_trials_without_an_episode_are_left_out_and_counted(collection: Collection, tmp_path: Path) -> None:
     collection.refuse(2, "too fast")
     collection.collect(tmp_path / "source", [0, 1, 3, 4, 5, 6], lost=[4])
-    found = filtered(tmp_path / "source", tmp_path / "some", where="trial < 6")
+    found = filter_trials(tmp_path / "source", tmp_path / "some", where="trial < 6")
     assert found.without_episode == {"lost": 1, "refused": 1}
     assert [number for _, number in sources(tmp_path / "some")] == [0, 1, 3, 5]
     with pytest.raises(ConfigError, match=r"no trial of .* that has an episode fulfils \"outcome == 'lost'\""):
-        filtered(tmp_path / "source", tmp_path / "none", where="outcome == 'lost'")
+        filter_trials(tmp_path / "source", tmp_path / "none", where="outcome == 'lost'")
     assert not (tmp_path / "none").exists()
 
 
@@ -103,7 +103,7 @@ def test_a_merged_dataset_sweeps_what_any_sweeps_and_what_they_differ_in(
     card = (tmp_path / "all" / "README.md").read_text()
     assert f"| other | {tmp_path / 'other'} | 2 | 2 | {digest(tmp_path / 'other')} |" in card
     # What was derived can be derived from.
-    filtered(tmp_path / "all", tmp_path / "light", where="ball.mass_kg < 0.04")
+    filter_trials(tmp_path / "all", tmp_path / "light", where="ball.mass_kg < 0.04")
     assert verify(tmp_path / "light") == []
     assert [number for _, number in sources(tmp_path / "light")] == [7, 8]
 
@@ -128,7 +128,7 @@ def test_datasets_of_other_physics_do_not_go_together(
 def test_a_dataset_is_never_overwritten(collected: Path, tmp_path: Path) -> None:
     (tmp_path / "mine").write_text("mine")
     with pytest.raises(ConfigError, match="mine: exists"):
-        filtered(collected, tmp_path / "mine", where="True")
+        filter_trials(collected, tmp_path / "mine", where="True")
     with pytest.raises(ConfigError, match="expected: a directory that is new or empty"):
         merge([collected], collected)
     assert [path.name for path in tmp_path.iterdir()] == ["mine"]
@@ -140,7 +140,7 @@ def test_a_damaged_episode_is_not_given_a_new_digest(dataset: Path, tmp_path: Pa
     contents[len(contents) // 2] ^= 1
     shard.write_bytes(contents)
     with pytest.raises(DatasetError, match=r"dataset: trial [345]: .*\n.*throwcollect dataset verify"):
-        filtered(dataset, tmp_path / "some", where="True")
+        filter_trials(dataset, tmp_path / "some", where="True")
     assert {path.name for path in tmp_path.iterdir()} == {"dataset"}
 
 
@@ -153,11 +153,11 @@ def test_an_episode_that_is_not_the_one_of_the_table_is_refused(
     for shard in collection.collect(tmp_path / "other", change=shorter).glob("*.mcap"):
         shutil.copy(shard, dataset / shard.name)
     with pytest.raises(DatasetError, match=r"trial 0: digest .*\n.* as throws.parquet says"):
-        filtered(dataset, tmp_path / "some", where="trial == 0")
+        filter_trials(dataset, tmp_path / "some", where="trial == 0")
 
 
 def test_a_list_that_is_not_the_one_of_the_plan_is_found(collected: Path, tmp_path: Path) -> None:
-    filtered(collected, tmp_path / "some", where="trial > 3")
+    filter_trials(collected, tmp_path / "some", where="trial > 3")
     path = tmp_path / "some" / "trials.parquet"
     table = pq.read_table(path)
     pq.write_table(table.take([1, 0, *range(2, len(table))]), path)

@@ -9,17 +9,17 @@ from tests.unit.dataset.conftest import Collection
 from throwcollect.dataset.reader import Dataset
 from throwcollect.derive.statistics import statistics
 from throwcollect.episode.record import EpisodeHeader, Samples
-from throwcollect.robots.talos import JOINTS
+from throwcollect.robots.talos import TALOS
 
 
 def test_signals_are_those_of_all_samples_together(collected: Path) -> None:
     found = statistics(collected)
-    samples = [episode.samples() for episode in Dataset.open(collected)]
+    samples = [episode.samples() for episode in Dataset.open(collected).episodes()]
     assert (found.episodes, found.samples) == (7, sum(map(len, samples)))
     for group, attribute, names in (
-        ("position_rad", "position", JOINTS),
-        ("velocity_radps", "velocity", JOINTS),
-        ("effort_nm", "effort", JOINTS),
+        ("position_rad", "position", TALOS.joints),
+        ("velocity_radps", "velocity", TALOS.joints),
+        ("effort_nm", "effort", TALOS.joints),
         ("ball_position_m", "ball_position", "xyz"),
         ("ball_velocity_mps", "ball_linear_velocity", "xyz"),
     ):

@@ -16,7 +16,7 @@ from throwcollect.dataset.reader import Dataset
 from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.export.formats import export
 from throwcollect.robots.quintic_curve import sample_quintic
-from throwcollect.robots.talos import JOINTS
+from throwcollect.robots.talos import TALOS
 from throwcollect.tasks.trajectory import throw_trajectory
 
 SETTINGS: dict[str, Any] = {
@@ -71,7 +71,7 @@ def exported(source: Path, tmp_path_factory: pytest.TempPathFactory) -> Export:
 def throws_of(directory: Path, step: int = 1) -> Iterator[tuple[int, Arrays]]:
     """Trial and signals of each throw, straight from the recordings: every `step`-th sample."""
     dataset = Dataset.open(directory)
-    for episode in dataset:
+    for episode in dataset.episodes():
         trial = episode.header.trial
         samples = episode.samples()[::step]
         time_s = (samples.stamps_ns - episode.header.start_ns) / 1e9
@@ -96,7 +96,7 @@ def throws_of(directory: Path, step: int = 1) -> Iterator[tuple[int, Arrays]]:
 
 
 def moving_columns() -> list[int]:
-    return [JOINTS.index(joint) for joint in MOVING]
+    return [TALOS.joints.index(joint) for joint in MOVING]
 
 
 def table_of(directory: Path) -> dict[str, list[Any]]:

@@ -15,6 +15,7 @@ from throwcollect.dataset.inspect import info
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.export.formats import FORMATS, export
 from throwcollect.export.signals import unit_of
+from throwcollect.extras import MissingExtraError
 
 ALL = list(FORMATS)
 
@@ -143,7 +144,9 @@ def test_without_h5py_the_message_says_what_to_install(
     source: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "h5py", None)
-    with pytest.raises(ConfigError, match=r"h5py is not installed\n  try: pip install 'throwcollect\[export\]'"):
+    with pytest.raises(
+        MissingExtraError, match=r"h5py, which is not installed\n  try: pip install 'throwcollect\[export\]'"
+    ):
         export(source, tmp_path / "out", to="hdf5")
     assert list(tmp_path.iterdir()) == []
 

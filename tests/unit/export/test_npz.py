@@ -7,7 +7,7 @@ import pytest
 from tests.unit.export.conftest import MOVING, WITH_EPISODE, Export, table_of, throws_of
 
 from throwcollect.dataset.inspect import info
-from throwcollect.robots.talos import JOINTS
+from throwcollect.robots.talos import TALOS
 
 
 @pytest.mark.parametrize(("rate_hz", "step"), [(None, 1), (50, 5)])
@@ -17,7 +17,7 @@ def test_arrays_are_those_of_the_dataset(rate_hz: int | None, step: int, exporte
     expected = dict(throws_of(source, step))
     assert list(expected) == WITH_EPISODE
     for archive in archives:
-        assert archive["joints"].tolist() == list(JOINTS)
+        assert archive["joints"].tolist() == list(TALOS.joints)
         assert archive["moving_joints"].tolist() == MOVING
         assert str(archive["digest_of_dataset"]) == info(source).digest
         offsets = archive["offsets"]

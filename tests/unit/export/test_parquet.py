@@ -10,13 +10,13 @@ from tests.unit.export.conftest import MOVING, WITH_EPISODE, Export, table_of, t
 from throwcollect.dataset.inspect import info
 from throwcollect.export import parquet
 from throwcollect.export.formats import export
-from throwcollect.robots.talos import JOINTS
+from throwcollect.robots.talos import TALOS
 
 COLUMNS = {
     "time_s": ["time_s"],
-    "joint_position_rad": [f"{joint}_position_rad" for joint in JOINTS],
-    "joint_velocity_radps": [f"{joint}_velocity_radps" for joint in JOINTS],
-    "joint_effort_nm": [f"{joint}_effort_nm" for joint in JOINTS],
+    "joint_position_rad": [f"{joint}_position_rad" for joint in TALOS.joints],
+    "joint_velocity_radps": [f"{joint}_velocity_radps" for joint in TALOS.joints],
+    "joint_effort_nm": [f"{joint}_effort_nm" for joint in TALOS.joints],
     "command_position_rad": [f"{joint}_command_position_rad" for joint in MOVING],
     "command_velocity_radps": [f"{joint}_command_velocity_radps" for joint in MOVING],
     "command_acceleration_radps2": [f"{joint}_command_acceleration_radps2" for joint in MOVING],

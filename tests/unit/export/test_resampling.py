@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from throwcollect.episode.record import Samples
-from throwcollect.export.resampling import resample, resampled_count
+from throwcollect.export.resampling import count_resampled, resample
 
 
 def polynomial(rate_hz: int, count: int) -> Samples:
@@ -29,7 +29,7 @@ def test_a_rate_that_divides_takes_every_nth_sample_as_it_is() -> None:
     recorded = polynomial(250, 101)
     for rate_hz, step in ((250, 1), (125, 2), (50, 5), (25, 10), (1, 250)):
         given = resample(recorded, recorded_hz=250, rate_hz=rate_hz)
-        assert len(given) == resampled_count(101, recorded_hz=250, rate_hz=rate_hz)
+        assert len(given) == count_resampled(101, recorded_hz=250, rate_hz=rate_hz)
         for name, column in vars(given).items():
             assert np.array_equal(column, getattr(recorded, name)[::step]), name
 

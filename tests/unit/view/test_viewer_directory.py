@@ -17,12 +17,12 @@ from mcap.reader import make_reader
 from rosbags.rosbag2 import Reader
 from tests.unit.dataset.mcap_doctor import Examination
 
+from rclzenoh.interfaces import deserialize, get_message
 from throwcollect.dataset.reader import Dataset
 from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.errors import ConfigError, DatasetError
-from throwcollect.interfaces import deserialize, get_message
-from throwcollect.robots.model import joint_limits, share_directory
-from throwcollect.robots.talos import JOINTS
+from throwcollect.robots.limits import joint_limits
+from throwcollect.robots.talos import TALOS
 from throwcollect.view.viewer_directory import View, view
 
 CHOSEN = [5, 0]
@@ -100,11 +100,11 @@ def test_the_ball_speed_is_that_of_the_samples(collected: Path, messages: Messag
 
 
 def test_joints_are_shown_within_their_limits(collected: Path, messages: Messages) -> None:
-    samples, limits = Dataset.open(collected).episode(CHOSEN[0]).samples(), joint_limits()
+    samples, limits = Dataset.open(collected).episode(CHOSEN[0]).samples(), joint_limits(TALOS)
     share = messages["/view/limits"][100][1]
     assert len(share.name) > 1
     for index, joint in enumerate(share.name):
-        column = JOINTS.index(joint)
+        column = TALOS.joints.index(joint)
         lower, upper = limits.lower[column], limits.upper[column]
         assert share.position[index] == pytest.approx(
             np.interp(samples.position[100, column], [lower, upper], [-1.0, 1.0])
@@ -132,7 +132,7 @@ def test_the_robot_holds_its_meshes_inside(messages: Messages) -> None:
             assert (marker.type in (marker.CUBE, marker.CYLINDER), marker.mesh_resource) == (True, "")
             continue
         kind, _, content = marker.mesh_resource.partition(";base64,")
-        path = share_directory() / mesh.attrib["filename"].removeprefix("package://")
+        path = TALOS.share() / mesh.attrib["filename"].removeprefix("package://")
         assert (marker.type, kind) == (marker.MESH_RESOURCE, "data:model/stl")
         assert base64.b64decode(content) == path.read_bytes()
         scale = [float(number) for number in mesh.get("scale", "1 1 1").split()]
@@ -152,7 +152,7 @@ def test_meshes_beside_the_recording_are_where_the_description_says(written: Vie
     urls = set(re.findall(r'filename="package://([^"]+)"', description))
     directory = written.recording.parent
     assert len(urls) > 20
-    assert all((directory / url).read_bytes() == (share_directory() / url).read_bytes() for url in urls)
+    assert all((directory / url).read_bytes() == (TALOS.share() / url).read_bytes() for url in urls)
     assert sum((directory / url).stat().st_size for url in urls) == written.mesh_bytes
     for package in {url.split("/")[0] for url in urls}:
         assert ElementTree.parse(directory / package / "package.xml").findtext("name") == package  # noqa: S314

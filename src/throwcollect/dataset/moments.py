@@ -1,0 +1,51 @@
+"""Extrema, means and deviations of columns that come in pieces (Chan, Golub and LeVeque, 1979)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class Moments:
+    """What is known of the rows of a table when they have passed by once.
+
+    Attributes:
+        count: Number of rows.
+        minimum: Of each column, shape ``(n_columns,)``, as all that follow.
+        maximum: Of each column.
+        mean: Of each column.
+        squares: Sum of squared distances from the mean, of each column.
+    """
+
+    count: int
+    minimum: NDArray[np.float64]
+    maximum: NDArray[np.float64]
+    mean: NDArray[np.float64]
+    squares: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, rows: NDArray[np.float64]) -> Moments:
+        """Those of some rows, shape ``(n_rows, n_columns)``, at least one."""
+        mean = rows.mean(axis=0)
+        return cls(len(rows), rows.min(axis=0), rows.max(axis=0), mean, ((rows - mean) ** 2).sum(axis=0))
+
+    @property
+    def std(self) -> NDArray[np.float64]:
+        """Standard deviations of the population, shape ``(n_columns,)``."""
+        deviations: NDArray[np.float64] = np.sqrt(self.squares / self.count)
+        return deviations
+
+    def with_more(self, more: Moments) -> Moments:
+        """Those of both."""
+        count = self.count + more.count
+        step = more.mean - self.mean
+        return Moments(
+            count,
+            np.minimum(self.minimum, more.minimum),
+            np.maximum(self.maximum, more.maximum),
+            self.mean + step * (more.count / count),
+            self.squares + more.squares + step**2 * (self.count * more.count / count),
+        )

@@ -1,0 +1,117 @@
+"""How a dataset was collected: ``provenance.json``.
+
+Where, when and how fast a collection ran is no function of its configuration, so neither digest nor manifest cover this
+file. Together with the data card, which shows it to people, it is what may differ between two collections of the same
+configuration.
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+import socket
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from datetime import datetime, timezone
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from pydantic import TypeAdapter, ValidationError
+
+from throwcollect.dataset.directory import PROVENANCE
+from throwcollect.errors import DatasetError
+from throwcollect.files import read_text, write_file
+from throwcollect.version import __version__
+
+HOST_VARIABLE = "THROWCOLLECT_HOST"
+"""Environment variable with the name of the machine, for containers, which cannot know it; empty if it is unknown."""
+
+_LIBRARIES = ("pybullet", "numpy", "rosbags", "mcap", "zstandard", "pyarrow", "pin", "example-robot-data")
+_MOST_BYTES = 1_000_000
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """How one collection was run.
+
+    Attributes:
+        finished: When it ended.
+        host: Name of the machine that wrote the dataset; None if it is not known, as in a container.
+        platform: Its system and processor.
+        python: Version of Python.
+        libraries: Versions of the libraries that the data pass through.
+        simulations: Number of simulations; None if not known.
+        wall_s: Real time that it took [s]; None if not known.
+        was_open: Whether anybody who reached its router could join it.
+    """
+
+    finished: datetime
+    host: str | None
+    platform: str
+    python: str
+    libraries: Mapping[str, str]
+    simulations: int | None
+    wall_s: float | None
+    was_open: bool
+
+    @classmethod
+    def of_this_machine(cls, *, simulations: int | None, wall_s: float | None, was_open: bool) -> Provenance:
+        """Provenance of a collection that ends now, here."""
+        return cls(
+            finished=datetime.now(timezone.utc),
+            # Of itself, a container knows nothing but a random id.
+            host=os.environ.get(HOST_VARIABLE, socket.gethostname()) or None,
+            platform=platform.platform(),
+            python=platform.python_version(),
+            libraries={"throwcollect": __version__, **_versions()},
+            simulations=simulations,
+            wall_s=wall_s,
+            was_open=was_open,
+        )
+
+    def facts(self) -> dict[str, str]:
+        """Its facts in words, by name; what is not known is left out."""
+        facts = {
+            "finished": self.finished.isoformat(timespec="seconds"),
+            **({"host": self.host} if self.host else {}),
+            "platform": self.platform,
+            "Python": self.python,
+            **self.libraries,
+        }
+        if self.simulations is not None:
+            facts["simulations"] = str(self.simulations)
+        if self.wall_s is not None:
+            facts["wall time"] = f"{self.wall_s:.1f} s"
+        if self.was_open:
+            facts["open"] = "anybody who reached the router could join, read and disturb the collection"
+        return facts
+
+
+def write_provenance(directory: Path, provenance: Provenance) -> None:
+    """Write how a dataset was collected beside its data card.
+
+    Raises:
+        DatasetError: If the file cannot be written.
+    """
+    write_file(directory / PROVENANCE, _JSON.dump_json(provenance, indent=2) + b"\n")
+
+
+def read_provenance(directory: Path) -> Provenance | None:
+    """How a dataset was collected; None if it does not say, as those of earlier versions, or says it unreadably."""
+    try:
+        return _JSON.validate_json(read_text(directory / PROVENANCE, most_bytes=_MOST_BYTES))
+    except (DatasetError, ValidationError):
+        return None
+
+
+def _versions() -> dict[str, str]:
+    found = {}
+    for name in _LIBRARIES:
+        # Not every machine that collects also simulates.
+        with suppress(PackageNotFoundError):
+            found[name] = version(name)
+    return found
+
+
+_JSON = TypeAdapter(Provenance)

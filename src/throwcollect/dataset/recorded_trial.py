@@ -1,0 +1,84 @@
+"""A trial as it was recorded, with what it was to be: what the checks of headers and of motion look at."""
+
+from __future__ import annotations
+
+import reprlib
+from collections.abc import Collection
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from throwcollect.config.schema import Config
+from throwcollect.episode.record import Contact, EpisodeHeader, Samples
+from throwcollect.robots.trajectory import JointTrajectory
+from throwcollect.tasks.throw.flight import NS_PER_S
+
+_short = reprlib.Repr()
+_short.maxstring = 60
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedTrial:
+    """The samples of a trial with its header, and what it was simulated with.
+
+    Its time is counted in physics steps: the first sample is at step 0.
+
+    Attributes:
+        samples: The samples; finite, with the stamps that belong to the trial.
+        header: What is known besides.
+        config: Configuration of the trial.
+        trajectory: What its controllers were sent.
+    """
+
+    samples: Samples
+    header: EpisodeHeader
+    config: Config
+    trajectory: JointTrajectory
+
+    @cached_property
+    def stride(self) -> int:
+        """Physics steps from one sample to the next."""
+        return self.config.sim.physics_hz // self.config.record.rate_hz
+
+    @cached_property
+    def last_step(self) -> int:
+        """The step of the last sample."""
+        return self.stride * (len(self.samples) - 1)
+
+    @cached_property
+    def times_s(self) -> NDArray[np.float64]:
+        """Times of the samples since the start of the trial [s], shape ``(n_samples,)``."""
+        times: NDArray[np.float64] = (self.samples.stamps_ns - self.header.start_ns) / NS_PER_S
+        return times
+
+    def step_at(self, instant_ns: int) -> int | None:
+        """The step that ends at an instant [ns]; None if none of the trial does."""
+        hz = self.config.sim.physics_hz
+        step = round((instant_ns - self.header.start_ns) * hz / NS_PER_S)
+        on_step = self.header.start_ns + step * NS_PER_S // hz == instant_ns
+        return step if on_step and 0 <= step <= self.last_step else None
+
+    def steps_of(self, contact: Contact) -> tuple[int, int] | None:
+        """First step of a contact and the one after its last; None if it does not begin and end on steps, in order."""
+        begin = self.step_at(contact.start_ns)
+        end = self.last_step + 1 if contact.end_ns is None else self.step_at(contact.end_ns)
+        return None if begin is None or end is None or end <= begin else (begin, end)
+
+    def find_pressed(self, contacts: Collection[Contact]) -> NDArray[np.bool_]:
+        """At which samples at least one of these contacts lasts, shape ``(n_samples,)``."""
+        steps = np.arange(0, self.last_step + 1, self.stride)
+        pressed = np.zeros(len(steps), dtype=bool)
+        for interval in map(self.steps_of, contacts):
+            if interval is not None:
+                pressed |= (steps >= interval[0]) & (steps < interval[1])
+        return pressed
+
+    def name_contact(self, contact: Contact) -> str:
+        """A contact in words, however long the name of its body is."""
+        return f"the contact with {_short.repr(contact.body)} at {self.tell_time(contact.start_ns)}"
+
+    def tell_time(self, instant_ns: int) -> str:
+        """An instant as time since the start of the trial, in words."""
+        return f"{(instant_ns - self.header.start_ns) / NS_PER_S:.3f} s"

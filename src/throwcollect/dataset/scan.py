@@ -1,0 +1,127 @@
+"""Finds the episodes of an MCAP file, however damaged the rest of it is.
+
+Neither the order of records nor their lengths are relied on: chunks are found by the bytes that every header of theirs
+holds, wherever they lie. So what is lost is what was damaged, and never what follows it.
+
+Everything that looks through a file for episodes does it with `scan`: recovery takes the intact ones, repair takes the
+whole ones, and verify reports what lies between the readable ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from mcap import records
+
+from throwcollect.dataset.mcap_file import EPISODE, SENSORS_SHA256, episode_run
+from throwcollect.dataset.mcap_reader import MOST_CHUNKS, McapContents, Record, StoredChunk, StoredEpisode, map_file
+from throwcollect.episode.chunk import MOST_RATIO, RECORD_PREFIX_BYTES, Chunk
+from throwcollect.errors import DatasetError
+
+_FACTS_MARK = len(EPISODE).to_bytes(4, "little") + EPISODE.encode()
+"""How the contents of the Metadata record of an episode begin."""
+_EFFORT = 64
+"""Bytes that may be looked at in vain for each byte of the file; only a file made to be slow takes more."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """An episode that was found.
+
+    Attributes:
+        stored: The episode as it lies in the file; without message indexes if it is not readable.
+        readable: Whether its records follow each other as they are written. If not, it was put together from its
+            chunks and the metadata behind them.
+        damage: Why its contents cannot be believed; None if it is whole: each chunk has its CRC and the hash that is
+            written beside it, and header and hash have the digest.
+        intact: Whether its run of records is byte for byte what is written for the episode. A whole episode that is
+            not intact has damaged message indexes or metadata, and has to be written anew.
+    """
+
+    stored: StoredEpisode
+    readable: bool
+    damage: DatasetError | None
+    intact: bool
+
+
+def scan(contents: McapContents, start: int = 0) -> Iterator[Found]:
+    """All episodes of a file, in the order in which they lie there; one episode at a time is in memory.
+
+    Whether an episode is one of the dataset's is not known here. Behind an episode that is not whole, chunks are looked
+    for from within its records on, as their lengths may be what is wrong.
+
+    Args:
+        contents: Those of an MCAP file or the beginning of one, finished or not.
+        start: Where to begin [bytes].
+    """
+    effort = _EFFORT * len(contents)
+    facts = 0
+    offset = contents.next_chunk(start)
+    while offset >= 0 and effort > 0:
+        record = contents.record(offset)
+        if 0 <= facts < record.end + RECORD_PREFIX_BYTES:
+            facts = contents.find(_FACTS_MARK, record.end + RECORD_PREFIX_BYTES)
+        found = _find(contents, record, facts - RECORD_PREFIX_BYTES)
+        if found is not None:
+            yield found
+        if found is None or found.damage is not None:
+            size = Chunk.parse(record.data).uncompressed_size
+            effort -= len(record.data) + min(size, MOST_RATIO * len(record.data))
+        whole = found is not None and found.damage is None
+        offset = contents.next_chunk(found.stored.end if found and whole else offset + 1)
+
+
+def scan_whole(path: Path) -> Iterator[Found]:
+    """All whole episodes of a file, in the order in which they lie there.
+
+    Args:
+        path: An MCAP file or the beginning of one, finished or not.
+
+    Raises:
+        DatasetError: If the file is missing or cannot be read.
+    """
+    with map_file(path) as contents:
+        yield from (found for found in scan(contents) if found.damage is None)
+
+
+def _find(contents: McapContents, first: Record, facts: int) -> Found | None:
+    """The episode whose first chunk a record is; None if it is none.
+
+    Args:
+        contents: Those of the file.
+        first: The record.
+        facts: Where the next metadata of an episode begin [bytes]; negative if there are none.
+    """
+    try:
+        stored, readable = contents.episode(first.offset), True
+    except DatasetError:
+        try:
+            stored, readable = _gather(contents, first, contents.record(facts)), False
+            stored.check_whole()
+        except DatasetError:
+            return None
+        return Found(stored, readable, None, intact=False)
+    try:
+        stored.check_whole()
+        intact = contents.slice(stored.offset, stored.end) == episode_run(stored.episode).data
+    except DatasetError as error:
+        return Found(stored, readable, error, intact=False)
+    return Found(stored, readable, None, intact)
+
+
+def _gather(contents: McapContents, first: Record, facts: Record) -> StoredEpisode:
+    """The episode of a chunk and of some metadata, with as many further chunks as the metadata have hashes of.
+
+    Raises:
+        DatasetError: If they do not belong together.
+    """
+    chunks = [StoredChunk(first, {})]
+    said = facts.parse(records.Metadata).metadata.get(SENSORS_SHA256, "")
+    for _ in said.split()[:MOST_CHUNKS]:
+        offset = contents.next_chunk(chunks[-1].record.end)
+        if not 0 <= offset < facts.offset:
+            break
+        chunks.append(StoredChunk(contents.record(offset), {}))
+    return StoredEpisode.of(chunks, facts)

@@ -1,0 +1,54 @@
+"""All checks of a finished dataset in one call: files, physics, what the plan refuses, and throws simulated again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from throwcollect.coordinator.prepare import feasibility_check
+from throwcollect.dataset.findings import Finding
+from throwcollect.dataset.reader import Dataset
+from throwcollect.dataset.verify import verify
+from throwcollect.errors import DatasetError
+from throwcollect.extras import require
+from throwcollect.files import StrPath
+from throwcollect.replay.audit import chosen_trials, replayed
+
+
+def verify_dataset(directory: StrPath, *, replay: int | None = None) -> list[Finding]:
+    """Check a finished dataset: its files against each other, its episodes against physics, its plan against the robot.
+
+    Without the extra ``collect``, what takes the robot's model is left out; `dataset.verify.unchecked` names it.
+
+    Args:
+        directory: Its directory.
+        replay: How many throws, chosen by the seed of the dataset, to simulate again and to compare bit for bit; None
+            for none.
+
+    Returns:
+        What is wrong, file by file; empty when nothing is.
+
+    Raises:
+        DatasetError: If the directory holds no finished dataset.
+        MissingExtraError: If throws are to be simulated, and the extra ``collect`` is not installed.
+        WorkerError: If the physics engine does not start.
+    """
+    if replay is not None:
+        require("pybullet", "pinocchio")
+    findings = verify(Path(directory), check_of=feasibility_check)
+    if replay is not None:
+        findings += _replay_findings(Path(directory), replay)
+    return findings
+
+
+def _replay_findings(directory: Path, count: int) -> Iterator[Finding]:
+    """Throws that do not come out of the simulation as they are stored."""
+    try:
+        dataset = Dataset.open(directory)
+        shards = dataset.throws["shard"].to_pylist()
+        for comparison in replayed(directory, chosen_trials(dataset, sample=count)):
+            if comparison.differences:
+                told = "; ".join(comparison.differences)
+                yield Finding(shards[comparison.trial], f"trial {comparison.trial}", f"comes out otherwise: {told}")
+    except DatasetError as error:
+        yield Finding("", "", f"cannot be replayed: {error}")

@@ -1,0 +1,145 @@
+"""Whole episodes are found in files that are damaged anywhere else."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import zstandard
+
+from throwcollect.dataset.mcap_file import MAGIC
+from throwcollect.dataset.mcap_reader import open_mcap
+from throwcollect.dataset.scan import Found, scan_whole
+from throwcollect.episode.chunk import Chunk
+from throwcollect.errors import DatasetError
+
+SHARD = "quick_00001.mcap"
+
+
+@pytest.fixture(scope="module")
+def whole(collected: Path) -> bytes:
+    return (collected / SHARD).read_bytes()
+
+
+@pytest.fixture(scope="module")
+def runs(collected: Path) -> list[Found]:
+    """The three episodes of an undamaged file."""
+    return list(scan_whole(collected / SHARD))
+
+
+def find_in(path: Path, data: bytes) -> list[tuple[int, bool]]:
+    path.write_bytes(data)
+    return [(found.stored.episode.header.trial, found.intact) for found in scan_whole(path)]
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "damaged.mcap.part"
+
+
+def test_all_episodes_of_a_sound_file_are_found_where_they_lie(collected: Path, runs: list[Found]) -> None:
+    assert [(each.stored.episode.header.trial, each.intact) for each in runs] == [(3, True), (4, True), (5, True)]
+    assert [each.stored.offset for each in runs[1:]] == [each.stored.end for each in runs[:-1]]
+    with open_mcap(collected / SHARD) as contents:
+        for each in runs:
+            stored = contents.episode(each.stored.offset)
+            assert (stored.chunks, stored.facts) == (each.stored.chunks, each.stored.facts)
+
+
+@pytest.mark.parametrize("wrong", [0, 1, 2])
+def test_any_damaged_chunk_costs_its_own_episode_alone(path: Path, whole: bytes, runs: list[Found], wrong: int) -> None:
+    data = bytearray(whole)
+    data[runs[wrong].stored.offset + 3000] ^= 1
+    assert find_in(path, bytes(data)) == [(trial, True) for trial in (3, 4, 5) if trial != 3 + wrong]
+
+
+def test_lengths_that_lead_nowhere_are_not_followed(path: Path, whole: bytes, runs: list[Found]) -> None:
+    for length in (0, 1, 2**32 - 1, 2**63, 2**64 - 1):
+        data = bytearray(whole)
+        struct.pack_into("<Q", data, runs[1].stored.offset + 1, length)
+        assert find_in(path, bytes(data)) == [(3, True), (5, True)]
+
+
+def test_a_missing_or_an_inserted_stretch_hides_nothing_behind_it(path: Path, whole: bytes, runs: list[Found]) -> None:
+    place = runs[1].stored.offset + 5000
+    assert find_in(path, whole[:place] + whole[place + 512 :]) == [(3, True), (5, True)]
+    assert find_in(path, whole[:place] + bytes(512) + whole[place:]) == [(3, True), (5, True)]
+    # So much is missing that the length of the chunk leads into the next one.
+    assert find_in(path, whole[:place] + whole[place + 20_000 :]) == [(3, True), (5, True)]
+    assert find_in(path, whole[len(MAGIC) + 1000 :]) == [(3, True), (4, True), (5, True)]
+    # The end of an episode and the beginning of the next one are gone.
+    assert find_in(path, whole[: runs[1].stored.end - 50] + whole[runs[2].stored.offset + 50 :]) == [(3, True)]
+
+
+def test_an_episode_with_damaged_indexes_is_whole_but_not_intact(path: Path, whole: bytes, runs: list[Found]) -> None:
+    indexes = runs[1].stored.chunks[0].indexes
+    for place in (indexes[3].offset, indexes[4].offset + 1, indexes[4].offset + 300):
+        data = bytearray(whole)
+        data[place] ^= 0x40
+        assert find_in(path, bytes(data)) == [(3, True), (4, False), (5, True)]
+
+
+def test_a_header_that_was_changed_is_not_believed(path: Path, whole: bytes, runs: list[Found]) -> None:
+    facts = runs[1].stored.facts
+    place = facts.offset + facts.data.index(b"landed")
+    assert find_in(path, whole[:place] + b"rested" + whole[place + 6 :]) == [(3, True), (5, True)]
+
+
+def test_a_file_cut_anywhere_has_the_episodes_before_the_cut(path: Path, whole: bytes, runs: list[Found]) -> None:
+    ends = [run.stored.end for run in runs]
+    cuts = {0, 3, *range(100, len(whole), 9973), *ends, *(end - 1 for end in ends)}
+    for size in sorted(cuts):
+        assert len(find_in(path, whole[:size])) == sum(end <= size for end in ends), size
+
+
+def test_a_file_of_noise_has_no_episode(path: Path) -> None:
+    assert find_in(path, np.random.default_rng(0).bytes(100_000)) == []
+    assert find_in(path, b"") == []
+
+
+def test_contents_that_are_announced_too_large_are_not_decompressed(path: Path, runs: list[Found]) -> None:
+    """Zeros compress so well that a small file could fill any memory."""
+    zeros = zstandard.ZstdCompressor(level=1).compress(bytes(50_000_000))
+    bomb = Chunk(zeros, 50_000_000, 0, 0, 0)
+    with pytest.raises(DatasetError, match="bytes of data announce 50000000"):
+        bomb.decompress()
+    assert find_in(path, bomb.record() + runs[0].stored.facts.data) == []
+
+
+def test_chunks_within_chunks_do_not_take_forever(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each header begins a chunk that reaches to the end of the file; they are given up after 64 times its size."""
+    header = Chunk(b"", 0, 0, 0, 0).record()
+    count = 3000
+    data = bytearray()
+    for number in range(count):
+        behind = len(header) * (count - number - 1)
+        data += Chunk(bytes(behind), 0, 0, 0, 0).record()[: len(header)]
+    parse, parsed = Chunk.parse, []
+    monkeypatch.setattr(Chunk, "parse", lambda record: parsed.append(len(record)) or parse(record))
+    assert find_in(path, bytes(data)) == []
+    assert 60 <= len(parsed) <= 70
+
+
+def test_samples_that_were_changed_are_not_believed_even_if_the_crc_was_made_to_fit(
+    path: Path, whole: bytes, runs: list[Found]
+) -> None:
+    stored = runs[1].stored
+    contents = bytearray(stored.episode.chunk.decompress())
+    contents[200] ^= 1
+    data = zstandard.ZstdCompressor(level=1).compress(bytes(contents))
+    chunk = replace(stored.episode.chunk, data=data, crc=zlib.crc32(contents)).record()
+    assert find_in(path, whole[: stored.offset] + chunk + whole[stored.chunks[0].record.end :]) == [
+        (3, True),
+        (5, True),
+    ]
+
+
+def test_what_is_no_file_is_named(tmp_path: Path) -> None:
+    with pytest.raises(DatasetError, match=r"missing\.mcap: cannot be read: No such file"):
+        list(scan_whole(tmp_path / "missing.mcap"))
+    with pytest.raises(DatasetError, match="cannot be read: not a file"):
+        list(scan_whole(tmp_path))
