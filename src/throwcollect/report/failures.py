@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-_NUMBER = re.compile(r"(?<![\w.])-?\d[\d.]*(?:e[-+]?\d+)?")
+from throwcollect.wording import blank_numbers
+
 _EXAMPLES = 5
 
 
 @dataclass(frozen=True)
 class Failure:
-    """Trials that ended alike.
+    """Trials with one outcome and, but for numbers, one reason.
 
     Attributes:
-        outcome: How.
-        pattern: Why, with ``#`` in place of numbers that differ between them; one of the reasons if none does.
-        count: How many.
-        examples: Numbers of the first of them.
+        outcome: Their outcome.
+        pattern: Their reason, with ``#`` in place of numbers if these differ between the trials.
+        count: Number of trials.
+        examples: Numbers of the first of these trials.
     """
 
     outcome: str
@@ -27,20 +27,19 @@ class Failure:
     examples: tuple[int, ...]
 
 
-def failures(rows: Iterable[tuple[int, str, str | None]]) -> tuple[Failure, ...]:
-    """Failures by outcome and reason, most frequent first.
+def group_failures(rows: Iterable[tuple[int, str, str | None]]) -> tuple[Failure, ...]:
+    """Group trials by outcome and reason, most frequent first.
 
     Args:
         rows: Trial, outcome and reason; those without a reason did not fail.
     """
-    groups: dict[tuple[str, str], tuple[set[str], list[int]]] = {}
+    groups: dict[tuple[str, str], list[tuple[int, str]]] = {}
     for trial, outcome, reason in rows:
         if reason is not None:
-            reasons, trials = groups.setdefault((outcome, _NUMBER.sub("#", reason)), (set(), []))
-            reasons.add(reason)
-            trials.append(trial)
-    found = [
-        Failure(outcome, pattern if len(reasons) > 1 else next(iter(reasons)), len(trials), tuple(trials[:_EXAMPLES]))
-        for (outcome, pattern), (reasons, trials) in groups.items()
-    ]
-    return tuple(sorted(found, key=lambda failure: (-failure.count, failure.outcome, failure.pattern)))
+            groups.setdefault((outcome, blank_numbers(reason)), []).append((trial, reason))
+    failures = []
+    for (outcome, pattern), members in groups.items():
+        trials, reasons = zip(*members, strict=True)
+        said = pattern if len(set(reasons)) > 1 else reasons[0]
+        failures.append(Failure(outcome, said, len(trials), trials[:_EXAMPLES]))
+    return tuple(sorted(failures, key=lambda failure: (-failure.count, failure.outcome, failure.pattern)))

@@ -1,4 +1,7 @@
-"""The figures of the page, in plotly; text, sizes and colours of the theme are the page's."""
+"""Figures that any dataset has, in plotly; `painter` draws the same ones with matplotlib for print.
+
+Text, sizes and colours of the theme are the page's own.
+"""
 
 from __future__ import annotations
 
@@ -9,143 +12,155 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
 
-from throwcollect.report.coverage import Axis
-from throwcollect.report.episodes import BallPath, JointMotion, Residuals
-from throwcollect.report.landing import Landings
 from throwcollect.report.limits import JointPeaks
 from throwcollect.report.outcomes import LANDED, Outcomes, in_words, style_of
+from throwcollect.report.points import choose_points
 from throwcollect.report.swept_keys import Parameter
-from throwcollect.report.thinning import thinned
 from throwcollect.report.throughput import Throughput
-from throwcollect.tasks.flight import BALLISTIC_TOLERANCE_M
 
-SCALE = "Viridis"
+BLUE = style_of(LANDED).colour
 NEUTRAL = "#8a8f98"
-_BLUE = style_of(LANDED).colour
-_MOST_SVG_POINTS = 1500
-"""Above this a plot is left to WebGL."""
-_FLOOR_M = 1e-17
-_ABOVE = {"orientation": "h", "x": 0, "y": 1.02, "yanchor": "bottom"}
+LEGEND_ABOVE = {"orientation": "h", "x": 0, "y": 1.02, "yanchor": "bottom"}
+LIMIT_LINE = {"color": "#D55E00", "width": 1.5, "dash": "dash"}
+MOMENT_LINE = {"color": NEUTRAL, "width": 1.5, "dash": "dot"}
+
+MOST_KEYS = 8
+"""Swept keys in a matrix of pairs."""
+_MOST_MATRIX_POINTS = 8000
+"""Points in all panels of the matrix together, which a browser draws and redraws with ease."""
+_CELL_PX = 128
+_CELL_GAP = 0.012
 
 
-def landing_map(landings: Landings, outcomes: Outcomes) -> go.Figure:
-    """Landings seen from above, coloured by release speed."""
-    figure = _coloured(
-        landings,
-        outcomes,
-        columns=("x_m", "y_m", "speed_mps"),
-        hover="x %{x:.3f} m, y %{y:.3f} m, released at %{marker.color:.2f} m/s",
-        scale_title="release speed [m/s]",
-    )
-    robot = {"symbol": "star-triangle-up", "size": 13, "color": NEUTRAL, "line": {"width": 1, "color": "white"}}
-    figure.add_scatter(x=[0], y=[0], mode="markers", name="robot", marker=robot, hovertemplate="robot<extra></extra>")
-    figure.update_xaxes(title="x, forward [m]", constrain="domain")
-    figure.update_yaxes(title="y, left [m]", scaleanchor="x", constrain="domain")
-    return figure.update_layout(height=460)
+def draw_parameter_matrix(parameters: Sequence[Parameter], outcomes: Outcomes) -> go.Figure:
+    """Draw each pair of swept keys below the diagonal, and on it how often each value occurs.
 
-
-def release_map(landings: Landings, outcomes: Outcomes) -> go.Figure:
-    """Speed and elevation at release, coloured by the distance at which the ball landed."""
-    figure = _coloured(
-        landings,
-        outcomes,
-        columns=("speed_mps", "elevation_rad", "distance_m"),
-        hover="%{x:.2f} m/s at %{y:.3f} rad, landed at %{marker.color:.3f} m",
-        scale_title="landing distance [m]",
-    )
-    figure.update_xaxes(title="release speed [m/s]")
-    figure.update_yaxes(title="release elevation [rad]")
-    return figure.update_layout(height=420)
-
-
-def _coloured(
-    landings: Landings, outcomes: Outcomes, *, columns: tuple[str, str, str], hover: str, scale_title: str
-) -> go.Figure:
-    """Points with one colour scale, and a marker of its own for each outcome."""
-    shown = landings[thinned(len(landings))]
-    x, y, colour = (getattr(shown, name) for name in columns)
-    kind = go.Scattergl if len(shown) > _MOST_SVG_POINTS else go.Scatter
-    size = _size(len(shown))
+    Args:
+        parameters: At most `MOST_KEYS`.
+        outcomes: Outcomes of the trials.
+    """
+    count = len(parameters)
+    chosen = choose_points(len(outcomes.codes), count_matrix_points(parameters))
     figure = go.Figure()
-    there = [(code, name) for code, name in enumerate(outcomes.names) if (shown.code == code).any()]
-    looks = {
-        name: {"size": size, "symbol": style_of(name).symbol}
-        | ({} if name == LANDED else {"size": 1.4 * size, "line": {"color": style_of(name).colour, "width": size / 5}})
-        for _, name in there
-    }
-    # Throws that landed come last, on top: they are what the colours are about.
-    for code, name in reversed(there):
-        own = shown.code == code
-        figure.add_trace(
-            kind(
-                x=_single(x[own]),
-                y=_single(y[own]),
-                customdata=shown.trial[own],
-                mode="markers",
-                marker={**looks[name], "color": _single(colour[own]), "coloraxis": "coloraxis"},
-                showlegend=False,
-                hovertemplate=f"trial %{{customdata}}<br>{hover}<extra>{in_words(name)}</extra>",
-            )
+    for code, name in enumerate(outcomes.names):
+        trials = chosen[outcomes.codes[chosen] == code]
+        style = style_of(name)
+        for row in range(1, count):
+            for column in range(row):
+                figure.add_scatter(
+                    x=single_precision(parameters[column].values[trials]),
+                    y=single_precision(parameters[row].values[trials]),
+                    customdata=trials,
+                    xaxis=_axis_name("x", column),
+                    yaxis=_axis_name("y", row),
+                    mode="markers",
+                    marker={"color": style.colour, "symbol": style.symbol, "size": 4, "opacity": 0.8},
+                    name=in_words(name),
+                    legendgroup=name,
+                    showlegend=row == 1,
+                    hovertemplate=f"trial %{{customdata}}<br>%{{x:.4g}}, %{{y:.4g}}<extra>{in_words(name)}</extra>",
+                )
+    for index, parameter in enumerate(parameters):
+        figure.add_bar(
+            **place_bars(parameter.edges),
+            y=parameter.counts.sum(axis=1),
+            xaxis=_axis_name("x", index),
+            yaxis=_axis_name("y", count + index),
+            marker={"color": NEUTRAL, "opacity": 0.55},
+            showlegend=False,
+            hovertemplate="%{y} trials near %{x:.4g}<extra></extra>",
         )
-    for _, name in there:
-        # A colour scale has no colour for the legend.
-        legend = {**looks[name], "size": 9, "color": NEUTRAL if name == LANDED else "rgba(0,0,0,0)"}
-        figure.add_scatter(x=[None], y=[None], mode="markers", name=in_words(name), marker=legend)
-    bar = {"title": {"text": scale_title, "side": "right"}, "thickness": 12, "outlinewidth": 0}
-    return figure.update_layout(coloraxis={"colorscale": SCALE, "colorbar": bar}, legend=_ABOVE)
+    figure.update_layout(_matrix_axes(parameters))
+    legend = {"x": 1, "y": 1, "xanchor": "right", "yanchor": "top"}
+    return figure.update_layout(height=90 + _CELL_PX * max(count, 2), bargap=0, legend=legend)
 
 
-def coverage_map(x: Axis, y: Axis, counts: NDArray[np.intp]) -> go.Figure:
-    """Number of throws over two axes of the cells; empty cells are blank."""
-    figure = go.Figure(
-        go.Heatmap(
-            x=x.edges,
-            y=y.edges,
-            z=np.where(counts, counts, np.nan).T,
-            colorscale=SCALE,
-            zmin=0,
-            xgap=1,
-            ygap=1,
-            colorbar={"title": {"text": "throws", "side": "right"}, "thickness": 12, "outlinewidth": 0},
-            hovertemplate="%{x:.3f}, %{y:.3f}<br>%{z} throws<extra></extra>",
-        )
+def count_matrix_points(parameters: Sequence[Parameter]) -> int:
+    """How many trials are drawn in each panel of the matrix, at most."""
+    return _MOST_MATRIX_POINTS // max(len(parameters) * (len(parameters) - 1) // 2, 4)
+
+
+def _matrix_axes(parameters: Sequence[Parameter]) -> dict[str, object]:
+    """Axes of the matrix: x and y of parameter i, and behind all of these the y axes of the counts."""
+    count = len(parameters)
+    axes: dict[str, object] = {}
+    for index, parameter in enumerate(parameters):
+        across = [index / count + _CELL_GAP / 2, (index + 1) / count - _CELL_GAP / 2]
+        down = [1 - across[1], 1 - across[0]]
+        last, above = parameter.short_label
+        title = {"text": f"{last}<br>{above}", "font": {"size": 10}}
+        shared = {"title": title, "tickfont": {"size": 9}, "nticks": 4, "range": _matrix_range(parameter)}
+        shared |= {"type": "log", **parameter.ticks} if parameter.logarithmic else {}
+        # Each column is labelled below its lowest panel; in the last column that is the one of the counts.
+        lowest = _axis_name("y", count - 1 if index < count - 1 else count + index)
+        axes[_axis_key("x", index)] = {**shared, "domain": across, "anchor": lowest, "tickangle": 0}
+        if index:
+            axes[_axis_key("y", index)] = {**shared, "domain": down, "anchor": "x"}
+        counts = {"domain": down, "anchor": _axis_name("x", index), "showticklabels": False, "showgrid": False}
+        axes[_axis_key("y", count + index)] = {**counts, "rangemode": "tozero"}
+    return axes
+
+
+def _matrix_range(parameter: Parameter) -> list[float]:
+    ends = parameter.edges[[0, -1]]
+    low, high = np.log10(ends) if parameter.logarithmic else ends
+    room = 0.04 * (high - low)
+    return [float(low - room), float(high + room)]
+
+
+def _axis_name(letter: str, index: int) -> str:
+    """Name of an axis in a trace."""
+    return letter if index == 0 else f"{letter}{index + 1}"
+
+
+def _axis_key(letter: str, index: int) -> str:
+    """Name of an axis in a layout."""
+    return f"{letter}axis" if index == 0 else f"{letter}axis{index + 1}"
+
+
+def draw_outcome_bars(outcomes: Outcomes) -> go.Figure:
+    """Draw number and share of trials of each outcome, the first one on top."""
+    rows = list(reversed(outcomes.counts.items()))
+    total, most = len(outcomes.codes), max(outcomes.counts.values())
+    bars = go.Bar(
+        x=[count for _, count in rows],
+        y=[in_words(name) for name, _ in rows],
+        text=[f"{count} ({count / total:.1%})" for _, count in rows],
+        textposition="outside",
+        orientation="h",
+        marker_color=[style_of(name).colour for name, _ in rows],
     )
-    figure.update_xaxes(title=x.label, showgrid=False)
-    figure.update_yaxes(title=y.label, showgrid=False)
-    return figure.update_layout(height=460)
+    figure = go.Figure(bars).update_xaxes(title="trials", range=[0, 1.3 * most], showgrid=False)
+    return figure.update_layout(height=72 + 41 * len(rows))
 
 
-def coverage_bars(axis: Axis, counts: NDArray[np.intp]) -> go.Figure:
-    """Number of throws over the only axis of the cells."""
-    middles, widths = (axis.edges[:-1] + axis.edges[1:]) / 2, np.diff(axis.edges)
-    hover = "near %{x:.3f}: %{y} throws<extra></extra>"
-    figure = go.Figure(go.Bar(x=middles, width=widths, y=counts, marker_color=_BLUE, hovertemplate=hover))
-    figure.update_xaxes(title=axis.label, showgrid=False)
-    figure.update_yaxes(title="throws")
-    return figure.update_layout(height=460, bargap=0)
-
-
-def outcome_shares(parameter: Parameter, outcomes: Outcomes) -> go.Figure:
-    """Share of each outcome in each bin of a parameter."""
+def draw_outcome_shares(parameter: Parameter, outcomes: Outcomes) -> go.Figure:
+    """Draw the share of each outcome in each bin of a parameter."""
     totals = parameter.counts.sum(axis=1)
     shares = parameter.counts / np.maximum(totals, 1)[:, np.newaxis]
+    bars = place_bars(parameter.edges)
+    axis: dict[str, Any] = {}
+    if parameter.steps is not None:
+        bars, axis = {"x": [f"{value:g}" for value in parameter.steps], "width": 0.7}, {"type": "category"}
+    elif parameter.logarithmic:
+        axis = {"type": "log", **parameter.ticks}
     figure = go.Figure()
     for code, name in enumerate(outcomes.names):
         figure.add_bar(
-            **_bars(parameter),
+            **bars,
             y=shares[:, code],
             customdata=np.stack([parameter.counts[:, code], totals], axis=1),
             name=in_words(name),
             marker_color=style_of(name).colour,
             hovertemplate=f"%{{customdata[0]}} of %{{customdata[1]}} (%{{y:.1%}})<extra>{in_words(name)}</extra>",
         )
-    figure.update_xaxes(**_axis(parameter), title=_value_title(parameter), showgrid=False)
+    figure.update_xaxes(**axis, title=f"value [{parameter.unit or '-'}]", showgrid=False)
     figure.update_yaxes(title="share of trials", tickformat=".0%", range=[0, 1])
     return figure.update_layout(barmode="stack", bargap=0, showlegend=False, height=230)
 
 
-def limit_boxes(peaks: Sequence[JointPeaks]) -> go.Figure:
-    """Peaks of each joint over their limit."""
+def draw_limit_boxes(peaks: Sequence[JointPeaks]) -> go.Figure:
+    """Draw the peaks of each joint over their limit, the first joint on top."""
     rows = list(reversed(peaks))
     low, first, median, third, high = zip(*(each.quartiles for each in rows), strict=True)
     figure = go.Figure(
@@ -157,44 +172,20 @@ def limit_boxes(peaks: Sequence[JointPeaks]) -> go.Figure:
             q3=third,
             upperfence=high,
             orientation="h",
-            line_color=_BLUE,
+            line_color=BLUE,
             showlegend=False,
             name="",
         )
     )
-    figure.add_vline(x=1, line={"color": "#D55E00", "width": 1.5, "dash": "dash"})
+    figure.add_vline(x=1, line=LIMIT_LINE)
     figure.update_xaxes(title="peak over limit [-]", range=[0, max(1.08, 1.05 * max(high))])
     return figure.update_layout(height=120 + 46 * len(rows))
 
 
-def residual_histogram(residuals: Residuals) -> go.Figure:
-    """How far flights depart from ballistic motion, on a logarithmic axis."""
-    shown = np.maximum(residuals.finite_m, _FLOOR_M)
-    low = np.floor(np.log10(shown.min()))
-    high = max(np.ceil(np.log10(max(shown.max(), 10 * _FLOOR_M))), low + 1)
-    edges = 10 ** np.arange(low, high + 0.1, 0.25)
-    counts, _ = np.histogram(np.clip(shown, edges[0], edges[-1]), edges)
-    figure = go.Figure(
-        go.Bar(
-            x=(edges[:-1] + edges[1:]) / 2,
-            width=np.diff(edges),
-            y=counts,
-            marker_color=_BLUE,
-            hovertemplate="%{y} flights near %{x:.1e} m<extra></extra>",
-        )
-    )
-    figure.add_vline(x=BALLISTIC_TOLERANCE_M, line={"color": "#D55E00", "width": 1.5, "dash": "dash"})
-    ends = [low - 0.2, max(high, np.log10(BALLISTIC_TOLERANCE_M)) + 0.5]
-    figure.update_xaxes(title="distance from ballistic motion [m]", type="log", range=ends, exponentformat="e")
-    figure.update_yaxes(title="flights")
-    return figure.update_layout(height=300, bargap=0)
-
-
-def throughput_line(throughput: Throughput) -> go.Figure:
-    """Throws a second over the time of collecting."""
-    unit, seconds = (
-        ("h", 3600) if throughput.edges_s[-1] > 7200 else ("min", 60) if throughput.edges_s[-1] > 120 else ("s", 1)
-    )
+def draw_throughput(throughput: Throughput) -> go.Figure:
+    """Draw throws a second over the time spent collecting."""
+    total_s = throughput.edges_s[-1]
+    unit, seconds = ("h", 3600) if total_s > 7200 else ("min", 60) if total_s > 120 else ("s", 1)
     edges = throughput.edges_s / seconds
     figure = go.Figure(
         go.Scatter(
@@ -202,118 +193,31 @@ def throughput_line(throughput: Throughput) -> go.Figure:
             y=np.repeat(throughput.rate_per_s, 2),
             mode="lines",
             fill="tozeroy",
-            line={"color": _BLUE, "width": 1.5},
+            line={"color": BLUE, "width": 1.5},
             name="throws",
             hovertemplate="%{y:.1f} throws/s<extra></extra>",
         )
     )
-    for kind, name, symbol, colour in (
-        ("fail", "a simulation did not bring a trial back", "x", "#D55E00"),
-        ("lost", "a trial was lost", "diamond", NEUTRAL),
+    for times_s, name, symbol, colour in (
+        (throughput.failed_s, "a simulation did not bring a trial back", "x", "#D55E00"),
+        (throughput.lost_s, "a trial was lost", "diamond", NEUTRAL),
     ):
-        times = np.array(throughput.troubles[kind]) / seconds
-        if len(times):
-            times = times[thinned(len(times), 500)]
+        if times_s:
+            x = np.array(times_s)[choose_points(len(times_s), 500)] / seconds
             marker = {"symbol": symbol, "color": colour, "size": 9}
-            rows = np.zeros(len(times))
-            figure.add_scatter(x=times, y=rows, mode="markers", name=name, marker=marker, cliponaxis=False)
-    for time in throughput.resumed_s:
-        figure.add_vline(x=time / seconds, line={"color": NEUTRAL, "width": 1.5, "dash": "dot"})
+            figure.add_scatter(x=x, y=np.zeros(len(x)), mode="markers", name=name, marker=marker, cliponaxis=False)
+    for time_s in throughput.resumed_s:
+        figure.add_vline(x=time_s / seconds, line=MOMENT_LINE)
     figure.update_xaxes(title=f"time spent collecting [{unit}]", range=[0, edges[-1]])
     figure.update_yaxes(title="throws per second [1/s]", rangemode="tozero")
-    return figure.update_layout(height=300, legend=_ABOVE, showlegend=len(figure.data) > 1)
+    return figure.update_layout(height=300, legend=LEGEND_ABOVE, showlegend=len(figure.data) > 1)
 
 
-def ball_views(paths: Sequence[BallPath], landing_height_m: float | None) -> tuple[go.Figure, go.Figure]:
-    """Paths of the ball seen from the robot's right, and from above."""
-    side, above = _ball_lines(paths, 2), _ball_lines(paths, 1)
-    if landing_height_m is not None:
-        side.add_hline(y=landing_height_m, line={"color": NEUTRAL, "width": 1})
-    side.update_yaxes(title="z, up [m]")
-    above.update_yaxes(title="y, left [m]")
-    return side, above
+def place_bars(edges: NDArray[np.float64]) -> dict[str, Any]:
+    """Place bars between edges, shape ``(n_bars + 1,)``."""
+    return {"x": (edges[:-1] + edges[1:]) / 2, "width": np.diff(edges)}
 
 
-def _ball_lines(paths: Sequence[BallPath], axis: int) -> go.Figure:
-    """Paths of the ball: x against another coordinate."""
-    letter = "xyz"[axis]
-    figure = go.Figure()
-    for number, path in enumerate(paths):
-        style = style_of(path.outcome)
-        colour = style.colour if path.outcome != LANDED else shade(number, paths)
-        name = f"trial {path.trial}" + (f", {in_words(path.outcome)}" if path.outcome != LANDED else "")
-        x, y = _single(path.positions[:, 0]), _single(path.positions[:, axis])
-        release = len(x) - 1 if path.release is None else path.release
-        hover = f"x %{{x:.3f}} m, {letter} %{{y:.3f}} m<extra>{name}</extra>"
-        common = {"mode": "lines", "legendgroup": name, "name": name, "hovertemplate": hover}
-        held = {"color": colour, "width": 1, "dash": "dot"}
-        figure.add_scatter(x=x[: release + 1], y=y[: release + 1], line=held, showlegend=False, **common)
-        figure.add_scatter(x=x[release:], y=y[release:], line={"color": colour, "width": 2}, **common)
-        marker = {"color": colour, "size": 8, "symbol": "circle-open", "line": {"width": 2}}
-        if path.release is not None:
-            figure.add_scatter(
-                x=x[release : release + 1],
-                y=y[release : release + 1],
-                marker=marker,
-                showlegend=False,
-                **{**common, "mode": "markers"},
-            )
-    figure.update_xaxes(title="x, forward [m]", constrain="domain")
-    figure.update_yaxes(scaleanchor="x", constrain="domain")
-    return figure.update_layout(height=480, legend=_ABOVE)
-
-
-def shade(number: int, paths: Sequence[BallPath]) -> str:
-    """Colour of a path that landed: from dark to bright, from the nearest to the farthest."""
-    landed = [index for index, path in enumerate(paths) if path.outcome == LANDED]
-    shades = ("#3b528b", "#2c728e", "#21908d", "#27ad81", "#5dc863", "#aadc32")
-    return shades[landed.index(number) * (len(shades) - 1) // max(len(landed) - 1, 1)]
-
-
-def joint_lines(motion: JointMotion, column: int) -> go.Figure:
-    """Commanded and measured position of one joint."""
-    figure = go.Figure()
-    for values, name, line in (
-        (motion.measured, "measured", {"color": "#56B4E9", "width": 4}),
-        (motion.commanded, "commanded", {"color": "#D55E00", "width": 1.5, "dash": "dash"}),
-    ):
-        hover = f"%{{x:.3f}} s, %{{y:.4f}} rad<extra>{name}</extra>"
-        figure.add_scatter(
-            x=_single(motion.times_s),
-            y=_single(values[:, column]),
-            mode="lines",
-            name=name,
-            line=line,
-            hovertemplate=hover,
-        )
-    if motion.release_s is not None:
-        figure.add_vline(x=motion.release_s, line={"color": NEUTRAL, "width": 1.5, "dash": "dot"})
-    figure.update_xaxes(title="time [s]")
-    figure.update_yaxes(title="position [rad]", range=list(motion.span(column)))
-    return figure.update_layout(height=230, showlegend=False)
-
-
-def _bars(parameter: Parameter) -> dict[str, Any]:
-    """Where the bars of a parameter stand."""
-    if parameter.steps is not None:
-        return {"x": [f"{value:g}" for value in parameter.steps], "width": 0.7}
-    return {"x": (parameter.edges[:-1] + parameter.edges[1:]) / 2, "width": np.diff(parameter.edges)}
-
-
-def _axis(parameter: Parameter) -> dict[str, Any]:
-    if parameter.steps is not None:
-        return {"type": "category"}
-    return {"type": "log", **parameter.ticks} if parameter.logarithmic else {}
-
-
-def _value_title(parameter: Parameter) -> str:
-    return f"value [{parameter.unit or '-'}]"
-
-
-def _size(count: int) -> float:
-    return 8 if count <= 300 else 6 if count <= 1500 else 4
-
-
-def _single(values: Any) -> Any:
-    """Single precision, which no eye can tell from double."""
-    return np.asarray(values, dtype=np.float32)
+def single_precision(values: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Values in single precision: half the size of the page, and no visible difference."""
+    return values.astype(np.float32)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pyarrow as pa
 
-from throwcollect.report.landing import numbers
+from throwcollect.report.points import read_numbers
 
 KINDS = ("position", "velocity", "effort")
 
@@ -29,14 +29,14 @@ class JointPeaks:
     reached: int
 
 
-def joint_peaks(throws: pa.Table, kind: str) -> tuple[JointPeaks, ...]:
-    """Peaks of one kind by joint, the joint that came closest to its limit first.
+def summarise_peaks(throws: pa.Table, kind: str) -> tuple[JointPeaks, ...]:
+    """Summarise the peaks of one kind by joint; the joint that came closest to its limit comes first.
 
     Args:
         throws: Table of throws.
         kind: One of `KINDS`.
     """
-    shares = numbers(throws, f"{kind}_peak_share")
+    shares = read_numbers(throws, f"{kind}_peak_share")
     joints = np.array(throws[f"{kind}_peak_joint"].to_pylist(), dtype=object)
     measured = np.isfinite(shares)
     found = []

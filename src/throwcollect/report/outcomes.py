@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.dataset.throws_table import REFUSED
-from throwcollect.tasks.throw import Outcome
+from throwcollect.tasks.throw.outcome import Outcome
 
 
 @dataclass(frozen=True)
@@ -18,30 +18,28 @@ class Style:
 
     Attributes:
         colour: In hex; told apart by people who confuse red and green, on white and on black.
-        symbol: Marker in plotly's words.
-        marker: Marker in matplotlib's words.
+        symbol: Marker, as plotly calls it.
     """
 
     colour: str
     symbol: str
-    marker: str
 
 
 LANDED = Outcome.LANDED.value
 
 _STYLES = {
-    LANDED: Style("#0072B2", "circle", "o"),
-    Outcome.LIMIT_VIOLATED.value: Style("#E69F00", "diamond", "D"),
-    Outcome.SELF_HIT.value: Style("#D55E00", "x", "X"),
-    Outcome.RECAUGHT.value: Style("#CC79A7", "triangle-up", "^"),
-    Outcome.NOT_RELEASED.value: Style("#56B4E9", "square", "s"),
-    Outcome.DROPPED.value: Style("#8A63D2", "star-triangle-down", "<"),
-    Outcome.TIMEOUT.value: Style("#009E73", "triangle-down", "v"),
-    Outcome.TRACKING_FAILED.value: Style("#999933", "cross", "P"),
-    Outcome.LOST.value: Style("#7F7F7F", "hexagon", "h"),
-    REFUSED: Style("#B3B3B3", "star", "*"),
+    LANDED: Style("#0072B2", "circle"),
+    Outcome.LIMIT_VIOLATED.value: Style("#E69F00", "diamond"),
+    Outcome.SELF_HIT.value: Style("#D55E00", "x"),
+    Outcome.RECAUGHT.value: Style("#CC79A7", "triangle-up"),
+    Outcome.NOT_RELEASED.value: Style("#56B4E9", "square"),
+    Outcome.DROPPED.value: Style("#8A63D2", "star-triangle-down"),
+    Outcome.TIMEOUT.value: Style("#009E73", "triangle-down"),
+    Outcome.TRACKING_FAILED.value: Style("#999933", "cross"),
+    Outcome.LOST.value: Style("#7F7F7F", "hexagon"),
+    REFUSED: Style("#B3B3B3", "star"),
 }
-_UNKNOWN = Style("#882255", "pentagon", "p")
+_UNKNOWN = Style("#882255", "pentagon")
 
 
 def style_of(outcome: str) -> Style:

@@ -1,40 +1,27 @@
-"""Where a dataset came from: what its data card and its configuration say."""
+"""Where a dataset came from: its digests, and how it was collected."""
 
 from __future__ import annotations
 
-from throwcollect.dataset.directory import CARD, CONFIG
-from throwcollect.dataset.inspect import Info
+from throwcollect.dataset.directory import CONFIG, PROVENANCE
+from throwcollect.dataset.provenance import read_provenance
 from throwcollect.dataset.reader import Dataset
-from throwcollect.errors import DatasetError
+from throwcollect.dataset.summary import Info
 from throwcollect.files import read_text
 from throwcollect.sweep.digest import config_digest
 
-_HEADING = "## Provenance"
 _MOST_BYTES = 10_000_000
 
 
 def provenance(dataset: Dataset, info: Info) -> dict[str, str]:
-    """Facts by name: digests first, then what the data card says; what it does not say is left out."""
+    """Facts by name: digests first, then how it was collected, as far as that is known."""
+    collected = read_provenance(dataset.directory)
     return {
         "dataset digest": info.digest,
         "configuration digest": config_digest(dataset.config),
         "layout": str(dataset.bag["custom_data"].get("throwcollect.format", "unknown")),
         "sampler": f"{dataset.config.sweep.sampler}, seed {dataset.config.seed}",
-        **_card_facts(dataset),
+        **(collected.facts() if collected else {"collected": f"unknown: it has no readable {PROVENANCE}"}),
     }
-
-
-def _card_facts(dataset: Dataset) -> dict[str, str]:
-    try:
-        text = read_text(dataset.directory / CARD, most_bytes=_MOST_BYTES)
-    except DatasetError:
-        return {}
-    rows = [
-        [cell.strip() for cell in line.strip("|").split("|")]
-        for line in text.partition(_HEADING)[2].splitlines()
-        if line.startswith("|")
-    ]
-    return {row[0]: row[1] for row in rows if len(row) == 2 and row[0].strip("-")}
 
 
 def config_text(dataset: Dataset) -> str:

@@ -1,4 +1,4 @@
-"""What was swept: how the values of each key are spread, and what came of them."""
+"""Swept keys: how the values of each are spread, and with which outcomes."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from throwcollect.config.schema import Config, Range
 from throwcollect.config.shape import shape_of
 from throwcollect.report.outcomes import Outcomes
+from throwcollect.report.points import read_numbers
 
 _BINS = 12
 
@@ -25,9 +26,9 @@ class Parameter:
         unit: Of its values; empty when they have none.
         logarithmic: Whether its logarithm was spread evenly.
         values: Value of each trial, shape ``(n_trials,)``.
-        edges: Of the bins, shape ``(n_bins + 1,)``; around each value if there are but few.
+        edges: Of the bins, shape ``(n_bins + 1,)``; around each value if there are only a few.
         counts: Trials in each bin by outcome, shape ``(n_bins, n_outcomes)``.
-        steps: The distinct values, one a bin, if there are but few; else None.
+        steps: The distinct values, one a bin, if there are only a few; else None.
     """
 
     key: str
@@ -39,13 +40,8 @@ class Parameter:
     steps: NDArray[np.float64] | None
 
     @property
-    def label(self) -> str:
-        """Key with its unit."""
-        return f"{self.key} [{self.unit or '-'}]"
-
-    @property
     def ticks(self) -> dict[str, list[Any]]:
-        """Ticks of a logarithmic axis, which mostly spans too little for powers of ten."""
+        """Ticks of a logarithmic axis, as plotly has them; mostly it spans too little for powers of ten."""
         values = [float(f"{value:.2g}") for value in np.geomspace(self.edges[0], self.edges[-1], 3)]
         return {"tickvals": values, "ticktext": [f"{value:g}" for value in values]}
 
@@ -56,8 +52,8 @@ class Parameter:
         return last, f"{above} [{self.unit or '-'}]".strip()
 
 
-def parameters(config: Config, throws: pa.Table, outcomes: Outcomes) -> tuple[Parameter, ...]:
-    """All swept keys, in the order of the table.
+def read_parameters(config: Config, throws: pa.Table, outcomes: Outcomes) -> tuple[Parameter, ...]:
+    """Read all swept keys, in the order of the table.
 
     Args:
         config: Configuration of the dataset.
@@ -65,19 +61,17 @@ def parameters(config: Config, throws: pa.Table, outcomes: Outcomes) -> tuple[Pa
         outcomes: Their outcomes.
     """
     return tuple(
-        _parameter(config, key, np.asarray(throws[key].to_numpy(), dtype=np.float64), outcomes)
-        for key in throws.column_names
-        if "." in key
+        _read_parameter(config, key, read_numbers(throws, key), outcomes) for key in throws.column_names if "." in key
     )
 
 
-def _parameter(config: Config, key: str, values: NDArray[np.float64], outcomes: Outcomes) -> Parameter:
+def _read_parameter(config: Config, key: str, values: NDArray[np.float64], outcomes: Outcomes) -> Parameter:
     swept = config.sweep.parameters.get(key)
     logarithmic = isinstance(swept, Range) and swept.scale == "log"
     distinct = np.unique(values)
     steps = distinct if len(distinct) <= _BINS else None
     if steps is not None:
-        edges = np.exp(_around(np.log(steps))) if logarithmic and len(steps) > 1 else _around(steps)
+        edges = np.exp(_surround(np.log(steps))) if logarithmic and len(steps) > 1 else _surround(steps)
         bins = np.searchsorted(steps, values)
     else:
         low, high = (swept.min, swept.max) if isinstance(swept, Range) else (distinct[0], distinct[-1])
@@ -90,7 +84,7 @@ def _parameter(config: Config, key: str, values: NDArray[np.float64], outcomes: 
     return Parameter(key, shape_of(key.split(".")).unit, logarithmic, values, edges, counts, steps)
 
 
-def _around(steps: NDArray[np.float64]) -> NDArray[np.float64]:
+def _surround(steps: NDArray[np.float64]) -> NDArray[np.float64]:
     """Edges half-way between values, and as far beyond the first and the last."""
     if len(steps) == 1:
         half = abs(steps[0]) / 2 or 0.5

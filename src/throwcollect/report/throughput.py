@@ -10,30 +10,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 _BINS = 40
-_TROUBLES = ("fail", "lost")
 
 
 @dataclass(frozen=True)
 class Throughput:
-    """Throws brought home over the time in which somebody collected; pauses between are left out.
+    """Episodes that came in, over the time spent collecting; pauses are left out.
+
+    All times are since the first event.
 
     Attributes:
-        edges_s: Of the intervals, since the first event [s], shape ``(n + 1,)``.
-        rate_per_s: Throws per second in each interval, shape ``(n,)``.
-        commits: Throws in all.
-        resumed_s: When another process went on [s].
-        troubles: When a simulation did not bring a trial back (``fail``) and when none did (``lost``) [s].
+        edges_s: Edges of intervals of time [s], shape ``(n + 1,)``.
+        rate_per_s: Episodes per second in each interval, shape ``(n,)``.
+        commits: Number of episodes.
+        resumed_s: Times at which the collection was resumed [s].
+        failed_s: Times at which a simulation failed to return a trial [s].
+        lost_s: Times at which a trial was given up [s].
     """
 
     edges_s: NDArray[np.float64]
     rate_per_s: NDArray[np.float64]
     commits: int
     resumed_s: tuple[float, ...]
-    troubles: Mapping[str, tuple[float, ...]]
+    failed_s: tuple[float, ...]
+    lost_s: tuple[float, ...]
 
 
-def throughput(events: Iterable[Mapping[str, Any]]) -> Throughput | None:
-    """Throughput over time.
+def measure_throughput(events: Iterable[Mapping[str, Any]]) -> Throughput | None:
+    """Measure throughput over time.
 
     Args:
         events: Entries of a journal, in order, each with `event` and `time` [s].
@@ -41,7 +44,7 @@ def throughput(events: Iterable[Mapping[str, Any]]) -> Throughput | None:
     Returns:
         None if no episode came in, or all at one instant.
     """
-    times: dict[str, list[float]] = {"commit": [], "opened": [], **{kind: [] for kind in _TROUBLES}}
+    times: dict[str, list[float]] = {kind: [] for kind in ("commit", "opened", "fail", "lost")}
     elapsed = 0.0
     last: float | None = None
     for event in events:
@@ -51,14 +54,15 @@ def throughput(events: Iterable[Mapping[str, Any]]) -> Throughput | None:
         last = event["time"]
         if event["event"] in times:
             times[event["event"]].append(elapsed)
-    if not times["commit"] or elapsed <= 0:
+    commits = times["commit"]
+    if not commits or elapsed <= 0:
         return None
-    edges = np.linspace(0, elapsed, min(_BINS, max(len(times["commit"]) // 5, 1)) + 1)
-    counts = np.histogram(times["commit"], edges)[0]
+    edges = np.linspace(0, elapsed, min(_BINS, max(len(commits) // 5, 1)) + 1)
     return Throughput(
         edges_s=edges,
-        rate_per_s=counts / np.diff(edges),
-        commits=len(times["commit"]),
+        rate_per_s=np.histogram(commits, edges)[0] / np.diff(edges),
+        commits=len(commits),
         resumed_s=tuple(times["opened"][1:]),
-        troubles={kind: tuple(times[kind]) for kind in _TROUBLES},
+        failed_s=tuple(times["fail"]),
+        lost_s=tuple(times["lost"]),
     )

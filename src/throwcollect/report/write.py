@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from importlib.util import find_spec
 from pathlib import Path
 
-from throwcollect.dataset.new_directory import new_directory
 from throwcollect.dataset.reader import Dataset
 from throwcollect.errors import ConfigError
-from throwcollect.files import write_file
-from throwcollect.report.dataset_facts import Facts, gather
+from throwcollect.extras import require
+from throwcollect.files import new_directory, write_file
 
 
 @dataclass(frozen=True)
 class Written:
-    """What a report consists of.
+    """Files of a report.
 
     Attributes:
         page: The page.
@@ -27,7 +25,7 @@ class Written:
 
 
 def write_report(directory: Path, page: Path, *, pictures: Path | None = None) -> Written:
-    """Report on a dataset.
+    """Write a report on a dataset.
 
     Args:
         directory: Directory of the dataset.
@@ -35,35 +33,25 @@ def write_report(directory: Path, page: Path, *, pictures: Path | None = None) -
         pictures: Directory for pictures, which must not exist or be empty; None for a page alone.
 
     Raises:
-        ConfigError: If what draws is not installed, or a file is there already.
+        MissingExtraError: If a library that draws is not installed.
+        ConfigError: If a file is there already.
         DatasetError: If the directory holds no finished dataset, it is damaged, or the report cannot be written.
     """
-    _check_installed("plotly", *(("matplotlib",) if pictures else ()))
+    require("jinja2", "plotly", *(("matplotlib",) if pictures else ()))
+    from throwcollect.report.page import render_page
+    from throwcollect.report.sections import report_dataset
+
     if page.exists():
         raise ConfigError(
             f"{page}: exists", expected="a file that is new", hint="choose another --output, or remove it"
         )
     if pictures is None:
-        _write_page(gather(Dataset.open(directory)), page)
+        write_file(page, render_page(report_dataset(Dataset.open(directory))).encode())
         return Written(page, ())
     with new_directory(pictures) as beside:
         from throwcollect.report.pictures import write_pictures
 
-        facts = gather(Dataset.open(directory))
-        names = [path.name for path in write_pictures(facts, beside)]
-        _write_page(facts, page)
+        report = report_dataset(Dataset.open(directory))
+        names = [path.name for path in write_pictures(report.sections, beside)]
+        write_file(page, render_page(report).encode())
     return Written(page, tuple(pictures / name for name in names))
-
-
-def _write_page(facts: Facts, path: Path) -> None:
-    from throwcollect.report.page import page
-
-    write_file(path, page(facts).encode())
-
-
-def _check_installed(*packages: str) -> None:
-    if missing := [name for name in packages if find_spec(name) is None]:
-        raise ConfigError(
-            f"a report needs {' and '.join(missing)}, which {'is' if len(missing) == 1 else 'are'} not installed",
-            hint="pip install 'throwcollect[report]'",
-        )

@@ -1,4 +1,4 @@
-"""What a report takes from recordings: how ballistic the flights are, and a few throws to look at."""
+"""What a report takes from recordings: departures from ballistic motion, and a few throws to look at."""
 
 from __future__ import annotations
 
@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.dataset.reader import Dataset
-from throwcollect.report.landing import Landings
 from throwcollect.report.outcomes import LANDED, Outcomes
+from throwcollect.report.throw.landings import Landings
+from throwcollect.robots.description import robot_of
 from throwcollect.robots.quintic_curve import sample_positions
-from throwcollect.robots.talos import JOINTS
-from throwcollect.tasks.flight import NS_PER_S, flight_residual, release_of
+from throwcollect.tasks.throw.config import throw_section
+from throwcollect.tasks.throw.flight import NS_PER_S, flight_residual, release_of
 from throwcollect.tasks.trajectory import throw_trajectory
 
 MOST_RESIDUALS = 2000
@@ -28,7 +29,7 @@ class Residuals:
 
     Attributes:
         episodes: Number of episodes in the dataset.
-        checked: Number of those that were looked at, chosen at random if not all.
+        checked: Number of those that were compared, chosen at random if not all.
         distance_m: Largest distance of each flight that could be compared [m], shape ``(n,)``; nan where a sample is
             not a number.
     """
@@ -49,7 +50,7 @@ class BallPath:
 
     Attributes:
         trial: Number of the trial.
-        outcome: How it ended.
+        outcome: Outcome of the trial.
         positions: Ball centre in world [m], shape ``(n_samples, 3)``.
         release: Index of the first sample after the release; None if it was not released.
     """
@@ -68,8 +69,8 @@ class JointMotion:
         trial: Number of the trial.
         joints: Their names.
         times_s: Since the start of the trial [s], shape ``(n_samples,)``.
-        commanded: What the controllers were sent [rad], shape ``(n_samples, n_joints)``.
-        measured: What the joints did [rad], shape ``(n_samples, n_joints)``.
+        commanded: Positions on the trajectory that the controllers were sent [rad], shape ``(n_samples, n_joints)``.
+        measured: Recorded positions [rad], shape ``(n_samples, n_joints)``.
         release_s: Since the start of the trial [s]; None if the ball was not released.
     """
 
@@ -81,7 +82,7 @@ class JointMotion:
     release_s: float | None
 
     def span(self, column: int) -> tuple[float, float]:
-        """Range of positions to show of a joint [rad]; joints at rest should look it."""
+        """Range of positions to show of a joint [rad], at least 0.1 rad, so that joints at rest look at rest."""
         both = np.concatenate([self.commanded[:, column], self.measured[:, column]])
         both = both[np.isfinite(both)]
         low, high = (float(both.min()), float(both.max())) if len(both) else (0.0, 0.0)
@@ -89,13 +90,13 @@ class JointMotion:
         return low - room, high + room
 
 
-def residuals(dataset: Dataset) -> Residuals:
-    """Flights computed again, at most `MOST_RESIDUALS`.
+def measure_residuals(dataset: Dataset) -> Residuals:
+    """Compare flights with ballistic motion, at most `MOST_RESIDUALS` of them.
 
     Raises:
         DatasetError: If an episode is not where the table says, or is damaged.
     """
-    trials = _with_episode(dataset)
+    trials = _find_recorded(dataset)
     # A regular choice would be a lattice in the parameters of a Sobol sequence or a grid.
     chosen = np.sort(np.random.default_rng(0).permutation(trials)[:MOST_RESIDUALS])
     found = []
@@ -108,15 +109,15 @@ def residuals(dataset: Dataset) -> Residuals:
     return Residuals(len(trials), len(chosen), np.array(found))
 
 
-def example_trials(dataset: Dataset, landed: Landings, outcomes: Outcomes) -> tuple[int, ...]:
-    """Trials to look at: some that landed, from the nearest to the farthest, and the first of some other outcomes.
+def choose_examples(dataset: Dataset, landed: Landings, outcomes: Outcomes) -> tuple[int, ...]:
+    """Choose trials to look at: some that landed, from the nearest to the farthest, and one of some other outcomes.
 
     Args:
         dataset: The dataset.
         landed: Throws that landed as planned.
         outcomes: Outcomes of all its trials.
     """
-    recorded = set(_with_episode(dataset).tolist())
+    recorded = set(_find_recorded(dataset).tolist())
     by_distance = landed.trial[np.argsort(landed.distance_m, kind="stable")].tolist()
     usable = [trial for trial in by_distance if trial in recorded]
     picks = np.linspace(0, len(usable) - 1, min(len(usable), _MOST_LANDED)).round().astype(int)
@@ -128,8 +129,8 @@ def example_trials(dataset: Dataset, landed: Landings, outcomes: Outcomes) -> tu
     return (*(usable[pick] for pick in picks), *[trial for trial in others if trial is not None][:_MOST_OTHERS])
 
 
-def ball_paths(dataset: Dataset, trials: Sequence[int]) -> Iterator[BallPath]:
-    """Paths of the ball in some throws.
+def read_paths(dataset: Dataset, trials: Sequence[int]) -> Iterator[BallPath]:
+    """Read paths of the ball.
 
     Raises:
         DatasetError: If an episode is not where the table says, or is damaged.
@@ -138,13 +139,13 @@ def ball_paths(dataset: Dataset, trials: Sequence[int]) -> Iterator[BallPath]:
     for trial in trials:
         episode = dataset.episode(trial)
         samples = episode.samples()
-        release_ns = release_of(episode.header.contacts, gap_s=dataset.config.task.recatch_gap_s)
+        release_ns = release_of(episode.header.contacts, gap_s=throw_section(dataset.config.task).recatch_gap_s)
         release = None if release_ns is None else int(np.searchsorted(samples.stamps_ns, release_ns))
         yield BallPath(trial, outcomes[trial].as_py(), samples.ball_position, release)
 
 
-def joint_motion(dataset: Dataset, trial: int) -> JointMotion:
-    """Commanded and measured motion of one throw.
+def read_motion(dataset: Dataset, trial: int) -> JointMotion:
+    """Read the commanded and measured motion of one throw.
 
     Raises:
         DatasetError: If the episode is not where the table says, or is damaged.
@@ -154,8 +155,8 @@ def joint_motion(dataset: Dataset, trial: int) -> JointMotion:
     config = dataset.plan.config_of(dataset.plan.trials[trial])
     trajectory = throw_trajectory(config)
     times = (samples.stamps_ns - episode.header.start_ns) / NS_PER_S
-    columns = [JOINTS.index(joint) for joint in trajectory.joints]
-    release_ns = release_of(episode.header.contacts, gap_s=config.task.recatch_gap_s)
+    columns = [robot_of(config).joints.index(joint) for joint in trajectory.joints]
+    release_ns = release_of(episode.header.contacts, gap_s=throw_section(config.task).recatch_gap_s)
     return JointMotion(
         trial=trial,
         joints=trajectory.joints,
@@ -166,5 +167,5 @@ def joint_motion(dataset: Dataset, trial: int) -> JointMotion:
     )
 
 
-def _with_episode(dataset: Dataset) -> NDArray[np.int64]:
+def _find_recorded(dataset: Dataset) -> NDArray[np.int64]:
     return np.flatnonzero(dataset.throws["shard"].is_valid().to_numpy())

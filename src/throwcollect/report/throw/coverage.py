@@ -1,4 +1,4 @@
-"""How many throws each target has: cells over distance, hit angle and height."""
+"""Throws by target: cells over distance, hit angle and height."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from throwcollect.config.sweep import LANDING_HEIGHT, TargetConfig
-from throwcollect.report.landing import Landings, numbers
+from throwcollect.report.points import read_numbers
+from throwcollect.report.throw.landings import Landings
 
 _BINS = 14
 _LABELS = {
@@ -24,8 +25,8 @@ class Axis:
     """One dimension of the cells.
 
     Attributes:
-        label: What is along it, with its unit.
-        edges: Of its bins, shape ``(n_bins + 1,)``.
+        label: Its title, with the unit.
+        edges: Edges of its bins, shape ``(n_bins + 1,)``.
     """
 
     label: str
@@ -40,7 +41,7 @@ class Coverage:
         axes: One to three dimensions.
         counts: Throws in each cell, of one dimension for each axis.
         throws: Number of throws that landed as planned, in a cell or not.
-        asked: Whether the configuration names the cells; else they are those between the lowest and highest values.
+        asked: Whether the cells are those of the configuration; else they lie between the lowest and highest values.
     """
 
     axes: tuple[Axis, ...]
@@ -55,7 +56,7 @@ class Coverage:
 
     @property
     def pairs(self) -> tuple[tuple[Axis, Axis, NDArray[np.intp]], ...]:
-        """Each two axes, and the throws over both, shape ``(n_first, n_second)``, whatever the third is."""
+        """Each pair of axes, and the throws over both, shape ``(n_first, n_second)``, summed over the third."""
         count = len(self.axes)
         return tuple(
             (
@@ -68,8 +69,8 @@ class Coverage:
         )
 
 
-def coverage(landings: Landings, throws: pa.Table, *, target: TargetConfig | None) -> Coverage | None:
-    """Coverage of the targets of a configuration, or of what was reached if it has none.
+def count_throws(landings: Landings, throws: pa.Table, *, target: TargetConfig | None) -> Coverage | None:
+    """Count throws in the cells of a configuration's targets, or of what was reached if it has none.
 
     Args:
         landings: Throws that landed as planned.
@@ -83,10 +84,10 @@ def coverage(landings: Landings, throws: pa.Table, *, target: TargetConfig | Non
         return None
     values = {"distance_m": landings.distance_m, "hit_angle_rad": landings.hit_angle_rad}
     if target is None:
-        edges = {name: _edges(column) for name, column in values.items()}
+        edges = {name: _choose_edges(column) for name, column in values.items()}
     else:
         if target.height_m is not None:
-            values["height_m"] = numbers(throws, LANDING_HEIGHT)[landings.trial]
+            values["height_m"] = read_numbers(throws, LANDING_HEIGHT)[landings.trial]
         bins = target.dimensions
         values = {name: column for name, column in values.items() if name in bins}
         edges = {name: np.linspace(bins[name].min, bins[name].max, bins[name].bins + 1) for name in values}
@@ -95,8 +96,8 @@ def coverage(landings: Landings, throws: pa.Table, *, target: TargetConfig | Non
     return Coverage(axes, counts.astype(np.intp), len(landings), target is not None)
 
 
-def _edges(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Edges of cells; cells of a round number, so that they can be quoted."""
+def _choose_edges(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Edges of cells whose width is a round number, so that it can be quoted."""
     low, high = float(values.min()), float(values.max())
     width = _round_up((high - low) / _BINS) or 0.1
     first, last = np.floor(low / width), np.floor(high / width) + 1

@@ -1,15 +1,21 @@
-"""Fewer points where more of them would show nothing new."""
+"""Columns of a table as points to plot, and fewer of them where more would show nothing new."""
 
 from __future__ import annotations
 
 import numpy as np
+import pyarrow as pa
 from numpy.typing import NDArray
 
 MOST_POINTS = 5000
 """Points in one plot."""
 
 
-def thinned(count: int, most: int = MOST_POINTS) -> NDArray[np.intp]:
+def read_numbers(throws: pa.Table, name: str) -> NDArray[np.float64]:
+    """A column of numbers, nan where there is none, shape ``(n_trials,)``."""
+    return np.asarray(throws[name].to_numpy(), dtype=np.float64)
+
+
+def choose_points(count: int, most: int = MOST_POINTS) -> NDArray[np.intp]:
     """Indices of the points to draw, in order: all, or as many as allowed, always the same ones.
 
     Args:

@@ -1,4 +1,4 @@
-"""Where balls landed, from where they came, and which targets they cover."""
+"""Landings of balls, and the releases that they came from."""
 
 from __future__ import annotations
 
@@ -9,11 +9,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from throwcollect.report.outcomes import Outcomes
-
-
-def numbers(throws: pa.Table, name: str) -> NDArray[np.float64]:
-    """A column of numbers, nan where there is none."""
-    return np.asarray(throws[name].to_numpy(), dtype=np.float64)
+from throwcollect.report.points import read_numbers
 
 
 @dataclass(frozen=True)
@@ -47,17 +43,17 @@ class Landings:
         return Landings(**{name: column[rows] for name, column in vars(self).items()})
 
 
-def landings(throws: pa.Table, outcomes: Outcomes) -> Landings:
-    """The landings of a table of throws."""
-    x, y = numbers(throws, "landing_x_m"), numbers(throws, "landing_y_m")
+def read_landings(throws: pa.Table, outcomes: Outcomes) -> Landings:
+    """Read the landings of a table of throws."""
+    x, y = read_numbers(throws, "landing_x_m"), read_numbers(throws, "landing_y_m")
     everything = Landings(
         trial=np.asarray(throws["trial"].to_numpy()),
         x_m=x,
         y_m=y,
         distance_m=np.hypot(x, y),
-        hit_angle_rad=numbers(throws, "hit_angle_rad"),
-        speed_mps=numbers(throws, "release_speed_mps"),
-        elevation_rad=numbers(throws, "release_elevation_rad"),
+        hit_angle_rad=read_numbers(throws, "hit_angle_rad"),
+        speed_mps=read_numbers(throws, "release_speed_mps"),
+        elevation_rad=read_numbers(throws, "release_elevation_rad"),
         code=outcomes.codes,
     )
     return everything[np.isfinite(x + y)]

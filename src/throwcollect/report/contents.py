@@ -1,0 +1,119 @@
+"""What a report is made of, before it becomes a page or pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import plotly.graph_objects as go
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A figure with its caption.
+
+    Attributes:
+        key: Its name within the section.
+        title: Short title, as text.
+        figure: The figure, with its height.
+        text: Caption, as text.
+        picture: Name of the picture for papers; panels of one name stand below one another in it. Empty for none.
+        width_px: Width below which it scrolls [px]; 0: it shrinks with the page.
+        small: Whether a third of the page is enough for it.
+        on_page: False if the page shows the same in another way, so that only the picture is drawn.
+    """
+
+    key: str
+    title: str
+    figure: go.Figure
+    text: str = ""
+    picture: str = ""
+    width_px: int = 0
+    small: bool = False
+    on_page: bool = True
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table.
+
+    Attributes:
+        rows: Text of each cell; `markupsafe.Markup` for HTML.
+        head: Titles of the columns; empty for a table whose first column has the titles of the rows.
+        number_columns: Columns of numbers, which are aligned at the right.
+    """
+
+    rows: tuple[Sequence[str], ...]
+    head: tuple[str, ...] = ()
+    number_columns: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class Listing:
+    """A file that unfolds at a click.
+
+    Attributes:
+        name: Name of the file.
+        text: Its contents.
+    """
+
+    name: str
+    text: str
+
+
+Row = tuple[Panel, ...]
+"""Panels side by side."""
+
+
+@dataclass(frozen=True)
+class Section:
+    """A part of the page.
+
+    Attributes:
+        key: Its name in links.
+        short: Its name in the table of contents.
+        title: Its subject, as text.
+        text: What it comes to, as text; `markupsafe.Markup` for HTML.
+        blocks: Below one another; a string is a paragraph.
+    """
+
+    key: str
+    short: str
+    title: str
+    text: str
+    blocks: tuple[Row | Table | Listing | str, ...] = ()
+
+    @property
+    def panels(self) -> Iterator[Panel]:
+        """All its panels, in order."""
+        return (panel for block in self.blocks if isinstance(block, tuple) for panel in block)
+
+
+@dataclass(frozen=True)
+class Tile:
+    """A key number of the dataset.
+
+    Attributes:
+        value: The number with its unit.
+        label: What it is.
+    """
+
+    value: str
+    label: str
+
+
+@dataclass(frozen=True)
+class TaskReport:
+    """What a task adds to the report on a dataset of its trials.
+
+    Attributes:
+        subject: What the trials are, after their number in a sentence.
+        tiles: Key numbers.
+        results: What came of the trials; these sections open the page.
+        episodes: Single episodes looked at closely; these follow the sections on parameters, outcomes and limits.
+    """
+
+    subject: str
+    tiles: tuple[Tile, ...]
+    results: tuple[Section, ...]
+    episodes: tuple[Section, ...]

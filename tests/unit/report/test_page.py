@@ -1,0 +1,127 @@
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import plotly.graph_objects as go
+import pytest
+from plotly.offline import get_plotlyjs
+from tests.unit.report.page_parser import Page
+
+from throwcollect.dataset.directory import PROVENANCE
+from throwcollect.dataset.provenance import read_provenance, write_provenance
+from throwcollect.dataset.reader import Dataset
+from throwcollect.report.contents import Panel, Section, Table
+from throwcollect.report.outcomes import Outcomes
+from throwcollect.report.page import render_page
+from throwcollect.report.sections import Report, report_dataset
+
+SECTIONS = [
+    "landing",
+    "release",
+    "parameters",
+    "outcomes",
+    "limits",
+    "throws",
+    "physics",
+    "throughput",
+    "provenance",
+]
+
+
+def parse(directory: Path) -> Page:
+    return Page(render_page(report_dataset(Dataset.open(directory))))
+
+
+@pytest.fixture(scope="module")
+def text(collected: Path) -> str:
+    return render_page(report_dataset(Dataset.open(collected)))
+
+
+def test_a_page_has_every_section_and_a_drawing_place_for_every_plot(text: str) -> None:
+    page = Page(text)
+    assert [attributes["id"] for attributes in page.named("section")] == SECTIONS
+    assert [attributes["href"] for attributes in page.named("a")] == [f"#{name}" for name in SECTIONS]
+    places = [attributes["id"] for attributes in page.named("div") if attributes.get("class") == "plot"]
+    assert places == list(page.plots)
+    assert {name.partition("-")[0] for name in places} >= {"landing", "parameters", "release", "limits", "throws"}
+    for name, plot in page.plots.items():
+        assert plot["data"], name
+        axes = [axis for key, axis in plot["layout"].items() if re.fullmatch(r"[xy]axis\d*", key)]
+        titled = [axis for axis in axes if axis.get("title")]
+        assert titled, name
+        for axis in titled:
+            assert re.search(r"\[.+\]$|^flights$|^throws$|^share of trials$", axis["title"]["text"]), axis
+
+
+def test_a_page_needs_nothing_from_elsewhere(text: str) -> None:
+    page = Page(text)
+    assert not [attributes for tag, attributes in page.elements if "src" in attributes]
+    assert [attributes["href"] for attributes in page.named("link")] == ["data:,"]
+    assert text.count(get_plotlyjs()) == 1
+    assert not re.search(r"\w+://|url\(|@import", text.replace(get_plotlyjs(), ""))
+    assert "default-src 'none'" in text
+    assert len(text) < 7_000_000
+
+
+def test_what_a_dataset_says_is_never_markup(collection: Any, tmp_path: Path) -> None:
+    hostile = "</script><script>alert('$x')</script> & <b>"
+    collection.refuse(4, hostile)
+    directory = collection.collect(tmp_path / "dataset", [0, 1, 2, 3, 5, 6])
+    collected = read_provenance(directory)
+    assert collected is not None
+    write_provenance(directory, replace(collected, host="<img src=x onerror=alert(1)>"))
+    page = parse(directory)
+    assert len(page.named("script")) == len(page.plots) + 2
+    assert not page.named("img")
+    assert ("td", hostile) in page.texts
+    assert ("code", "<img src=x onerror=alert(1)>") in page.texts
+
+
+@pytest.mark.parametrize("text", [None, "", "{}", '{"finished": 1e400}', "[" * 100_000, "\xff"])
+def test_a_dataset_that_does_not_say_how_it_was_collected_is_reported_all_the_same(
+    collection: Any, tmp_path: Path, text: str | None
+) -> None:
+    """Those of earlier versions have no such file."""
+    directory = collection.collect(tmp_path / "dataset")
+    (directory / PROVENANCE).unlink()
+    if text is not None:
+        (directory / PROVENANCE).write_text(text, encoding="latin-1")
+    words = parse(directory).words
+    assert "unknown: it has no readable provenance.json" in words
+    assert Dataset.open(directory).digest in words
+    assert "finished on" not in words
+
+
+def test_what_a_report_says_does_not_end_the_script_or_the_attribute_that_holds_it() -> None:
+    hostile = """a"></div>'</script ><b>"""
+    figure = go.Figure(layout_title=hostile, layout_height=100).add_scatter(x=[1], y=[2])
+    table = Table(rows=((hostile, hostile),))
+    blocks = ((Panel("key", hostile, figure, hostile),), table, hostile)
+    text = render_page(
+        Report(hostile, hostile, (), Outcomes.of([hostile]), (Section("one", hostile, hostile, hostile, blocks),))
+    )
+    assert "</script " not in text
+    page = Page(text)
+    assert page.plots["one-key"]["layout"]["title"]["text"] == hostile
+    assert [attributes["aria-label"] for attributes in page.named("div") if attributes.get("class") == "plot"] == [
+        hostile
+    ]
+    assert not page.named("b")
+    assert {tag for tag, said in page.texts if said == hostile} == {"h1", "h2", "h3", "p", "a", "th", "td"}
+
+
+def test_eight_keys_are_drawn_in_pairs_and_more_are_named(make_collection: Any, tmp_path: Path) -> None:
+    keys = [f"task.{end}.{joint}" for end in ("start", "end") for joint in ("torso_1_joint", "arm_right_4_joint")]
+    keys += ["task.duration_s", "ball.mass_kg", "ball.friction", "ball.restitution", "scene.gravity_mps2"]
+    parameters = {key: {"min": 0.2, "max": 0.9} for key in keys}
+    collection = make_collection({"trials": 20, "sweep": {"sampler": "sobol", "parameters": parameters}})
+    directory = collection.collect(tmp_path / "dataset", lost=range(20))
+    page = parse(directory)
+    plot = page.plots["parameters-pairs"]
+    assert sum(trace["type"] == "bar" for trace in plot["data"]) == 8
+    assert sum(trace["type"] == "scatter" for trace in plot["data"]) == 28
+    assert "The first 8 of 9 swept keys." in page.words
+    assert all(("code", key) in page.texts for key in keys)

@@ -1,0 +1,94 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import matplotlib.image as image
+import numpy as np
+import plotly.graph_objects as go
+import pytest
+
+from throwcollect.dataset.throws_table import REFUSED
+from throwcollect.report.contents import Panel
+from throwcollect.report.outcomes import style_of
+from throwcollect.report.painter import MARKERS, paint
+from throwcollect.tasks.throw.outcome import Outcome
+
+RED = (1.0, 0.0, 0.0)
+
+
+def red_pixels(figures: list[go.Figure], path: Path) -> np.ndarray:
+    """Where something red was painted, shape ``(height, width)``."""
+    panels = [
+        Panel(f"panel-{number}", "title", figure, small=len(figures) > 1) for number, figure in enumerate(figures)
+    ]
+    paint(panels, path, width_in=3.5, dpi=100)
+    return np.asarray(np.abs(image.imread(path)[..., :3] - RED).max(axis=2) < 0.05)
+
+
+def scatter(x: list[float], y: list[float], mode: str = "markers") -> go.Figure:
+    figure = go.Figure().add_scatter(
+        x=x,
+        y=y,
+        mode=mode,
+        marker={"color": "#ff0000", "size": 20, "symbol": "circle"},
+        line={"color": "#ff0000", "width": 6},
+    )
+    return figure.update_layout(height=400)
+
+
+def centre(mask: np.ndarray) -> tuple[float, float]:
+    rows, columns = np.nonzero(mask)
+    return rows.mean() / len(mask), columns.mean() / len(mask[0])
+
+
+def test_points_are_where_their_axes_say(tmp_path: Path) -> None:
+    figure = scatter([10.0], [1.0]).update_xaxes(type="log", range=[0, 2]).update_yaxes(range=[0, 10])
+    down, across = centre(red_pixels([figure], tmp_path / "log.png"))
+    assert across == pytest.approx(0.5, abs=0.1)  # 10 is half-way between 1 and 100
+    assert down > 0.7  # 1 is near the lower end
+
+
+def test_a_scale_anchor_makes_a_circle_of_a_circle(tmp_path: Path) -> None:
+    angles = np.linspace(0, 2 * np.pi, 100)
+    figure = scatter(np.cos(angles).tolist(), np.sin(angles).tolist(), "lines").update_yaxes(scaleanchor="x")
+    rows, columns = np.nonzero(red_pixels([figure], tmp_path / "circle.png"))
+    assert np.ptp(rows) == pytest.approx(np.ptp(columns), abs=3)
+
+
+def test_figures_of_one_picture_stand_below_one_another(tmp_path: Path) -> None:
+    figures = [scatter([1.0, 2.0], [0.0, 0.0], "lines"), scatter([1.0, 2.0], [0.0, 0.0], "lines")]
+    rows, columns = np.nonzero(red_pixels(figures, tmp_path / "stack.png"))
+    first, second = rows[rows < rows.mean()], rows[rows > rows.mean()]
+    assert second.min() - first.max() > 50
+    ends = [(columns[part].min(), columns[part].max()) for part in (rows < rows.mean(), rows > rows.mean())]
+    assert ends[0] == ends[1]
+
+
+def test_subplots_go_where_their_domains_are(tmp_path: Path) -> None:
+    red, grey = "#ff0000", "#888888"
+    figure = go.Figure(layout_height=400)
+    for number, (left, bottom) in enumerate([(0, 0.5), (0.5, 0.5), (0, 0), (0.5, 0)], start=1):
+        figure.add_bar(
+            x=[1], y=[1], width=[1], marker_color=red if number == 2 else grey, xaxis=f"x{number}", yaxis=f"y{number}"
+        )
+        figure.update_layout(
+            {f"xaxis{number}": {"domain": [left, left + 0.5]}, f"yaxis{number}": {"domain": [bottom, bottom + 0.5]}}
+        )
+    down, across = centre(red_pixels([figure], tmp_path / "grid.png"))
+    assert down < 0.45
+    assert across > 0.55
+
+
+def test_every_outcome_has_a_marker_of_its_own() -> None:
+    names = (*(outcome.value for outcome in Outcome), REFUSED, "unheard of")
+    assert len({MARKERS[style_of(name).symbol] for name in names}) == len(names)
+
+
+def test_a_trace_that_the_painter_does_not_know_is_an_error(tmp_path: Path) -> None:
+    with pytest.raises(KeyError, match="violin"):
+        paint(
+            [Panel("panel", "title", go.Figure(go.Violin(y=[1, 2])).update_layout(height=400))],
+            tmp_path / "a.png",
+            width_in=3.5,
+            dpi=100,
+        )

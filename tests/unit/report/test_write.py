@@ -1,0 +1,117 @@
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import sys
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import matplotlib.image as image
+import pytest
+from tests.unit.report.page_parser import Page
+from tests.unit.report.test_page import SECTIONS
+from typer.testing import CliRunner
+
+from throwcollect.cli.dataset.commands import dataset_app
+from throwcollect.dataset.directory import METADATA
+from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.extras import MissingExtraError
+from throwcollect.report.write import write_report
+
+
+@pytest.fixture(scope="module")
+def written(collected: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    directory = tmp_path_factory.mktemp("report")
+    write_report(collected, directory / "page.html", pictures=directory / "pictures")
+    return directory
+
+
+@pytest.mark.parametrize(
+    ("settings", "refused", "lost"),
+    [
+        ({"sweep": {"sampler": "grid", "parameters": {"task.duration_s": {"values": [1.0]}}}}, [], []),
+        ({"trials": 1}, [], [0]),
+        ({"trials": 4}, [0, 1, 3], []),
+    ],
+    ids=["a single throw", "no landing", "all refused but one"],
+)
+def test_datasets_with_little_in_them(
+    make_collection: Any,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    settings: dict[str, Any],
+    refused: list[int],
+    lost: list[int],
+) -> None:
+    collection = make_collection({"trials": None, **settings})
+    for trial in refused:
+        collection.refuse(trial, "too fast")
+    trials = [trial.number for trial in collection.plan.trials if trial.number not in refused]
+    directory = collection.collect(tmp_path / "dataset", trials, lost=lost)
+    monkeypatch.setattr("throwcollect.report.pictures.DPI", 50)
+    written = write_report(directory, tmp_path / "page.html", pictures=tmp_path / "pictures")
+    page = Page(written.page.read_text(encoding="utf-8"))
+    assert [attributes["id"] for attributes in page.named("section")] == SECTIONS
+    assert ("No ball crossed the landing plane." in page.words) == bool(lost)
+    assert "This dataset has no journal of its collection" in page.words
+    assert len(written.pictures) == (2 if lost else 9)
+    for picture in written.pictures:
+        assert image.imread(picture)[..., :3].min() < 0.9, picture.name
+
+
+def test_an_unfinished_dataset_is_refused_and_nothing_written(dataset: Path, tmp_path: Path) -> None:
+    (dataset / METADATA).unlink()
+    with pytest.raises(DatasetError, match=r"not finished|unfinished"):
+        write_report(dataset, tmp_path / "page.html", pictures=tmp_path / "pictures")
+    assert [path.name for path in tmp_path.iterdir()] == ["dataset"]
+
+
+def test_what_is_there_is_never_overwritten(collected: Path, tmp_path: Path) -> None:
+    page, pictures = tmp_path / "page.html", tmp_path / "pictures"
+    page.write_text("mine")
+    with pytest.raises(ConfigError, match=r"page\.html: exists"):
+        write_report(collected, page)
+    assert page.read_text() == "mine"
+    pictures.mkdir()
+    (pictures / "mine.png").write_text("mine")
+    with pytest.raises(ConfigError, match="pictures: exists"):
+        write_report(collected, tmp_path / "other.html", pictures=pictures)
+    assert not (tmp_path / "other.html").exists()
+
+
+def test_without_plotly_the_message_says_how_to_get_it(
+    collected: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "plotly", None)
+    with pytest.raises(MissingExtraError, match="needs plotly, which is not installed") as raised:
+        write_report(collected, tmp_path / "page.html", pictures=tmp_path / "pictures")
+    assert raised.value.hint == "pip install 'throwcollect[report]'"
+
+
+def test_the_command_writes_beside_the_dataset_and_says_what(dataset: Path, tmp_path: Path) -> None:
+    printed = CliRunner().invoke(dataset_app, ["report", str(dataset), "--json"])
+    assert printed.exit_code == 0, printed.output
+    found = json.loads(printed.output)
+    assert found["page"] == str(tmp_path / "dataset.html")
+    assert found["size_bytes"] == (tmp_path / "dataset.html").stat().st_size
+    assert found["pictures"] == []
+
+
+def test_the_documented_command_gives_the_same_report_again_with_or_without_a_display(
+    collected: Path, written: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = (Path(__file__).parents[3] / "docs" / "report.md").read_text(encoding="utf-8")
+    (command,) = re.findall(r"^throwcollect dataset (report .*)$", text, flags=re.MULTILINE)
+    shutil.copytree(collected, tmp_path / "datasets" / "quick")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("DISPLAY", "nowhere:7")
+    with mpl.rc_context({"backend": "tkagg"}):
+        printed = CliRunner().invoke(dataset_app, command.split())
+    assert printed.exit_code == 0, printed.output
+    pictures = {path.name: path for path in tmp_path.rglob("*.png")}
+    assert set(re.findall(r"^\| `(\w+\.png)` \|", text, flags=re.MULTILINE)) == set(pictures)
+    assert (tmp_path / "quick.html").read_bytes() == (written / "page.html").read_bytes()
+    for name, path in pictures.items():
+        assert path.read_bytes() == (written / "pictures" / name).read_bytes(), name

@@ -1,0 +1,47 @@
+from __future__ import annotations
+
+import numpy as np
+import pyarrow as pa
+import pytest
+
+from throwcollect.config.sweep import TargetConfig
+from throwcollect.report.throw.coverage import count_throws
+from throwcollect.report.throw.landings import Landings
+
+
+def landed(distance: list[float], angle: list[float]) -> Landings:
+    count, zero = len(distance), np.zeros(len(distance))
+    trials = np.arange(count)
+    return Landings(trials, np.array(distance), zero, np.array(distance), np.array(angle), zero, zero, trials * 0)
+
+
+def test_cells_are_those_of_the_targets() -> None:
+    target = TargetConfig.model_validate(
+        {
+            "distance_m": {"min": 1, "max": 2, "bins": 2},
+            "height_m": {"min": 0, "max": 1, "bins": 2},
+            "hit_angle_rad": {"min": 0, "max": 1, "bins": 1},
+        }
+    )
+    throws = pa.table({"scene.landing_height_m": [0.2, 0.7, 1.0, 0.1]})
+    found = count_throws(landed([1.2, 1.2, 2.0, 2.1], [0.5, 0.5, 1.0, 0.5]), throws, target=target)
+    assert found is not None
+    assert found.counts.tolist() == [[[1, 1]], [[0, 1]]]  # distance, hit angle, height
+    assert (found.hit, found.throws, found.counts.size) == (3, 4, 4)
+    assert [(first.label[:3], second.label[:3]) for first, second, _ in found.pairs] == [
+        ("lan", "hit"),
+        ("lan", "lan"),
+        ("hit", "lan"),
+    ]
+    assert found.pairs[1][2].tolist() == [[1, 1], [0, 1]]
+    assert found.pairs[2][2].tolist() == [[1, 2]]
+
+
+def test_cells_without_targets_are_of_round_numbers() -> None:
+    found = count_throws(landed([1.0, 1.34, 2.4], [1.2, 1.21, 1.3]), pa.table({}), target=None)
+    assert found is not None
+    distance, angle = found.axes
+    assert distance.edges == pytest.approx(np.arange(1.0, 2.5001 + 0.1, 0.1)[: len(distance.edges)])
+    assert np.diff(angle.edges) == pytest.approx(0.01)
+    assert found.counts.sum() == 3
+    assert count_throws(landed([], []), pa.table({}), target=None) is None

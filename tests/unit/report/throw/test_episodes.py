@@ -1,0 +1,55 @@
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from throwcollect.dataset.reader import Dataset
+from throwcollect.report.outcomes import Outcomes
+from throwcollect.report.throw.episodes import choose_examples, measure_residuals, read_motion, read_paths
+from throwcollect.report.throw.landings import read_landings
+
+
+def test_examples_are_of_trials_with_an_episode_from_the_nearest_to_the_farthest(
+    collection: Any, tmp_path: Path
+) -> None:
+    collection.refuse(5, "too fast")
+    dataset = Dataset.open(collection.collect(tmp_path / "dataset", [0, 1, 2, 3, 4, 6], lost=[2]))
+    outcomes = Outcomes.of(dataset.throws["outcome"].to_pylist())
+    landings = read_landings(dataset.throws, outcomes)
+    results = [collection.result(collection.episode(trial)) for trial in (0, 1, 3, 4, 6)]
+    assert landings.trial.tolist() == [0, 1, 3, 4, 6]
+    assert landings.x_m.tolist() == [result.landing.position[0] for result in results]
+    assert landings.distance_m == pytest.approx([np.hypot(*result.landing.position[:2]) for result in results])
+    nearest = landings.trial[np.argsort(landings.distance_m)].tolist()
+    examples = choose_examples(dataset, landings, outcomes)
+    assert list(examples) == nearest
+    assert [path.trial for path in read_paths(dataset, examples)] == nearest
+    motion = read_motion(dataset, 3)
+    assert motion.trial == 3
+    assert np.abs(motion.measured - motion.commanded).max() < 1e-9
+
+
+def test_flights_of_a_sound_dataset_are_ballistic(collected: Path) -> None:
+    residuals = measure_residuals(Dataset.open(collected))
+    assert (residuals.episodes, residuals.checked, len(residuals.distance_m)) == (7, 7, 7)
+    assert residuals.distance_m.max() < 1e-12
+
+
+def test_residuals_are_computed_for_a_part_of_many_episodes(collected: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("throwcollect.report.throw.episodes.MOST_RESIDUALS", 3)
+    found = measure_residuals(Dataset.open(collected))
+    assert (found.episodes, found.checked, len(found.distance_m)) == (7, 3, 3)
+
+
+def test_a_flight_with_a_kick_stands_out(collection: Any, tmp_path: Path) -> None:
+    def kick(samples: Any, header: Any) -> Any:
+        if header.trial == 3:
+            samples.ball_position[-5:, 0] += 1e-6
+        return samples, header
+
+    found = measure_residuals(Dataset.open(collection.collect(tmp_path / "dataset", change=kick)))
+    assert (found.distance_m > 1e-9).sum() == 1
+    assert found.distance_m[3] == pytest.approx(1e-6, rel=1e-3)
