@@ -15,7 +15,7 @@ from typing import Any
 
 from bench import collection
 from throwcollect.config.loader import load
-from throwcollect.ros.backend import VARIABLE
+from throwcollect.ros.middleware import VARIABLE
 from throwcollect.sweep.plan import make_plan
 
 CONFIG = Path(__file__).parents[1] / "configs" / "quickstart.yaml"

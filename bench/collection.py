@@ -15,11 +15,13 @@ from throwcollect.coordinator.progress import Progress
 from throwcollect.dataset.writer import create
 from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
-from throwcollect.runtime.docker import DockerRuntime
-from throwcollect.runtime.local import LocalRuntime
-from throwcollect.runtime.nodes import Runtime, endpoint_of
-from throwcollect.runtime.run_listener import RunListener
-from throwcollect.runtime.supervisor import Supervisor
+from throwcollect.runtimes.docker.containers import DockerNodes
+from throwcollect.runtimes.local import LocalNodes
+from throwcollect.runtimes.node_collection import roster
+from throwcollect.runtimes.nodes import NodeHost
+from throwcollect.runtimes.run_listener import RunListener
+from throwcollect.runtimes.runtime import Place
+from throwcollect.runtimes.supervisor import Supervisor
 from throwcollect.sweep.plan import Plan
 
 ROLES = ("sim", "router", "coordinator")
@@ -58,7 +60,7 @@ class _Mark:
 def _until(supervisor: Supervisor, listener: RunListener, reports: list[Progress], ended: int) -> float:
     """Wait until so many trials have ended; the time."""
     while not reports or reports[-1].ended < ended:
-        listener.spin(endpoint_of(supervisor.runtime), _POLL_S)
+        listener.spin(supervisor.host.connection, _POLL_S)
         if (end := supervisor.poll()[0]) is not None:
             raise RuntimeError(f"the collection ended early: {end.reason}: {end.log}")
     return time.monotonic()
@@ -71,8 +73,8 @@ class _Watch:
         self._supervisor = supervisor
         self._listener = listener
         self._reports = reports
-        names = supervisor.runtime.running()
-        self._nodes = {name: _process(supervisor.runtime.handle(name) or "") for name in names}
+        names = supervisor.host.running()
+        self._nodes = {name: _process(supervisor.host.handle(name) or "") for name in names}
 
     def until(self, ended: int) -> _Mark:
         return _Mark(
@@ -90,7 +92,7 @@ class _Watch:
 
     def finish(self) -> None:
         while self._supervisor.poll()[0] is None:
-            self._listener.spin(endpoint_of(self._supervisor.runtime), _POLL_S)
+            self._listener.spin(self._supervisor.host.connection, _POLL_S)
 
     def _sum(self, measure) -> dict[str, float]:
         return {
@@ -115,27 +117,24 @@ def _key(directory: Path) -> RunKey:
     return key
 
 
-def local_runtime(plan: Plan, directory: Path) -> LocalRuntime:
+def _place(name: str, directory: Path) -> Place:
+    return Place(name, directory, None, directory / "logs", 0, Middleware.of_process(), _key(directory))
+
+
+def local_runtime(plan: Plan, directory: Path) -> NodeHost:
     """Nodes as processes."""
-    return LocalRuntime(directory, directory / "logs", plan.config.run, _key(directory), Middleware.of_process())
+    return LocalNodes(_place("bench", directory), plan.config)
 
 
-def docker_runtime(plan: Plan, directory: Path) -> DockerRuntime:
+def docker_runtime(plan: Plan, directory: Path) -> NodeHost:
     """Nodes as containers of the default image."""
-    runtime = DockerRuntime(
-        f"bench-{os.getpid()}",
-        plan.config,
-        directory=directory,
-        logs=directory / "logs",
-        key=_key(directory),
-        middleware=Middleware.of_process(),
-    )
-    runtime.open()
-    return runtime
+    host = DockerNodes(_place(f"bench-{os.getpid()}", directory), plan.config)
+    host.open()
+    return host
 
 
 def measure(
-    plan: Plan, simulations: int, directory: Path, make_runtime: Callable[[Plan, Path], Runtime] = local_runtime
+    plan: Plan, simulations: int, directory: Path, make_runtime: Callable[[Plan, Path], NodeHost] = local_runtime
 ) -> Collection:
     """Collect all trials of a plan, as the command does, and watch the processes.
 
@@ -151,12 +150,9 @@ def measure(
     began = time.monotonic()
     run = plan.config.run
     runtime = make_runtime(plan, directory)
-    with Supervisor(runtime, run, simulations=simulations) as supervisor:
+    with Supervisor(runtime, run, roster(runtime, simulations)) as supervisor:
         supervisor.start()
-        listener = RunListener(
-            reports.append, domain_id=run.domain_id, key=_key(directory), middleware=Middleware.of_process()
-        )
-        with listener:
+        with RunListener(reports.append) as listener:
             first = _until(supervisor, listener, reports, 1)
             watch = _Watch(supervisor, listener, reports)
             start, stop = watch.until(trials // 10), watch.until(trials * 9 // 10)

@@ -9,7 +9,7 @@ from typing import Any
 import docker
 
 from bench import collection
-from throwcollect.runtime.image import default_tag
+from throwcollect.runtimes.docker.image import default_tag
 from throwcollect.sweep.plan import Plan
 
 MANY = 8

@@ -18,10 +18,9 @@ from throwcollect.coordinator.acceptance import Acceptance, Assignment
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.episode.message import pack, unpack
-from throwcollect.robots.model import joint_limits
 from throwcollect.run_key import Signer
 from throwcollect.sweep.plan import Plan
-from throwcollect.tasks.throw import judge
+from throwcollect.tasks.throw.judge import judge
 
 _SIGNER = Signer(b"key of a run")
 
@@ -35,7 +34,9 @@ def measure(directory: Path) -> tuple[float, float]:
     dataset = Dataset.open(directory)
     acceptance = Acceptance(dataset.config)
     assignments = [acceptance.assign(dataset.plan, trial) for trial in dataset.plan.trials]
-    messages = [pack(episode, assignments[episode.header.trial].conditions.to_json(), _SIGNER) for episode in dataset]
+    messages = [
+        pack(episode, assignments[episode.header.trial].conditions.to_json(), _SIGNER) for episode in dataset.episodes()
+    ]
     random.Random(0).shuffle(messages)
     with tempfile.TemporaryDirectory(prefix="throwcollect-bench-") as scratch:
         taken_in = _taken_in(messages, dataset.plan, acceptance, assignments, Path(scratch) / "data")
@@ -45,7 +46,6 @@ def measure(directory: Path) -> tuple[float, float]:
 def _taken_in(
     messages: list[bytes], plan: Plan, acceptance: Acceptance, assignments: list[Assignment], directory: Path
 ) -> float:
-    limits = joint_limits()
     writer = DatasetWriter.create(directory, plan)
     began = time.perf_counter()
     for message in messages:
@@ -59,7 +59,6 @@ def _taken_in(
             episode.header,
             config=assignment.config,
             trajectory=assignment.trajectory,
-            limits=limits,
         )
         writer.append(episode, result)
     seconds = time.perf_counter() - began

@@ -12,9 +12,9 @@ import pybullet
 
 from throwcollect.config.schema import Config
 from throwcollect.robots.description import physics_description
-from throwcollect.robots.model import joint_limits
+from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.quintic_curve import sample_quintic
-from throwcollect.robots.talos import JOINTS
+from throwcollect.robots.talos import TALOS
 from throwcollect.sim.world import World
 from throwcollect.sweep.plan import Plan
 from throwcollect.tasks.trajectory import throw_trajectory
@@ -35,7 +35,8 @@ def commands_of(config: Config, moving: tuple[str, ...]) -> Commands:
 
 def throw(world: World, state: int, commands: Commands, config: Config, forces: list[float]) -> int:
     """Run one trial the barest way; returns the number of steps."""
-    robot, joints, ball = world._scenery.robot, world._scenery.joints, world._ball
+    engine = world.engine
+    robot, joints, ball = engine._scenery.robot, engine._scenery.joints, engine._ball
     hz, stride = config.sim.physics_hz, config.sim.physics_hz // config.record.rate_hz
     gains, damping = [config.robot.position_gain_per_s / hz] * len(joints), [1.0] * len(joints)
     plane = config.scene.landing_height_m + config.ball.radius_m
@@ -70,8 +71,8 @@ def _loop(
     if core is not None:
         os.sched_setaffinity(0, {core})
     world = World(plan.config)
-    limits = joint_limits().effort * plan.config.robot.effort_scale
-    forces = [float(limits[JOINTS.index(joint)]) for joint in world.moving]
+    limits = joint_limits(TALOS).effort * plan.config.robot.effort_scale
+    forces = [float(limits[TALOS.joints.index(joint)]) for joint in world.moving]
     trials = [plan.config_of(plan.trials[number]) for number in numbers]
     prepared = [(config, commands_of(config, physics_description(config).moving)) for config in trials]
     state = pybullet.saveState()

@@ -30,7 +30,7 @@ from mcap.records import Chunk
 from mcap.stream_reader import StreamReader, get_chunk_data_stream
 
 from throwcollect import load
-from throwcollect.dataset.throw_dataset import ThrowDataset
+from throwcollect.dataset.reader import Dataset
 
 THROWS = 10_000
 COLUMNS = ("stamps_ns", "joints.position", "joints.velocity", "joints.effort", "ball.position", "ball.velocity")
@@ -61,7 +61,7 @@ class Reading:
         raw: Decompressing.
         raw_crc: Decompressing and comparing CRCs.
         mcap_chunks: The `mcap` library's way to the contents of all chunks, which compares CRCs.
-        one_thread: `ThrowDataset.trajectories` with one thread, which compares CRCs.
+        one_thread: `Dataset.trajectories` with one thread, which compares CRCs.
         moving: The same with the columns of those joints only that the task moves.
         threads: All joints, with as many threads as by default.
         by_messages: The `mcap` library, scaled to all throws.
@@ -111,7 +111,7 @@ def measure(directory: Path, *, rounds: int, throws: int = THROWS) -> Reading:
     return Reading(len(dataset), before / 1e6, after / 1e6, arrays_mb, **times)
 
 
-def _multiplied(dataset: ThrowDataset, throws: int, scratch: Path) -> ThrowDataset:
+def _multiplied(dataset: Dataset, throws: int, scratch: Path) -> Dataset:
     """At least so many throws: whole copies of all shards, which are links to one file."""
     shards = dataset.throws["shard"].to_pylist()
     column = dataset.throws.schema.get_field_index("shard")

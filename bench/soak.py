@@ -18,12 +18,12 @@ from typing import Any
 
 import psutil
 
+from rclzenoh.session_config import OVERRIDE_VARIABLE
 from throwcollect import ros
 from throwcollect.config.schema import Config
 from throwcollect.robots.description import start_posture
-from throwcollect.robots.talos import CONTROLLERS
+from throwcollect.robots.talos import TALOS
 from throwcollect.ros.router import router
-from throwcollect.ros.session_config import OVERRIDE_VARIABLE
 
 GOALS, WARM = 5000, 1000
 MOST_GROWTH_MB = 2.0
@@ -79,7 +79,7 @@ def measure(goals: int = GOALS) -> list[Look]:
 
 
 def _send(goals: int, process: psutil.Process) -> list[Look]:
-    node = ros.create_node("soak")
+    node = ros.Node("soak")
     executor = ros.SingleThreadedExecutor()
     executor.add_node(node)
     client = ros.ActionClient(node, _FJT, f"/{_NAME}/{_LIMB}/follow_joint_trajectory")
@@ -108,7 +108,7 @@ def _send(goals: int, process: psutil.Process) -> list[Look]:
 
 def _goal(offset_rad: float) -> Any:
     posture, goal = start_posture(Config(name="soak")), _FJT.Goal()
-    joints = CONTROLLERS[_LIMB]
+    joints = TALOS.controllers[_LIMB]
     positions = [posture[joint] + (offset_rad if joint == _JOINT else 0.0) for joint in joints]
     point = _Point(positions=positions)
     point.time_from_start.nanosec = _GOAL_MS * 10**6

@@ -33,7 +33,7 @@ from tests.unit.dataset.test_forgeries import FORGED, FORGERIES, problems
 from throwcollect.config.loader import load
 from throwcollect.dataset.manifest import promised_names
 from throwcollect.dataset.verify import verify
-from throwcollect.dataset.verify_manifest import manifest_findings
+from throwcollect.dataset.verify_manifest import find_manifest_problems
 
 MANIFEST = "datapackage.json"
 _TOO_ALIKE = "swapped trials"
@@ -70,7 +70,7 @@ def flips(directory: Path, count: int, source: random.Random) -> Count:
         damaged = bytearray(whole)
         damaged[place] ^= 1 << bit
         path.write_bytes(damaged)
-        seen = bool(list(manifest_findings(directory, collection)))
+        seen = bool(list(find_manifest_problems(directory, collection)))
         if number % _WHOLE_VERIFY_EVERY == 0:
             seen = seen and bool(verify(directory))
         path.write_bytes(whole)

@@ -2,5 +2,18 @@
 
 import signal
 
+import pytest
+from hypothesis import settings
+
 # Whoever starts the tests in the background may have SIGINT ignored, which all processes that they start would inherit.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+# How long an example takes depends on what else the machine does.
+settings.register_profile("any machine", deadline=None)
+settings.load_profile("any machine")
+
+
+@pytest.fixture(autouse=True)
+def _unsettled(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What carries messages is what the environment says again, whatever a test before has settled on."""
+    monkeypatch.setattr("throwcollect.ros.middleware._settled", [])

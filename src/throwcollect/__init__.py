@@ -1,7 +1,7 @@
 """throwcollect: databases of robot throws from many simulations at once.
 
-`load` is the way into a dataset from Python, `Simulator` gives single throws; what stands behind them is imported when
-they are taken.
+`__all__` lists what other programs may use; `docs/python.md` describes it. What stands behind a name is imported when
+it is taken, so `import throwcollect` costs nothing; a name that needs an extra says so there and then.
 """
 
 from typing import TYPE_CHECKING
@@ -9,23 +9,85 @@ from typing import TYPE_CHECKING
 from throwcollect.version import __version__
 
 if TYPE_CHECKING:
-    from throwcollect.dataset.throw_dataset import load as load
-    from throwcollect.simulator import Simulator as Simulator
-else:
+    from throwcollect.config.loader import load as load_config
+    from throwcollect.config.schema import Config
+    from throwcollect.dataset.reader import Dataset, load
+    from throwcollect.dataset.throw import Throw
+    from throwcollect.derive.selection import filter_trials as filter_dataset
+    from throwcollect.derive.selection import merge as merge_datasets
+    from throwcollect.derive.selection import sample as sample_dataset
+    from throwcollect.derive.split import split as split_dataset
+    from throwcollect.derive.statistics import statistics as compute_statistics
+    from throwcollect.errors import ConfigError, DatasetError, PlanError, ThrowcollectError, WorkerError
+    from throwcollect.export.formats import export as export_dataset
+    from throwcollect.extras import MissingExtraError
+    from throwcollect.replay.verification import verify_dataset
+    from throwcollect.simulator import Simulator
 
-    def __getattr__(name: str) -> object:
-        if name == "load":
-            from throwcollect.dataset.throw_dataset import load
+__all__ = [
+    "Config",
+    "ConfigError",
+    "Dataset",
+    "DatasetError",
+    "MissingExtraError",
+    "PlanError",
+    "Simulator",
+    "Throw",
+    "ThrowcollectError",
+    "WorkerError",
+    "__version__",
+    "compute_statistics",
+    "export_dataset",
+    "filter_dataset",
+    "load",
+    "load_config",
+    "merge_datasets",
+    "sample_dataset",
+    "split_dataset",
+    "verify_dataset",
+]
 
-            return load
-        if name == "Simulator":
-            from throwcollect.simulator import Simulator
+_PLACES = {
+    "Config": "config.schema:Config",
+    "ConfigError": "errors:ConfigError",
+    "Dataset": "dataset.reader:Dataset",
+    "DatasetError": "errors:DatasetError",
+    "MissingExtraError": "extras:MissingExtraError",
+    "PlanError": "errors:PlanError",
+    "Simulator": "simulator:Simulator",
+    "Throw": "dataset.throw:Throw",
+    "ThrowcollectError": "errors:ThrowcollectError",
+    "WorkerError": "errors:WorkerError",
+    "compute_statistics": "derive.statistics:statistics",
+    "export_dataset": "export.formats:export",
+    "filter_dataset": "derive.selection:filter_trials",
+    "load": "dataset.reader:load",
+    "load_config": "config.loader:load",
+    "merge_datasets": "derive.selection:merge",
+    "sample_dataset": "derive.selection:sample",
+    "split_dataset": "derive.split:split",
+    "verify_dataset": "replay.verification:verify_dataset",
+}
+"""Where each name comes from, for `__getattr__`; type checkers read the same from the imports above."""
 
-            return Simulator
+
+def __getattr__(name: str) -> object:
+    """Import what stands behind a public name.
+
+    Raises:
+        AttributeError: If there is no such name.
+        MissingExtraError: If it needs an extra that is not installed.
+    """
+    if name not in _PLACES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from importlib import import_module
 
-    def __dir__() -> list[str]:
-        return sorted({*globals(), *__all__})
+    from throwcollect.extras import explained
+
+    module, _, attribute = _PLACES[name].partition(":")
+    with explained():
+        return getattr(import_module(f"{__name__}.{module}"), attribute)
 
 
-__all__ = ["Simulator", "__version__", "load"]
+def __dir__() -> list[str]:
+    return __all__

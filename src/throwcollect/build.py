@@ -8,9 +8,11 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator
 from functools import cache
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import PackageNotFoundError, entry_points, version
 from importlib.util import find_spec
 from pathlib import Path
+
+import rclzenoh
 
 _PACKAGES = {"pybullet": "pybullet", "example-robot-data": None, "zstandard": None}
 """Packages whose versions count, and the compiled module of the one that simulates."""
@@ -19,10 +21,12 @@ _SOURCES = (".py", ".msg", ".srv", ".action")
 
 @cache
 def build_digest() -> str:
-    """SHA-256, in hexadecimal, over the installed sources, and over versions and sizes of engine and model."""
+    """SHA-256, in hexadecimal, over the installed sources, and over versions of engine, model and added packages."""
     digest = hashlib.sha256()
-    root = Path(__file__).parent
-    for path in sorted(path for path in root.rglob("*") if path.suffix in _SOURCES):
+    root = Path(__file__).parents[1]
+    # The ROS client lays out the messages of an episode.
+    packages = (Path(__file__).parent, Path(rclzenoh.__file__).parent)
+    for path in sorted(path for package in packages for path in package.rglob("*") if path.suffix in _SOURCES):
         content = path.read_bytes()
         digest.update(f"{path.relative_to(root).as_posix()}\0{len(content)}\0".encode() + content)
     for fact in _facts():
@@ -41,3 +45,8 @@ def _facts() -> Iterator[str]:
             found = find_spec(module)
             path = Path(found.origin) if found and found.origin else None
             yield f"{module} {path.stat().st_size if path and path.exists() else 'missing'} bytes"
+    # Robots, tools, engines and tasks of other packages.
+    for group in sorted(group for group in entry_points().groups if group.startswith("throwcollect.")):
+        for point in sorted(entry_points(group=group), key=lambda point: point.name):
+            package = f"{point.dist.name} {point.dist.version}" if point.dist else "an unknown package"
+            yield f"{group} {point.name}: {point.value} of {package}"

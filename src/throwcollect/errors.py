@@ -5,6 +5,7 @@
     ThrowcollectError                exit 1
     ├── ConfigError                  exit 2   the request is wrong; nothing has been started
     │   └── PlanError                exit 2   the sweep yields no trial that could be run
+    ├── MissingExtraError            exit 2   a package that an extra brings is not installed (`throwcollect.extras`)
     ├── WorkerError                  exit 3   a process of the run could not be started or was lost for good
     ├── LossError                    exit 5   a dataset is there, but trials of it are lost or doubtful
     ├── DatasetError                 exit 4   a dataset is missing, torn or contradicts itself
@@ -49,7 +50,10 @@ class ThrowcollectError(Exception):
         super().__init__(message)
 
     def __str__(self) -> str:
-        lines = [self.message]
+        return self._with_facts(self.message)
+
+    def _with_facts(self, first: str) -> str:
+        lines = [first]
         for label, text in (("expected", self.expected), ("evidence", self.evidence), ("try", self.hint)):
             if text:
                 lines.append(f"  {label}: " + text.replace("\n", "\n    "))
@@ -120,9 +124,50 @@ class LossError(ThrowcollectError):
 
 
 class DatasetError(ThrowcollectError):
-    """A dataset is missing, torn or contradicts itself."""
+    """A dataset is missing, torn or contradicts itself.
+
+    Args:
+        problem: What is wrong: one line.
+        path: The file or directory in which it is wrong; None if only the caller knows that.
+        place: Where in that file, such as ``byte 17``; empty when it is the file as a whole.
+        expected: What would have been right.
+        evidence: What was seen.
+        hint: One command or one edit that gets further.
+    """
 
     exit_code = 4
+
+    def __init__(
+        self,
+        problem: str,
+        *,
+        path: Path | None = None,
+        place: str = "",
+        expected: str | None = None,
+        evidence: str | None = None,
+        hint: str | None = None,
+    ) -> None:
+        self.problem = problem
+        self.path = path
+        self.place = place
+        message = ": ".join([*filter(None, ("" if path is None else str(path), place)), problem])
+        super().__init__(message, expected=expected, evidence=evidence, hint=hint)
+
+    @property
+    def details(self) -> str:
+        """What is wrong with all facts but where, for reports that have columns of their own for file and place."""
+        return self._with_facts(self.problem)
+
+    def located(self, path: Path | None = None, place: str = "") -> DatasetError:
+        """The same error in more detail, for a caller that knows where the bytes came from.
+
+        Args:
+            path: The file that they came from; None if that is not known here either.
+            place: Where they began; the place of the error itself follows it.
+        """
+        whole = ": ".join(filter(None, (place, self.place)))
+        facts = {"expected": self.expected, "evidence": self.evidence, "hint": self.hint}
+        return type(self)(self.problem, path=path or self.path, place=whole, **facts)
 
 
 class ForeignPlanError(DatasetError):

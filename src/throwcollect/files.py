@@ -1,21 +1,27 @@
 """Files that appear whole or not at all, that lie where they seem to lie, and errors that say what is wrong.
 
 A dataset may come from anybody, so a name in its directory may be a symbolic link to any file of the user, a pipe that
-blocks whoever opens it, or a second name of a file elsewhere. Nothing here follows such a name: a file is read, written
-or cut only if it is a regular file in the very directory that it is looked for in. That directory itself is the user's
-choice, and may be reached through links.
+blocks the process that opens it, or a second name of a file elsewhere. Nothing here follows such a name: a file is
+read, written or cut only if it is a regular file in the very directory that it is looked for in. That directory itself
+is the user's choice, and may be reached through links.
 """
 
 from __future__ import annotations
 
 import errno
 import os
+import shutil
 import stat
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from throwcollect.errors import DatasetError
+from throwcollect.errors import ConfigError, DatasetError
+
+_DIRECTORY_PERMISSIONS = 0o755
+StrPath = str | os.PathLike[str]
+"""What functions that other programs call take as a path."""
 
 _MOVE_HERE = "put the file itself, or a copy of it, in that place; or remove it"
 _HINTS = {
@@ -38,13 +44,13 @@ _REASONS = {
 
 def unwritable(path: Path, error: OSError) -> DatasetError:
     """The error that says that a path cannot be written, and why."""
-    return DatasetError(f"{path}: cannot be written: {_reason(error)}", hint=_HINTS.get(error.errno or 0))
+    return DatasetError(f"cannot be written: {_reason(error)}", path=path, hint=_HINTS.get(error.errno or 0))
 
 
 def unreadable(path: Path, error: OSError) -> DatasetError:
     """The error that says that a path cannot be read, and why."""
     hint = _MOVE_HERE if error.errno in _REASONS else None
-    return DatasetError(f"{path}: cannot be read: {_reason(error)}", hint=hint)
+    return DatasetError(f"cannot be read: {_reason(error)}", path=path, hint=hint)
 
 
 def _reason(error: OSError) -> str:
@@ -122,7 +128,7 @@ def beside(path: Path, *, mode: int = 0o666) -> Iterator[int]:
     """A new file that takes the place of `path` when the block ends well, and vanishes when it does not.
 
     While it is written, it is called ``<name>.new``. What already has that name was left by a process that was killed,
-    or put there by somebody else, and is removed.
+    or put there by another one, and is removed.
 
     Args:
         path: The file.
@@ -171,6 +177,38 @@ def replacing(path: Path) -> Iterator[int]:
         raise unwritable(path, error) from error
 
 
+@contextmanager
+def new_directory(path: Path) -> Iterator[Path]:
+    """A directory that gets its name when the block ends well, and vanishes when it does not.
+
+    Args:
+        path: The directory; must not exist, or be empty.
+
+    Yields:
+        Where to write meanwhile: a hidden directory beside it.
+
+    Raises:
+        ConfigError: If there is already something.
+        DatasetError: If the directory cannot be written.
+    """
+    try:
+        if path.is_symlink() or (path.exists() and not (path.is_dir() and not any(path.iterdir()))):
+            raise ConfigError(f"{path}: exists", expected="a directory that is new or empty")
+        if not path.parent.exists():
+            path.parent.mkdir(parents=True)
+        beside = Path(tempfile.mkdtemp(prefix=f".{path.name}.", dir=path.parent))
+    except OSError as error:
+        raise unwritable(path, error) from error
+    try:
+        yield beside
+        beside.chmod(_DIRECTORY_PERMISSIONS)
+        os.rename(beside, path)
+    except OSError as error:
+        raise unwritable(path, error) from error
+    finally:
+        shutil.rmtree(beside, ignore_errors=True)
+
+
 def remove(path: Path) -> None:
     """Remove a file, if it is there.
 
@@ -180,7 +218,7 @@ def remove(path: Path) -> None:
     try:
         path.unlink(missing_ok=True)
     except OSError as error:
-        raise DatasetError(f"{path}: cannot be removed: {error.strerror}") from error
+        raise DatasetError(f"cannot be removed: {error.strerror}", path=path) from error
 
 
 def sync_directory(directory: Path) -> None:
@@ -217,12 +255,12 @@ def read_text(path: Path, *, most_bytes: int) -> str:
         with open(open_regular(path), "rb") as file:
             data = file.read(most_bytes + 1)
         if len(data) > most_bytes:
-            raise DatasetError(f"{path}: cannot be read: larger than {most_bytes} bytes")
+            raise DatasetError(f"cannot be read: larger than {most_bytes} bytes", path=path)
         return data.decode("utf-8")
     except OSError as error:
         raise unreadable(path, error) from error
     except UnicodeDecodeError as error:
-        raise DatasetError(f"{path}: cannot be read: no UTF-8 text: byte {error.start}") from error
+        raise DatasetError(f"cannot be read: no UTF-8 text: byte {error.start}", path=path) from error
 
 
 def write_file(path: Path, data: bytes) -> None:

@@ -1,7 +1,8 @@
-"""A sign of life that costs nothing: a file that the loop of a node touches, and a health check looks at.
+"""What a node shows of its state without ROS: that it is ready, as a line in its log, and that its loop goes on.
 
-Nodes on Fast DDS have it: to join them takes a second of processor time, too much for a check that is made often. The
-image names the file; outside of containers there is none.
+The sign of life is a file that the loop of a node touches, and a health check looks at. Nodes on Fast DDS have it: to
+join them takes a second of processor time, too much for a check that is made often. The image names the file; outside
+of containers there is none.
 """
 
 from __future__ import annotations
@@ -15,6 +16,15 @@ VARIABLE = "THROWCOLLECT_HEARTBEAT"
 SILENT_S = 5.0
 """A node that has not touched its file for so long is stuck: its loop goes round several times a second."""
 _PERIOD_S = 1.0
+
+
+def ready_line(name: str) -> str:
+    """The line by which a simulation announces in its log that it is ready for trials.
+
+    Args:
+        name: Name of its node.
+    """
+    return f"{name} is ready"
 
 
 class Heartbeat:

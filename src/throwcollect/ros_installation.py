@@ -13,8 +13,10 @@ from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from pathlib import Path
 
-# Not from `interfaces`, whose import health checks cannot afford.
-DEFINITIONS = Path(__file__).parent / "interfaces" / "definitions"
+import rclzenoh
+
+# Not from `rclzenoh.interfaces`, whose import health checks cannot afford.
+DEFINITIONS = Path(rclzenoh.__file__).parent / "interfaces" / "definitions"
 """Definitions of interfaces, by package and kind."""
 PACKAGES = (
     "action_msgs",

@@ -67,7 +67,7 @@ class RunKey:
             ConfigError: If one of its files is missing, or cannot be read.
         """
         for path in (self.private_key, self.certificate):
-            check_readable(path)
+            _read(path)
 
     def create(self) -> None:
         """Make a new key; the directory is made if it is missing.
@@ -121,23 +121,24 @@ class Signer:
         return hmac.compare_digest(signature.encode(), self.sign(*parts).encode())
 
 
-def check_readable(path: Path) -> None:
-    """Find out whether this process may read a file of a key.
+def unreadable(path: Path, reason: str) -> ConfigError:
+    """What to raise when a file of a key cannot be read.
 
-    Raises:
-        ConfigError: If it is missing, or cannot be read.
+    Args:
+        path: The file.
+        reason: Why, in words.
     """
-    _read(path)
+    return ConfigError(
+        f"the key of the run cannot be read: {path}: {reason}",
+        expected=f"a directory with the key of a run, which only its owner can read (--key, {KEY_VARIABLE})",
+    )
 
 
 def _read(path: Path) -> bytes:
     try:
         return path.read_bytes()
     except OSError as error:
-        raise ConfigError(
-            f"the key of the run cannot be read: {path}: {error.strerror}",
-            expected=f"a directory with the key of a run, which only its owner can read (--key, {KEY_VARIABLE})",
-        ) from error
+        raise unreadable(path, error.strerror or str(error)) from error
 
 
 def _new_pair() -> tuple[bytes, bytes]:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 from collections.abc import Sequence
 
 _LONGEST_LINE = 1000
 _MOST_NAMES = 6
+_NUMBER = re.compile(r"(?<![\w.])-?\d[\d.]*(?:e[-+]?\d+)?")
 
 
 def counted(number: int, noun: str) -> str:
@@ -24,6 +26,14 @@ def listed(names: Sequence[str], word: str = "and") -> str:
     if len(names) > _MOST_NAMES:
         names = [*names[: _MOST_NAMES - 1], f"{len(names) - _MOST_NAMES + 1} more"]
     return f" {word} ".join(filter(None, [", ".join(names[:-1]), *names[-1:]]))
+
+
+def blank_numbers(text: str) -> str:
+    """A text with ``#`` in place of each number, so that reasons that differ only in numbers can be counted as one.
+
+    Plans and datasets store reasons as text alone; numbers in names such as ``arm_right_4_joint`` stay.
+    """
+    return _NUMBER.sub("#", text)
 
 
 def command(*words: object) -> str:

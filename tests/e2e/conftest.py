@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from throwcollect.runtime.records import STATE_VARIABLE
+from throwcollect.runs.records import STATE_VARIABLE
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -20,14 +20,14 @@ import pytest
 from tests.e2e.collection import call, command, write_config
 from throwcollect.cli.main import main
 from throwcollect.interruption import stop_signals
-from throwcollect.robots.model import share_directory
-from throwcollect.runtime.records import Records
+from throwcollect.robots.talos import TALOS
+from throwcollect.runs.records import Records
 
 pytestmark = pytest.mark.e2e
 
 PR_CAPBSET_DROP, CAP_DAC_OVERRIDE, CAP_DAC_READ_SEARCH = 24, 1, 2
 
-TALOS = "example-robot-data/robots/talos_data"
+TALOS_DATA = "example-robot-data/robots/talos_data"
 LIST = ["--set", "sweep.sampler=list", "--set", "sweep.parameters={}", "--set"]
 
 
@@ -76,7 +76,7 @@ def small(tmp_path: Path) -> Path:
         (["up", "--trials", "0", "small.yaml"], "trials: should be a whole number from 1 to 10000000 or null, got 0"),
         (
             ["up", "--runtime", "dockr", "small.yaml"],
-            "run.runtime: should be one of 'auto', 'local', 'docker', got 'dockr'; did you mean 'docker'?",
+            "run.runtime: should be one of 'auto', 'local', 'docker', 'inprocess', got 'dockr'; did you mean 'docker'?",
         ),
         (["up", "--set", "trials", "small.yaml"], "an override should be KEY=VALUE, got 'trials'"),
         (["up", "--set", "=3", "small.yaml"], "an override should be KEY=VALUE, got '=3'"),
@@ -254,10 +254,10 @@ def test_a_robot_that_cannot_be_read(urdf: str | None, message: str, small: Path
     metadata.parent.mkdir(parents=True)
     metadata.write_text("Metadata-Version: 2.1\nName: example-robot-data\nVersion: 6.0.0\n")
     if urdf is not None:
-        robot = fake / "cmeel.prefix" / "share" / TALOS
+        robot = fake / "cmeel.prefix" / "share" / TALOS_DATA
         (robot / "robots").mkdir(parents=True)
         (robot / "robots" / "talos_reduced.urdf").write_text(urdf)
-        (robot / "srdf").symlink_to(share_directory() / TALOS / "srdf")
+        (robot / "srdf").symlink_to(TALOS.share() / TALOS_DATA / "srdf")
     environment = {**os.environ, "PYTHONPATH": str(fake)}
     run = partial(subprocess.run, capture_output=True, text=True, timeout=60, env=environment, check=False)
     said = run(command("up", small, "--output", tmp_path / "data"))
@@ -391,7 +391,7 @@ def test_a_collection_outlives_its_readers(lost: str, small: Path, tmp_path: Pat
     os.close(writing)
     assert collecting.returncode == (6 if lost == "both" else 0)
     (run,) = [run for run in Records().all() if run.record.directory == str(tmp_path / "data")]
-    assert (run.record.exit_code, run.record.message, run.record.trials_ended) == (0, "", 2)
+    assert (run.record.exit_code, run.record.failure, run.record.trials_ended) == (0, None, 2)
     assert (tmp_path / "data" / "metadata.yaml").exists()
 
 

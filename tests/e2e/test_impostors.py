@@ -74,8 +74,11 @@ def spinning(context: ros.Context, *nodes: ros.Node) -> Iterator[None]:
 @contextmanager
 def started(*arguments: str | Path, log: Path) -> Iterator[subprocess.Popen[bytes]]:
     with log.open("wb") as file, subprocess.Popen(command(*arguments), stdout=file, stderr=file) as process:
-        yield process
-        process.terminate()
+        # Also when what is tried meanwhile fails; the process is waited for either way.
+        try:
+            yield process
+        finally:
+            process.terminate()
 
 
 @pytest.fixture

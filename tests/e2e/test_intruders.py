@@ -19,12 +19,13 @@ from pathlib import Path
 
 import pytest
 
+from rclzenoh.session_config import OVERRIDE_VARIABLE, client_override
 from tests.e2e.collection import Running, call, start, write_config
 from throwcollect.dataset.directory import CARD
 from throwcollect.dataset.journal import read_journal
-from throwcollect.ros.session_config import OVERRIDE_VARIABLE, client_override
 from throwcollect.run_key import RunKey
-from throwcollect.runtime.records import STATE_VARIABLE, Record, Records
+from throwcollect.runs.record import Record
+from throwcollect.runs.records import STATE_VARIABLE, Records
 
 pytestmark = [
     pytest.mark.e2e,
@@ -45,14 +46,16 @@ os.setresuid({NOBODY}, {NOBODY}, {NOBODY})
 ATTEMPT = f"""
 import json, os, sys, time, zenoh
 from throwcollect.errors import ConfigError
-from throwcollect.ros.health import REQUEST, attachment
-from throwcollect.ros.session_config import client_config
+from throwcollect.ros.zenoh_errors import zenoh_errors
+from rclzenoh.health import REQUEST, attachment
+from rclzenoh.session_config import environment_config
 {BECOME_NOBODY}
 heard = []
 for name, override in json.loads(sys.argv[1]).items():
     os.environ["ZENOH_CONFIG_OVERRIDE"] = override
     try:
-        session = zenoh.open(client_config())
+        with zenoh_errors():
+            session = zenoh.open(environment_config())
     except (zenoh.ZError, ConfigError) as error:
         print(f"{{name}}: {{error}}")
         continue
@@ -68,9 +71,11 @@ for name, override in json.loads(sys.argv[1]).items():
 
 POSE = f"""
 import os, sys
-import throwcollect.cli.nodes, throwcollect.sim.main
+import concurrent.futures.thread, mmap, pinocchio, pyarrow.parquet, scipy.stats
+import throwcollect.coordinator.main, throwcollect.coordinator.resume, throwcollect.dataset.reader
+import throwcollect.cli.nodes, throwcollect.engines.bullet.bullet_engine, throwcollect.sim.main
 from throwcollect.cli.main import main
-from throwcollect.ros.embedded import session
+from rclzenoh import session
 session._PATIENCE_S = 0.5
 {BECOME_NOBODY}
 main()

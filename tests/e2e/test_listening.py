@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 from mcap.reader import make_reader
 
+from rclzenoh.interfaces import get_message
 from tests.e2e.collection import collect, fingerprints, start, write_config
 from tests.integration.robot import connected
 from throwcollect.dataset.reader import Dataset
-from throwcollect.interfaces import get_message
 from throwcollect.ros import Context, HistoryPolicy, Node, QoSProfile, SingleThreadedExecutor
 
 pytestmark = pytest.mark.e2e
@@ -69,7 +69,7 @@ def during_trials(messages: Messages) -> Messages:
 
 def recorded(directory: Path) -> dict[str, dict[bytes, int]]:
     """Trial of every message in the dataset, by topic; read by MCAP's own library."""
-    starts = {episode.header.start_ns: episode.header.trial for episode in Dataset.open(directory)}
+    starts = {episode.header.start_ns: episode.header.trial for episode in Dataset.open(directory).episodes()}
     messages: dict[str, dict[bytes, int]] = {topic: {} for topic in KINDS}
     for path in directory.glob("*.mcap"):
         with path.open("rb") as file:

@@ -18,7 +18,8 @@ import pytest
 
 from tests.e2e.collection import call, collect, command, fingerprints, start, write_config
 from throwcollect.cli.main import main
-from throwcollect.runtime.records import STATE_VARIABLE, Record, Records
+from throwcollect.runs.record import Record
+from throwcollect.runs.records import STATE_VARIABLE, Records
 
 pytestmark = pytest.mark.e2e
 TRIALS = 40

@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 
 import throwcollect.ros.health as health
+from rclzenoh.session_config import OVERRIDE_VARIABLE
 from throwcollect.errors import ThrowcollectError
 from throwcollect.heartbeat import SILENT_S, VARIABLE, Heartbeat, is_beating
 from throwcollect.ros.middleware import Middleware
-from throwcollect.ros.session_config import OVERRIDE_VARIABLE
 
 
 @pytest.fixture

@@ -15,7 +15,7 @@ import tomllib
 
 ROOT = Path(__file__).parents[3]
 PROJECT = ROOT / "packaging" / "ros_interfaces"
-DEFINITIONS = ROOT / "src" / "throwcollect" / "interfaces" / "definitions"
+DEFINITIONS = ROOT / "src" / "rclzenoh" / "interfaces" / "definitions"
 
 
 @pytest.fixture(autouse=True)

@@ -1,0 +1,180 @@
+"""What `pip install throwcollect` without extras can do, in a fresh environment of another Python than the tests'.
+
+One Python is tried in each run; `THROWCOLLECT_TRY_PYTHONS=3.10,3.12,3.13` asks for others.
+"""
+
+import filecmp
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.unit.dataset.conftest import Collection
+from throwcollect import compute_statistics, filter_dataset
+
+ROOT = Path(__file__).parents[2]
+KNOWN = ("3.13", "3.12", "3.10")
+OF_THE_MOMENT = ("README.md", "provenance.json")
+"""Files that say when and where a dataset was made."""
+QUICKSTART = str(ROOT / "configs" / "quickstart.yaml")
+
+
+def find_python(version: str) -> str | None:
+    """Path of a Python of this version, in the path or of pyenv."""
+    of_pyenv = sorted(
+        Path(os.environ.get("PYENV_ROOT", Path.home() / ".pyenv")).glob(f"versions/{version}.*/bin/python")
+    )
+    for python in (shutil.which(f"python{version}"), *map(str, of_pyenv)):
+        if python and subprocess.run([python, "-c", "import venv"], capture_output=True, check=False).returncode == 0:
+            return python
+    return None
+
+
+def chosen_versions() -> tuple[str, ...]:
+    if asked := os.environ.get("THROWCOLLECT_TRY_PYTHONS"):
+        return tuple(asked.split(","))
+    return next(((version,) for version in KNOWN if find_python(version)), (KNOWN[0],))
+
+
+@pytest.fixture(scope="module", params=chosen_versions())
+def environment(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A fresh environment with the wheel of these sources and nothing but what it depends on."""
+    python = find_python(request.param)
+    if python is None:
+        pytest.skip(f"no Python {request.param} is here")
+    directory = tmp_path_factory.mktemp("light")
+    source = directory / "source"
+    source.mkdir()
+    for name in ("pyproject.toml", "README.md", "LICENSE"):
+        shutil.copy(ROOT / name, source)
+    shutil.copytree(ROOT / "src", source / "src", ignore=shutil.ignore_patterns("*.egg-info", "__pycache__"))
+    pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "--quiet"]
+    subprocess.run([*pip, "wheel", "--no-deps", "--wheel-dir", directory, source], check=True)
+    (wheel,) = directory.glob("*.whl")
+    subprocess.run([python, "-m", "venv", "--without-pip", directory / "venv"], check=True)
+    into = ["--python", str(directory / "venv" / "bin" / "python")]
+    subprocess.run([*pip, *into, "install", "--no-compile", "--only-binary=:all:", wheel], check=True)
+    return directory / "venv" / "bin"
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return Collection({"trials": 6}).collect(tmp_path_factory.mktemp("data") / "dataset")
+
+
+def run(environment: Path, program: str, *arguments: object) -> subprocess.CompletedProcess[str]:
+    clean = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    return subprocess.run(
+        [environment / program, *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        env=clean,
+        timeout=300,
+        check=False,
+    )
+
+
+def test_nothing_of_the_extras_is_installed(environment: Path) -> None:
+    script = "from throwcollect.extras import EXTRA_OF, is_installed; print([*filter(is_installed, EXTRA_OF)])"
+    assert run(environment, "python", "-c", script).stdout == "[]\n"
+
+
+def test_datasets_are_read_exported_and_derived_as_with_all_extras(
+    environment: Path, dataset: Path, tmp_path: Path
+) -> None:
+    for arguments in (
+        ("dataset", "info", dataset),
+        ("dataset", "digest", dataset),
+        ("dataset", "export", dataset, tmp_path / "parquet", "--to", "parquet"),
+        ("dataset", "export", dataset, tmp_path / "lerobot", "--to", "lerobot"),
+        ("dataset", "export", dataset, tmp_path / "npz", "--to", "npz", "--rate", "50"),
+        ("dataset", "merge", dataset, dataset, tmp_path / "merged"),
+        ("config", QUICKSTART),
+    ):
+        said = run(environment, "throwcollect", *arguments)
+        assert (said.returncode, said.stderr) == (0, ""), arguments
+        assert said.stdout, arguments
+    told = run(environment, "throwcollect", "dataset", "stats", dataset, "--json").stdout
+    assert json.loads(told)["samples"] == compute_statistics(dataset).samples
+    said = run(environment, "throwcollect", "dataset", "filter", dataset, tmp_path / "few", "--where", "trial < 3")
+    assert said.returncode == 0, said.stderr
+    filter_dataset(dataset, tmp_path / "as few", where="trial < 3")
+    names = sorted(path.name for path in (tmp_path / "as few").iterdir() if path.name not in OF_THE_MOMENT)
+    assert filecmp.cmpfiles(tmp_path / "few", tmp_path / "as few", names, shallow=False) == (names, [], [])
+
+
+def test_verify_names_what_it_cannot_check(environment: Path, dataset: Path) -> None:
+    said = run(environment, "throwcollect", "dataset", "verify", dataset)
+    assert (said.returncode, said.stderr) == (0, "")
+    assert "nothing wrong" in said.stdout
+    assert "not checked without the extra collect: whether the robot can do them, how its joints moved" in said.stdout
+    recording = min(dataset.glob("*.mcap"))
+    damaged = bytearray(recording.read_bytes())
+    damaged[len(damaged) // 2] ^= 1
+    whole = recording.read_bytes()
+    recording.write_bytes(damaged)
+    assert run(environment, "throwcollect", "dataset", "verify", dataset).returncode == 4
+    recording.write_bytes(whole)
+
+
+def test_the_public_functions_read_in_python(environment: Path, dataset: Path) -> None:
+    script = """
+import sys
+import throwcollect
+
+dataset = throwcollect.load(sys.argv[1])
+print(len(dataset), dataset[2].ball.position.shape[1], throwcollect.load_config(sys.argv[2]).name)
+print(throwcollect.verify_dataset(sys.argv[1]))
+try:
+    throwcollect.Simulator
+except ImportError as error:
+    print(type(error).__name__, error.extra)
+"""
+    said = run(environment, "python", "-c", script, dataset, QUICKSTART)
+    assert said.stdout.splitlines() == ["6 3 quickstart", "[]", "MissingExtraError collect"], said.stderr
+
+
+@pytest.mark.parametrize(
+    ("extra", "arguments"),
+    [
+        ("collect", ("plan", QUICKSTART)),
+        ("collect", ("up", QUICKSTART)),
+        ("collect", ("ps",)),
+        ("collect", ("ros", "topic", "list")),
+        ("collect", ("router",)),
+        ("collect", ("dataset", "rebuild", "DATASET")),
+        ("collect", ("dataset", "view", "DATASET", "out")),
+        ("docker", ("image", "build")),
+        ("report", ("dataset", "report", "DATASET")),
+        ("export", ("dataset", "export", "DATASET", "out", "--to", "hdf5")),
+        ("export", ("dataset", "export", "DATASET", "out", "--to", "mat")),
+        ("export", ("dataset", "export", "DATASET", "out", "--to", "npz", "--rate", "77")),
+    ],
+)
+def test_a_command_without_its_extra_says_which_one_helps(
+    extra: str, arguments: tuple[str, ...], environment: Path, dataset: Path, tmp_path: Path
+) -> None:
+    names = {"DATASET": str(dataset), "out": str(tmp_path / "out")}
+    said = run(environment, "throwcollect", *(names.get(word, word) for word in arguments))
+    assert (said.returncode, said.stdout) == (2, "")
+    first, *rest = said.stderr.splitlines()
+    assert first.startswith("throwcollect: this needs ")
+    assert rest == [f"  try: pip install 'throwcollect[{extra}]'"]
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_command_that_simulates_has_a_hint_for_pythons_without_a_wheel(environment: Path, dataset: Path) -> None:
+    said = run(environment, "throwcollect", "dataset", "replay", dataset, "--all")
+    assert said.returncode == 2
+    assert "this needs pybullet, which is not installed" in said.stderr
+    assert len(said.stderr.splitlines()) == 2
+
+
+def test_doctor_tells_which_extras_are_missing(environment: Path) -> None:
+    checks = {each["name"]: each for each in json.loads(run(environment, "throwcollect", "doctor", "--json").stdout)}
+    assert checks["extras"]["finding"].startswith("without collect, docker, export and report (try: pip install")
+    assert checks["robot"]["status"] == checks["embedded"]["status"] == checks["pybullet"]["status"] == "problem"

@@ -1,0 +1,23 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+from throwcollect.dataset.findings import Finding
+from throwcollect.errors import DatasetError, ForeignPlanError
+
+
+def test_an_error_about_a_dataset_has_its_facts_as_fields_and_tells_them_in_order() -> None:
+    error = DatasetError("a chunk is cut off", path=Path("a/b.mcap"), place="byte 17", expected="90 bytes")
+    assert (error.path, error.place, error.problem) == (Path("a/b.mcap"), "byte 17", "a chunk is cut off")
+    assert str(error) == "a/b.mcap: byte 17: a chunk is cut off\n  expected: 90 bytes"
+    assert error.details == "a chunk is cut off\n  expected: 90 bytes"
+    assert str(Finding.of("b.mcap", error)) == "b.mcap: byte 17: a chunk is cut off\n  expected: 90 bytes"
+
+
+def test_whoever_knows_where_it_happened_adds_that_and_loses_nothing() -> None:
+    inner = ForeignPlanError("chunk: its CRC differs", place="byte 9", expected="5", evidence="6", hint="copy it again")
+    outer = inner.located(Path("x.mcap"), "trial 4")
+    assert type(outer) is ForeignPlanError
+    assert outer.message == "x.mcap: trial 4: byte 9: chunk: its CRC differs"
+    assert (outer.expected, outer.evidence, outer.hint) == ("5", "6", "copy it again")
+    assert outer.located(place="shard 1").path == Path("x.mcap")

@@ -1,0 +1,72 @@
+import sys
+from importlib.util import find_spec
+
+import pytest
+
+from throwcollect.errors import ThrowcollectError
+from throwcollect.extras import EXTRA_OF, MissingExtraError, explained, is_installed, lazily, require
+
+
+@pytest.fixture
+def without_scipy(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in [name for name in sys.modules if name.partition(".")[0] == "scipy"]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "scipy", None)
+
+
+def test_a_module_is_imported_when_something_of_it_is_used(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delitem(sys.modules, "colorsys", raising=False)
+    module = lazily("colorsys")
+    assert "colorsys" not in sys.modules
+    assert module.rgb_to_hsv(1, 1, 1) == (0, 0, 1)
+    assert module.rgb_to_hsv is sys.modules["colorsys"].rgb_to_hsv
+
+
+def test_an_unknown_attribute_of_it_is_an_error_as_ever() -> None:
+    with pytest.raises(AttributeError, match="rgb_to_taste"):
+        _ = lazily("colorsys").rgb_to_taste
+
+
+def test_a_missing_package_is_told_with_the_extra_that_brings_it(without_scipy) -> None:
+    with pytest.raises(MissingExtraError) as raised:
+        _ = lazily("scipy.io").savemat
+    assert str(raised.value) == "this needs scipy, which is not installed\n  try: pip install 'throwcollect[collect]'"
+    assert (raised.value.package, raised.value.extra, raised.value.exit_code) == ("scipy", "collect", 2)
+
+
+def test_where_another_extra_brings_it_too_that_one_is_told(without_scipy) -> None:
+    with pytest.raises(MissingExtraError, match=r"throwcollect\[export\]"):
+        _ = lazily("scipy.io", extra="export").savemat
+    with pytest.raises(MissingExtraError, match=r"throwcollect\[export\]"):
+        require("numpy", "scipy", extra="export")
+
+
+def test_whoever_expects_an_import_error_gets_one(without_scipy) -> None:
+    with pytest.raises(ImportError), explained():
+        import scipy  # noqa: F401
+    assert issubclass(MissingExtraError, ThrowcollectError)
+
+
+def test_a_missing_module_that_no_extra_brings_is_not_explained_away() -> None:
+    with pytest.raises(ModuleNotFoundError, match="throwcollect_of_tomorrow") as raised, explained():
+        import throwcollect_of_tomorrow  # noqa: F401
+    assert not isinstance(raised.value, MissingExtraError)
+
+
+def test_a_missing_package_does_not_count_as_installed(without_scipy) -> None:
+    assert is_installed("numpy")
+    assert not is_installed("scipy")
+
+
+@pytest.mark.parametrize(("version", "wheel"), [((3, 11, 9), True), ((3, 12, 0), False)])
+def test_where_pybullet_has_no_wheel_the_hint_is_another_python(
+    version: tuple[int, int, int], wheel: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "version_info", version)
+    error = MissingExtraError("pybullet")
+    assert ("has no wheel for Python 3.12" in str(error)) == (not wheel)
+    assert ("pip install" in str(error.hint)) == wheel
+
+
+def test_every_package_of_the_table_is_there_for_the_tests() -> None:
+    assert [package for package in EXTRA_OF if find_spec(package) is None] == []

@@ -1,0 +1,59 @@
+"""The shop window: what `throwcollect.__all__` lists, what the documents describe, and what importing it costs."""
+
+import ast
+import inspect
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import throwcollect
+
+ROOT = Path(__file__).parents[2]
+DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+
+
+def test_the_list_and_what_is_shown_and_described_agree() -> None:
+    described = re.findall(r"^\| `(\w+)[`(]", (ROOT / "docs" / "python.md").read_text(encoding="utf-8"), re.MULTILINE)
+    assert dir(throwcollect) == throwcollect.__all__ == sorted(throwcollect.__all__)
+    assert sorted(described) == throwcollect.__all__
+
+
+def test_type_checkers_read_what_is_imported() -> None:
+    tree = ast.parse(inspect.getsource(throwcollect))
+    (block,) = (each for each in tree.body if isinstance(each, ast.If))
+    imported = {
+        alias.asname or alias.name: f"{statement.module}:{alias.name}".removeprefix("throwcollect.")
+        for statement in block.body
+        if isinstance(statement, ast.ImportFrom)
+        for alias in statement.names
+    }
+    assert imported == throwcollect._PLACES
+
+
+def test_everything_that_is_public_can_be_taken_and_says_what_it_does() -> None:
+    for name in throwcollect.__all__:
+        if name != "__version__":
+            taken = getattr(throwcollect, name)
+            assert inspect.isclass(taken) or inspect.isroutine(taken), name
+            assert taken.__doc__, name
+
+
+def test_importing_it_loads_nothing_else() -> None:
+    script = (
+        "import sys; before = set(sys.modules); import throwcollect; "
+        "print(*sorted(name for name in set(sys.modules) - before "
+        "if name.partition('.')[0] not in sys.stdlib_module_names))"
+    )
+    said = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert said.stdout.split() == ["throwcollect", "throwcollect.version"]
+
+
+def test_documents_import_nothing_from_inside() -> None:
+    inside = [
+        f"{path.name}: {line}"
+        for path in DOCUMENTS
+        for line in path.read_text(encoding="utf-8").splitlines()
+        if re.match(r"\s*(from throwcollect\.|import throwcollect\.)", line)
+    ]
+    assert inside == []
