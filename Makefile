@@ -1,5 +1,6 @@
 # Two commands do everything on a fresh machine: `make up` collects a first dataset, `make test` passes the tests.
-PYTHON ?= $(shell command -v python3.11 || command -v python3)
+# `make up PYTHON=python3.10` takes another Python than the one that is found.
+PYTHON ?=
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
@@ -12,21 +13,26 @@ READY_ROS := $(ROS_VENV)/.ready
 # starts twice as fast when its libraries are compiled once.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: up ros test test-containers test-processes check bench bench-full clean
+.PHONY: up ros test test-fast test-ros-client test-containers test-processes check bench bench-full clean
 
 up: $(READY)
 	$(BIN)/throwcollect up -n 2 configs/quickstart.yaml
 
 $(VENV)/bin/python:
-	$(PYTHON) -m venv $(VENV)
+	@packaging/environment.sh $(VENV) $(PYTHON)
+
+# pip shows what it downloads, as this takes minutes. Nothing may be compiled: a Bullet of one's own computes other bytes.
+INSTALL := $(BIN)/python -m pip install --no-compile --disable-pip-version-check --only-binary=pybullet
 
 $(READY): pyproject.toml | $(VENV)/bin/python
-	$(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check -e '.[report,export]'
-	touch $@
+	@echo "installing about 60 packages, 1.5 GB with the robot's description, into $(VENV)"
+	$(INSTALL) -e '.[collect,docker,report,export]'
+	@touch $@
 
 $(READY_DEV): pyproject.toml | $(VENV)/bin/python
-	$(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check -e '.[dev]'
-	touch $(READY) $@
+	@echo "installing about 80 packages, 1.7 GB with the robot's description, into $(VENV)"
+	$(INSTALL) -e '.[dev]'
+	@touch $(READY) $@
 
 # An environment with genuine rclpy on top of the one for development: `.venv-ros/bin/python -m pytest tests/ros`.
 ros: $(READY_DEV)
@@ -46,13 +52,23 @@ $(READY_ROS): $(ROS_WHEELS)/made-from.sha256 | $(READY_DEV)
 # On Fast DDS, nodes at times do not find each other on a busy machine. A run starts them again; so do its tests.
 ROS_TESTS := $(ROS_VENV)/bin/python -m pytest -n 2 --dist loadfile tests/contract tests/ros
 
+# What a contributor runs in between, in less than a minute on two cores: the rules of the house, the API of nodes on the embedded
+# backend, and all units but those that write, read, draw or simulate whole datasets.
+SLOW := cli dataset derive export replay report runs runtimes sim slimming test_simulator.py view wheels
+test-fast: $(READY_DEV)
+	$(BIN)/python -m pytest -n logical tests/architecture tests/contract tests/unit $(addprefix --ignore=tests/unit/,$(SLOW))
+
 # Continuous integration makes the image meanwhile, and names the process that does.
 test: check
-	$(BIN)/python -m pytest -n logical tests/architecture tests/unit tests/contract tests/physics
+	$(BIN)/python -m pytest -n logical tests/architecture tests/unit tests/install tests/rclzenoh tests/contract tests/physics
 	@while [ -n "$(MAKES_IMAGE)" ] && kill -0 $(MAKES_IMAGE) 2> /dev/null; do sleep 1; done
 	$(MAKE) --no-print-directory ros
 	$(ROS_TESTS) || $(ROS_TESTS) --last-failed --last-failed-no-failures none
 	$(MAKE) --no-print-directory -j 2 --output-sync=target test-containers test-processes
+
+# The ROS client alone, on the embedded backend: what somebody runs who changes it.
+test-ros-client: $(READY_DEV)
+	$(BIN)/python -m pytest -n logical tests/rclzenoh tests/contract tests/unit/ros tests/unit/cli/ros
 
 # Both wait most of the time, so they run side by side. Tests with an engine look at all that is on it, so one by one.
 test-containers:

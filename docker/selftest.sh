@@ -10,11 +10,13 @@ python - <<'PYTHON'
 import importlib
 import pkgutil
 
+import rclzenoh
 import throwcollect
-from throwcollect.ros.backend import uses_rclpy
+from throwcollect.ros.middleware import uses_rclpy
 
-EXTRAS = {"plotly", "matplotlib", "h5py"}
-for module in pkgutil.walk_packages(throwcollect.__path__, "throwcollect."):
+EXTRAS = {"docker", "plotly", "jinja2", "markupsafe", "matplotlib", "h5py"}
+modules = [module for root in (rclzenoh, throwcollect) for module in pkgutil.walk_packages(root.__path__, f"{root.__name__}.")]
+for module in modules:
     if not module.name.endswith("__main__") and (uses_rclpy() or module.name != "throwcollect.ros.genuine"):
         try:
             importlib.import_module(module.name)
@@ -24,7 +26,9 @@ for module in pkgutil.walk_packages(throwcollect.__path__, "throwcollect."):
 PYTHON
 throwcollect --help > help
 for backend; do
-    throwcollect up -n 1 --runtime local --trials 4 --set run.ros="$backend" --output "$backend" "$quickstart"
+    # On Fast DDS, nodes at times do not find each other; the next start goes on with what is there.
+    throwcollect up -n 1 --runtime local --trials 4 --set run.ros="$backend" --output "$backend" "$quickstart" \
+        || throwcollect up --resume -n 1 --runtime local --trials 4 --set run.ros="$backend" --output "$backend" "$quickstart"
     throwcollect dataset info "$backend" > info
     throwcollect dataset verify "$backend"
 done

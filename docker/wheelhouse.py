@@ -40,9 +40,12 @@ _EPOCH = (1980, 1, 1, 0, 0, 0)
 
 
 def requirements() -> list[str]:
-    """What throwcollect needs at run time and to be built, and pip, as it may be missing in the base image."""
+    """What nodes need at run time and throwcollect to be built, and pip, as it may be missing in the base image."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-    return [*project["project"]["dependencies"], *project["build-system"]["requires"], "pip"]
+    nodes = [*project["project"]["dependencies"], *project["project"]["optional-dependencies"]["collect"]]
+    # pip would compare markers with the Python that runs here, and not with the image's.
+    nodes = [requirement.partition(";")[0] for requirement in nodes]
+    return [*nodes, *project["build-system"]["requires"], "pip"]
 
 
 def digest(*, ros: bool) -> str:
