@@ -27,7 +27,7 @@ _STOP_S = 60.0
 _GRACE_S = 3.0
 _FORCE_S = 10.0
 _ANSWER_S = 10.0
-"""Time in which a launcher answers; it may be busy ending simulations."""
+"""Time in which a router, and then a launcher, answers: the one may just start again, the other be busy ending simulations."""
 
 
 def stop(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Run:
@@ -108,7 +108,7 @@ def scale(run: Run, simulations: int) -> None:
     if not get_runtime(record.runtime).can_be_scaled:
         raise ConfigError(f"run {run.id}: has one simulation, as all runs of the runtime {record.runtime} have")
     connection = run.connection
-    if connection is None or not answers(connection.endpoint):
+    if connection is None or not answers(connection.endpoint, patience_s=_ANSWER_S):
         raise _silent(run)
     connection.middleware.joining.settle()
     from throwcollect import ros
@@ -149,7 +149,7 @@ def _silent(run: Run) -> WorkerError:
     endpoint = run.record.endpoint
     return WorkerError(
         f"run {run.id}: its launcher does not answer" + (f" over the router at {endpoint}" if endpoint else ""),
-        hint="its router may just be starting again: try once more, or look at throwcollect events",
+        hint="throwcollect events tells what became of its nodes",
     )
 
 

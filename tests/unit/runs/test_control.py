@@ -95,7 +95,8 @@ def test_a_launcher_that_is_not_there_is_one_message(endpoint: str, monkeypatch:
 
 
 @pytest.mark.parametrize("nowhere", [None, "tcp/127.0.0.1:1"])
-def test_a_router_that_is_not_there_is_one_message(nowhere: str | None) -> None:
+def test_a_router_that_is_not_there_is_one_message(nowhere: str | None, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(control, "_ANSWER_S", 0.2)
     with pytest.raises(WorkerError, match="run a-0123: its launcher does not answer"):
         scale(living(nowhere), 3)
 
