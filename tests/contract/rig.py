@@ -71,8 +71,8 @@ class Rig:
         return True
 
     def sees(self, condition: Callable[[], Any]) -> bool:
-        """Whether something of others that is there can be seen: at once, or on rclpy as soon as it is discovered."""
-        return self.spin(condition) if ON_RCLPY else bool(condition())
+        """Whether something of others that is there is seen, as soon as word of it has come by the router or by discovery."""
+        return self.spin(condition)
 
     def result(self, future: Future, timeout: float = PATIENCE_S) -> Any:
         assert self.spin(future.done, timeout), "no result"
