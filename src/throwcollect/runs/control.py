@@ -27,7 +27,7 @@ _STOP_S = 60.0
 _GRACE_S = 3.0
 _FORCE_S = 10.0
 _ANSWER_S = 10.0
-"""Time in which a router, and then a launcher, answers: the one may just start again, the other be busy ending simulations."""
+"""Time in which a router, which may just be starting, and then a launcher, which may be busy, answers."""
 
 
 def stop(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Run:
