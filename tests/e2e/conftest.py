@@ -1,4 +1,4 @@
-"""Runs of tests are remembered apart from those of the user, and their processes have what the extras bring, no more."""
+"""Runs of tests are remembered apart from those of the user, and their processes have what the extras bring alone."""
 
 import os
 from collections.abc import Iterator
@@ -10,7 +10,7 @@ from throwcollect.runs.records import STATE_VARIABLE
 
 @pytest.fixture(scope="session", autouse=True)
 def environment(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    # Where pandas is installed, Arrow imports it in every process, which takes a quarter of a second. No extra brings it.
+    # Arrow imports pandas wherever that is installed, which takes each process a quarter of a second.
     extras_alone = tmp_path_factory.mktemp("extras")
     (extras_alone / "pandas.py").write_text("raise ImportError('no extra brings pandas')\n")
     with pytest.MonkeyPatch.context() as patch:
