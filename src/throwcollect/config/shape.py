@@ -44,7 +44,7 @@ class Shape:
     def alternatives(self) -> list[Shape]:
         """The shapes that a union allows; only the shape itself when it is no union."""
         nodes = self.node.get("oneOf") or self.node.get("anyOf")
-        return [Shape(_resolved(node), self.unit) for node in nodes] if nodes else [self]
+        return [Shape(_resolve(node), self.unit) for node in nodes] if nodes else [self]
 
     @property
     def keys(self) -> dict[str, Shape]:
@@ -59,7 +59,7 @@ class Shape:
     @property
     def choices(self) -> list[str]:
         """The words it allows, if there are only some."""
-        return [word for shape in self.alternatives for word in _words_allowed(shape.node)]
+        return [word for shape in self.alternatives for word in _list_words(shape.node)]
 
     def child(self, part: str | int) -> Shape:
         """The shape of what is in it under a key or an index; any value when it should hold nothing there."""
@@ -67,7 +67,7 @@ class Shape:
             rest = shape.node.get("items" if isinstance(part, int) else "additionalProperties")
             if node := shape.node.get("properties", {}).get(part) or rest:
                 inherited = self.unit if node.get("type") in ("number", "array", "object") else ""
-                return Shape(_resolved(node), node.get("unit") or _unit(str(part)) or inherited)
+                return Shape(_resolve(node), node.get("unit") or _unit(str(part)) or inherited)
         return Shape({})
 
     def __str__(self) -> str:
@@ -87,7 +87,7 @@ def shape_of(parts: Sequence[str | int]) -> Shape:
     return shape
 
 
-def _resolved(node: dict[str, Any]) -> dict[str, Any]:
+def _resolve(node: dict[str, Any]) -> dict[str, Any]:
     if "$ref" not in node:
         return node
     target = json_schema()["$defs"][node["$ref"].rpartition("/")[2]]
@@ -98,7 +98,7 @@ def _unit(key: str) -> str:
     return next((unit for suffix, unit in _UNITS.items() if key.endswith(suffix)), "")
 
 
-def _words_allowed(node: dict[str, Any]) -> list[str]:
+def _list_words(node: dict[str, Any]) -> list[str]:
     return [node["const"]] if "const" in node else list(node.get("enum", []))
 
 
@@ -106,7 +106,7 @@ def _in_words(shape: Shape) -> str:
     node = shape.node
     if own := node.get("words"):
         return str(own)
-    words = _words_allowed(node)
+    words = _list_words(node)
     if node.get("title") == "Joint":
         return "a joint's name"
     if words:

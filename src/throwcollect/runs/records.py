@@ -231,7 +231,7 @@ class Records:
                 undo.pop_all()
             return made
 
-    def inherited(self, run: str, lock: int) -> OpenRun:
+    def inherit(self, run: str, lock: int) -> OpenRun:
         """The run that the starter of this process has handed over, with its locked descriptor."""
         return OpenRun(self._runs, run, lock)
 

@@ -258,7 +258,7 @@ class SimulationNode(Node):
         """Begin the trial of a lease; what it does not say is as configured, whatever was set before."""
         if missing := [name for name in (NUMBER, CONTROLLERS) if name not in values]:
             raise ConfigError(f"{LEASE}: comes without {missing[0]}")
-        number, controllers = self._checked_trial(values)
+        number, controllers = self._check_trial(values)
         physics = {key: values[key] for key in self._physics if key in values}
         lease = Lease(self.get_namespace(), number, controllers, physics)
         if not lease.is_signed(values[LEASE], self._signer):
@@ -274,12 +274,12 @@ class SimulationNode(Node):
             trial.set_up_nothing()
         elif trial.leased and changed:
             raise ConfigError(f"{changed[0]}: {trial.lease_in_words}")
-        number, controllers = self._checked_trial(values)
+        number, controllers = self._check_trial(values)
         config = with_values(trial.setup.config, {key: values[key] for key in self._physics if key in values})
         if changed:
             trial.setup = TrialSetup(number, controllers, config)
 
-    def _checked_trial(self, values: Mapping[str, Any]) -> tuple[int, tuple[str, ...]]:
+    def _check_trial(self, values: Mapping[str, Any]) -> tuple[int, tuple[str, ...]]:
         setup = self._simulation.trial.setup
         number = int(values.get(NUMBER, setup.number))
         controllers = tuple(filter(None, values.get(CONTROLLERS, setup.controllers)))
@@ -299,13 +299,13 @@ class SimulationNode(Node):
         given = {parameter.name for parameter in parameters}
         if LEASE not in given or not self._simulation.trial.leased:
             return
-        stray = [key for key, value in self._physics.items() if key not in given and self._shown(key) != value]
+        stray = [key for key, value in self._physics.items() if key not in given and self._get_value(key) != value]
         if stray:
             self._restoring = True
             self.set_parameters([Parameter(key, value=self._physics[key]) for key in stray])
             self._restoring = False
 
-    def _shown(self, key: str) -> Any:
+    def _get_value(self, key: str) -> Any:
         return self.get_parameter(key).value
 
 

@@ -73,7 +73,7 @@ def find_resources(sources: Sequence[str]) -> tuple[list[Resource], list[str]]:
     Returns:
         What was found, in order of the URIs, and what is wrong with each source that cannot be searched.
     """
-    found = list(_installed())
+    found = list(_find_installed())
     useless = []
     for source in sources:
         try:
@@ -89,7 +89,7 @@ def find_resources(sources: Sequence[str]) -> tuple[list[Resource], list[str]]:
 
 
 @cache
-def _installed() -> tuple[Resource, ...]:
+def _find_installed() -> tuple[Resource, ...]:
     share = TALOS.share()
     return tuple(_search(share / _DATA, lambda path: f"package://{quote(path.relative_to(share).as_posix())}"))
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from throwcollect.config.loader import load, loaded, resolved_yaml
+from throwcollect.config.loader import dump_yaml, load, load_locating_errors
 from throwcollect.config.schema import (
     BallConfig,
     Config,
@@ -452,7 +452,7 @@ def test_what_is_found_later_is_named_with_the_place_of_its_key(write, key, wher
                    ball/odometry]
         """)
     found = PlanError([Problem("all too fast", key)], expected="slower ones", hint="slow down")
-    with pytest.raises(PlanError, match="all too fast") as caught, loaded(path, ["run.router_port=7447"]):
+    with pytest.raises(PlanError, match="all too fast") as caught, load_locating_errors(path, ["run.router_port=7447"]):
         raise found
     assert caught.value.message.replace(f"{path.parent}/", "") == f"{where}{key}: all too fast"
     assert (caught.value.expected, caught.value.hint) == (found.expected, found.hint)
@@ -460,7 +460,7 @@ def test_what_is_found_later_is_named_with_the_place_of_its_key(write, key, wher
 
 @pytest.mark.parametrize("problem", [Problem("torn", "trials", Path("list.csv"), 8), Problem("torn")])
 def test_what_has_another_place_or_none_keeps_it(write, problem):
-    with pytest.raises(ConfigError, match="torn") as caught, loaded(write("trials: 3")):
+    with pytest.raises(ConfigError, match="torn") as caught, load_locating_errors(write("trials: 3")):
         raise ConfigError([problem])
     assert caught.value.problems == [problem]
 
@@ -511,18 +511,18 @@ configs = st.builds(
 @given(config=configs)
 def test_resolved_text_loads_back_to_an_equal_configuration(tmp_path_factory, config):
     path = tmp_path_factory.getbasetemp() / "resolved.yaml"
-    path.write_text(resolved_yaml(config), encoding="utf-8", newline="")
+    path.write_text(dump_yaml(config), encoding="utf-8", newline="")
     loaded = load(path)
     assert loaded == config
-    assert resolved_yaml(loaded) == resolved_yaml(config)
+    assert dump_yaml(loaded) == dump_yaml(config)
 
 
 def test_resolved_text_shows_every_key():
-    lines = resolved_yaml(Config()).splitlines()
+    lines = dump_yaml(Config()).splitlines()
     assert "  mass_kg: 0.045" in lines
     assert "  topics: [joint_states, ball/odometry]" in lines
     assert "trials: null" in lines
-    assert resolved_yaml(Config(name="on")).startswith('name: "on"\n')
+    assert dump_yaml(Config(name="on")).startswith('name: "on"\n')
 
 
 PARAMETERS = "parameters: {task.duration_s: {min: 1, max: 1.2}}"
@@ -591,7 +591,7 @@ def test_until_is_enough_for_samplers_that_draw(tmp_path):
     assert config.until is not None
     assert config.until.landed == 5
     assert config.grows
-    path.write_text(resolved_yaml(config))
+    path.write_text(dump_yaml(config))
     assert load(path) == config
 
 
