@@ -49,7 +49,11 @@ def execute(app: typer.Typer) -> NoReturn:
 
 
 def _check_surroundings() -> None:
-    """Refuse what would end up in names of files and in records, and cannot."""
+    """Refuse what would end up in names of files and in records, and cannot.
+
+    Raises:
+        ConfigError: If the current directory is gone, or a word of the command line is not UTF-8.
+    """
     try:
         here = os.getcwd()
     except OSError as error:

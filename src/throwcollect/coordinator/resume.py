@@ -121,7 +121,11 @@ def _write(
 
 
 def _find_damaged(directory: Path, plan: Plan | None, *, check: bool, say: Say) -> frozenset[str]:
-    """Names of the files of a finished dataset that are missing or damaged; none if it is not finished."""
+    """Names of the files of a finished dataset that are missing or damaged; none if it is not finished.
+
+    Raises:
+        DatasetError: If the list of what the dataset was derived from is among them, as nothing else has it.
+    """
     if not is_there(directory / METADATA):
         return frozenset()
     findings = find_damage(directory, plan, in_full=check)
@@ -192,7 +196,11 @@ def _grows(before: int | None, after: int | None, config: Config) -> bool:
 
 
 def _extend(directory: Path, old: Plan | None, new: Plan) -> Plan:
-    """The new plan, which has to begin with all trials of the old one."""
+    """The new plan, which has to begin with all trials of the old one.
+
+    Raises:
+        ConfigError: If it is shorter, or its sampler draws other trials when there are more.
+    """
     if old is None:
         return new
     count = min(len(old.trials), len(new.trials))

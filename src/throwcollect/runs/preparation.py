@@ -247,7 +247,11 @@ def _take_over(records: Records, directory: Path, config: Config, onlooker: Onlo
 
 
 def _prepare(records: Records, request: _Request, plan: Plan | None, onlooker: Onlooker) -> PreparedRun:
-    """A run that is ready to be launched; nothing is left behind if that fails."""
+    """A run that is ready to be launched; nothing is left behind if that fails.
+
+    Raises:
+        ConfigError: If the dataset is in a volume, from which a collection cannot go on.
+    """
     config = request.config
     with ExitStack() as held, ExitStack() as undo:
         run = records.new(config.name)

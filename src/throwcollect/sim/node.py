@@ -255,7 +255,11 @@ class SimulationNode(Node):
         return SetParametersResult(successful=True)
 
     def _lease(self, values: Mapping[str, Any]) -> None:
-        """Begin the trial of a lease; what it does not say is as configured, whatever was set before."""
+        """Begin the trial of a lease; what it does not say is as configured, whatever was set before.
+
+        Raises:
+            ConfigError: If the lease is incomplete, or is not signed with the key of this run.
+        """
         if missing := [name for name in (NUMBER, CONTROLLERS) if name not in values]:
             raise ConfigError(f"{LEASE}: comes without {missing[0]}")
         number, controllers = self._check_trial(values)
@@ -267,7 +271,11 @@ class SimulationNode(Node):
         self._simulation.lease(TrialSetup(number, controllers, config, values[LEASE]))
 
     def _prepare(self, values: Mapping[str, Any]) -> None:
-        """Set up what the next reset prepares, unless the simulation is leased; a negative number ends the lease."""
+        """Set up what the next reset prepares, unless the simulation is leased; a negative number ends the lease.
+
+        Raises:
+            ConfigError: If the simulation is leased, so that only its coordinator may change it.
+        """
         trial = self._simulation.trial
         changed = [name for name in values if name != _FACTOR]
         if trial.leased and changed == [NUMBER] and values[NUMBER] < 0:

@@ -95,7 +95,11 @@ def _find_installed() -> tuple[Resource, ...]:
 
 
 def _search(directory: Path, uri_of: Callable[[Path], str]) -> list[Resource]:
-    """Descriptions below a directory whose collision shapes are all there."""
+    """Descriptions below a directory whose collision shapes are all there.
+
+    Raises:
+        RequestError: ``RESULT_NOT_FOUND`` if there are too many files to search.
+    """
     found = []
     seen = 0
     for parent, directories, files in os.walk(directory):
@@ -121,7 +125,11 @@ def _spawnable_name(path: Path) -> str:
 
 
 def _locate(filename: str, directory: Path | None) -> Path:
-    """File of a mesh, which may be relative to the directory of its description."""
+    """File of a mesh, which may be relative to the directory of its description.
+
+    Raises:
+        RequestError: ``MISSING_ASSETS`` if nothing says what a relative path is relative to.
+    """
     if "://" in filename:
         return _path(filename, missing="MISSING_ASSETS")
     if directory is None and not filename.startswith("/"):

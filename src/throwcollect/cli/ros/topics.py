@@ -146,7 +146,11 @@ def _types(session: Session, topic: str) -> tuple[str, list[str]]:
 
 
 def _message_type(session: Session, topic: str, kind: str | None) -> tuple[str, Any]:
-    """Absolute name and class of a topic."""
+    """Absolute name and class of a topic.
+
+    Raises:
+        ConfigError: If the topic has several types and none is named, or does not have the one that is.
+    """
     name, kinds = _types(session, topic)
     if kind is None:
         require_name("topic", name, (each for each in _names(session) if not is_hidden(each) or each == name))
