@@ -8,17 +8,8 @@ from functools import cache
 from typing import Any
 
 from throwcollect.config.schema import Config
+from throwcollect.units import unit_of_name
 
-_UNITS = {
-    "_per_s": "1/s",
-    "_kgpm3": "kg/m³",
-    "_mps2": "m/s²",
-    "_kg": "kg",
-    "_hz": "Hz",
-    "_rad": "rad",
-    "_m": "m",
-    "_s": "s",
-}
 _NOUNS = {"number": "a number", "integer": "a whole number", "string": "text", "boolean": "true or false"}
 
 
@@ -67,7 +58,7 @@ class Shape:
             rest = shape.node.get("items" if isinstance(part, int) else "additionalProperties")
             if node := shape.node.get("properties", {}).get(part) or rest:
                 inherited = self.unit if node.get("type") in ("number", "array", "object") else ""
-                return Shape(_resolve(node), node.get("unit") or _unit(str(part)) or inherited)
+                return Shape(_resolve(node), node.get("unit") or unit_of_name(str(part)) or inherited)
         return Shape({})
 
     def __str__(self) -> str:
@@ -77,6 +68,15 @@ class Shape:
 def root() -> Shape:
     """The shape of a whole configuration."""
     return Shape(json_schema())
+
+
+def unit_of_key(key: str) -> str:
+    """Unit of the numbers of a dotted key: that of its field, or else the one that a name in it ends with.
+
+    Args:
+        key: Dotted key, in which an index is a part of its own; of what is no key, the name alone counts.
+    """
+    return shape_of([int(part) if part.isdecimal() else part for part in key.split(".")]).unit or unit_of_name(key)
 
 
 def shape_of(parts: Sequence[str | int]) -> Shape:
@@ -92,10 +92,6 @@ def _resolve(node: dict[str, Any]) -> dict[str, Any]:
         return node
     target = json_schema()["$defs"][node["$ref"].rpartition("/")[2]]
     return {**target, **{key: value for key, value in node.items() if key != "$ref"}}
-
-
-def _unit(key: str) -> str:
-    return next((unit for suffix, unit in _UNITS.items() if key.endswith(suffix)), "")
 
 
 def _list_words(node: dict[str, Any]) -> list[str]:

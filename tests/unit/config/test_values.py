@@ -61,7 +61,7 @@ def test_numbers_of_numpy_are_numbers():
         ({"ball.mass_kg": -1}, r"^ball\.mass_kg: should be a number above 0 and up to 2 kg, got -1$"),
         (
             {"task.trajectory.weights.arm_right_4_joint.1": float("nan")},
-            r"^task\.trajectory\.weights\.arm_right_4_joint\.1: should be a number, got nan$",
+            r"^task\.trajectory\.weights\.arm_right_4_joint\.1: should be a number in rad, got nan$",
         ),
         (
             {"task.end.torso_1_joint": 90},
