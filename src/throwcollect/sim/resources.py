@@ -73,7 +73,7 @@ def find_resources(sources: Sequence[str]) -> tuple[list[Resource], list[str]]:
     Returns:
         What was found, in order of the URIs, and what is wrong with each source that cannot be searched.
     """
-    found = list(_installed())
+    found = list(_find_installed())
     useless = []
     for source in sources:
         try:
@@ -89,13 +89,17 @@ def find_resources(sources: Sequence[str]) -> tuple[list[Resource], list[str]]:
 
 
 @cache
-def _installed() -> tuple[Resource, ...]:
+def _find_installed() -> tuple[Resource, ...]:
     share = TALOS.share()
     return tuple(_search(share / _DATA, lambda path: f"package://{quote(path.relative_to(share).as_posix())}"))
 
 
 def _search(directory: Path, uri_of: Callable[[Path], str]) -> list[Resource]:
-    """Descriptions below a directory whose collision shapes are all there."""
+    """Descriptions below a directory whose collision shapes are all there.
+
+    Raises:
+        RequestError: ``RESULT_NOT_FOUND`` if there are too many files to search.
+    """
     found = []
     seen = 0
     for parent, directories, files in os.walk(directory):
@@ -121,7 +125,11 @@ def _spawnable_name(path: Path) -> str:
 
 
 def _locate(filename: str, directory: Path | None) -> Path:
-    """File of a mesh, which may be relative to the directory of its description."""
+    """File of a mesh, which may be relative to the directory of its description.
+
+    Raises:
+        RequestError: ``MISSING_ASSETS`` if nothing says what a relative path is relative to.
+    """
     if "://" in filename:
         return _path(filename, missing="MISSING_ASSETS")
     if directory is None and not filename.startswith("/"):
