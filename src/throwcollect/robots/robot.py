@@ -31,6 +31,10 @@ class Robot:
         rigid: For each group of links that only mimic joints move: how their names begin. Links of a group are not
             checked for collisions with each other.
         ros1_names: Name of each controller on the robot's ROS 1 software; empty if they are the same.
+        goal_tolerance_rad: How far each joint may be from the end of a trajectory whose goal brings no tolerances of
+            its own; 0 is not checked.
+        goal_time_s: How long after the end of such a trajectory it may get there; 0 waits for ever.
+        stopped_velocity_radps: Largest velocity that its controllers say they take for standing still.
     """
 
     name: str
@@ -45,6 +49,9 @@ class Robot:
     holding: tuple[str, ...] = ()
     rigid: tuple[str, ...] = ()
     ros1_names: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+    goal_tolerance_rad: float = 0.0
+    goal_time_s: float = 0.0
+    stopped_velocity_radps: float = 0.01
 
     @cached_property
     def joints(self) -> tuple[str, ...]:

@@ -33,6 +33,7 @@ from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.episode.topics import joint_states
 from throwcollect.errors import DatasetError
 from throwcollect.robots.description import full_description
+from throwcollect.robots.talos import TALOS
 
 SHARD = "quick_00001.mcap"
 FIRST = 3
@@ -278,7 +279,7 @@ def episode_of_another_dataset(directory: Path) -> None:
 def altered_with_all_hashes_made_to_fit(directory: Path) -> None:
     first, second, third = episodes_of(directory)
     contents = bytearray(second.chunk.decompress())
-    contents[31 + joint_states().layout.dtype.fields["position"][1] + 6] ^= 1
+    contents[31 + joint_states(TALOS.joints).layout.dtype.fields["position"][1] + 6] ^= 1
     data = zstandard.ZstdCompressor(level=1).compress(bytes(contents))
     chunk = replace(second.chunk, data=data, crc=zlib.crc32(contents))
     written(directory / SHARD, [first, Episode(second.header, chunk, hashlib.sha256(contents).hexdigest()), third])
@@ -632,7 +633,7 @@ def test_a_changed_sample_is_found_even_if_all_checksums_are_made_to_fit(dataset
     path = dataset / SHARD
     episode = stored(path, 4)
     contents = bytearray(episode.episode.chunk.decompress())
-    contents[31 + joint_states().layout.dtype.fields["position"][1]] ^= 0x40
+    contents[31 + joint_states(TALOS.joints).layout.dtype.fields["position"][1]] ^= 0x40
     data = zstandard.ZstdCompressor(level=1).compress(bytes(contents))
     chunk = replace(episode.episode.chunk, data=data, crc=zlib.crc32(contents)).record()
     whole = path.read_bytes()
