@@ -34,7 +34,7 @@ _LATEST_NS = 2**62
 _MOST_SAMPLES = 2**32
 """As many as sequence numbers of message records can count."""
 _LONGEST_NAME, _LONGEST_TEXT = 256, 10_000
-"""Characters in names and messages; Talos' names and the controllers' messages stay far below."""
+"""Characters in names and messages; those of robots and of their controllers stay far below."""
 _STATUSES = range(7)
 """Of action_msgs/msg/GoalStatus."""
 _COUNT = struct.Struct("<I")

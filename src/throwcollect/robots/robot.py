@@ -19,6 +19,8 @@ class Robot:
     Attributes:
         name: Its name in configurations, such as ``talos``.
         title: Its name in sentences, such as ``Talos``.
+        kind: What it is, as it stands before its title where somebody reads of it for the first time, such as ``the
+            humanoid robot``; empty if the title says enough.
         controllers: Joint trajectory controller of each limb and its joints, in order.
         share: Returns the directory that ``package://`` paths of the description are relative to; raises `ConfigError`
             if the package that brings it is not installed.
@@ -45,6 +47,7 @@ class Robot:
     srdf: str
     rest: str
     hand: str
+    kind: str = ""
     open_hand: str = ""
     holding: tuple[str, ...] = ()
     rigid: tuple[str, ...] = ()
@@ -57,6 +60,11 @@ class Robot:
     def joints(self) -> tuple[str, ...]:
         """All joints that are commanded, in the order of every joint state and joint array."""
         return tuple(joint for joints in self.controllers.values() for joint in joints)
+
+    @property
+    def introduction(self) -> str:
+        """Kind and title, such as ``the humanoid robot Talos``."""
+        return f"{self.kind} {self.title}".lstrip()
 
     def controller_of(self, joint: str) -> str:
         """Return the name of the controller that commands a joint.
