@@ -159,11 +159,15 @@ class _Simulated:
     def samples(self) -> int:
         return self.episode.header.samples
 
+    @property
+    def joints(self) -> tuple[str, ...]:
+        return self.episode.table.joints
+
     def read(self) -> Episode:
         return self.episode
 
     def read_rows(self) -> NDArray[np.void]:
-        return trajectory_rows(self.episode.state.contents, self.samples)
+        return trajectory_rows(self.episode.state.contents, self.samples, self.joints)
 
 
 _make: list[Callable[[], Simulator]] = []

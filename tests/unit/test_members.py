@@ -83,10 +83,11 @@ def test_with_a_robot_that_there_is_not_its_joints_are_not_complained_of(tmp_pat
     assert "joint" not in done.stderr
 
 
-def test_a_robot_that_cannot_be_recorded_yet_is_refused_in_words(tmp_path: Path) -> None:
-    path = tmp_path / "arm.yaml"
+def test_a_robot_of_another_package_is_recorded(tmp_path: Path) -> None:
+    path, data = tmp_path / "arm.yaml", tmp_path / "data"
     path.write_text(f"{ARM}sweep: {{parameters: {{task.duration_s: {{min: 0.5, max: 0.6}}}}}}\ntrials: 2\n")
-    done = with_plugins("up", str(path), "--runtime", "inprocess", "--output", str(tmp_path / "data"))
-    assert done.returncode == 2, done.stderr
-    assert "robot.name: recordings have a place for the joints of Talos alone so far" in done.stderr
-    assert "Traceback" not in done.stderr
+    collected = with_plugins("up", str(path), "--runtime", "inprocess", "--output", str(data))
+    assert collected.returncode == 0, collected.stderr
+    assert "2 trials simulated again in a fresh process: the same bit for bit" in collected.stderr
+    verified = with_plugins("dataset", "verify", str(data))
+    assert (verified.returncode, "nothing wrong" in verified.stdout) == (0, True), verified.stderr

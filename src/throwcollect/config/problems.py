@@ -25,6 +25,9 @@ MOST_EXAMINED = 200
 Location = tuple[str | int, ...]
 """Keys and list indices from the root of a configuration to a value."""
 
+_MEMBERS: tuple[Location, ...] = (("robot", "name"), ("tool", "name"), ("sim", "engine"), ("task", "name"))
+"""Where a member of a family is named, which a package may bring."""
+
 
 @dataclass(frozen=True)
 class Finding:
@@ -125,11 +128,14 @@ def _findings(details: ErrorDetails, values: Any, above: Location) -> Iterator[F
         words = " or ".join(f"'{family}'" for family in families)
         yield Finding((*location, "family"), _should_be(words, value["family"], families))
     else:
-        yield Finding(location, _should_be(str(shape), value, shape.choices) + _radians(kind, shape, value))
+        strange = "; no package that is installed brings it" if location in _MEMBERS else ""
+        sentence = _should_be(str(shape), value, shape.choices, strange=strange)
+        yield Finding(location, sentence + _radians(kind, shape, value))
 
 
-def _should_be(words: str, value: Any, choices: list[str]) -> str:
-    return f"should be {words}, got {quote(value)}{_did_you_mean(value, choices)}"
+def _should_be(words: str, value: Any, choices: list[str], *, strange: str = "") -> str:
+    """Say what would be right, and which choice was meant; `strange` is what is said if none is like the value."""
+    return f"should be {words}, got {quote(value)}{_did_you_mean(value, choices) or strange}"
 
 
 def _did_you_mean(value: Any, choices: Sequence[str]) -> str:

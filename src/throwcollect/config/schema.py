@@ -55,13 +55,15 @@ class RobotConfig(Section):
     """The robot and how its motors follow commands."""
 
     name: RobotName = "talos"
-    """Robot model: Talos of PAL Robotics, `talos_reduced` of example-robot-data, with its base fixed."""
+    """Robot model, with its base fixed: Talos of PAL Robotics is `talos_reduced` of example-robot-data. Packages may
+    add others."""
     base_height_m: Annotated[float, Field(ge=0.5, le=2.0)] = 1.01927
     """Height of the fixed base link above the ground."""
     posture: dict[Joint, Angle] = {}
-    """Joint angles that replace those of the half-sitting posture, for joints that the task does not move."""
+    """Joint angles that replace those of the robot's posture at rest, which for Talos is half-sitting, for joints that
+    the task does not move."""
     locked: Literal["auto", "none"] | list[Joint] = "auto"
-    """Joints simulated as rigid: `auto` locks what the task does not move, `none` simulates all 32, or a list."""
+    """Joints simulated as rigid: `auto` locks what the task does not move, `none` simulates all, or a list."""
     position_gain_per_s: Annotated[float, Field(gt=0, le=1000), Key(swept=True)] = 100.0
     """Velocity commanded per radian of position error; Bullet's position gain is this times the time step."""
     velocity_gain: Annotated[float, Field(gt=0, le=1), Key(swept=True)] = 1.0

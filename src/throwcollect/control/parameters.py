@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from throwcollect.errors import ConfigError, Problem
@@ -83,30 +83,6 @@ class ControllerParameters:
         if wrong:
             expected = "must be a finite number of at least 0.0"
             raise ConfigError([Problem(f"{expected}; got {value}", key) for key, value in wrong.items()])
-
-    @classmethod
-    def talos(cls, joints: Sequence[str], *, max_deceleration: float | None = None) -> ControllerParameters:
-        """Parameters of the controllers of PAL Robotics' Talos.
-
-        Args:
-            joints: Names of the controller's joints, in order.
-            max_deceleration: How hard joints brake when they are stopped [rad/s²], by measured velocities that Talos
-                itself does not have; None holds them where they are, as on Talos.
-
-        Returns:
-            The values of talos_controller_configuration (humble-devel 2.0), equal for all limbs.
-        """
-        brakes = max_deceleration is not None
-        limits = JointConstraints(goal=0.02, max_deceleration_on_cancel=max_deceleration or 0.0)
-        return cls(
-            joints=tuple(joints),
-            constraints=Constraints(
-                goal_time=0.6,
-                stopped_velocity_tolerance=0.05,
-                decelerate_on_cancel=brakes,
-                joints=dict.fromkeys(joints, limits),
-            ),
-        )
 
     @property
     def measures_velocity(self) -> bool:

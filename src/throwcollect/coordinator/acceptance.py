@@ -116,7 +116,7 @@ class Acceptance:
             return str(error)
 
     def _problems(self, episode: Episode, assignment: Assignment) -> Iterator[str]:
-        samples = episode.samples()
+        samples = episode.samples(robot_of(self._config).joints)
         yield from find_channel_problems(episode, self._channels)
         yield from find_stamp_problems(episode, samples, assignment.config)
         yield from find_sensor_problems(episode)

@@ -22,21 +22,20 @@ from throwcollect.episode.topics import rotate
 from throwcollect.episode.trajectory_rows import (
     BALL_ORIENTATION,
     BALL_VELOCITIES,
+    JOINT_COLUMNS,
     STAMPS,
-    column_widths,
+    column_shapes,
     to_nanoseconds,
     trajectory_rows,
     view_as_bytes,
 )
 from throwcollect.errors import ConfigError, DatasetError
-from throwcollect.robots.talos import JOINTS
 
 TIMES = "time_s"
-_JOINT_COLUMNS = ("joints.position", "joints.velocity", "joints.effort")
 COLUMNS = (
     TIMES,
     STAMPS,
-    *_JOINT_COLUMNS,
+    *JOINT_COLUMNS,
     "ball.position",
     BALL_ORIENTATION,
     *BALL_VELOCITIES,
@@ -59,6 +58,10 @@ class Recorded(Protocol):
     @property
     def samples(self) -> int:
         """Number of samples."""
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Joints that are recorded, in the order of their columns."""
 
     def read(self) -> Episode:
         """The episode.
@@ -85,6 +88,7 @@ class StoredThrow:
         path: The MCAP file.
         offset: Where its chunk begins in the file [bytes].
         samples: Number of samples.
+        joints: Joints that are recorded, in the order of their columns.
     """
 
     trial: int
@@ -92,6 +96,7 @@ class StoredThrow:
     path: Path
     offset: int
     samples: int
+    joints: tuple[str, ...]
 
     def read(self) -> Episode:
         """The episode, from its file; see `Recorded`.
@@ -130,35 +135,31 @@ class StoredThrow:
                 raise DatasetError(
                     f"starts at {chunk.start_ns} ns", expected=f"trial {self.trial} at {self.start_ns} ns"
                 )
-            return trajectory_rows(chunk.decompress(), self.samples)
+            return trajectory_rows(chunk.decompress(), self.samples, self.joints)
         except DatasetError as error:
             raise error.located(self.path, f"byte {self.offset}") from error
 
 
-def check_columns(columns: Sequence[str], joints: Sequence[str]) -> None:
+def check_columns(columns: Sequence[str]) -> None:
     """Check names.
 
     Raises:
-        ConfigError: If a column is none of `COLUMNS`, or a joint none of Talos.
+        ConfigError: If a column is none of `COLUMNS`.
     """
     for column in columns:
         if column not in COLUMNS:
             raise ConfigError(f"a trajectory has no column {column!r}", expected=", ".join(COLUMNS))
-    for joint in joints:
-        if joint not in JOINTS:
-            raise ConfigError(f"Talos has no joint {joint!r}", expected=", ".join(JOINTS))
 
 
-def empty_columns(columns: Iterable[str], samples: int, joints: Sequence[str] = JOINTS) -> dict[str, Column]:
+def empty_columns(columns: Iterable[str], samples: int, joints: int) -> dict[str, Column]:
     """Arrays to be filled, by name; shape ``(samples,)`` or ``(samples, n)``.
 
     Args:
         columns: Which of `COLUMNS`.
         samples: Number of samples.
-        joints: Joints that the columns of joints have.
+        joints: Number of joints that the columns of joints have.
     """
-    shapes = {name: (samples, width) if width else (samples,) for name, width in column_widths().items()}
-    shapes |= {TIMES: (samples,), **dict.fromkeys(_JOINT_COLUMNS, (samples, len(joints)))}
+    shapes = {TIMES: (samples,), **column_shapes(samples, joints)}
     return {name: _empty(shapes[name], np.int64 if name == STAMPS else np.float64) for name in columns}
 
 
@@ -188,28 +189,28 @@ def fill(
     columns: Mapping[str, Column],
     throws: Sequence[Recorded],
     tables: Iterable[NDArray[np.void]],
-    joints: Sequence[str] = JOINTS,
+    joints: tuple[str, ...],
 ) -> None:
     """Fill columns with those of some throws, one after the other.
 
     Args:
         columns: Arrays with as many rows as the throws have samples, by name, as `empty_columns` makes them.
-        throws: The throws.
+        throws: The throws, at least one; all have the same joints.
         tables: Their rows, as `read_stored_rows` gives them.
-        joints: Joints that the columns of joints have.
+        joints: Joints that the columns of joints have; some of those of the throws.
 
     Raises:
         DatasetError: Whatever `tables` raises.
     """
-    lengths = [place.samples for place in throws]
+    lengths, known = [place.samples for place in throws], throws[0].joints
     velocities = [name for name in BALL_VELOCITIES if name in columns]
     needed = {TIMES: STAMPS, **dict.fromkeys(velocities, BALL_ORIENTATION)}
     missing = {source for name, source in needed.items() if name in columns} - columns.keys()
-    recorded = {**columns, **empty_columns(missing, sum(lengths))}
-    chosen = [] if tuple(joints) == JOINTS else [name for name in _JOINT_COLUMNS if name in columns]
+    recorded = {**columns, **empty_columns(missing, sum(lengths), len(known))}
+    chosen = [] if joints == known else [name for name in JOINT_COLUMNS if name in columns]
     targets = [(view_as_bytes(recorded[name]), name) for name in recorded if name != TIMES and name not in chosen]
-    indexes = np.array([JOINTS.index(joint) for joint in joints], np.intp)
-    every = np.empty((max(lengths), len(JOINTS)))
+    indexes = np.array([known.index(joint) for joint in joints], np.intp)
+    every = np.empty((max(lengths), len(known)))
     filled = 0
     for rows in tables:
         span = slice(filled, filled + len(rows))

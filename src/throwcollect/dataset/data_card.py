@@ -9,6 +9,7 @@ from throwcollect.config.schema import Config
 from throwcollect.dataset.bag import to_yaml
 from throwcollect.dataset.directory import TRIALS
 from throwcollect.dataset.provenance import Provenance
+from throwcollect.robots.description import robot_of
 from throwcollect.sweep.plan import FIRST_TRIALS
 
 _SIZES = ((1_000, "n<1K"), (10_000, "1K<n<10K"), (100_000, "10K<n<100K"), (1_000_000, "100K<n<1M"))
@@ -41,7 +42,7 @@ def data_card(config: Config, throws: pa.Table, provenance: Provenance) -> str:
         "license": "apache-2.0",
         "pretty_name": config.name,
         "task_categories": ["robotics"],
-        "tags": ["robotics", "throwing", "ros2", "mcap", "talos", "simulation"],
+        "tags": ["robotics", "throwing", "ros2", "mcap", config.robot.name, "simulation"],
         "size_categories": [size],
         "configs": [{"config_name": "throws", "data_files": "throws.parquet"}],
     }
@@ -51,8 +52,8 @@ def data_card(config: Config, throws: pa.Table, provenance: Provenance) -> str:
         "",
         f"# {config.name}",
         "",
-        f"{episodes} simulated throws of a ball by the humanoid robot Talos, each with the joint states of the robot "
-        f"and the odometry of the ball at {config.record.rate_hz} Hz. Made with throwcollect.",
+        f"{episodes} simulated throws of a ball by {robot_of(config).introduction}, each with the joint states of the "
+        f"robot and the odometry of the ball at {config.record.rate_hz} Hz. Made with throwcollect.",
         "",
         *outcome_lines(throws),
         "",

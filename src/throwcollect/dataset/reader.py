@@ -29,7 +29,7 @@ from throwcollect.episode.message import Episode
 from throwcollect.episode.message_table import MessageTable
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.files import StrPath
-from throwcollect.robots.talos import JOINTS
+from throwcollect.robots.description import robot_of
 from throwcollect.sweep.plan import Plan
 from throwcollect.wording import counted
 
@@ -205,21 +205,31 @@ class Dataset(Sequence[Throw]):
         return self._with(self.throws.take(rows))
 
     def trajectories(
-        self, columns: Iterable[str] = COLUMNS, *, joints: Iterable[str] = JOINTS, threads: int | None = None
+        self, columns: Iterable[str] = COLUMNS, *, joints: Iterable[str] | None = None, threads: int | None = None
     ) -> Trajectories:
         """Read the trajectories of all throws into one array for each column.
 
         Args:
             columns: Which of `COLUMNS`; nothing else is copied.
-            joints: Joints that the columns of joints have, in this order; `moving_joints` leaves out the constant ones.
+            joints: Joints that the columns of joints have, in this order; None for all. `moving_joints` leaves out the
+                constant ones.
             threads: How many of them work; None for one a core, up to 4.
 
         Raises:
             ConfigError: If there is no such column or joint.
             DatasetError: If an episode is not where the table says, or it is damaged; CRCs are compared.
         """
-        trials = self.throws["trial"].to_pylist()
-        return read_trajectories(trials, self._stored, tuple(columns), tuple(joints), threads=threads)
+        trials, known = self.throws["trial"].to_pylist(), self.joints
+        wanted = known if joints is None else tuple(joints)
+        for joint in wanted:
+            if joint not in known:
+                raise ConfigError(f"{robot_of(self.config).title} has no joint {joint!r}", expected=", ".join(known))
+        return read_trajectories(trials, self._stored, tuple(columns), wanted, threads=threads)
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """All joints of the robot, in the order of the columns of joints."""
+        return robot_of(self.config).joints
 
     @property
     def moving_joints(self) -> tuple[str, ...]:
@@ -235,9 +245,9 @@ class Dataset(Sequence[Throw]):
         paths = {
             name: self.directory / Path(name).name for name in {shard for _, shard, *_ in rows} if name is not None
         }
-        start_ns = self.config.trial_start_ns
+        start_ns, joints = self.config.trial_start_ns, self.joints
         return [
-            None if shard is None else StoredThrow(trial, start_ns(trial), paths[shard], offset, samples)
+            None if shard is None else StoredThrow(trial, start_ns(trial), paths[shard], offset, samples, joints)
             for trial, shard, offset, samples in rows
         ]
 

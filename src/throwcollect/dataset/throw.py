@@ -15,7 +15,6 @@ from throwcollect.dataset.throws_table import Row, ball_state
 from throwcollect.episode.record import NS_PER_S
 from throwcollect.episode.trajectory_rows import STAMPS
 from throwcollect.errors import DatasetError
-from throwcollect.robots.talos import JOINTS
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,14 +53,20 @@ class _Recording:
     def __init__(self, recorded: Recorded) -> None:
         self._recorded = recorded
 
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Joints that are recorded."""
+        return self._recorded.joints
+
     @cached_property
     def _rows(self) -> NDArray[np.void]:
         return self._recorded.read_rows()
 
     def column(self, name: str) -> Column:
         """A column in an array of its own."""
-        columns = empty_columns([name], self._recorded.samples)
-        fill(columns, [self._recorded], [self._rows])
+        joints = self._recorded.joints
+        columns = empty_columns([name], self._recorded.samples, len(joints))
+        fill(columns, [self._recorded], [self._rows], joints)
         return columns[name]
 
 
@@ -120,14 +125,14 @@ class Ball(_Series):
 
 
 class Joints(_Series):
-    """The robot's joints during a throw.
-
-    Attributes:
-        names: Their names, in the order of the columns of all arrays.
-    """
+    """The robot's joints during a throw."""
 
     _prefix = "joints"
-    names: tuple[str, ...] = JOINTS
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Their names, in the order of the columns of all arrays."""
+        return self._recording.joints
 
     @cached_property
     def position(self) -> NDArray[np.float64]:

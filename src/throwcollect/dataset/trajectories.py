@@ -107,18 +107,18 @@ def read_trajectories(
         trials: Numbers of the trials.
         places: Where their episodes lie; None for a trial that has none.
         columns: Which of `COLUMNS`; nothing else is copied.
-        joints: Joints that the columns of joints have, in this order.
+        joints: Joints that the columns of joints have, in this order; some of those of the episodes.
         threads: How many of them work; None for one a core, up to 4.
 
     Raises:
-        ConfigError: If there is no such column or joint.
+        ConfigError: If there is no such column.
         DatasetError: If an episode is not where it should be, or its chunk is damaged; its CRC is compared.
     """
-    check_columns(columns, joints)
+    check_columns(columns)
     stored = [place for place in places if place is not None]
     offsets = np.zeros(len(places) + 1, np.int64)
     np.cumsum([place.samples if place else 0 for place in places], out=offsets[1:])
-    found = empty_columns(columns, int(offsets[-1]), joints)
+    found = empty_columns(columns, int(offsets[-1]), len(joints))
     blocks = [stored[first : first + _BLOCK] for first in range(0, len(stored), _BLOCK)]
     starts = np.cumsum([0, *(sum(place.samples for place in block) for block in blocks)]).tolist()
 

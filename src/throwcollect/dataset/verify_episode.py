@@ -21,7 +21,7 @@ from throwcollect.episode.channels import Channels
 from throwcollect.episode.message import Episode
 from throwcollect.episode.record import NS_PER_S, Samples
 from throwcollect.errors import ConfigError, DatasetError
-from throwcollect.robots.description import touchable_bodies
+from throwcollect.robots.description import robot_of, touchable_bodies
 from throwcollect.sweep.plan import Plan
 from throwcollect.tasks.trajectory import throw_trajectory
 from throwcollect.wording import counted
@@ -51,6 +51,7 @@ class EpisodeCheck:
         self._doubtful = doubtful
         self._table = ThrowsTable.of(plan) if plan else None
         self._robot = robot
+        self._joints = robot_of(plan.config).joints if plan else None
         self._bodies = touchable_bodies(plan.config) if plan and robot else None
 
     def find_problems(self, stored: StoredEpisode, shard: str, channels: Channels | None) -> Iterator[str]:
@@ -113,7 +114,7 @@ class EpisodeCheck:
     def _find_layout_problems(self, episode: Episode, channels: Channels | None) -> Iterator[str]:
         """What keeps an episode from being measured: by its records, its layout, its trial or its stamps."""
         try:
-            samples = episode.samples()
+            samples = episode.samples(self._joints)
             episode.check_records()
         except DatasetError as error:
             yield str(error)

@@ -16,20 +16,14 @@ from throwcollect.dataset.moments import Moments
 from throwcollect.dataset.reader import Dataset
 from throwcollect.episode.record import Samples
 from throwcollect.files import StrPath
-from throwcollect.robots.talos import JOINTS
 
 QUANTILES = (0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99)
 _PLACES = frozenset({"trial", "chunk_offset"})
 """Columns of numbers that measure nothing."""
 _AXES = ("x", "y", "z")
-_CHANNELS = (
-    ("position_rad", "position", JOINTS),
-    ("velocity_radps", "velocity", JOINTS),
-    ("effort_nm", "effort", JOINTS),
-    ("ball_position_m", "ball_position", _AXES),
-    ("ball_velocity_mps", "ball_linear_velocity", _AXES),
-)
-"""Name of a group of signals here, the attribute of `Samples` that has them, and the signals' names."""
+_JOINT_GROUPS = {"position_rad": "position", "velocity_radps": "velocity", "effort_nm": "effort"}
+_BALL_GROUPS = {"ball_position_m": "ball_position", "ball_velocity_mps": "ball_linear_velocity"}
+"""Name of a group of signals here, and the attribute of `Samples` that has them."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +107,7 @@ def statistics(directory: StrPath) -> Statistics:
     dataset = Dataset.open(directory)
     moments, left_out = None, 0
     for episode in dataset.episodes():
-        rows = _table(episode.samples())
+        rows = _table(episode.samples(dataset.joints))
         finite = rows[np.isfinite(rows).all(axis=1)]
         left_out += len(rows) - len(finite)
         if len(finite):
@@ -126,7 +120,7 @@ def statistics(directory: StrPath) -> Statistics:
         episodes=len(dataset.recorded),
         samples=moments.count if moments else 0,
         samples_not_finite=left_out,
-        signals=_signals(moments) if moments else {},
+        signals=_signals(moments, dataset.joints) if moments else {},
     )
 
 
@@ -156,13 +150,14 @@ def _column(numbers: NDArray[np.float64], *, nulls: int) -> ColumnStatistics:
 
 def _table(samples: Samples) -> NDArray[np.float64]:
     """All signals side by side, shape ``(n_samples, n_signals)``."""
-    return np.hstack([getattr(samples, attribute) for _, attribute, _ in _CHANNELS])
+    return np.hstack([getattr(samples, attribute) for attribute in (_JOINT_GROUPS | _BALL_GROUPS).values()])
 
 
-def _signals(moments: Moments) -> dict[str, dict[str, SignalStatistics]]:
+def _signals(moments: Moments, joints: tuple[str, ...]) -> dict[str, dict[str, SignalStatistics]]:
     columns = (moments.minimum, moments.maximum, moments.mean, moments.std)
     each = (_signal(*numbers) for numbers in zip(*(column.tolist() for column in columns), strict=True))
-    return {group: dict(zip(names, islice(each, len(names)), strict=True)) for group, _, names in _CHANNELS}
+    groups = {**dict.fromkeys(_JOINT_GROUPS, joints), **dict.fromkeys(_BALL_GROUPS, _AXES)}
+    return {group: dict(zip(names, islice(each, len(names)), strict=True)) for group, names in groups.items()}
 
 
 def _signal(low: float, high: float, mean: float, std: float) -> SignalStatistics:

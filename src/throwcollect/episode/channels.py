@@ -19,9 +19,7 @@ from throwcollect.episode.topics import (
     transform_message,
     transforms,
 )
-from throwcollect.errors import ConfigError, Problem
 from throwcollect.robots.description import robot_of
-from throwcollect.robots.talos import JOINTS
 
 ROBOT_DESCRIPTION_ID = 1
 TF_STATIC_ID = 2
@@ -115,7 +113,7 @@ class Channels:
         urdf: URDF text of the robot.
 
     Raises:
-        ConfigError: If the text is not a URDF, or the robot is not Talos.
+        ConfigError: If the text is not a URDF.
     """
 
     latched = (
@@ -175,17 +173,14 @@ class Channels:
 
 def _topics(config: Config, frames: FrameTree) -> dict[int, Topic]:
     chosen, robot = config.record.topics, robot_of(config)
-    if robot.joints != JOINTS:
-        sentence = f"recordings have a place for the joints of Talos alone so far, and not for those of {robot.title}"
-        raise ConfigError([Problem(sentence, "robot.name")])
-    topics = {JOINT_STATES_ID: joint_states(), BALL_ODOMETRY_ID: ball_odometry()}
+    topics = {JOINT_STATES_ID: joint_states(robot.joints), BALL_ODOMETRY_ID: ball_odometry()}
     if "clock" in chosen:
         topics[_CLOCK_ID] = clock()
     if "tf" in chosen:
-        topics[_TF_ID] = transforms(frames.moving)
+        topics[_TF_ID] = transforms(frames.moving, robot.joints)
     if "controller_state" in chosen:
         moved = {robot.controller_of(joint) for joint in config.task.end}
         for number, name in enumerate(robot.controllers, start=_FIRST_CONTROLLER_ID):
             if name in moved:
-                topics[number] = controller_state(name)
+                topics[number] = controller_state(robot, name)
     return topics

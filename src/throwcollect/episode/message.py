@@ -34,7 +34,7 @@ _LATEST_NS = 2**62
 _MOST_SAMPLES = 2**32
 """As many as sequence numbers of message records can count."""
 _LONGEST_NAME, _LONGEST_TEXT = 256, 10_000
-"""Characters in names and messages; Talos' names and the controllers' messages stay far below."""
+"""Characters in names and messages; those of robots and of their controllers stay far below."""
 _STATUSES = range(7)
 """Of action_msgs/msg/GoalStatus."""
 _COUNT = struct.Struct("<I")
@@ -94,12 +94,18 @@ class Episode:
         """
         return MessageTable(self.state.contents, self.header.samples)
 
-    def samples(self) -> Samples:
+    def samples(self, joints: Sequence[str] | None = None) -> Samples:
         """The samples, as views of the records where possible.
 
+        Args:
+            joints: The joints that must have been recorded, in this order; None for whichever were.
+
         Raises:
-            DatasetError: If the chunk is damaged, or its messages are laid out otherwise than they are written.
+            DatasetError: If the chunk is damaged, its messages are laid out otherwise than they are written, or other
+                joints were recorded.
         """
+        if joints is not None:
+            _require_joints(self.table.joints, tuple(joints))
         return self.table.samples
 
     @cached_property
@@ -124,6 +130,14 @@ class Episode:
         """
         for chunk in self.chunks:
             chunk.check_records()
+
+
+def _require_joints(recorded: tuple[str, ...], wanted: tuple[str, ...]) -> None:
+    if len(recorded) != len(wanted):
+        raise DatasetError(f"chunk: joint states of {len(recorded)} joints", expected=f"{len(wanted)}")
+    for number, (found, joint) in enumerate(zip(recorded, wanted, strict=True), start=1):
+        if found != joint:
+            raise DatasetError(f"chunk: joint {number} of the joint states is {found[:_LONGEST_NAME]}", expected=joint)
 
 
 def header_to_json(header: EpisodeHeader) -> str:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from throwcollect.episode.channels import BALL_ODOMETRY_ID, JOINT_STATES_ID
 from throwcollect.episode.chunk import MESSAGE_HEADER, RECORD_PREFIX_BYTES, encode_message_index
 from throwcollect.episode.record import NS_PER_S, Samples
-from throwcollect.episode.topics import Rows, Topic, ball_odometry, joint_states, read_samples
+from throwcollect.episode.topics import Rows, Topic, ball_odometry, joint_states, read_joint_names, read_samples
 from throwcollect.errors import DatasetError
 
 _HEADERS = np.dtype(
@@ -125,13 +125,22 @@ class MessageTable:
         return encode_message_index(channel, self.headers(channel)["log_time"], offsets)
 
     @cached_property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the joints, in the order of the columns of `samples`: those that the first joint state has.
+
+        Raises:
+            DatasetError: If there is no readable joint state.
+        """
+        return read_joint_names(self._first_message(JOINT_STATES_ID, "/joint_states"))
+
+    @cached_property
     def samples(self) -> Samples:
         """The samples; joint columns and the ball's pose are views of the records.
 
         Raises:
             DatasetError: If joint states or the ball's odometry are missing, or not laid out as they are written here.
         """
-        topics = {JOINT_STATES_ID: joint_states(), BALL_ODOMETRY_ID: ball_odometry()}
+        topics = {JOINT_STATES_ID: joint_states(self.joints), BALL_ODOMETRY_ID: ball_odometry()}
         return read_samples(*(self._read(channel, topic) for channel, topic in topics.items()))
 
     def _read(self, channel: int, topic: Topic) -> Rows:
@@ -144,12 +153,16 @@ class MessageTable:
         Raises:
             DatasetError: If the chunk has no such channel, or its messages are laid out otherwise.
         """
-        if channel not in self.columns:
-            raise DatasetError(f"chunk: no messages of {topic.name}")
-        if not topic.layout.describes_message(self.messages(channel)[0].tobytes()):
+        if not topic.layout.describes_message(self._first_message(channel, topic.name)):
             raise DatasetError(
                 f"chunk: the messages of {topic.name} have another layout than {topic.type_name} written here"
             )
+
+    def _first_message(self, channel: int, topic: str) -> bytes:
+        if channel not in self.columns:
+            raise DatasetError(f"chunk: no messages of {topic}")
+        message: bytes = self.messages(channel)[0].tobytes()
+        return message
 
 
 class MessageList:

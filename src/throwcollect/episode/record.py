@@ -18,9 +18,9 @@ class Samples:
 
     Attributes:
         stamps_ns: Simulated time [ns], shape ``(n_samples,)``, int64.
-        position: Joint positions [rad], shape ``(n_samples, 32)``, in the order of `talos.JOINTS`.
-        velocity: Joint velocities [rad/s], shape ``(n_samples, 32)``.
-        effort: Torques applied by the motors [Nm], shape ``(n_samples, 32)``; 0 for locked joints.
+        position: Joint positions [rad], shape ``(n_samples, n_joints)``, in the order of `Robot.joints`.
+        velocity: Joint velocities [rad/s], shape ``(n_samples, n_joints)``.
+        effort: Torques applied by the motors [Nm], shape ``(n_samples, n_joints)``; 0 for locked joints.
         ball_position: Ball centre in world [m], shape ``(n_samples, 3)``.
         ball_orientation_xyzw: Unit quaternion, ball to world, shape ``(n_samples, 4)``.
         ball_linear_velocity: In world [m/s], shape ``(n_samples, 3)``.

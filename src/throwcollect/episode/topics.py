@@ -2,24 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rclzenoh.interfaces import get_message
+from rclzenoh.interfaces import deserialize, get_message
 from throwcollect.episode.frames import WORLD, MovingFrame
 from throwcollect.episode.layout import MessageLayout
 from throwcollect.episode.record import NS_PER_S, ControllerSamples, Samples
-from throwcollect.robots.talos import CONTROLLERS, JOINTS
+from throwcollect.errors import DatasetError
+from throwcollect.robots.robot import Robot
 
 BALL = "ball"
 """Name of the ball's frame, fixed to the ball and at its centre."""
 
+_JOINT_STATE = "sensor_msgs/msg/JointState"
 _STAMP = ("header.stamp.sec", "header.stamp.nanosec")
+_MOST_ROBOTS = 8
+"""Robots whose layouts are kept: a file may name as many as it likes."""
 
 Rows = NDArray[np.void]
 """Messages of one topic, one a sample: an array of the layout's structured type."""
@@ -90,15 +94,32 @@ def _cross(left: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.
     return crossed
 
 
-@cache
-def joint_states() -> Topic:
-    """``/joint_states``: sensor_msgs/JointState with all joints of Talos."""
-    kind = "sensor_msgs/msg/JointState"
-    zeros = np.zeros(len(JOINTS))
-    message = get_message(kind)(name=list(JOINTS), position=zeros, velocity=zeros, effort=zeros)
-    return Topic(
-        "/joint_states", kind, MessageLayout(message, [*_STAMP, "position", "velocity", "effort"]), _fill_joint_states
-    )
+@lru_cache(maxsize=_MOST_ROBOTS)
+def joint_states(joints: tuple[str, ...]) -> Topic:
+    """``/joint_states``: sensor_msgs/JointState with all joints of a robot.
+
+    Args:
+        joints: Their names, in the order of the samples; at least one.
+    """
+    zeros = np.zeros(len(joints))
+    message = get_message(_JOINT_STATE)(name=list(joints), position=zeros, velocity=zeros, effort=zeros)
+    layout = MessageLayout(message, [*_STAMP, "position", "velocity", "effort"])
+    return Topic("/joint_states", _JOINT_STATE, layout, _fill_joint_states)
+
+
+def read_joint_names(message: bytes) -> tuple[str, ...]:
+    """Names of the joints that a message of `joint_states` is about, in the order of its numbers.
+
+    Raises:
+        DatasetError: If it is no such message, or names no joint.
+    """
+    try:
+        joints = tuple(deserialize(message, get_message(_JOINT_STATE)).name)
+    except ValueError as error:
+        raise DatasetError(f"chunk: {error}") from error
+    if not joints:
+        raise DatasetError("chunk: joint states that name no joint")
+    return joints
 
 
 def _fill_joint_states(rows: Rows, recording: Recording) -> None:
@@ -169,17 +190,18 @@ def _fill_clock(rows: Rows, recording: Recording) -> None:
     _put_stamps(rows, "clock", recording.samples.stamps_ns)
 
 
-def transforms(frames: tuple[MovingFrame, ...]) -> Topic:
+def transforms(frames: tuple[MovingFrame, ...], joints: Sequence[str]) -> Topic:
     """``/tf``: tf2_msgs/TFMessage with the ball in world and every frame that a joint moves.
 
     Args:
-        frames: The frames; their joints are among `talos.JOINTS`.
+        frames: The frames.
+        joints: All joints of the robot, in the order of the samples.
 
     Raises:
-        ValueError: If a joint is not one of Talos.
+        ValueError: If the joint of a frame is none of them.
     """
     kind = "tf2_msgs/msg/TFMessage"
-    columns = [JOINTS.index(frame.joint) for frame in frames]
+    columns = [joints.index(frame.joint) for frame in frames]
     pairs = [(WORLD, BALL, (0.0, 0.0, 0.0)), *((frame.parent, frame.child, frame.translation) for frame in frames)]
     message = get_message(kind)(transforms=[transform_message(*pair, (0.0, 0.0, 0.0, 1.0), 0) for pair in pairs])
     variable = [f"transforms.{n}.{path}" for n in range(len(pairs)) for path in (*_STAMP, "transform.rotation")]
@@ -225,18 +247,22 @@ def transform_message(
     return get_message("geometry_msgs/msg/TransformStamped")(header=header, child_frame_id=child, transform=transform)
 
 
-def controller_state(controller: str) -> Topic:
+def controller_state(robot: Robot, controller: str) -> Topic:
     """``/<controller>/controller_state``: control_msgs/JointTrajectoryControllerState of one controller.
 
     Reference, feedback and error have positions and velocities, the reference has accelerations, the output positions.
 
     Args:
-        controller: Name of one of `talos.CONTROLLERS`.
+        robot: The robot.
+        controller: Name of one of its controllers.
+
+    Raises:
+        KeyError: If the robot has no such controller.
     """
     kind = "control_msgs/msg/JointTrajectoryControllerState"
     point = get_message("trajectory_msgs/msg/JointTrajectoryPoint")
-    joints = CONTROLLERS[controller]
-    columns = [JOINTS.index(joint) for joint in joints]
+    joints = robot.controllers[controller]
+    columns = [robot.joints.index(joint) for joint in joints]
     zeros = np.zeros(len(joints))
     message = get_message(kind)(
         joint_names=list(joints),

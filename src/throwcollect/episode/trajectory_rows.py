@@ -20,6 +20,7 @@ from throwcollect.episode.topics import ball_odometry, joint_states
 
 STAMPS = "stamps_ns"
 """A pair of 32-bit numbers until `to_nanoseconds` makes one of it."""
+JOINT_COLUMNS = ("joints.position", "joints.velocity", "joints.effort")
 BALL_VELOCITIES = ("ball.velocity", "ball.angular_velocity")
 """In the frame of the ball as they are recorded."""
 BALL_ORIENTATION = "ball.orientation_xyzw"
@@ -27,9 +28,7 @@ BALL_ORIENTATION = "ball.orientation_xyzw"
 _FIELDS = {
     JOINT_STATES_ID: {
         STAMPS: "header.stamp.sec",
-        "joints.position": "position",
-        "joints.velocity": "velocity",
-        "joints.effort": "effort",
+        **dict(zip(JOINT_COLUMNS, ("position", "velocity", "effort"), strict=True)),
     },
     BALL_ODOMETRY_ID: {
         "ball.position": "pose.pose.position",
@@ -42,28 +41,37 @@ _FIELDS = {
 _STAMP_BYTES = 8
 
 
-@cache
-def column_widths() -> Mapping[str, int]:
-    """How many numbers a row of each column has, by its name; 0 for a single one."""
-    return {name: shape[0] if shape else 0 for name, (_, _, shape) in _fields().items()}
+def column_shapes(samples: int, joints: int) -> Mapping[str, tuple[int, ...]]:
+    """Shapes of the columns of some samples, by name.
+
+    Args:
+        samples: Number of samples.
+        joints: Number of joints that the columns of joints have.
+    """
+    ball = dict(ball_odometry().layout.dtype.fields or {})
+    return {
+        STAMPS: (samples,),
+        **dict.fromkeys(JOINT_COLUMNS, (samples, joints)),
+        **{name: (samples, *ball[field][0].shape) for name, field in _FIELDS[BALL_ODOMETRY_ID].items()},
+    }
 
 
 @cache
-def _fields() -> Mapping[str, tuple[int, int, tuple[int, ...]]]:
-    """Where each column begins in its message, its size [bytes] and its shape, by name."""
+def _fields(joints: tuple[str, ...]) -> Mapping[str, tuple[int, int]]:
+    """Where each column begins in its message, and its size [bytes], by name."""
     fields = {}
-    for topic, columns in zip((joint_states(), ball_odometry()), _FIELDS.values(), strict=True):
+    for topic, columns in zip((joint_states(joints), ball_odometry()), _FIELDS.values(), strict=True):
         places = dict(topic.layout.dtype.fields or {})
         for name, field in columns.items():
             kind, offset = places[field][:2]
-            fields[name] = (offset, _STAMP_BYTES if name == STAMPS else kind.itemsize, kind.shape)
+            fields[name] = (offset, _STAMP_BYTES if name == STAMPS else kind.itemsize)
     return fields
 
 
 @cache
-def _row_type(starts: tuple[int, ...], size: int) -> np.dtype[np.void]:
+def _row_type(joints: tuple[str, ...], starts: tuple[int, ...], size: int) -> np.dtype[np.void]:
     """Type of a row in which the records of joint states and odometry begin at `starts`."""
-    fields = _fields()
+    fields = _fields(joints)
     places = {
         name: start + MESSAGE_HEADER.size + fields[name][0]
         for start, columns in zip(starts, _FIELDS.values(), strict=True)
@@ -73,25 +81,26 @@ def _row_type(starts: tuple[int, ...], size: int) -> np.dtype[np.void]:
     return np.dtype({"names": list(places), "formats": formats, "offsets": [*places.values()], "itemsize": size})
 
 
-def trajectory_rows(contents: bytes, samples: int) -> NDArray[np.void]:
+def trajectory_rows(contents: bytes, samples: int, joints: tuple[str, ...]) -> NDArray[np.void]:
     """Uncompressed records of a state chunk seen as a table, without a copy.
 
     Args:
         contents: Records that their CRC has been compared with; the first message of a channel stands for the layout
             of all.
         samples: Number of samples.
+        joints: Joints that must have been recorded, in this order.
 
     Returns:
         Shape ``(samples,)``; the fields are the columns, as bytes.
 
     Raises:
-        DatasetError: If they are not rows with joint states and odometry as they are written here.
+        DatasetError: If they are not rows with joint states of these joints and odometry as they are written here.
     """
     table = MessageTable(contents, samples, first_row_only=True)
-    for channel, topic in zip(_FIELDS, (joint_states(), ball_odometry()), strict=True):
+    for channel, topic in zip(_FIELDS, (joint_states(joints), ball_odometry()), strict=True):
         table.check_layout(channel, topic)
     starts = tuple(table.columns[channel].offset for channel in _FIELDS)
-    return np.frombuffer(contents, _row_type(starts, len(contents) // samples))
+    return np.frombuffer(contents, _row_type(joints, starts, len(contents) // samples))
 
 
 def view_as_bytes(array: NDArray[np.float64] | NDArray[np.int64]) -> NDArray[np.void]:

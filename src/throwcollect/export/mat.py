@@ -58,7 +58,7 @@ _FIELDS = (
     "are those of the throwing database of the Jožef Stefan Institute.",
     "",
     "- `robot_data`: `joints`; `base`, position of the robot's base in world [m]; `dt`, time step [s]. There are no "
-    "link lengths, as Talos is no planar arm.",
+    "link lengths, which describe planar arms alone.",
     "- `qPath{k}`: commanded motion, a row each `dt`: time [s], n positions [rad], n velocities [rad/s], n "
     "accelerations [rad/s²].",
     "- `targets(k, :)`: what the throw achieved. `d`: distance of the ball's centre at its landing from the vertical "

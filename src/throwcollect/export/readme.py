@@ -8,13 +8,13 @@ from typing import Any
 
 import pyarrow as pa
 
+from throwcollect.config.schema import Config
 from throwcollect.dataset.bag import to_yaml
 from throwcollect.dataset.data_card import outcome_lines
 from throwcollect.dataset.directory import CONFIG
 from throwcollect.export.throw_source import Source
+from throwcollect.robots.description import robot_of
 from throwcollect.version import __version__
-
-_TAGS = ("robotics", "throwing", "talos", "simulation")
 
 
 @dataclass(frozen=True)
@@ -47,11 +47,11 @@ def render_card(source: Source, layout: Layout) -> str:
     """
     config = source.dataset.config
     lines = [
-        *(_render_front_matter(config.name, layout.hub) if layout.hub else []),
+        *(_render_front_matter(config, layout.hub) if layout.hub else []),
         f"# {config.name}",
         "",
-        f"{len(source.table)} simulated throws of a ball by the humanoid robot Talos; {len(source.entries)} of them "
-        f"have time series, at {source.rate_hz} Hz. Exported by throwcollect {__version__} from the "
+        f"{len(source.table)} simulated throws of a ball by {robot_of(config).introduction}; {len(source.entries)} of "
+        f"them have time series, at {source.rate_hz} Hz. Exported by throwcollect {__version__} from the "
         f"dataset with the digest `{source.digest}`.",
         "",
         *outcome_lines(source.table),
@@ -79,12 +79,12 @@ def render_card(source: Source, layout: Layout) -> str:
     return "\n".join(lines)
 
 
-def _render_front_matter(name: str, hub: Mapping[str, Any]) -> list[str]:
+def _render_front_matter(config: Config, hub: Mapping[str, Any]) -> list[str]:
     header = {
         "license": "apache-2.0",
-        "pretty_name": name,
+        "pretty_name": config.name,
         "task_categories": ["robotics"],
-        "tags": [*hub["tags"], *_TAGS],
+        "tags": [*hub["tags"], "robotics", "throwing", config.robot.name, "simulation"],
         "configs": hub["configs"],
     }
     return ["---", to_yaml(header) + "---", ""]

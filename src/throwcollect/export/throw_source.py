@@ -16,7 +16,6 @@ from throwcollect.episode.record import Samples
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.export.resampling import count_resampled, resample
 from throwcollect.export.signals import Signal, list_signals, unit_of
-from throwcollect.robots.description import robot_of
 from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.tasks.throw.outcome import Outcome
@@ -113,7 +112,7 @@ class Source:
         except (KeyError, TypeError) as error:
             raise DatasetError(f"{directory / METADATA}: {error} is missing") from error
         rate_hz = rate_hz or recorded_hz
-        joints = robot_of(dataset.config).joints
+        joints = dataset.joints
         moving = tuple(joint for joint in joints if joint in dataset.config.task.end)
         return cls(
             dataset,
@@ -144,7 +143,7 @@ class Source:
         dataset = self.dataset
         episode = dataset.episode(trial)
         try:
-            recorded = episode.samples()
+            recorded = episode.samples(self.joints)
         except DatasetError as error:
             raise DatasetError(f"{dataset.directory}: trial {trial}: {error}") from error
         samples = resample(recorded, recorded_hz=dataset.config.record.rate_hz, rate_hz=self.rate_hz)

@@ -32,7 +32,7 @@ def compare(stored: Episode, again: Episode) -> Comparison:
     """Compare two episodes of one trial.
 
     Raises:
-        DatasetError: If the stored one is damaged.
+        DatasetError: If the stored one is damaged, or another robot's.
     """
     stored.check_records()
     differences: tuple[str, ...] = ()
@@ -46,7 +46,7 @@ def _differences(stored: Episode, again: Episode) -> Iterator[str]:
         before, now = getattr(stored.header, field.name), getattr(again.header, field.name)
         if before != now:
             yield f"{field.name}: {before} stored, {now} now"
-    one, other = stored.samples(), again.samples()
+    one, other = stored.samples(again.table.joints), again.samples()
     count = min(len(one), len(other))
     for column in fields(Samples):
         before, now = getattr(one, column.name)[:count], getattr(other, column.name)[:count]

@@ -19,6 +19,8 @@ class Robot:
     Attributes:
         name: Its name in configurations, such as ``talos``.
         title: Its name in sentences, such as ``Talos``.
+        kind: What it is, as it stands before its title where somebody reads of it for the first time, such as ``the
+            humanoid robot``; empty if the title says enough.
         controllers: Joint trajectory controller of each limb and its joints, in order.
         share: Returns the directory that ``package://`` paths of the description are relative to; raises `ConfigError`
             if the package that brings it is not installed.
@@ -31,6 +33,10 @@ class Robot:
         rigid: For each group of links that only mimic joints move: how their names begin. Links of a group are not
             checked for collisions with each other.
         ros1_names: Name of each controller on the robot's ROS 1 software; empty if they are the same.
+        goal_tolerance_rad: How far each joint may be from the end of a trajectory whose goal brings no tolerances of
+            its own; 0 is not checked.
+        goal_time_s: How long after the end of such a trajectory it may get there; 0 waits for ever.
+        stopped_velocity_radps: Largest velocity that its controllers say they take for standing still.
     """
 
     name: str
@@ -41,15 +47,24 @@ class Robot:
     srdf: str
     rest: str
     hand: str
+    kind: str = ""
     open_hand: str = ""
     holding: tuple[str, ...] = ()
     rigid: tuple[str, ...] = ()
     ros1_names: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+    goal_tolerance_rad: float = 0.0
+    goal_time_s: float = 0.0
+    stopped_velocity_radps: float = 0.01
 
     @cached_property
     def joints(self) -> tuple[str, ...]:
         """All joints that are commanded, in the order of every joint state and joint array."""
         return tuple(joint for joints in self.controllers.values() for joint in joints)
+
+    @property
+    def introduction(self) -> str:
+        """Kind and title, such as ``the humanoid robot Talos``."""
+        return f"{self.kind} {self.title}".lstrip()
 
     def controller_of(self, joint: str) -> str:
         """Return the name of the controller that commands a joint.

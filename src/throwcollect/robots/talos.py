@@ -1,7 +1,7 @@
 """Talos of PAL Robotics, as example-robot-data describes it.
 
-Names and order of joints and controllers are those of PAL's ROS 2 controller configuration
-(talos_controller_configuration, humble-devel 2.0).
+Names and order of joints and controllers, and the controllers' tolerances, are those of PAL's ROS 2 controller
+configuration (talos_controller_configuration, humble-devel 2.0).
 """
 
 from __future__ import annotations
@@ -34,6 +34,7 @@ def _find_share() -> Path:
 TALOS = Robot(
     name="talos",
     title="Talos",
+    kind="the humanoid robot",
     controllers=MappingProxyType(
         {
             "arm_left_controller": _number_joints("arm_left", 7),
@@ -56,6 +57,9 @@ TALOS = Robot(
             "gripper_right_controller": "right_gripper_controller",
         }
     ),
+    goal_tolerance_rad=0.02,
+    goal_time_s=0.6,
+    stopped_velocity_radps=0.05,
     share=_find_share,
     urdf=f"{_DATA}/robots/talos_reduced.urdf",
     srdf=f"{_DATA}/srdf/talos.srdf",
@@ -67,8 +71,3 @@ TALOS = Robot(
     rigid=("gripper_left_", "gripper_right_"),
 )
 """The humanoid with its 32 actuated joints; the hand is the right gripper."""
-
-JOINTS = TALOS.joints
-"""Its joints, which are those of every recording so far."""
-CONTROLLERS = TALOS.controllers
-"""Its controllers and their joints."""

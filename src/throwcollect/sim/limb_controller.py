@@ -9,17 +9,20 @@ from numpy.typing import NDArray
 
 from throwcollect.config.controllers import ControllersConfig
 from throwcollect.control import (
+    Constraints,
     ControllerParameters,
     ControllerState,
     Deviations,
     ErrorCode,
     GoalResult,
+    JointConstraints,
     JointState,
     JointTrajectoryController,
     Refusal,
     Trajectory,
 )
 from throwcollect.episode.record import ControllerSamples
+from throwcollect.robots.robot import Robot
 
 _LOCKED_TOLERANCE_RAD = 1e-6
 
@@ -30,22 +33,20 @@ class LimbController:
     Joints that are locked are measured where they are locked, and goals that would move them are refused.
 
     Args:
-        name: Name of the controller in the ROS graph.
-        joints: Its joints, in order.
+        robot: The robot.
+        limb: Name of one of its controllers.
         moving: The world's moving joints, in order.
         period_ns: Control period [ns].
         config: How it answers its clients.
     """
 
     def __init__(
-        self, name: str, joints: Sequence[str], *, moving: Sequence[str], period_ns: int, config: ControllersConfig
+        self, robot: Robot, limb: str, *, moving: Sequence[str], period_ns: int, config: ControllersConfig
     ) -> None:
-        self.name = name
+        self.name = robot.graph_name(limb, config.names)
         """Name of the controller in the ROS graph."""
-        brakes = config.hold == "decelerate"
-        self._configured = ControllerParameters.talos(
-            joints, max_deceleration=config.max_deceleration_radps2 if brakes else None
-        )
+        joints = robot.controllers[limb]
+        self._configured = _configure(robot, joints, config)
         self._controller = JointTrajectoryController(
             self.name,
             self._configured,
@@ -58,7 +59,7 @@ class LimbController:
         """Whether the state of every update is kept for `pop_states`."""
         self._states: list[ControllerState] = []
         self._start_ns: int | None = None
-        self._joints = tuple(joints)
+        self._joints = joints
         self._own = [index for index, joint in enumerate(joints) if joint in moving]
         self._worlds = [moving.index(joints[index]) for index in self._own]
         self._posture = np.zeros(len(joints))
@@ -184,3 +185,22 @@ class LimbController:
         self._controller.reset(start_ns, measured)
         # Begins the hold, so that an idle limb need not be driven.
         self._controller.update(start_ns, 0, measured)
+
+
+def _configure(robot: Robot, joints: tuple[str, ...], config: ControllersConfig) -> ControllerParameters:
+    """Parameters of a controller of some joints: what the robot has, and the one thing that configurations may change.
+
+    The real Talos has no measured velocities, by which joints brake with ``hold: decelerate``.
+    """
+    brakes = config.hold == "decelerate"
+    deceleration = config.max_deceleration_radps2 if brakes else 0.0
+    limits = JointConstraints(goal=robot.goal_tolerance_rad, max_deceleration_on_cancel=deceleration)
+    return ControllerParameters(
+        joints=joints,
+        constraints=Constraints(
+            goal_time=robot.goal_time_s,
+            stopped_velocity_tolerance=robot.stopped_velocity_radps,
+            decelerate_on_cancel=brakes,
+            joints=dict.fromkeys(joints, limits),
+        ),
+    )

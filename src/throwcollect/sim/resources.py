@@ -13,13 +13,12 @@ import numpy as np
 
 from throwcollect.engines.engine import BodyModel
 from throwcollect.errors import RequestError
-from throwcollect.robots.talos import TALOS
+from throwcollect.robots.robot import Robot
 from throwcollect.sim.mesh import Triangles, check_mesh, read_mesh
 from throwcollect.sim.urdf import read_model
 
 _LARGEST_FILE = 4 * 2**20
 _MOST_ENTRIES = 20_000
-_DATA = "example-robot-data"
 
 
 @dataclass(frozen=True)
@@ -35,12 +34,13 @@ class Resource:
     name: str
 
 
-def load_model(uri: str, text: str) -> BodyModel:
+def load_model(uri: str, text: str, robot: Robot) -> BodyModel:
     """Read the description that a client means.
 
     Args:
         uri: ``file://`` or ``package://`` URI of a URDF file.
         text: URDF text; what counts if there is no URI.
+        robot: The robot, beside whose description those of ``package://`` are.
 
     Raises:
         RequestError: ``NO_RESOURCE`` if both are empty, ``RESULT_NOT_FOUND`` if there is no such file,
@@ -49,8 +49,8 @@ def load_model(uri: str, text: str) -> BodyModel:
     if not uri:
         if not text:
             raise RequestError("NO_RESOURCE", "neither a URI nor a description was given")
-        return read_model(text, lambda filename: read_mesh(_locate(filename, None)))
-    path = _path(uri, missing="RESULT_NOT_FOUND")
+        return read_model(text, lambda filename: read_mesh(_locate(filename, None, robot)))
+    path = _path(uri, robot, missing="RESULT_NOT_FOUND")
     if path.suffix.lower() != ".urdf":
         raise RequestError("UNSUPPORTED_FORMAT", f"{uri:.255}: a file of type {path.suffix!r:.20}", expected="*.urdf")
     try:
@@ -61,26 +61,27 @@ def load_model(uri: str, text: str) -> BodyModel:
         content = path.read_bytes()
     except (OSError, ValueError) as error:
         raise RequestError("RESULT_NOT_FOUND", f"{path!s:.255}: cannot be read: {error}") from error
-    return read_model(content, lambda filename: read_mesh(_locate(filename, path.parent)))
+    return read_model(content, lambda filename: read_mesh(_locate(filename, path.parent, robot)))
 
 
-def find_resources(sources: Sequence[str]) -> tuple[list[Resource], list[str]]:
+def find_resources(sources: Sequence[str], robot: Robot) -> tuple[list[Resource], list[str]]:
     """Look for descriptions that can be spawned.
 
     Args:
-        sources: URIs of directories to search besides the robots that are installed.
+        sources: URIs of directories to search besides the package of the robot's description.
+        robot: The robot.
 
     Returns:
         What was found, in order of the URIs, and what is wrong with each source that cannot be searched.
     """
-    found = list(_find_installed())
+    found = list(_find_installed(robot))
     useless = []
     for source in sources:
         try:
-            directory = _path(source, missing="RESULT_NOT_FOUND")
+            directory = _path(source, robot, missing="RESULT_NOT_FOUND")
             if not directory.is_dir():
                 raise RequestError("RESULT_NOT_FOUND", f"{source!r:.255}: no such directory")
-            found += _search(directory, Path.as_uri)
+            found += _search(directory, Path.as_uri, robot)
         except (OSError, ValueError) as error:
             useless.append(f"{source!r:.255}: cannot be searched: {error}")
         except RequestError as error:
@@ -89,12 +90,21 @@ def find_resources(sources: Sequence[str]) -> tuple[list[Resource], list[str]]:
 
 
 @cache
-def _find_installed() -> tuple[Resource, ...]:
-    share = TALOS.share()
-    return tuple(_search(share / _DATA, lambda path: f"package://{quote(path.relative_to(share).as_posix())}"))
+def _find_installed(robot: Robot) -> tuple[Resource, ...]:
+    share = robot.share()
+
+    def uri_of(path: Path) -> str:
+        return f"package://{quote(path.relative_to(share).as_posix())}"
+
+    return tuple(_search(share / _package_of(robot), uri_of, robot))
 
 
-def _search(directory: Path, uri_of: Callable[[Path], str]) -> list[Resource]:
+def _package_of(robot: Robot) -> str:
+    """The directory of the robot's share that its description is in."""
+    return robot.urdf.split("/", 1)[0]
+
+
+def _search(directory: Path, uri_of: Callable[[Path], str], robot: Robot) -> list[Resource]:
     """Descriptions below a directory whose collision shapes are all there.
 
     Raises:
@@ -110,39 +120,40 @@ def _search(directory: Path, uri_of: Callable[[Path], str]) -> list[Resource]:
         for path in (Path(parent, name) for name in sorted(files) if name.endswith(".urdf")):
             try:
                 if path.is_file() and path.stat().st_size <= _LARGEST_FILE:
-                    found.append(Resource(uri_of(path), _spawnable_name(path)))
+                    found.append(Resource(uri_of(path), _spawnable_name(path, robot)))
             except (RequestError, OSError):
                 continue
     return found
 
 
-def _spawnable_name(path: Path) -> str:
+def _spawnable_name(path: Path, robot: Robot) -> str:
     def check(filename: str) -> Triangles:
-        check_mesh(_locate(filename, path.parent))
+        check_mesh(_locate(filename, path.parent, robot))
         return np.empty((0, 3, 3), np.float32)
 
     return read_model(path.read_bytes(), check).name or path.stem
 
 
-def _locate(filename: str, directory: Path | None) -> Path:
+def _locate(filename: str, directory: Path | None, robot: Robot) -> Path:
     """File of a mesh, which may be relative to the directory of its description.
 
     Raises:
         RequestError: ``MISSING_ASSETS`` if nothing says what a relative path is relative to.
     """
     if "://" in filename:
-        return _path(filename, missing="MISSING_ASSETS")
+        return _path(filename, robot, missing="MISSING_ASSETS")
     if directory is None and not filename.startswith("/"):
         message = f"mesh {filename!r:.255}: a relative path means nothing in a description without a file"
         raise RequestError("MISSING_ASSETS", message, expected="package:// or file://")
     return (directory or Path("/")) / filename
 
 
-def _path(uri: str, *, missing: str) -> Path:
+def _path(uri: str, robot: Robot, *, missing: str) -> Path:
     """File that a URI means.
 
     Args:
         uri: The URI.
+        robot: The robot, whose share the packages are in.
         missing: Reason to give if there is no such package.
 
     Raises:
@@ -157,9 +168,12 @@ def _path(uri: str, *, missing: str) -> Path:
     if parts.scheme == "package":
         # With three slashes the package is the first part of the path.
         package, *rest = unquote(parts.netloc + parts.path).lstrip("/").split("/")
-        if not package or not (TALOS.share() / package).is_dir():
-            raise RequestError(missing, f"{uri!r:.255}: no such package", expected=f"package://{_DATA}/...")
-        return TALOS.share().joinpath(package, *rest)
+        share = robot.share()
+        if not package or not (share / package).is_dir():
+            raise RequestError(
+                missing, f"{uri!r:.255}: no such package", expected=f"package://{_package_of(robot)}/..."
+            )
+        return share.joinpath(package, *rest)
     raise RequestError(
         "UNSUPPORTED_FORMAT", f"{uri!r:.255}: unknown kind of URI", expected="file:///... or package://..."
     )

@@ -69,16 +69,10 @@ class Simulation:
         self._steps: StepRequest | None = None
         self._period_ns = period_ns = round(10**9 / config.sim.physics_hz)
         self._stride = config.sim.physics_hz // config.record.rate_hz
-        robot, answers = robot_of(config), config.controllers
+        robot = robot_of(config)
         self.limbs = {
-            name: LimbController(
-                robot.graph_name(name, answers.names),
-                joints,
-                moving=self.world.moving,
-                period_ns=period_ns,
-                config=answers,
-            )
-            for name, joints in robot.controllers.items()
+            name: LimbController(robot, name, moving=self.world.moving, period_ns=period_ns, config=config.controllers)
+            for name in robot.controllers
         }
         self._watched: list[LimbController] = []
         self._keeps_states = "controller_state" in config.record.topics

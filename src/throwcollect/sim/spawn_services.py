@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from throwcollect.errors import RequestError
+from throwcollect.robots.description import robot_of
 from throwcollect.ros import Node
 from throwcollect.ros.msg import Resource, Result, Spawnable, SpawnResult
 from throwcollect.ros.msg import SpawnEntity as SpawnWish
@@ -28,6 +29,7 @@ class SpawnServices:
     def __init__(self, node: Node, simulation: Simulation) -> None:
         self._simulation = simulation
         self._entities = simulation.entities
+        self._robot = robot_of(simulation.config)
         for service, name, fill in (
             (SpawnEntity, "spawn_entity", self._spawn_one),
             (SpawnEntities, "spawn_entities", self._spawn_all),
@@ -71,12 +73,13 @@ class SpawnServices:
                 start=body_state(pose.pose),
                 frame=pose.header.frame_id,
             ),
+            self._robot,
         )
 
     def _list_spawnables(self, request: GetSpawnables.Request, response: GetSpawnables.Response) -> None:
         if len(request.sources) > _MOST_SOURCES:
             message = f"{len(request.sources)} sources in one call; at most {_MOST_SOURCES}"
             raise RequestError("RESULT_OPERATION_FAILED", message)
-        resources, useless = find_resources(request.sources)
+        resources, useless = find_resources(request.sources, self._robot)
         response.spawnables = [Spawnable(uri=resource.uri, description=resource.name) for resource in resources]
         response.result.error_message = "\n".join(useless)

@@ -8,6 +8,7 @@ from itertools import count
 
 from throwcollect.engines.engine import BodyState
 from throwcollect.errors import RequestError
+from throwcollect.robots.robot import Robot
 from throwcollect.sim.entities import WORLD_FRAME, Entities
 from throwcollect.sim.resources import load_model
 
@@ -41,12 +42,13 @@ class SpawnRequest:
     frame: str
 
 
-def spawn(entities: Entities, request: SpawnRequest) -> str:
+def spawn(entities: Entities, request: SpawnRequest, robot: Robot) -> str:
     """Put a new entity into the world; a wish that cannot be met changes nothing.
 
     Args:
         entities: Where to put it.
         request: The wish.
+        robot: The robot, beside whose description those of ``package://`` are.
 
     Returns:
         Its name.
@@ -61,7 +63,7 @@ def spawn(entities: Entities, request: SpawnRequest) -> str:
         message = f"namespace {request.namespace!r:.80}"
         raise RequestError("NAMESPACE_INVALID", message, expected="such as /left/table, or nothing")
     start = entities.in_world(request.start, request.frame)
-    model = load_model(request.uri, request.text)
+    model = load_model(request.uri, request.text, robot)
     name = _free_name(entities, request.name or model.name)
     origin = f"URDF {model.name!r:.80}" + (f" of {request.uri:.500}" if request.uri else "")
     namespace = f", namespace {request.namespace}" if request.namespace else ""

@@ -208,7 +208,7 @@ class World(Observer):
         return sample[:count], sample[count : 2 * count]
 
     def posture(self) -> Mapping[str, float]:
-        """Position of each of the 32 joints now [rad]."""
+        """Position of each joint of the robot now [rad]."""
         return {**self._locked, **dict(zip(self._moving, self.joints()[0], strict=True))}
 
     @property

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import math
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,9 +16,8 @@ from throwcollect.episode.frames import WORLD
 from throwcollect.episode.record import NS_PER_S
 from throwcollect.episode.topics import BALL
 from throwcollect.errors import ConfigError
-from throwcollect.robots.talos import TALOS
 from throwcollect.tasks.throw.outcome import Outcome
-from throwcollect.view.robot import BALL_RGBA, Rgba, Shape
+from throwcollect.view.robot import BALL_RGBA, DrawnRobot, Rgba
 from throwcollect.view.viewed import ViewedThrow
 
 _HELD: Rgba = (0.6, 0.6, 0.6, 0.8)
@@ -33,11 +33,11 @@ _POINTS_PER_S = 100
 """As many points of a path as the eye can tell apart."""
 
 
-def robot_markers(shapes: Sequence[Shape], stamp_ns: int) -> Any:
+def robot_markers(robot: DrawnRobot, stamp_ns: int) -> Any:
     """The robot's shapes in the frames of its links, each mesh inside as ``data:`` URL, so that nothing is to be found.
 
     Args:
-        shapes: The shapes.
+        robot: The robot.
         stamp_ns: Stamp of the markers [ns].
 
     Returns:
@@ -47,10 +47,10 @@ def robot_markers(shapes: Sequence[Shape], stamp_ns: int) -> Any:
         ConfigError: If a mesh cannot be read.
     """
     array, marker = (get_message(f"visualization_msgs/msg/{name}") for name in ("MarkerArray", "Marker"))
-    kinds = {"mesh": marker.MESH_RESOURCE, "box": marker.CUBE, "cylinder": marker.CYLINDER}
-    meshes = {mesh: _data_url(mesh) for mesh in {shape.mesh for shape in shapes if shape.mesh}}
+    kinds = {"mesh": marker.MESH_RESOURCE, "box": marker.CUBE, "cylinder": marker.CYLINDER, "sphere": marker.SPHERE}
+    meshes = {mesh: _data_url(robot.share / mesh) for mesh in robot.meshes}
     markers = []
-    for number, shape in enumerate(shapes):
+    for number, shape in enumerate(robot.shapes):
         drawn = _marker("robot", kinds[shape.kind], shape.rgba, shape.size, stamp_ns, number=number)
         drawn.header.frame_id, drawn.frame_locked = shape.link, True
         drawn.mesh_resource = meshes.get(shape.mesh, "")
@@ -189,8 +189,7 @@ def _header(stamp_ns: int) -> Any:
     return get_message("std_msgs/msg/Header")(stamp=stamp, frame_id=WORLD)
 
 
-def _data_url(mesh: str) -> str:
-    path = TALOS.share() / mesh
+def _data_url(path: Path) -> str:
     try:
         return f"data:model/{path.suffix[1:].lower()};base64,{base64.b64encode(path.read_bytes()).decode()}"
     except OSError as error:

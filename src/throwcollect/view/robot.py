@@ -14,7 +14,6 @@ from throwcollect.episode.topics import BALL
 from throwcollect.errors import DatasetError
 from throwcollect.extras import lazily
 from throwcollect.files import unwritable
-from throwcollect.robots.talos import TALOS
 
 transform = lazily("scipy.spatial.transform")
 
@@ -36,8 +35,8 @@ class Shape:
         link: The link, whose frame it moves with.
         position: Its origin in that frame [m].
         rotation_xyzw: Unit quaternion, shape to frame.
-        size: Edge lengths of a box or of the box around a cylinder along z [m]; scale of a mesh.
-        kind: ``box``, ``cylinder`` or ``mesh``.
+        size: Edge lengths of a box, or of the box around a sphere or a cylinder along z [m]; scale of a mesh.
+        kind: ``box``, ``cylinder``, ``sphere`` or ``mesh``.
         mesh: Path of the mesh's file, relative to the directory that holds its package; empty if it is none.
         rgba: Its colour.
     """
@@ -58,10 +57,12 @@ class DrawnRobot:
     Attributes:
         urdf: URDF text without collision shapes; meshes are ``package://`` URLs.
         shapes: The same shapes.
+        share: Directory that the paths of meshes are relative to.
     """
 
     urdf: str
     shapes: tuple[Shape, ...]
+    share: Path
 
     @property
     def meshes(self) -> list[str]:
@@ -78,13 +79,14 @@ class DrawnRobot:
             target = directory / mesh
             try:
                 target.parent.mkdir(parents=True, exist_ok=True)
-                shutil.copyfile(TALOS.share() / mesh, target)
+                shutil.copyfile(self.share / mesh, target)
             except OSError as error:
                 raise unwritable(target, error) from error
         for package in sorted({mesh.split("/", 1)[0] for mesh in self.meshes}):
             path = Path(package, "package.xml")
+            source = self.share / path
             try:
-                text = (TALOS.share() / path).read_text(encoding="utf-8")
+                text = source.read_text(encoding="utf-8") if source.exists() else "<package><name></name></package>\n"
                 # Foxglove searches for the name that a package gives itself, which in URLs is that of its directory.
                 renamed = re.sub(r"<name>[^<]*</name>", f"<name>{package}</name>", text, count=1)
                 (directory / path).write_text(renamed, encoding="utf-8")
@@ -92,12 +94,13 @@ class DrawnRobot:
                 raise unwritable(directory / path, error) from error
 
 
-def read_drawn_robot(description: str, tool: str) -> DrawnRobot:
+def read_drawn_robot(description: str, tool: str, share: Path) -> DrawnRobot:
     """Read the robot as viewers draw it.
 
     Args:
         description: URDF text of the robot, as in the dataset.
         tool: Name of the tool's link, which has a colour of its own.
+        share: Directory that ``package://`` paths are relative to.
 
     Raises:
         DatasetError: If the text is not a URDF that can be drawn.
@@ -116,7 +119,7 @@ def read_drawn_robot(description: str, tool: str) -> DrawnRobot:
         )
     except (ElementTree.ParseError, AttributeError, KeyError, ValueError) as error:
         raise DatasetError(f"robot description: cannot be drawn: {error}") from error
-    return DrawnRobot(ElementTree.tostring(robot, encoding="unicode"), shapes)
+    return DrawnRobot(ElementTree.tostring(robot, encoding="unicode"), shapes, share)
 
 
 def ball_urdf(ball: BallConfig) -> str:
@@ -154,6 +157,8 @@ def _shape(link: str, visual: ElementTree.Element, colors: Mapping[str, Rgba]) -
         mesh = geometry.attrib["filename"].removeprefix(_PACKAGE)
     elif geometry.tag == "box":
         size = _numbers(geometry.attrib["size"])
+    elif geometry.tag == "sphere":
+        size = (2 * float(geometry.attrib["radius"]),) * 3
     elif geometry.tag == "cylinder":
         diameter = 2 * float(geometry.attrib["radius"])
         size = (diameter, diameter, float(geometry.attrib["length"]))

@@ -15,7 +15,7 @@ from throwcollect.episode.channels import Channel
 from throwcollect.episode.record import Samples
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.files import new_directory, unwritable
-from throwcollect.robots.description import full_description
+from throwcollect.robots.description import full_description, robot_of
 from throwcollect.tools.tool import tool_of
 from throwcollect.view.foxglove import layout
 from throwcollect.view.robot import read_drawn_robot
@@ -68,21 +68,22 @@ def view(directory: Path, output: Path, trials: Iterable[int] | None = None) -> 
         What has been written.
 
     Raises:
-        ConfigError: If there is something at `output`, or Talos' files cannot be read.
+        ConfigError: If there is something at `output`, or the robot's files cannot be read.
         DatasetError: If the dataset is damaged or not finished, a trial has no episode, or `output` cannot be written.
     """
     dataset = Dataset.open(directory)
     throws = _schedule(dataset, _rows(dataset, trials))
-    robot = read_drawn_robot(full_description(dataset.config), tool_of(dataset.config.tool).link)
+    config = dataset.config
+    robot = read_drawn_robot(full_description(config), tool_of(config.tool).link, robot_of(config).share())
     with new_directory(output) as beside:
         path = beside / RECORDING
         try:
             with path.open("wb") as stream:
-                recording = ViewRecording(stream, dataset.config)
+                recording = ViewRecording(stream, config)
                 recording.write(throws, lambda throw: _samples(dataset, throw.row), robot)
                 summary = recording.finish(RECORDING)
             (beside / METADATA).write_text(_metadata(summary, recording.channels), encoding="utf-8")
-            (beside / LAYOUT).write_bytes(layout(tuple(dataset.config.task.end)))
+            (beside / LAYOUT).write_bytes(layout(tuple(config.task.end)))
             robot.copy_package(beside)
             sizes = {mesh: (beside / mesh).stat().st_size for mesh in robot.meshes}
             recording_bytes = path.stat().st_size
@@ -128,7 +129,7 @@ def _schedule(dataset: Dataset, rows: Iterable[Row]) -> list[ViewedThrow]:
 
 
 def _samples(dataset: Dataset, row: Row) -> Samples:
-    return dataset.episode(row["trial"]).samples()
+    return dataset.episode(row["trial"]).samples(dataset.joints)
 
 
 def _metadata(summary: FileSummary, channels: tuple[Channel, ...]) -> str:

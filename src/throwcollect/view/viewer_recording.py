@@ -53,12 +53,13 @@ class ViewRecording:
     def __init__(self, stream: IO[bytes], config: Config) -> None:
         self._config = config
         self._frames = read_frames(full_description(config), base_height=config.robot.base_height_m)
+        robot = robot_of(config)
         self._topics = [
-            transforms(self._frames.moving),
-            joint_states(),
+            transforms(self._frames.moving, robot.joints),
+            joint_states(robot.joints),
             ball_odometry(),
             ball_speed(),
-            range_shares(robot_of(config), tuple(config.task.end)),
+            range_shares(robot, tuple(config.task.end)),
         ]
         declared = [(name, kind, _LATCHED) for name, kind in _LATCHED_TYPES.items()]
         declared += [(topic.name, topic.type_name, _SAMPLED) for topic in self._topics]
@@ -92,7 +93,7 @@ class ViewRecording:
 
         Raises:
             DatasetError: If an episode cannot be read.
-            ConfigError: If Talos' files cannot be read.
+            ConfigError: If the robot's files cannot be read.
         """
         start = throws[0].start_ns
         string = get_message("std_msgs/msg/String")
@@ -103,7 +104,7 @@ class ViewRecording:
             for frame in self._frames.fixed
         ]
         self._put("/tf_static", start, get_message("tf2_msgs/msg/TFMessage")(transforms=fixed))
-        self._put("/view/robot", start, robot_markers(robot.shapes, start))
+        self._put("/view/robot", start, robot_markers(robot, start))
         self._put("/view/throws", start, all_markers(throws))
         for throw in throws:
             self._put("/view/throw", throw.start_ns, throw_markers(throw))

@@ -21,15 +21,6 @@ def test_defaults_are_those_of_ros2_controllers() -> None:
     assert JointConstraints() == JointConstraints(trajectory=0.0, goal=0.0, max_deceleration_on_cancel=0.0)
 
 
-def test_talos_has_a_goal_tolerance_and_no_path_tolerance() -> None:
-    parameters = ControllerParameters.talos(["head_1_joint", "head_2_joint"])
-    assert parameters.joints == ("head_1_joint", "head_2_joint")
-    assert not parameters.measures_velocity
-    assert (parameters.constraints.goal_time, parameters.constraints.stopped_velocity_tolerance) == (0.6, 0.05)
-    assert set(parameters.constraints.joints.values()) == {JointConstraints(trajectory=0.0, goal=0.02)}
-    assert set(parameters.constraints.joints) == set(parameters.joints)
-
-
 WRONG = [
     ({"constraints": Constraints(goal_time=-1)}, "constraints.goal_time: must be .* at least 0.0; got -1"),
     ({"constraints": Constraints(stopped_velocity_tolerance=math.nan)}, "stopped_velocity_tolerance: .*got nan"),

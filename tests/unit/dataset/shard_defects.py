@@ -19,6 +19,7 @@ from throwcollect.episode.channels import Channels
 from throwcollect.episode.message import Episode
 from throwcollect.episode.topics import joint_states
 from throwcollect.robots.description import full_description
+from throwcollect.robots.talos import TALOS
 
 
 def chunk_contents(directory: Path) -> None:
@@ -164,7 +165,7 @@ def episode_of_another_dataset(directory: Path) -> None:
 def altered_with_all_hashes_made_to_fit(directory: Path) -> None:
     first, second, third = episodes_of(directory)
     contents = bytearray(second.chunk.decompress())
-    contents[31 + joint_states().layout.dtype.fields["position"][1] + 6] ^= 1
+    contents[31 + joint_states(TALOS.joints).layout.dtype.fields["position"][1] + 6] ^= 1
     data = zstandard.ZstdCompressor(level=1).compress(bytes(contents))
     chunk = replace(second.chunk, data=data, crc=zlib.crc32(contents))
     written(directory / SHARD, [first, Episode(second.header, chunk, hashlib.sha256(contents).hexdigest()), third])

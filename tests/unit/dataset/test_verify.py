@@ -41,6 +41,7 @@ from throwcollect.dataset.writer import create
 from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.episode.topics import joint_states
 from throwcollect.errors import DatasetError
+from throwcollect.robots.talos import TALOS
 
 DEFECTS = {**SHARD_DEFECTS, **TABLE_DEFECTS}
 CONSEQUENCES = {**SHARD_CONSEQUENCES, **TABLE_CONSEQUENCES}
@@ -112,7 +113,7 @@ def test_a_changed_sample_is_found_even_if_all_checksums_are_made_to_fit(dataset
     path = dataset / SHARD
     episode = stored(path, 4)
     contents = bytearray(episode.episode.chunk.decompress())
-    contents[31 + joint_states().layout.dtype.fields["position"][1]] ^= 0x40
+    contents[31 + joint_states(TALOS.joints).layout.dtype.fields["position"][1]] ^= 0x40
     data = zstandard.ZstdCompressor(level=1).compress(bytes(contents))
     chunk = replace(episode.episode.chunk, data=data, crc=zlib.crc32(contents)).record()
     whole = path.read_bytes()

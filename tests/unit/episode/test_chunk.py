@@ -16,12 +16,16 @@ from mcap.records import Message, MessageIndex
 from throwcollect.config.schema import Config
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.chunk import Chunk, ChunkEncoder, encode_message
+from throwcollect.episode.message import Episode
 from throwcollect.episode.message_table import MessageTable
-from throwcollect.episode.record import Samples
+from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.errors import DatasetError
 from throwcollect.robots.description import full_description
+from throwcollect.robots.talos import TALOS
 
 URDF = full_description(Config())
+COUNT_OF_NAMES = 31 + 4 + 8 + 8
+"""Where the first row of a chunk has it: behind the record's header, CDR encapsulation, stamp and empty frame."""
 ALL = ["joint_states", "ball/odometry", "controller_state", "tf", "clock"]
 
 
@@ -38,6 +42,10 @@ def full() -> ChunkEncoder:
 @pytest.fixture
 def targets(make_set_points: Any) -> dict[str, Any]:
     return {name: make_set_points(name, 50) for name in ("arm_right_controller", "torso_controller")}
+
+
+def as_chunk(contents: bytes) -> Chunk:
+    return Chunk.of(contents, zstandard.compress(contents), start_ns=10**10, end_ns=10**10 + 49 * 4_000_000)
 
 
 def messages_of(contents: bytes) -> list[tuple[int, Message]]:
@@ -170,9 +178,29 @@ def test_records_of_other_topics_hold_no_samples(encoder: ChunkEncoder, make_sam
     size = 9 + struct.unpack_from("<Q", contents, 1)[0]
     with pytest.raises(DatasetError, match="no messages of /ball/odometry"):
         _ = MessageTable(contents[:size], 1).samples
-    renamed = contents[: len(contents) // 2].replace(b"head_1_joint", b"head_9_joint")
+    framed = contents[: len(contents) // 2].replace(b"head_1_joint\0", b"head_1_joint1")
     with pytest.raises(DatasetError, match="messages of /joint_states have another layout"):
-        _ = MessageTable(renamed, 1).samples
+        _ = MessageTable(framed, 1).samples
+    for length in (0, 33, 2**32 - 1):
+        counted = bytearray(contents[: len(contents) // 2])
+        assert struct.unpack_from("<I", counted, COUNT_OF_NAMES) == (32,)
+        struct.pack_into("<I", counted, COUNT_OF_NAMES, length)
+        with pytest.raises(DatasetError, match=r"JointState|joint states"):
+            _ = MessageTable(counted, 1).samples
+
+
+def test_samples_have_the_joints_that_the_recording_names(
+    encoder: ChunkEncoder, header: EpisodeHeader, make_samples: Any
+) -> None:
+    contents = encoder.encode(make_samples(50)).decompress()
+    assert Episode(header, as_chunk(contents)).samples(TALOS.joints).position.shape == (50, 32)
+    renamed = Episode(header, as_chunk(contents.replace(b"head_1_joint", b"neck_1_joint")))
+    assert renamed.table.joints == tuple(joint.replace("head_1", "neck_1") for joint in TALOS.joints)
+    assert renamed.samples().position.tolist() == make_samples(50).position.tolist()
+    with pytest.raises(DatasetError, match=r"joint 29 of the joint states is neck_1_joint\n.*head_1_joint"):
+        renamed.samples(TALOS.joints)
+    with pytest.raises(DatasetError, match=r"joint states of 32 joints\n.*2"):
+        renamed.samples(("shoulder_joint", "elbow_joint"))
 
 
 def test_times_are_compared_with_stamps(encoder: ChunkEncoder, make_samples: Any) -> None:

@@ -49,7 +49,7 @@ def stamped(stamp_ns: int, frame: str) -> Any:
 
 @pytest.mark.parametrize("count", [1, 500])
 def test_joint_states_are_the_bytes_that_rosbags_writes(count: int) -> None:
-    topic = joint_states()
+    topic = joint_states(TALOS.joints)
     columns = [wild((count, 32), seed=seed) for seed in range(3)]
     stamps = np.random.default_rng(3).integers(0, 2**31 * 10**9, size=count)
     empty = np.zeros((count, 3))
@@ -86,7 +86,7 @@ def test_odometry_is_the_bytes_that_rosbags_writes(sec: int, nanosec: int, numbe
 
 @pytest.mark.parametrize("controller", TALOS.controllers)
 def test_controller_states_can_be_read_by_rosbags(controller: str, make_samples: Any, make_set_points: Any) -> None:
-    topic, samples, targets = controller_state(controller), make_samples(3), make_set_points(controller, 3)
+    topic, samples, targets = controller_state(TALOS, controller), make_samples(3), make_set_points(controller, 3)
     columns = [TALOS.joints.index(joint) for joint in TALOS.controllers[controller]]
     for row, message in enumerate(messages_of(topic, samples, {controller: targets})):
         state: Any = STORE.deserialize_cdr(message, STATE)
@@ -101,7 +101,7 @@ def test_controller_states_can_be_read_by_rosbags(controller: str, make_samples:
 
 
 def test_a_transform_of_no_frame_is_that_of_the_ball(make_samples: Any) -> None:
-    topic, samples = transforms(()), make_samples(2)
+    topic, samples = transforms((), TALOS.joints), make_samples(2)
     for row, message in enumerate(messages_of(topic, samples)):
         (ball,) = STORE.deserialize_cdr(message, topic.type_name).transforms
         assert (ball.header.frame_id, ball.child_frame_id) == ("world", "ball")
@@ -137,7 +137,7 @@ def test_every_kind_of_field_is_found() -> None:
 
 
 def test_messages_that_differ_elsewhere_are_recognised() -> None:
-    layout = joint_states().layout
+    layout = joint_states(TALOS.joints).layout
     rows = np.tile(np.frombuffer(layout.template, np.uint8), (3, 1))
     rows.view(layout.dtype)["position"] = 1.5
     assert layout.describes(rows)

@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from throwcollect.episode.record import Samples
 from throwcollect.episode.topics import Recording, Topic, ball_odometry, joint_states, read_samples
+from throwcollect.robots.talos import TALOS
 
 
 def rows_of(topic: Topic, samples: Samples) -> Any:
@@ -27,7 +28,7 @@ def test_the_twist_is_in_the_frame_of_the_ball(make_samples: Any) -> None:
 
 def test_samples_survive_the_messages(make_samples: Any) -> None:
     samples = make_samples(100)
-    read = read_samples(rows_of(joint_states(), samples), rows_of(ball_odometry(), samples))
+    read = read_samples(rows_of(joint_states(TALOS.joints), samples), rows_of(ball_odometry(), samples))
     for field in fields(Samples):
         sent, got = getattr(samples, field.name), getattr(read, field.name)
         if field.name in ("ball_linear_velocity", "ball_angular_velocity"):

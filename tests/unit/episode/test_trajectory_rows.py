@@ -8,9 +8,10 @@ import pytest
 from throwcollect.config.schema import Config
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.chunk import ChunkEncoder
-from throwcollect.episode.trajectory_rows import STAMPS, column_widths, to_nanoseconds, trajectory_rows, view_as_bytes
+from throwcollect.episode.trajectory_rows import STAMPS, column_shapes, to_nanoseconds, trajectory_rows, view_as_bytes
 from throwcollect.errors import DatasetError
 from throwcollect.robots.description import full_description
+from throwcollect.robots.talos import TALOS
 
 
 @pytest.fixture(scope="module")
@@ -21,7 +22,7 @@ def contents(make_samples: Any) -> bytes:
 
 def test_every_column_lies_where_it_was_written(contents: bytes, make_samples: Any) -> None:
     samples = make_samples(20)
-    rows = trajectory_rows(contents, 20)
+    rows = trajectory_rows(contents, 20, TALOS.joints)
     for name, expected in {
         "joints.position": samples.position,
         "joints.velocity": samples.velocity,
@@ -30,7 +31,7 @@ def test_every_column_lies_where_it_was_written(contents: bytes, make_samples: A
         "ball.orientation_xyzw": samples.ball_orientation_xyzw,
     }.items():
         assert rows[name].tobytes() == expected.tobytes()
-        assert column_widths()[name] == expected.shape[1]
+        assert column_shapes(20, 32)[name] == expected.shape
     stamps = np.empty(20, np.int64)
     view_as_bytes(stamps)[:] = rows[STAMPS]
     to_nanoseconds(stamps)
@@ -49,11 +50,17 @@ def test_another_number_of_samples_is_refused(contents: bytes, samples: int) -> 
     with pytest.raises(
         DatasetError, match=f"are not the records of {samples} samples|not one message per channel and sample"
     ):
-        trajectory_rows(contents, samples)
+        trajectory_rows(contents, samples, TALOS.joints)
+
+
+@pytest.mark.parametrize("joints", [TALOS.joints[:-1], TALOS.joints[::-1], ("shoulder_joint", "elbow_joint")])
+def test_other_joints_are_refused(contents: bytes, joints: tuple[str, ...]) -> None:
+    with pytest.raises(DatasetError, match="messages of /joint_states have another layout"):
+        trajectory_rows(contents, 20, joints)
 
 
 def test_another_layout_is_refused(contents: bytes) -> None:
-    rows = trajectory_rows(contents, 20)
+    rows = trajectory_rows(contents, 20, TALOS.joints)
     varying = {
         place
         for kind, offset in (field[:2] for field in rows.dtype.fields.values())
@@ -65,7 +72,7 @@ def test_another_layout_is_refused(contents: bytes) -> None:
         changed = bytearray(contents)
         changed[position] ^= 1
         try:
-            trajectory_rows(bytes(changed), 20)
+            trajectory_rows(bytes(changed), 20, TALOS.joints)
         except DatasetError:
             refused += 1
             assert position not in varying

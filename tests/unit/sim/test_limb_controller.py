@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 
 from throwcollect.config.schema import Config
-from throwcollect.control import GoalStatus, Trajectory, TrajectoryGoal, TrajectoryPoint
+from throwcollect.control import (
+    ControllerParameters,
+    GoalStatus,
+    JointConstraints,
+    Trajectory,
+    TrajectoryGoal,
+    TrajectoryPoint,
+)
 from throwcollect.robots.description import start_posture
 from throwcollect.robots.talos import TALOS
 from throwcollect.sim.simulation import Simulation
@@ -37,6 +44,25 @@ def test_controllers_have_the_names_of_either_ros() -> None:
         "right_gripper_controller",
     ]
     assert [TALOS.graph_name(name, "ros2") for name in TALOS.controllers] == list(TALOS.controllers)
+
+
+def parameters_of(name: str, **options: object) -> ControllerParameters:
+    return simulation(**options).limbs[name].controller.parameters
+
+
+def test_talos_has_a_goal_tolerance_and_no_path_tolerance() -> None:
+    parameters = parameters_of(HEAD)
+    assert parameters.joints == ("head_1_joint", "head_2_joint")
+    assert not parameters.measures_velocity
+    assert (parameters.constraints.goal_time, parameters.constraints.stopped_velocity_tolerance) == (0.6, 0.05)
+    assert set(parameters.constraints.joints.values()) == {JointConstraints(trajectory=0.0, goal=0.02)}
+    assert set(parameters.constraints.joints) == set(parameters.joints)
+
+
+def test_joints_brake_if_the_configuration_says_so() -> None:
+    parameters = parameters_of(HEAD, hold="decelerate", max_deceleration_radps2=7.0)
+    assert parameters.measures_velocity
+    assert set(parameters.constraints.joints.values()) == {JointConstraints(goal=0.02, max_deceleration_on_cancel=7.0)}
 
 
 @pytest.mark.parametrize("seconds", [0.1, 0.7])

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from throwcollect.dataset.reader import Dataset
 from throwcollect.report.outcomes import LANDED, Outcomes
 from throwcollect.report.throw.landings import Landings
-from throwcollect.robots.description import robot_of
 from throwcollect.robots.quintic_curve import sample_positions
 from throwcollect.tasks.throw.config import throw_section
 from throwcollect.tasks.throw.flight import NS_PER_S, flight_residual, release_of
@@ -151,11 +150,11 @@ def read_motion(dataset: Dataset, trial: int) -> JointMotion:
         DatasetError: If the episode is not where the table says, or is damaged.
     """
     episode = dataset.episode(trial)
-    samples = episode.samples()
+    samples = episode.samples(dataset.joints)
     config = dataset.plan.config_of(dataset.plan.trials[trial])
     trajectory = throw_trajectory(config)
     times = (samples.stamps_ns - episode.header.start_ns) / NS_PER_S
-    columns = [robot_of(config).joints.index(joint) for joint in trajectory.joints]
+    columns = [dataset.joints.index(joint) for joint in trajectory.joints]
     release_ns = release_of(episode.header.contacts, gap_s=throw_section(config.task).recatch_gap_s)
     return JointMotion(
         trial=trial,

@@ -25,6 +25,7 @@ from throwcollect.report.throw.episodes import (
     read_paths,
 )
 from throwcollect.report.throw.landings import Landings, read_landings
+from throwcollect.robots.description import robot_of
 from throwcollect.tasks.throw.flight import BALLISTIC_TOLERANCE_M
 
 
@@ -38,6 +39,7 @@ def report_throws(dataset: Dataset, outcomes: Outcomes) -> TaskReport:
     Raises:
         DatasetError: If an episode is damaged, or not where the table says.
     """
+    robot = robot_of(dataset.config)
     throws, swept = dataset.throws, LANDING_HEIGHT in dataset.plan.keys
     height_m = None if swept else dataset.config.scene.landing_height_m
     landings = read_landings(throws, outcomes)
@@ -47,7 +49,7 @@ def report_throws(dataset: Dataset, outcomes: Outcomes) -> TaskReport:
     paths = tuple(read_paths(dataset, examples))
     motion = read_motion(dataset, _choose_middle(paths)) if paths else None
     return TaskReport(
-        subject=f"simulated throw{'s' if len(throws) > 1 else ''} of a ball by the humanoid robot Talos",
+        subject=f"simulated throw{'s' if len(throws) > 1 else ''} of a ball by {robot.introduction}",
         tiles=tuple(_show_key_numbers(landings, outcomes)),
         results=(
             _show_landings(landings, outcomes, coverage, height_m=height_m),

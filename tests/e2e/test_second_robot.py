@@ -1,0 +1,161 @@
+"""The robot of another package, `tests/plugins`, from its configuration to what is made of its datasets."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.e2e.collection import call, collect, fingerprints
+
+pytestmark = pytest.mark.e2e
+
+PLUGINS = Path(__file__).parents[1] / "plugins"
+CONFIG = """\
+name: arm
+robot: {name: planar_arm}
+task:
+  start: {shoulder_joint: 0.0, elbow_joint: 0.0}
+  end: {shoulder_joint: 1.4, elbow_joint: 0.3}
+  duration_s: 0.5
+record: {topics: [joint_states, ball/odometry, tf, controller_state]}
+sweep: {sampler: uniform, parameters: {task.duration_s: {min: 0.35, max: 0.6}}}
+trials: 6
+run: {runtime: local, replay: 2}
+"""
+READ = """
+import throwcollect
+
+dataset = throwcollect.load(directory)
+throw = dataset[4]
+every, elbow = dataset.trajectories(["joints.position"]), dataset.trajectories(joints=["elbow_joint"])
+with throwcollect.Simulator(directory / "config.yaml") as simulator:
+    simulated = simulator.throw(throw.parameters, trial=4)
+found = {
+    "joints": [dataset.joints, throw.joints.names, simulated.joints.names, dataset.moving_joints],
+    "digests": [throw.row["digest"], simulated.row["digest"]],
+    "end": throw.joints.position[-1].tolist(),
+    "ends": every[4]["joints.position"][-1].tolist() + elbow[4]["joints.position"][-1].tolist(),
+    "statistics": {group: [*signals] for group, signals in throwcollect.compute_statistics(directory).signals.items()},
+    "same": bool((throw.joints.effort == simulated.joints.effort).all()),
+}
+"""
+DERIVE = """
+import throwcollect
+
+throwcollect.split_dataset(directory, scratch / "parts", fractions="train=0.5,test=0.5")
+throwcollect.merge_datasets([scratch / "parts/train", scratch / "parts/test"], scratch / "merged")
+throwcollect.filter_dataset(directory, scratch / "some", where="trial < 3")
+found = {
+    "findings": [len(throwcollect.verify_dataset(scratch / name)) for name in ("parts/train", "merged", "some")],
+    "replayed": len(throwcollect.verify_dataset(scratch / "merged", replay=6)),
+    "trials": [len(throwcollect.load(scratch / name)) for name in ("merged", "some")],
+}
+"""
+EXPORT = """
+import json
+import numpy as np
+import throwcollect
+
+for kind in ("parquet", "npz", "lerobot", "hdf5", "mat"):
+    throwcollect.export_dataset(directory, scratch / kind, to=kind)
+(arrays,) = map(np.load, (scratch / "npz/trajectories").iterdir())
+features = json.loads((scratch / "lerobot/meta/info.json").read_text())
+found = {
+    "lerobot": [features["robot_type"], features["features"]["action"]["names"]],
+    "npz": [arrays["joints"].tolist(), arrays["joint_effort_nm"].shape[1]],
+    "cards": [(scratch / kind / "README.md").read_text().count("by the planar arm") for kind in ("parquet", "lerobot")],
+}
+"""
+
+
+@pytest.fixture(scope="module")
+def with_plugins() -> Any:
+    """Whatever is started finds the package of the robot."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("PYTHONPATH", os.pathsep.join([str(PLUGINS), os.environ.get("PYTHONPATH", "")]))
+        yield
+
+
+@pytest.fixture(scope="module")
+def arm(with_plugins: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A dataset that two simulation nodes have collected."""
+    scratch = tmp_path_factory.mktemp("arm")
+    (scratch / "arm.yaml").write_text(CONFIG)
+    summary = collect(scratch / "arm.yaml", scratch / "data", 2)
+    assert summary["outcomes"] == {"landed": 6}
+    return scratch / "data"
+
+
+def run(program: str, directory: Path, scratch: Path) -> dict[str, Any]:
+    """What a program finds that knows of a dataset and of a directory for what it makes of it."""
+    head = f"from pathlib import Path\ndirectory, scratch = Path({str(directory)!r}), Path({str(scratch)!r})\n"
+    tail = "\nimport json\nprint(json.dumps(found))\n"
+    done = subprocess.run([sys.executable, "-c", head + program + tail], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    found: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+    return found
+
+
+def test_nodes_and_one_process_write_the_same_files(arm: Path, tmp_path: Path) -> None:
+    done = call("up", arm / "config.yaml", "--runtime", "inprocess", "--output", tmp_path / "data")
+    assert done.returncode == 0, done.stderr
+    assert fingerprints(tmp_path / "data") == fingerprints(arm)
+
+
+def test_its_throws_can_be_read_and_simulated_again(arm: Path, tmp_path: Path) -> None:
+    found = run(READ, arm, tmp_path)
+    joints = ["shoulder_joint", "elbow_joint"]
+    assert found["joints"] == [joints] * 4
+    assert found["digests"][0] == found["digests"][1]
+    assert found["same"]
+    assert found["end"] == pytest.approx([1.4, 0.3], abs=1e-3)
+    assert found["ends"] == [*found["end"], found["end"][1]]
+    assert [found["statistics"][group] for group in ("position_rad", "velocity_radps", "effort_nm")] == [joints] * 3
+
+
+def test_datasets_are_made_of_it(arm: Path, tmp_path: Path) -> None:
+    assert run(DERIVE, arm, tmp_path) == {"findings": [0, 0, 0], "replayed": 0, "trials": [6, 3]}
+
+
+def test_it_is_exported(arm: Path, tmp_path: Path) -> None:
+    found = run(EXPORT, arm, tmp_path)
+    assert found["lerobot"] == ["planar_arm", ["shoulder_joint.pos", "elbow_joint.pos"]]
+    assert found["npz"] == [["shoulder_joint", "elbow_joint"], 2]
+    assert found["cards"] == [1, 1]
+
+
+def test_it_is_reported_and_viewed(arm: Path, tmp_path: Path) -> None:
+    reported = call("dataset", "report", arm, "--output", tmp_path / "report.html")
+    assert reported.returncode == 0, reported.stderr
+    assert "simulated throws of a ball by the planar arm" in (tmp_path / "report.html").read_text()
+    viewed = call("dataset", "view", arm, tmp_path / "view")
+    assert viewed.returncode == 0, viewed.stderr
+    assert (tmp_path / "view" / "throws.mcap").stat().st_size > 0
+
+
+def test_a_damaged_dataset_of_it_is_repaired(arm: Path, tmp_path: Path) -> None:
+    broken = tmp_path / "broken"
+    subprocess.run(["cp", "-r", str(arm), str(broken)], check=True)
+    (shard,) = broken.glob("*.mcap")
+    # The summary at the end of the file is lost, and so is the table.
+    shard.write_bytes(shard.read_bytes()[:-1000])
+    (broken / "throws.parquet").unlink()
+    assert call("dataset", "verify", broken).returncode != 0
+    repaired = call("dataset", "repair", broken, tmp_path / "repaired")
+    assert repaired.returncode == 0, repaired.stderr
+    assert fingerprints(tmp_path / "repaired") == fingerprints(arm)
+
+
+def test_without_its_package_it_is_not_read(arm: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PYTHONPATH", os.environ["PYTHONPATH"].removeprefix(f"{PLUGINS}{os.pathsep}"))
+    done = call("dataset", "info", arm)
+    assert done.returncode == 2
+    sentence = "robot.name: should be 'talos', got 'planar_arm'; no package that is installed brings it"
+    assert sentence in done.stderr
+    assert "Traceback" not in done.stderr
