@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from throwcollect.dataset.mcap_reader import McapContents, open_mcap
 from throwcollect.episode.chunk import CHUNK_HEADER_BYTES, Chunk
 from throwcollect.episode.message import Episode
-from throwcollect.episode.record import NS_PER_S
 from throwcollect.episode.topics import rotate
 from throwcollect.episode.trajectory_rows import (
     BALL_ORIENTATION,
@@ -30,6 +29,7 @@ from throwcollect.episode.trajectory_rows import (
     view_as_bytes,
 )
 from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.units import NS_PER_S
 
 TIMES = "time_s"
 COLUMNS = (

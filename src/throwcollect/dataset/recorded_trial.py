@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from throwcollect.config.schema import Config
 from throwcollect.episode.record import Contact, EpisodeHeader, Samples
 from throwcollect.robots.trajectory import JointTrajectory
-from throwcollect.tasks.throw.flight import NS_PER_S
+from throwcollect.units import NS_PER_S
 
 _short = reprlib.Repr()
 _short.maxstring = 60

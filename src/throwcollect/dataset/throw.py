@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from throwcollect.dataset.columns import TIMES, Column, Recorded, empty_columns, fill
 from throwcollect.dataset.throws_table import Row, ball_state
-from throwcollect.episode.record import NS_PER_S
 from throwcollect.episode.trajectory_rows import STAMPS
 from throwcollect.errors import DatasetError
+from throwcollect.units import NS_PER_S
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,11 +19,12 @@ from throwcollect.dataset.verify_header import find_header_problems
 from throwcollect.dataset.verify_motion import find_ball_problems, find_infinite_columns, find_joint_problems
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.message import Episode
-from throwcollect.episode.record import NS_PER_S, Samples
+from throwcollect.episode.record import Samples
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.robots.description import robot_of, touchable_bodies
 from throwcollect.sweep.plan import Plan
-from throwcollect.tasks.trajectory import throw_trajectory
+from throwcollect.tasks.task import task_of
+from throwcollect.units import NS_PER_S
 from throwcollect.wording import counted
 
 _RELATIVE_TOLERANCE = 1e-9
@@ -143,7 +144,7 @@ class EpisodeCheck:
         if infinite := list(find_infinite_columns(samples)):
             yield from infinite
             return
-        trial = RecordedTrial(samples, episode.header, config, throw_trajectory(config))
+        trial = RecordedTrial(samples, episode.header, config, task_of(config).trajectory())
         # Numbers of a forger may be as large as they like.
         with np.errstate(all="ignore"):
             problems = list(find_header_problems(trial, self._bodies))

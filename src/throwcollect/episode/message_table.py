@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 
 from throwcollect.episode.channels import BALL_ODOMETRY_ID, JOINT_STATES_ID
 from throwcollect.episode.chunk import MESSAGE_HEADER, RECORD_PREFIX_BYTES, encode_message_index
-from throwcollect.episode.record import NS_PER_S, Samples
+from throwcollect.episode.record import Samples
 from throwcollect.episode.topics import Rows, Topic, ball_odometry, joint_states, read_joint_names, read_samples
 from throwcollect.errors import DatasetError
+from throwcollect.units import NS_PER_S
 
 _HEADERS = np.dtype(
     {

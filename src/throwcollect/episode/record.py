@@ -8,9 +8,6 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-NS_PER_S = 1_000_000_000
-"""Nanoseconds in a second: stamps are counted in the former, times in the latter."""
-
 
 @dataclass(frozen=True)
 class Samples:

@@ -18,9 +18,10 @@ from throwcollect.episode.channels import Channels
 from throwcollect.episode.chunk import Chunk
 from throwcollect.episode.message import Episode
 from throwcollect.episode.message_table import MessageList, MessageTable
-from throwcollect.episode.record import NS_PER_S, EpisodeHeader
+from throwcollect.episode.record import EpisodeHeader
 from throwcollect.episode.recorded_chunk import RecordedChunk
 from throwcollect.errors import DatasetError
+from throwcollect.units import NS_PER_S
 
 _SECONDS = ("stamp.sec", "clock.sec")
 """How paths of fields end that hold the seconds of a stamp; durations, such as `time_from_start`, stay as they are."""

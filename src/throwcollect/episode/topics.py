@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 from rclzenoh.interfaces import deserialize, get_message
 from throwcollect.episode.frames import WORLD, MovingFrame
 from throwcollect.episode.layout import MessageLayout
-from throwcollect.episode.record import NS_PER_S, ControllerSamples, Samples
+from throwcollect.episode.record import ControllerSamples, Samples
 from throwcollect.errors import DatasetError
 from throwcollect.robots.robot import Robot
+from throwcollect.units import NS_PER_S
 
 BALL = "ball"
 """Name of the ball's frame, fixed to the ball and at its centre."""

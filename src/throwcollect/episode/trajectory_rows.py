@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from throwcollect.episode.channels import BALL_ODOMETRY_ID, JOINT_STATES_ID
 from throwcollect.episode.chunk import MESSAGE_HEADER
 from throwcollect.episode.message_table import MessageTable
-from throwcollect.episode.record import NS_PER_S
 from throwcollect.episode.topics import ball_odometry, joint_states
+from throwcollect.units import NS_PER_S
 
 STAMPS = "stamps_ns"
 """A pair of 32-bit numbers until `to_nanoseconds` makes one of it."""

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from rclzenoh.interfaces import get_message
 from throwcollect.episode.layout import MessageLayout
-from throwcollect.episode.record import NS_PER_S
 from throwcollect.episode.topics import Recording, Rows, Topic
 from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.robot import Robot
+from throwcollect.units import NS_PER_S
 
 
 def encode_samples(topic: Topic, recording: Recording) -> NDArray[np.uint8]:
