@@ -28,6 +28,11 @@ _OWN = MappingProxyType(
             "ballistic": "throwcollect.engines.ballistic.ballistic_engine:BallisticEngine",
         },
         "tasks": {"throw": "throwcollect.tasks.throw.config:ThrowConfig"},
+        "runtimes": {
+            "local": "throwcollect.runtimes.local:LocalRuntime",
+            "docker": "throwcollect.runtimes.docker.runtime:DockerRuntime",
+            "inprocess": "throwcollect.runtimes.in_process:InProcessRuntime",
+        },
     }
 )
 
@@ -41,11 +46,11 @@ def load_member(family: str, name: str) -> Any:
     """Import a member of a family.
 
     Args:
-        family: ``robots``, ``tools``, ``engines`` or ``tasks``.
+        family: ``robots``, ``tools``, ``engines``, ``tasks`` or ``runtimes``.
         name: Name of the member.
 
     Returns:
-        A `Robot`; the class of an engine; for tools and tasks, the class of their section of the configuration.
+        A `Robot`; the class of an engine or a runtime; of a tool or a task, the class of its section.
 
     Raises:
         KeyError: If the family has no such member.

@@ -128,13 +128,13 @@ class Simulator:
             return
         # A new interpreter each: the physics engine must not be forked.
         spawn = multiprocessing.get_context("spawn")
-        workers = ProcessPoolExecutor(processes, spawn, _begin, (self._source, self._overrides))
+        pool = ProcessPoolExecutor(processes, spawn, _begin, (self._source, self._overrides))
         try:
-            yield from workers.map(_throw, enumerate(points))
+            yield from pool.map(_throw, enumerate(points))
         except BrokenProcessPool as error:
             raise WorkerError("a process that simulates was killed", hint="the kernel's log may say why") from error
         finally:
-            workers.shutdown(cancel_futures=True)
+            pool.shutdown(cancel_futures=True)
 
     def _throw(self, trial: Trial) -> Throw:
         episode = self._replayer.run(trial)

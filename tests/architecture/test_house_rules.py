@@ -82,13 +82,6 @@ def test_package_faces_hold_re_exports_only() -> None:
             assert plain or lazy or table, path
 
 
-def test_every_room_of_the_tree_stands_in_the_architecture() -> None:
-    text = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
-    for room in SOURCE.iterdir():
-        if room.is_dir() and (room / "__init__.py").exists():
-            assert f"`{room.name}`" in text, room.name
-
-
 PURE_ROOMS = ("sweep", "tasks", "episode", "robots", "control", "engines", "sim")
 """Rooms whose numbers end up in the bytes of a dataset."""
 OF_THE_PROCESSOR = re.compile(

@@ -253,31 +253,31 @@ def bare(client: DockerClient, tmp_path: Path) -> Any:
 
 def test_what_the_engine_refuses_is_the_reason_of_an_end(bare: Any) -> None:
     runtime = bare("containers.sim.options.runtime=nowhere", "containers.coordinator.memory=16m")
-    runtime.start(NodeSpec("sim_0", ("--version",), Role.WORKER))
+    runtime.start(NodeSpec("sim_0", ("--version",), Role.EXPENDABLE))
     end = ended(runtime)
     assert (end.name, end.code) == ("sim_0", None)
     assert "cannot be started" in end.reason
     assert "nowhere" in end.reason
     assert (runtime.running(), runtime.handle("sim_0")) == ((), None)
-    runtime.start(NodeSpec(COORDINATOR, ("config", "/data/small.yaml"), Role.WORKER))
+    runtime.start(NodeSpec(COORDINATOR, ("config", "/data/small.yaml"), Role.EXPENDABLE))
     assert ended(runtime).reason == "ran out of memory (limit 16m)"
 
 
 def test_a_node_says_how_it_ended_and_what_it_said_last(monkeypatch: pytest.MonkeyPatch, bare: Any) -> None:
     monkeypatch.setattr(docker_watch, "_LOOK_EVERY_S", 3600.0)  # the engine's events are enough
     runtime = bare()
-    runtime.start(NodeSpec("sim_0", ("sim", "/data/nothing.yaml"), Role.WORKER))
+    runtime.start(NodeSpec("sim_0", ("sim", "/data/nothing.yaml"), Role.EXPENDABLE))
     end = ended(runtime)
     assert (end.code, end.reason) == (2, "exit code 2")
     assert end.log.splitlines()[-1] == "throwcollect: /data/nothing.yaml: no such file"
     assert runtime.exits() == []
-    runtime.start(NodeSpec("sim_0", ("--version",), Role.WORKER))
+    runtime.start(NodeSpec("sim_0", ("--version",), Role.EXPENDABLE))
     assert ended(runtime).log.splitlines()[-2:] == [*end.log.splitlines()[-1:], "throwcollect 0.1.0"]
 
 
 def test_a_container_that_somebody_removes_has_ended(bare: Any, client: DockerClient) -> None:
     runtime = bare()
-    runtime.start(NodeSpec(ROUTER, ("router", "--listen", runtime.listen), Role.WORKER))
+    runtime.start(NodeSpec(ROUTER, ("router", "--listen", runtime.listen), Role.EXPENDABLE))
     until(lambda: runtime.handle(ROUTER) is not None)
     client.containers.get(runtime.handle(ROUTER)).remove(force=True)
     assert ended(runtime).reason in ("its container was removed", "ended by SIGKILL")
@@ -289,7 +289,7 @@ def test_a_published_router_is_reached_on_the_loopback_interface_alone(bare: Any
         with pytest.raises(ConfigError, match=f"run.router_port: port {port} of 127.0.0.1 cannot be used"):
             bare(f"run.router_port={port}")
     runtime = bare(f"run.router_port={port}")
-    runtime.start(NodeSpec(ROUTER, ("router", "--listen", runtime.listen), Role.WORKER))
+    runtime.start(NodeSpec(ROUTER, ("router", "--listen", runtime.listen), Role.EXPENDABLE))
     until(lambda: runtime.log_tail(ROUTER) != "")
     assert runtime.router_address() == ("127.0.0.1", port)
     socket.create_connection(("127.0.0.1", port), 5).close()
@@ -305,7 +305,7 @@ def test_a_node_has_the_key_as_files_of_the_caller_which_the_engine_tells_nobody
     monkeypatch.setattr(os, "getuid", lambda: 4242)
     key = key_in(tmp_path).private_key.read_text()
     runtime = bare()
-    runtime.start(NodeSpec(ROUTER, ("router", "--listen", runtime.listen), Role.WORKER))
+    runtime.start(NodeSpec(ROUTER, ("router", "--listen", runtime.listen), Role.EXPENDABLE))
     until(lambda: runtime.log_tail(ROUTER) != "")
     assert runtime.log_tail(ROUTER) == "router listening on tls/router:7447"
     router = client.containers.get(runtime.handle(ROUTER))
@@ -353,7 +353,7 @@ def test_mounts_environment_and_networks_of_the_configuration_are_there(
             "containers.router.cpuset='0'",
             "containers.router.options={ulimits: {nofile: 99}, tmpfs: {/tmp: size=1m}}",
         )
-        runtime.start(NodeSpec(ROUTER, ("router", "--listen", runtime.listen), Role.WORKER))
+        runtime.start(NodeSpec(ROUTER, ("router", "--listen", runtime.listen), Role.EXPENDABLE))
         until(lambda: runtime.log_tail(ROUTER) != "")
         script = (
             "cat /extra; echo $ANSWER; ulimit -n; grep Cpus_allowed_list /proc/self/status; grep ' /tmp ' /proc/mounts"
@@ -378,7 +378,7 @@ def line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> CutLine:
 
 def test_a_broken_line_to_the_engine_is_mended(bare: Any, client: DockerClient, line: CutLine) -> None:
     runtime = bare(through=connect())
-    runtime.start(NodeSpec(ROUTER, ("router", "--listen", runtime.listen), Role.WORKER))
+    runtime.start(NodeSpec(ROUTER, ("router", "--listen", runtime.listen), Role.EXPENDABLE))
     until(lambda: runtime.log_tail(ROUTER) != "")
     handle = runtime.handle(ROUTER)
     line.interrupt()
@@ -399,7 +399,7 @@ def test_an_engine_that_does_not_answer_any_more_is_said_so_with_what_is_safe(
 ) -> None:
     monkeypatch.setattr("throwcollect.runtimes.docker.containers._SILENCE_S", 3.0)
     runtime = bare(through=connect())
-    runtime.start(NodeSpec(ROUTER, ("router", "--listen", runtime.listen), Role.WORKER))
+    runtime.start(NodeSpec(ROUTER, ("router", "--listen", runtime.listen), Role.EXPENDABLE))
     until(lambda: runtime.log_tail(ROUTER) != "")
     handle = runtime.handle(ROUTER)
     getattr(line, trouble)()

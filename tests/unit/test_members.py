@@ -33,7 +33,7 @@ def with_plugins(*arguments: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-@pytest.mark.parametrize("family", ["robots", "tools", "engines", "tasks"])
+@pytest.mark.parametrize("family", ["robots", "tools", "engines", "tasks", "runtimes"])
 def test_every_member_can_be_loaded(family: str) -> None:
     assert names_of(family)
     for name in names_of(family):

@@ -77,16 +77,16 @@ class Document:
             holder = holder[index] if _holds(holder, index) else None
         return self.problem(location, problem.message)
 
-    def override(self, assignment: str) -> None:
+    def override(self, given: str) -> None:
         """Replace one key; what is wrong with the override joins the problems.
 
         Args:
-            assignment: Dotted key, equals sign and value, as in ``task.duration_s=1.1``; the value is read as YAML.
+            given: Dotted key, equals sign and value, as in ``task.duration_s=1.1``; the value is read as YAML.
         """
-        key, equals, text = assignment.partition("=")
+        key, equals, text = given.partition("=")
         key = key.strip()
         if not equals or not all(key.split(".")):
-            self.problems.append(Problem(f"an override should be KEY=VALUE, got {quote(assignment)}"))
+            self.problems.append(Problem(f"an override should be KEY=VALUE, got {quote(given)}"))
             return
         try:
             node = compose(text)

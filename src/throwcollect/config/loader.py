@@ -55,8 +55,8 @@ def load_locating_errors(path: Path, overrides: Sequence[str] = ()) -> Iterator[
         ConfigError: If the file cannot be read or anything in it is wrong, or what is done inside finds so later.
     """
     document = Document(path)
-    for assignment in overrides:
-        document.override(assignment)
+    for override in overrides:
+        document.override(override)
     config, found, more = _check(document.values)
     problems = [document.problem(each.location, each.sentence) for each in found]
     unknown = sum(each.unknown for each in found)

@@ -2,26 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from importlib.metadata import entry_points
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import Field, PositiveFloat, ValidationError, WrapValidator
+from pydantic import Field, PositiveFloat
 
 from throwcollect.config.section import Section
+from throwcollect.members import names_of
 
-RUNTIMES = "throwcollect.runtimes"
-"""Group of the entry points by which other packages add runtimes."""
-
-
-def _accept_added(value: Any, validate: Callable[[Any], str]) -> str:
-    """A runtime of ours, or the name of one that another package adds; for anything else, ours are what is expected."""
-    try:
-        return validate(value)
-    except ValidationError:
-        if isinstance(value, str) and entry_points(group=RUNTIMES, name=value):
-            return value
-        raise
+if TYPE_CHECKING:
+    RuntimeName = str
+else:
+    # Which runtimes there are is known when the program runs.
+    RuntimeName = Literal[("auto", *names_of("runtimes"))]
 
 
 class RunConfig(Section):
@@ -29,7 +21,7 @@ class RunConfig(Section):
 
     simulations: Annotated[int, Field(ge=1, le=256)] = 2
     """Number of simulations, unless `-n` says otherwise."""
-    runtime: Annotated[Literal["auto", "local", "docker", "inprocess"], WrapValidator(_accept_added)] = "auto"
+    runtime: RuntimeName = "auto"
     """Where the nodes run: in processes (`local`) or in containers; `auto` takes containers if an engine answers.
 
     `inprocess` takes one simulation without nodes: for tests, breakpoints and Python programs."""

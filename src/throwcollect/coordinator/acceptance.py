@@ -30,7 +30,7 @@ _MOST_TOLD = 3
 
 
 @dataclass(frozen=True)
-class Assignment:
+class PreparedTrial:
     """Everything that is worked out of a trial before it is leased.
 
     Attributes:
@@ -66,7 +66,7 @@ class Acceptance:
         self._channels = Channels(config, full_description(config))
         self._bodies = touchable_bodies(config)
 
-    def assign(self, plan: Plan, trial: Trial) -> Assignment:
+    def prepare(self, plan: Plan, trial: Trial) -> PreparedTrial:
         """Work out a trial."""
         config = plan.config_of(trial)
         trajectory = task_of(config).trajectory()
@@ -80,27 +80,27 @@ class Acceptance:
             lease="",
         )
         messages = {controller: goal_message(goal) for controller, goal in goals.items()}
-        return Assignment(config, trajectory, physics, messages, conditions)
+        return PreparedTrial(config, trajectory, physics, messages, conditions)
 
     @staticmethod
-    def foreign(delivery: Delivery, assignment: Assignment, token: str) -> str | None:
+    def foreign(delivery: Delivery, prepared: PreparedTrial, token: str) -> str | None:
         """Why an episode is not the one that was asked for; None if it is.
 
         Args:
             delivery: The episode, with what the simulation says of it.
-            assignment: Its trial.
+            prepared: Its trial.
             token: Signature of the lease.
         """
         try:
             conditions = conditions_from_json(delivery.conditions)
         except DatasetError as error:
             return error.message
-        expected = replace(assignment.conditions, lease=token)
+        expected = replace(prepared.conditions, lease=token)
         differences = list(conditions.differences(expected))
         more = f" and {len(differences) - _MOST_TOLD} more" if len(differences) > _MOST_TOLD else ""
         return "; ".join(differences[:_MOST_TOLD]) + more or None
 
-    def unsound(self, episode: Episode, assignment: Assignment) -> str | None:
+    def unsound(self, episode: Episode, prepared: PreparedTrial) -> str | None:
         """What is wrong with an episode that nobody could want in a dataset; None if nothing is.
 
         Channels, times, numbers and header are checked here, in about half a millisecond; `dataset verify` also asks
@@ -108,18 +108,18 @@ class Acceptance:
 
         Args:
             episode: The episode.
-            assignment: Its trial.
+            prepared: Its trial.
         """
         try:
-            return next(self._problems(episode, assignment), None)
+            return next(self._problems(episode, prepared), None)
         except DatasetError as error:
             return str(error)
 
-    def _problems(self, episode: Episode, assignment: Assignment) -> Iterator[str]:
+    def _problems(self, episode: Episode, prepared: PreparedTrial) -> Iterator[str]:
         samples = episode.samples(robot_of(self._config).joints)
         yield from find_channel_problems(episode, self._channels)
-        yield from find_stamp_problems(episode, samples, assignment.config)
+        yield from find_stamp_problems(episode, samples, prepared.config)
         yield from find_sensor_problems(episode)
         yield from find_infinite_columns(samples)
-        trial = RecordedTrial(samples, episode.header, assignment.config, assignment.trajectory)
+        trial = RecordedTrial(samples, episode.header, prepared.config, prepared.trajectory)
         yield from find_header_problems(trial, self._bodies)

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from types import TracebackType
 
-from throwcollect.coordinator.acceptance import Acceptance, Assignment
+from throwcollect.coordinator.acceptance import Acceptance, PreparedTrial
 from throwcollect.coordinator.growth import Growth
 from throwcollect.coordinator.leases import Leases
 from throwcollect.coordinator.progress import Progress
@@ -60,8 +60,8 @@ class TrialCollection:
         self._growth = Growth(writer.plan) if self._config.grows else None
         self._names: dict[str, str] = {}
         self._acceptance = Acceptance(self._config)
-        self._assignments: dict[int, Assignment] = {}
-        self._backlog: deque[tuple[Episode, Assignment]] = deque()
+        self._prepared: dict[int, PreparedTrial] = {}
+        self._backlog: deque[tuple[Episode, PreparedTrial]] = deque()
         self._set_aside: dict[str, str] = {}
         self._outcomes: Counter[str] = Counter()
         self._ends: deque[tuple[float, int]] = deque([(time.monotonic(), 0)])
@@ -160,7 +160,7 @@ class TrialCollection:
         """Trial that a simulation works at; None if at none."""
         return self._leases.find_trial(simulation)
 
-    def lease(self, simulation: str) -> tuple[int, Assignment] | None:
+    def lease(self, simulation: str) -> tuple[int, PreparedTrial] | None:
         """Give the next trial to a simulation that has none.
 
         Returns:
@@ -171,10 +171,10 @@ class TrialCollection:
         trial = self._leases.lease(simulation, others=self._names)
         if trial is None:
             return None
-        assignment = self._assignments.get(trial) or self._assign(trial)
-        self._assignments[trial] = assignment
+        prepared = self._prepared.get(trial) or self._prepare(trial)
+        self._prepared[trial] = prepared
         self.writer.note("lease", trial=trial, simulation=self.name_of(simulation))
-        return trial, assignment
+        return trial, prepared
 
     def take_in(self, simulation: str, delivery: Delivery, token: str) -> bool:
         """Take an episode in, to be written by `write_one`, if it is the one that was asked for.
@@ -188,12 +188,12 @@ class TrialCollection:
             Whether it was; if not, its trial goes to another simulation.
         """
         trial = delivery.episode.header.trial
-        assignment = self._assignments[trial]
-        if (reason := self._acceptance.foreign(delivery, assignment, token)) is not None:
+        prepared = self._prepared[trial]
+        if (reason := self._acceptance.foreign(delivery, prepared, token)) is not None:
             self.take_back(simulation, f"its episode is refused: {reason}", refused=True)
             return False
         self._leases.deliver(simulation, trial)
-        self._backlog.append((delivery.episode, self._assignments.pop(trial)))
+        self._backlog.append((delivery.episode, self._prepared.pop(trial)))
         return True
 
     def take_back(self, simulation: str, reason: str, *, refused: bool = False) -> None:
@@ -215,16 +215,16 @@ class TrialCollection:
         Raises:
             DatasetError: If the dataset cannot be written.
         """
-        episode, assignment = self._backlog.popleft()
+        episode, prepared = self._backlog.popleft()
         trial = episode.header.trial
-        if (problem := self._acceptance.unsound(episode, assignment)) is not None:
+        if (problem := self._acceptance.unsound(episode, prepared)) is not None:
             simulation = self._leases.deliverer(trial)
-            self._assignments[trial] = assignment
+            self._prepared[trial] = prepared
             self._give_back(
                 simulation, trial, f"its episode is refused: {problem}", self._leases.reject(trial, problem)
             )
             return
-        result = task_of(assignment.config).judge(episode.samples(), episode.header, assignment.trajectory)
+        result = task_of(prepared.config).judge(episode.samples(), episode.header, prepared.trajectory)
         self.writer.append(episode, result)
         self._leases.complete(trial)
         self._tell_set_aside()
@@ -242,8 +242,8 @@ class TrialCollection:
             DatasetError: If the plan, or a shard that is complete without further trials, cannot be written.
         """
         for trial in self._leases.upcoming(len(self._names)):
-            if trial not in self._assignments:
-                self._assignments[trial] = self._assign(trial)
+            if trial not in self._prepared:
+                self._prepared[trial] = self._prepare(trial)
                 return True
         return self._growth is not None and self._grow(self._growth)
 
@@ -325,8 +325,8 @@ class TrialCollection:
         """Name of a simulation's node, also when it has left."""
         return self._names.get(simulation, simulation.strip("/"))
 
-    def _assign(self, number: int) -> Assignment:
-        return self._acceptance.assign(self.writer.plan, self._trials[number])
+    def _prepare(self, number: int) -> PreparedTrial:
+        return self._acceptance.prepare(self.writer.plan, self._trials[number])
 
     def _grow(self, growth: Growth) -> bool:
         if growth.over:
@@ -358,6 +358,6 @@ class TrialCollection:
         self.warn(f"{simulation}: trial {trial} is given to another simulation: {reason}")
         self.writer.note("fail", trial=trial, simulation=self.name_of(simulation), reason=reason)
         if given_up is not None:
-            del self._assignments[trial]
+            del self._prepared[trial]
             self.writer.append_lost(trial, "; ".join(given_up))
             self._note(trial, task_of(self._config).lose("; ".join(given_up)))

@@ -156,10 +156,10 @@ class Coordinator(Node):
             return
         if self._collection.draining or not simulation.ready() or (leased := self._collection.lease(namespace)) is None:
             return
-        trial, assignment = leased
+        trial, prepared = leased
         simulation.deadline = time.monotonic() + self._patience_s
-        lease = assignment.lease(namespace, trial)
-        simulation.begin(lease, lease.sign(self._signer), assignment.messages)
+        lease = prepared.lease(namespace, trial)
+        simulation.begin(lease, lease.sign(self._signer), prepared.messages)
 
     def _receive(self, namespace: str, message: bytes) -> None:
         try:

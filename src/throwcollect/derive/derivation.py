@@ -30,7 +30,7 @@ from throwcollect.sweep.plan import Plan, make_trials
 from throwcollect.wording import command
 
 _ROWS_AT_ONCE = 256
-_MOST_WORKERS = 4
+_MOST_THREADS = 4
 """Compressing and hashing run side by side; what stays with the interpreter keeps more of them from being of use."""
 
 
@@ -112,12 +112,12 @@ def write(sources: Sequence[Source], directory: Path, *, name: str | None = None
 
 def _episodes(sources: Sequence[Source], restamper: Restamper) -> Iterator[tuple[Episode, Row]]:
     """Episodes under their new numbers, in order, each with its row in the table of its source."""
-    workers = min(_MOST_WORKERS, os.cpu_count() or 1)
+    threads = min(_MOST_THREADS, os.cpu_count() or 1)
     pending: deque[tuple[Future[Episode], Row]] = deque()
-    with ThreadPoolExecutor(workers) as pool:
+    with ThreadPoolExecutor(threads) as pool:
         for number, (dataset, row) in enumerate(_rows(sources)):
             pending.append((pool.submit(_restamp, restamper, dataset, row, number), row))
-            if len(pending) > 2 * workers:
+            if len(pending) > 2 * threads:
                 yield _result(pending)
         while pending:
             yield _result(pending)

@@ -61,7 +61,7 @@ def replay_throws(directory: Path, trials: Sequence[int]) -> Iterator[Comparison
         yield from pool.imap(_replay, trials, chunksize=_AT_ONCE)
 
 
-class _Worker:
+class _Kept:
     """What a process keeps from one trial to the next."""
 
     def __init__(self, directory: Path) -> None:
@@ -71,16 +71,16 @@ class _Worker:
         self.replayer = Replayer(self.dataset.config)
 
 
-_worker: list[_Worker] = []
+_kept: list[_Kept] = []
 
 
 def _begin(directory: Path, child: bool = False) -> None:
     if child:
         # Ctrl-C is for the process that started this one, which ends it.
         signal.signal(signal.SIGINT, signal.SIG_IGN)
-    _worker[:] = [_Worker(directory)]
+    _kept[:] = [_Kept(directory)]
 
 
 def _replay(trial: int) -> Comparison:
-    worker = _worker[0]
-    return compare(worker.dataset.episode(trial), worker.replayer.run(worker.dataset.plan.trials[trial]))
+    kept = _kept[0]
+    return compare(kept.dataset.episode(trial), kept.replayer.run(kept.dataset.plan.trials[trial]))

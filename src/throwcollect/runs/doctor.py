@@ -14,9 +14,10 @@ from typing import Literal
 from throwcollect import ros_installation
 from throwcollect.errors import ConfigError
 from throwcollect.extras import EXTRA_OF, MissingExtraError, explain_missing, install_command, is_installed
+from throwcollect.members import names_of
 from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.talos import TALOS
-from throwcollect.runtimes.registry import get_runtime, runtime_names
+from throwcollect.runtimes.registry import get_runtime
 from throwcollect.runtimes.runtime import Check
 from throwcollect.wording import counted, listed
 
@@ -151,5 +152,5 @@ def examine(directory: Path) -> list[Check]:
         _check_rclpy,
         _check_embedded,
     ]
-    of_runtimes = [found for name in runtime_names() if (found := _check_runtime(name)) is not None]
+    of_runtimes = [found for name in names_of("runtimes") if (found := _check_runtime(name)) is not None]
     return [*(check() for check in machine), *of_runtimes, _check_port(), _check_disk(directory)]

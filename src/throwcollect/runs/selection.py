@@ -7,9 +7,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from throwcollect.errors import ConfigError, WorkerError
+from throwcollect.members import names_of
 from throwcollect.runs.record import Record
 from throwcollect.runs.records import Records, Run
-from throwcollect.runtimes.registry import get_runtime, runtime_names
+from throwcollect.runtimes.registry import get_runtime
 from throwcollect.runtimes.runtime import HeldRun
 from throwcollect.wording import command
 
@@ -202,4 +203,4 @@ def require_living(run: Run) -> Record:
 
 def find_held_runs() -> dict[str, tuple[str, HeldRun]]:
     """Runs of which a runtime holds something by their ids, each with the name of the runtime."""
-    return {held.run_id: (name, held) for name in runtime_names() for held in get_runtime(name).find_held()}
+    return {held.run_id: (name, held) for name in names_of("runtimes") for held in get_runtime(name).find_held()}

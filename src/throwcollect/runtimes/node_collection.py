@@ -56,7 +56,7 @@ def roster(host: NodeHost, simulations: int) -> list[NodeSpec]:
             NodeSpec(
                 name := simulation_name(index),
                 ("sim", f"{host.data}/config.yaml", "--name", name),
-                Role.WORKER,
+                Role.EXPENDABLE,
                 core=cores[index % len(cores)] if bound else None,
             )
             for index in range(simulations)

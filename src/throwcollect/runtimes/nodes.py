@@ -41,7 +41,7 @@ class Role(Enum):
     """What the end of a node means to its run."""
 
     VITAL = "the run ends if the node cannot be kept alive"
-    WORKER = "the run goes on as long as one of these can be kept alive"
+    EXPENDABLE = "the run goes on as long as one of these can be kept alive"
     MAIN = "the run is over when the node comes to its own end"
 
 

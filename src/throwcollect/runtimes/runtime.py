@@ -1,7 +1,7 @@
 """What a runtime is.
 
 A runtime says whether it can be had on this machine, and gives a run its host: what has the trials simulated, from the
-start of the run to its end. Hosts that start nodes derive from `nodes.NodeHost`. The table of runtimes is `registry`.
+start of the run to its end. Hosts that start nodes derive from `nodes.NodeHost`. `registry` finds runtimes by name.
 """
 
 from __future__ import annotations

@@ -95,12 +95,12 @@ class Supervisor:
             How the main node ended, None while it runs; and what happened to other nodes since the last call.
 
         Raises:
-            WorkerError: If no worker was ready in time, or a vital node or all workers are lost for good; with the
-                evidence.
+            WorkerError: If no expendable node was ready in time, or a vital one or all expendable ones are lost for
+                good; with the evidence.
         """
         end = None
         news = self._end_frozen()
-        self._ready |= {name for name in self._workers if name not in self._ready and self.host.ready(name)}
+        self._ready |= {name for name in self._expendables if name not in self._ready and self.host.ready(name)}
         for node in self.host.exits():
             if node.name not in self._roster:
                 # It was taken over from a launcher that had already decided to end it.
@@ -159,8 +159,8 @@ class Supervisor:
         return None
 
     @property
-    def _workers(self) -> list[str]:
-        return self._list_names(Role.WORKER)
+    def _expendables(self) -> list[str]:
+        return self._list_names(Role.EXPENDABLE)
 
     def _list_names(self, role: Role) -> list[str]:
         return [node.name for node in self._roster.values() if node.role is role]
@@ -177,7 +177,7 @@ class Supervisor:
             status = "restarting"
         elif name in self._frozen_since:
             status = "frozen"
-        elif handle is None or (self._roster[name].role is Role.WORKER and name not in self._ready):
+        elif handle is None or (self._roster[name].role is Role.EXPENDABLE and name not in self._ready):
             status = "starting"
         return NodeState(name, status, self._restarts.get(name, 0), handle, self._last_end.get(name))
 
@@ -197,7 +197,7 @@ class Supervisor:
     def _schedule_restart(self, node: NodeExit) -> bool:
         """Whether a node that ended will be started again."""
         count = self._restarts.get(node.name, 0)
-        worked = self._roster[node.name].role is not Role.WORKER or node.name in self._ready
+        worked = self._roster[node.name].role is not Role.EXPENDABLE or node.name in self._ready
         if count >= (self._run.restarts if worked else min(_RESTARTS_BEFORE_READY, self._run.restarts)):
             self._given_up[node.name] = node
             return False
@@ -208,10 +208,10 @@ class Supervisor:
 
     def _check_hope(self) -> None:
         hint = "throwcollect logs shows what the nodes said"
-        workers = self._workers
+        names = self._expendables
         vital = next((self._given_up[name] for name in self._list_names(Role.VITAL) if name in self._given_up), None)
-        lost = [name for name in workers if name in self._given_up]
-        if vital is not None or (lost and len(lost) == len(workers)):
+        lost = [name for name in names if name in self._given_up]
+        if vital is not None or (lost and len(lost) == len(names)):
             last = vital or self._given_up[lost[-1]]
             restarts = self._restarts.get(last.name, 0)
             what = f"the {last.name}" if vital else f"no simulation can be kept alive; the last, {last.name},"
@@ -220,13 +220,13 @@ class Supervisor:
                 evidence=last.log or None,
                 hint=hint,
             )
-        if not self._ready and not any(map(self.host.handle, workers)):
+        if not self._ready and not any(map(self.host.handle, names)):
             # None of them runs yet: it is the engine that takes its time, and it has a patience of its own.
             self._start_deadline = time.monotonic() + self._run.start_timeout_s
-        if workers and not self._ready and time.monotonic() > self._start_deadline:
+        if names and not self._ready and time.monotonic() > self._start_deadline:
             raise WorkerError(
                 f"no simulation was ready within {self._run.start_timeout_s:g} s (run.start_timeout_s)",
-                evidence=self.host.log_tail(workers[0]) or None,
+                evidence=self.host.log_tail(names[0]) or None,
                 hint=hint,
             )
 

@@ -42,21 +42,21 @@ def acceptance() -> Acceptance:
 
 
 def test_what_a_simulation_hands_over_is_taken(acceptance: Acceptance, delivery: Delivery) -> None:
-    assignment = acceptance.assign(PLAN, PLAN.trials[1])
-    assert acceptance.foreign(delivery, assignment, "") is None
+    prepared = acceptance.prepare(PLAN, PLAN.trials[1])
+    assert acceptance.foreign(delivery, prepared, "") is None
     assert unsound(acceptance, delivery.episode) is None
 
 
 def test_the_episode_of_another_lease_or_trial_is_not(acceptance: Acceptance, delivery: Delivery) -> None:
-    assignment = acceptance.assign(PLAN, PLAN.trials[1])
-    assert acceptance.foreign(delivery, assignment, "token") == "it was not simulated for this lease"
-    other = acceptance.assign(PLAN, PLAN.trials[0])
+    prepared = acceptance.prepare(PLAN, PLAN.trials[1])
+    assert acceptance.foreign(delivery, prepared, "token") == "it was not simulated for this lease"
+    other = acceptance.prepare(PLAN, PLAN.trials[0])
     assert "ball.mass_kg was " in (acceptance.foreign(delivery, other, "") or "")
 
 
 def test_conditions_that_cannot_be_read_are_a_reason(acceptance: Acceptance, delivery: Delivery) -> None:
-    assignment = acceptance.assign(PLAN, PLAN.trials[1])
-    reason = acceptance.foreign(delivery._replace(conditions="{}"), assignment, "")
+    prepared = acceptance.prepare(PLAN, PLAN.trials[1])
+    reason = acceptance.foreign(delivery._replace(conditions="{}"), prepared, "")
     assert (reason or "").startswith("conditions of the episode: ")
 
 
@@ -73,7 +73,7 @@ def test_numbers_that_are_not_finite_are_unsound(
 
 
 def unsound(acceptance: Acceptance, episode: Episode) -> str | None:
-    return acceptance.unsound(episode, acceptance.assign(PLAN, PLAN.trials[1]))
+    return acceptance.unsound(episode, acceptance.prepare(PLAN, PLAN.trials[1]))
 
 
 def encoded(header: EpisodeHeader, samples: Samples) -> Episode:

@@ -22,7 +22,7 @@ def nodes(directory: Path, **run: object) -> LocalNodes:
 
 
 def node(code: str, name: str = "node") -> NodeSpec:
-    return NodeSpec(name, (code,), Role.WORKER)
+    return NodeSpec(name, (code,), Role.EXPENDABLE)
 
 
 @pytest.fixture

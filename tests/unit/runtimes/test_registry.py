@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
-from throwcollect import extras
+from throwcollect import extras, members
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError
 from throwcollect.extras import MissingExtraError
+from throwcollect.members import names_of
 from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
 from throwcollect.runs.choice import choose
-from throwcollect.runtimes.registry import AUTOMATIC, get_runtime, runtime_names
+from throwcollect.runtimes.registry import AUTOMATIC, get_runtime
 from throwcollect.runtimes.runtime import Host, Place, Runtime
 
 
@@ -31,7 +35,7 @@ class Cluster(Runtime):
 
 
 @pytest.fixture
-def added(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def added(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """A package that adds the runtime `cluster`, as pip would have installed it."""
     package = tmp_path / "cluster-1.0.dist-info"
     package.mkdir()
@@ -39,12 +43,15 @@ def added(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (package / "entry_points.txt").write_text(f"[throwcollect.runtimes]\ncluster = {__name__}:Cluster\n")
     monkeypatch.syspath_prepend(tmp_path)
     importlib.invalidate_caches()
+    members._table.cache_clear()
+    yield
+    members._table.cache_clear()
 
 
 def test_the_table_has_the_runtimes_of_the_configuration() -> None:
-    assert runtime_names() == ["docker", "local", "inprocess"]
-    assert set(AUTOMATIC) < set(runtime_names())
-    for name in runtime_names():
+    assert names_of("runtimes") == ("local", "docker", "inprocess")
+    assert set(AUTOMATIC) < set(names_of("runtimes"))
+    for name in names_of("runtimes"):
         assert Config.model_validate({"run": {"runtime": name}}).run.runtime == name
 
 
@@ -71,19 +78,26 @@ def test_a_host_that_was_never_used_leaves_nothing(name: str, tmp_path: Path) ->
 
 
 def test_a_package_of_somebody_else_adds_a_runtime(added: None, tmp_path: Path) -> None:
-    (tmp_path / "far.yaml").write_text("name: far\nrun: {runtime: cluster}\n")
-    config = load(tmp_path / "far.yaml")
-    said: list[str] = []
+    assert type(get_runtime("cluster")).__name__ == "Cluster"
+    config, said = Config(), list[str]()
+    config = config.model_copy(update={"run": config.run.model_copy(update={"runtime": "cluster"})})
     assert choose(config, say=said.append, warn=said.append).name == "cluster"
     assert said == ["runtime: a cluster"]
-    assert type(get_runtime("cluster")).__name__ == "Cluster"
+
+
+def test_the_configuration_takes_a_runtime_that_a_package_adds(added: None, tmp_path: Path) -> None:
+    (tmp_path / "far.yaml").write_text("name: far\nrun: {runtime: cluster}\n")
+    code = f"from throwcollect.config.loader import load; print(load({str(tmp_path / 'far.yaml')!r}).run.runtime)"
+    path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
+    command, env = [sys.executable, "-c", code], {**os.environ, "PYTHONPATH": path}
+    assert subprocess.run(command, env=env, check=True, capture_output=True, text=True).stdout == "cluster\n"
 
 
 def test_a_runtime_that_is_not_there_is_refused_with_those_that_are(tmp_path: Path) -> None:
     (tmp_path / "far.yaml").write_text("name: far\nrun: {runtime: cluster}\n")
     with pytest.raises(ConfigError, match=r"far.yaml:2: run.runtime: .*'inprocess', got 'cluster'"):
         load(tmp_path / "far.yaml")
-    with pytest.raises(ConfigError, match="there is no runtime cluster\n  expected: docker, local or inprocess"):
+    with pytest.raises(ConfigError, match="there is no runtime cluster\n  expected: local, docker or inprocess"):
         get_runtime("cluster")
 
 

@@ -87,7 +87,7 @@ def test_an_engine_that_answers_others_is_not_silent(
     began = time.monotonic()
     number = 0
     while time.monotonic() < began + 1.2:
-        runtime.start(NodeSpec(f"sim_{number}", ("sim",), Role.WORKER))
+        runtime.start(NodeSpec(f"sim_{number}", ("sim",), Role.EXPENDABLE))
         until(lambda: f"throwcollect-run-1a2b-sim_{number}" in engine.names(), runtime=runtime)  # noqa: B023
         number += 1
         time.sleep(0.1)
@@ -126,7 +126,7 @@ def test_a_silent_engine_is_given_up_with_what_is_left_on_it_and_how_to_go_on(
     engine: Engine, make: Callable[[], DockerNodes], tmp_path: Path
 ) -> None:
     runtime = make()
-    runtime.start(NodeSpec("sim_0", ("sim",), Role.WORKER))
+    runtime.start(NodeSpec("sim_0", ("sim",), Role.EXPENDABLE))
     until(lambda: runtime.handle("sim_0"), runtime=runtime)
     engine.withheld = "."
     with pytest.raises(
@@ -158,7 +158,7 @@ def test_a_container_that_is_still_being_made_at_the_end_is_removed_when_it_is_t
     monkeypatch.setattr(module, "_BEGIN_S", 0.1)
     runtime = make()
     engine.withheld = "POST /containers/create"
-    runtime.start(NodeSpec("sim_0", ("sim",), Role.WORKER))
+    runtime.start(NodeSpec("sim_0", ("sim",), Role.EXPENDABLE))
     until(lambda: engine.withheld in engine.asked)
     runtime.stop(["sim_0"])
     engine.answer_all()
@@ -179,7 +179,7 @@ def test_an_answer_that_does_not_come_in_time_is_said_in_our_words(
     runtime = make()
     engine.withheld = "POST /containers/create"
     monkeypatch.setattr(module, "_SILENCE_S", 10.0)
-    runtime.start(NodeSpec("sim_0", ("sim",), Role.WORKER))
+    runtime.start(NodeSpec("sim_0", ("sim",), Role.EXPENDABLE))
     ends: list[NodeExit] = []
     until(lambda: ends.extend(runtime.exits()) or ends)
     assert [end.reason for end in ends] == ["cannot be started: no answer in time"]

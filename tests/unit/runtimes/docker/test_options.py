@@ -20,7 +20,7 @@ def options(
     name: str, place: RunPlace = DIRECTORY, *, core: int | None = None, run: Any = None, **containers: Any
 ) -> dict[str, Any]:
     config = Config.model_validate({"run": run or {}, "containers": containers}, strict=True)
-    node = NodeSpec(name, ("command", "--option"), Role.WORKER, core)
+    node = NodeSpec(name, ("command", "--option"), Role.EXPENDABLE, core)
     return node_options(node, place=place, config=config, middleware=Middleware())
 
 

@@ -1,0 +1,167 @@
+"""Draw the rooms of the product and the imports between them, as `docs/architecture.md` shows them.
+
+``python packaging/architecture_figure.py`` writes ``docs/architecture.svg``. Rooms, arrows and libraries are read from
+the sources; where a room stands, and the words in it, are in the table here.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator, Mapping
+from html import escape
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+SOURCE = ROOT / "src"
+FIGURE = ROOT / "docs" / "architecture.svg"
+
+PLACES: dict[str, tuple[float, int, str]] = {
+    "cli": (2.6, 0, "commands, exit codes"),
+    "runs": (0.3, 1, "prepare, follow, stop"),
+    "simulator": (1.5, 1, "throws for Python"),
+    "runtimes": (0.3, 2, "where nodes live"),
+    "replay": (0.3, 3, "throws once more"),
+    "sim": (-0.3, 4, "a node: simulates trials"),
+    "coordinator": (1.1, 4, "a node: leases trials"),
+    "derive": (2.2, 4, "other datasets"),
+    "export": (3.2, 4, "other formats"),
+    "report": (4.2, 4, "a page"),
+    "view": (5.2, 4, "files for viewers"),
+    "engines": (-1.55, 5, "physics"),
+    "ros": (-0.55, 5, "rclpy, two backends"),
+    "trial": (1.1, 5, "leases, conditions"),
+    "dataset": (3.2, 5, "the files"),
+    "sweep": (2.9, 6, "the plan"),
+    "tasks": (2.6, 7, "motion and judging"),
+    "episode": (2.2, 8, "samples ↔ bytes"),
+    "robots": (2.5, 9, "what a robot is"),
+    "ros_installation": (-0.55, 10, "is ROS 2 here?"),
+    "tools": (2.5, 10, "what a tool is"),
+    "control": (3.5, 10, "controller arithmetic"),
+    "config": (1.6, 11, "the shape of a run"),
+    "rclzenoh": (-0.55, 11, "ROS 2 client of its own"),
+}
+"""Column, row and words of each room; rooms that are not named here lie below all others, without arrows."""
+DOORS = ("pybullet", "pinocchio", "zenoh", "rclpy", "rosbags", "mcap", "docker", "plotly", "matplotlib", "jinja2")
+"""Outside libraries whose rooms are shown."""
+
+COLUMN, ROW, WIDTH, HEIGHT = 158, 82, 140, 54
+LEFT, TOP = 330, 44
+TOTAL_WIDTH, GROUND = 1240, TOP + 12 * ROW - 10
+
+
+def read_imports() -> tuple[dict[str, set[str]], dict[str, set[str]]]:
+    """Which rooms each room imports, and which outside libraries."""
+    inside = SOURCE / "throwcollect"
+    rooms = {path.stem for path in inside.iterdir() if not path.name.startswith("__") and path.suffix in ("", ".py")}
+    imported: dict[str, set[str]] = {room: set() for room in (*rooms, "rclzenoh")}
+    outside: dict[str, set[str]] = {room: set() for room in imported}
+    for path in SOURCE.rglob("*.py"):
+        package, *parts = path.relative_to(SOURCE).with_suffix("").parts
+        room = package if package == "rclzenoh" else parts[0]
+        if room not in imported:
+            continue  # The face of the package, which belongs to no room.
+        for name in _imported_names(ast.parse(path.read_text(encoding="utf-8"))):
+            first, *rest = name.split(".")
+            imported[room] |= {first if first == "rclzenoh" else rest[0]} & imported.keys() if _is_ours(name) else set()
+            outside[room] |= {first} & set(DOORS)
+        imported[room].discard(room)
+    return imported, outside
+
+
+def _is_ours(name: str) -> bool:
+    return name.split(".")[0] == "rclzenoh" or name.startswith("throwcollect.")
+
+
+def _imported_names(tree: ast.AST) -> Iterator[str]:
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+        elif isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.Call) and ast.unparse(node.func) == "lazily":
+            yield ast.literal_eval(node.args[0])
+
+
+def reduce_arrows(imported: Mapping[str, set[str]]) -> list[tuple[str, str]]:
+    """Imports between rooms that have a place, without those that others imply.
+
+    Raises:
+        ValueError: If a room below all others imports one that has a place.
+    """
+    for room in imported.keys() - PLACES.keys():
+        # The client imports nothing of ours, so it lies as low as they do.
+        if above := imported[room] & PLACES.keys() - {"rclzenoh"}:
+            raise ValueError(f"{room} imports {', '.join(sorted(above))}; give it a place in PLACES")
+    graph = {room: imported[room] & PLACES.keys() for room in PLACES}
+    below = {room: _descend(room, graph) for room in graph}
+    return [
+        (room, other)
+        for room, others in graph.items()
+        for other in sorted(others)
+        if not any(other in below[between] for between in others - {other})
+    ]
+
+
+def _descend(room: str, graph: Mapping[str, set[str]]) -> set[str]:
+    return {each for other in graph[room] for each in (other, *_descend(other, graph))}
+
+
+def draw() -> str:
+    """Draw the figure as SVG."""
+    imported, outside = read_imports()
+    lines = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {TOTAL_WIDTH} {GROUND + 110}" '
+        'font-family="sans-serif" font-size="12" text-anchor="middle">',
+        "<!-- Written by packaging/architecture_figure.py. -->",
+        '<defs><marker id="tip" viewBox="0 0 8 8" refX="8" refY="4" markerWidth="8" markerHeight="8" orient="auto">'
+        '<path d="M0 0 L8 4 L0 8 z" fill="#5b7083"/></marker></defs>',
+        '<rect width="100%" height="100%" fill="#ffffff"/>',
+    ]
+    for room, other in reduce_arrows(imported):
+        (x, y), (to_x, to_y) = _centre(room), _centre(other)
+        lines.append(
+            f'<line x1="{x:g}" y1="{y + HEIGHT / 2:g}" x2="{to_x:g}" y2="{to_y - HEIGHT / 2:g}" stroke="#5b7083" '
+            'stroke-width="1.2" marker-end="url(#tip)"/>'
+        )
+    for room, (_, _, words) in PLACES.items():
+        lines += _box(*_centre(room), room, words, ", ".join(sorted(outside[room])))
+    ground = sorted(imported.keys() - PLACES.keys())
+    lines += [
+        f'<rect x="20" y="{GROUND}" width="{TOTAL_WIDTH - 40}" height="74" rx="6" fill="#eef1f4" stroke="#9aa8b5"/>',
+        f'<text x="{TOTAL_WIDTH / 2:g}" y="{GROUND + 22}" fill="#52606d">below all of them, for any to import</text>',
+        *(
+            f'<text x="{TOTAL_WIDTH / 2:g}" y="{y}" font-weight="bold">{" · ".join(part)}</text>'
+            for y, part in ((GROUND + 42, ground[: len(ground) // 2]), (GROUND + 60, ground[len(ground) // 2 :]))
+        ),
+        _note(0, "An arrow is an import. Those that follow from others are left out:"),
+        _note(1, "cli imports runs, which imports runtimes; so cli may import runtimes, too."),
+        _note(2, "In colour: libraries that come in by this room."),
+        "</svg>",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _centre(room: str) -> tuple[float, float]:
+    column, row, _ = PLACES[room]
+    return round(LEFT + column * COLUMN, 1), TOP + row * ROW
+
+
+def _box(x: float, y: float, room: str, words: str, libraries: str) -> list[str]:
+    return [
+        f'<rect x="{x - WIDTH / 2:g}" y="{y - HEIGHT / 2:g}" width="{WIDTH}" height="{HEIGHT}" rx="6" '
+        'fill="#e3eefa" stroke="#34658f"/>',
+        f'<text x="{x:g}" y="{y - 9:g}" font-weight="bold" font-size="13">{room}</text>',
+        f'<text x="{x:g}" y="{y + 6:g}" font-size="10.5" fill="#333333">{escape(words)}</text>',
+        f'<text x="{x:g}" y="{y + 20:g}" font-size="10.5" fill="#a8470b">{libraries}</text>',
+    ]
+
+
+def _note(line: int, words: str) -> str:
+    return (
+        f'<text x="{TOTAL_WIDTH - 20}" y="{TOP + 8 * ROW + 18 * line}" text-anchor="end" fill="#52606d">{words}</text>'
+    )
+
+
+if __name__ == "__main__":
+    FIGURE.write_text(draw(), encoding="utf-8")
