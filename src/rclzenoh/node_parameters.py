@@ -186,7 +186,11 @@ class NodeParameters:
         return ListParametersResult(names=names, prefixes=list(nested))
 
     def _set(self, parameters: list[Parameter], declared: dict[str, ParameterDescriptor] | None) -> SetParametersResult:
-        """Set parameters, if descriptors and callbacks agree; ``declared`` has the descriptors of new ones."""
+        """Set parameters, if descriptors and callbacks agree; ``declared`` has the descriptors of new ones.
+
+        Raises:
+            TypeError: If a callback returns anything but a `SetParametersResult`.
+        """
         descriptors = self._descriptors if declared is None else declared
         for parameter in parameters:
             result = check(parameter, descriptors[parameter.name], is_declared=declared is None)

@@ -25,13 +25,13 @@ def check(parameter: Parameter, descriptor: ParameterDescriptor, *, is_declared:
         Whether it may, and if not, why.
     """
     if is_declared and descriptor.read_only:
-        return _refused(f"Trying to set a read-only parameter: {parameter.name}.")
+        return _refuse(f"Trying to set a read-only parameter: {parameter.name}.")
     if not descriptor.dynamic_typing:
         if is_declared and parameter.type_ is ParameterKind.NOT_SET:
-            return _refused("Static parameter cannot be undeclared")
+            return _refuse("Static parameter cannot be undeclared")
         if parameter.type_ is not ParameterKind.NOT_SET and parameter.type_.value != descriptor.type:
             expected = ParameterKind(descriptor.type).name
-            return _refused(f"{WRONG_TYPE} of {parameter.name}, expected {expected}, got {parameter.type_.name}")
+            return _refuse(f"{WRONG_TYPE} of {parameter.name}, expected {expected}, got {parameter.type_.name}")
     if parameter.type_ is ParameterKind.INTEGER and len(descriptor.integer_range):
         return _check_integer(parameter, descriptor.integer_range[0])
     if parameter.type_ is ParameterKind.DOUBLE and len(descriptor.floating_point_range):
@@ -39,7 +39,7 @@ def check(parameter: Parameter, descriptor: ParameterDescriptor, *, is_declared:
     return SetParametersResult(successful=True)
 
 
-def _refused(reason: str) -> SetParametersResult:
+def _refuse(reason: str) -> SetParametersResult:
     return SetParametersResult(successful=False, reason=reason)
 
 
@@ -47,9 +47,9 @@ def _check_integer(parameter: Parameter, allowed: IntegerRange) -> SetParameters
     low, high = sorted((allowed.from_value, allowed.to_value))
     value = parameter.value
     if not low <= value <= high:
-        return _refused(f"Parameter {parameter.name} out of range. Min: {low}, max: {high}, value: {value}")
+        return _refuse(f"Parameter {parameter.name} out of range. Min: {low}, max: {high}, value: {value}")
     if value not in (low, high) and allowed.step and (value - low) % allowed.step:
-        return _refused(f"{value} of parameter {parameter.name} is no step of {allowed.step} from {low}")
+        return _refuse(f"{value} of parameter {parameter.name} is no step of {allowed.step} from {low}")
     return SetParametersResult(successful=True)
 
 
@@ -59,9 +59,9 @@ def _check_double(parameter: Parameter, allowed: FloatingPointRange) -> SetParam
     if any(math.isclose(value, bound, rel_tol=_RELATIVE_TOLERANCE) for bound in (low, high)):
         return SetParametersResult(successful=True)
     if not low < value < high:
-        return _refused(f"Parameter {parameter.name} out of range. Min: {low}, max: {high}, value: {value}")
+        return _refuse(f"Parameter {parameter.name} out of range. Min: {low}, max: {high}, value: {value}")
     if allowed.step:
         nearest = low + round((value - low) / allowed.step) * allowed.step
         if not math.isclose(nearest, value, rel_tol=_RELATIVE_TOLERANCE):
-            return _refused(f"{value} of parameter {parameter.name} is no step of {allowed.step} from {low}")
+            return _refuse(f"{value} of parameter {parameter.name} is no step of {allowed.step} from {low}")
     return SetParametersResult(successful=True)

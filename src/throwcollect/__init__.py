@@ -82,10 +82,10 @@ def __getattr__(name: str) -> object:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from importlib import import_module
 
-    from throwcollect.extras import explained
+    from throwcollect.extras import explain_missing
 
     module, _, attribute = _PLACES[name].partition(":")
-    with explained():
+    with explain_missing():
         return getattr(import_module(f"{__name__}.{module}"), attribute)
 
 

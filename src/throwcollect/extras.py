@@ -88,7 +88,7 @@ def require(*packages: str, extra: str | None = None) -> None:
 
 
 @contextmanager
-def explained(extra: str | None = None) -> Iterator[None]:
+def explain_missing(extra: str | None = None) -> Iterator[None]:
     """Have imports in the block say which extra they lack.
 
     Args:
@@ -126,7 +126,7 @@ class _LazyModule:
         self._name, self._extra = name, extra
 
     def __getattr__(self, attribute: str) -> Any:
-        with explained(self._extra):
+        with explain_missing(self._extra):
             module = import_module(self._name)
         value = getattr(module, attribute)
         # The next look-up finds the value here and does not come by this function.

@@ -121,7 +121,7 @@ class Signer:
         return hmac.compare_digest(signature.encode(), self.sign(*parts).encode())
 
 
-def unreadable(path: Path, reason: str) -> ConfigError:
+def unreadable_key(path: Path, reason: str) -> ConfigError:
     """What to raise when a file of a key cannot be read.
 
     Args:
@@ -138,7 +138,7 @@ def _read(path: Path) -> bytes:
     try:
         return path.read_bytes()
     except OSError as error:
-        raise unreadable(path, error.strerror or str(error)) from error
+        raise unreadable_key(path, error.strerror or str(error)) from error
 
 
 def _new_pair() -> tuple[bytes, bytes]:

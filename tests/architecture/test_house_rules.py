@@ -14,6 +14,8 @@ MODULES = sorted([*SOURCE.rglob("*.py"), *CLIENT.rglob("*.py")])
 VAGUE = {"utils", "util", "helpers", "common", "misc", "base", "core", "types", "manager"}
 LONGEST_MODULE = 400
 LONGEST_FUNCTION = 60
+LONGEST_TEST = 500
+"""Lines of a module of tests; those that were longer had several subjects."""
 
 
 def name(path: Path) -> str:
@@ -55,6 +57,12 @@ def test_the_rules_see_what_they_should() -> None:
         "imports tests",
         "has an unfinished place",
     ]
+
+
+def test_modules_of_tests_have_one_subject() -> None:
+    lengths = {path: len(path.read_text(encoding="utf-8").splitlines()) for path in (ROOT / "tests").rglob("*.py")}
+    assert lengths
+    assert {str(path): lines for path, lines in lengths.items() if lines > LONGEST_TEST} == {}
 
 
 def unfolded(statement: ast.stmt) -> list[ast.stmt]:

@@ -71,7 +71,7 @@ class Rig:
         return True
 
     def sees(self, condition: Callable[[], Any]) -> bool:
-        """Whether something of others that is there is seen, as soon as word of it has come by the router or by discovery."""
+        """Whether something of others is seen, as soon as word of it has come by the router or by discovery."""
         return self.spin(condition)
 
     def result(self, future: Future, timeout: float = PATIENCE_S) -> Any:

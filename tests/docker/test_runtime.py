@@ -26,7 +26,7 @@ from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.runtimes.docker import watch as docker_watch
 from throwcollect.runtimes.docker.containers import DockerNodes
 from throwcollect.runtimes.docker.engine import connect
-from throwcollect.runtimes.docker.held_runs import held_runs, remove
+from throwcollect.runtimes.docker.held_runs import find_held_runs, remove
 from throwcollect.runtimes.docker.options import KEY_LABEL
 from throwcollect.runtimes.local import LocalNodes
 from throwcollect.runtimes.node_collection import roster
@@ -96,7 +96,7 @@ def test_a_collection_in_containers_yields_the_dataset_of_one_in_processes(
         os.chown(path, caller, -1)
     with collecting(client, tmp_path, run=run) as collection:
         collection.until(lambda: collection.status("sim_1") == "running")
-        known = next(each for each in held_runs(client) if each.run_id == run)
+        known = next(each for each in find_held_runs(client) if each.run_id == run)
         assert known.source == str(prepared)
         assert [node.name for node in known.nodes] == [COORDINATOR, ROUTER, "sim_0", "sim_1"]
         for node in collection.runtime.running():

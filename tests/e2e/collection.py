@@ -38,9 +38,17 @@ def call(*arguments: str | Path, cwd: Path | None = None) -> subprocess.Complete
     return subprocess.run(command(*arguments), capture_output=True, text=True, timeout=120, cwd=cwd, check=False)
 
 
-def write_config(directory: Path, *, trials: int, text: str = CONFIG) -> Path:
+FAST = "engine: ballistic"
+"""For tests of nodes and files: throws without contacts take a sixth of the time, and are data as any other."""
+
+
+INPROCESS = ("--runtime", "inprocess")
+"""For tests that only need the dataset: no node has to be started."""
+
+
+def write_config(directory: Path, *, trials: int, text: str = CONFIG, sim: str = "") -> Path:
     path = directory / "small.yaml"
-    path.write_text(text.format(trials=trials))
+    path.write_text(text.format(trials=trials) + (f"sim: {{{sim}}}\n" if sim else ""))
     return path
 
 

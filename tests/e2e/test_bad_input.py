@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import pytest
 
-from tests.e2e.collection import call, command, write_config
+from tests.e2e.collection import FAST, call, command, write_config
 from throwcollect.cli.main import main
 from throwcollect.interruption import stop_signals
 from throwcollect.robots.talos import TALOS
@@ -60,7 +60,7 @@ def say(
 
 @pytest.fixture
 def small(tmp_path: Path) -> Path:
-    return write_config(tmp_path, trials=2)
+    return write_config(tmp_path, trials=2, sim=FAST)
 
 
 @pytest.mark.parametrize(
@@ -279,7 +279,7 @@ def limited(size: int) -> Callable[[], None]:
 def dataset(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, object]]:
     """A dataset, and the summary that was printed."""
     directory = tmp_path_factory.mktemp("whole")
-    config = write_config(directory, trials=2)
+    config = write_config(directory, trials=2, sim=FAST)
     said = call("up", "-n", "1", config, "--output", directory / "data", "--json")
     assert (said.returncode, said.stderr) == (0, "")
     return directory / "data", json.loads(said.stdout)

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from tests.e2e.collection import collect, fingerprints
+from tests.e2e.collection import INPROCESS, collect, fingerprints
 from throwcollect.cli.main import app
 from throwcollect.dataset.verify import verify
 
@@ -27,7 +27,7 @@ sweep:
 record:
   topics: [joint_states, ball/odometry, controller_state, tf, clock]
   trials_per_shard: 6
-run: {runtime: local}
+run: {replay: 0}
 """
 TUESDAY = """\
 name: tuesday
@@ -42,7 +42,7 @@ sweep:
 record:
   topics: [joint_states, ball/odometry, controller_state, tf, clock]
   zstd_level: 3
-run: {runtime: local}
+run: {replay: 0}
 """
 OF_DERIVED_ONLY = {"sources.parquet", "datapackage.json"}
 """Where the throws come from, and the manifest, which covers that, too."""
@@ -56,14 +56,14 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
         name = text.split()[1]
         config = directory / f"{name}.yaml"
         config.write_text(text)
-        collect(config, directory / "datasets" / name, 1)
+        collect(config, directory / "datasets" / name, 1, *INPROCESS)
     for block in re.findall(r"```sh\n(.*?)```", PAGE, flags=re.DOTALL):
         for line in block.replace("\\\n", " ").splitlines():
             program, command, *arguments = shlex.split(line)
             assert program == "throwcollect"
             if command == "up":
                 config, _, output = arguments
-                collect(directory / config, directory / output, 1)
+                collect(directory / config, directory / output, 1, *INPROCESS)
             else:
                 with pytest.MonkeyPatch.context() as patch:
                     patch.chdir(directory)
@@ -73,7 +73,7 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def collected_anew(derived: Path, directory: Path) -> dict[str, str]:
-    collect(derived / "config.yaml", directory, 1)
+    collect(derived / "config.yaml", directory, 1, *INPROCESS)
     return as_derived(directory)
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from tests.e2e.collection import call, command, write_config
+from tests.e2e.collection import FAST, call, command, write_config
 from throwcollect import ros
 from throwcollect.config.loader import load
 from throwcollect.coordinator.goals import FollowJointTrajectory
@@ -94,7 +94,7 @@ def graph(monkeypatch: pytest.MonkeyPatch) -> Iterator[ros.Context]:
 def test_a_dataset_is_that_of_its_configuration_whoever_poses_as_a_simulation(
     graph: ros.Context, tmp_path: Path
 ) -> None:
-    config = write_config(tmp_path, trials=TRIALS)
+    config = write_config(tmp_path, trials=TRIALS, sim=FAST)
     # Every trial is simulated again at the end, so it is known that all are right.
     config.write_text(config.read_text().replace("replay: 0", f"replay: {TRIALS}, trial_timeout_s: 3"))
     other = tmp_path / "other.yaml"
@@ -129,7 +129,7 @@ def forged(directory: Path, path: Path) -> bytes:
 def test_a_collection_ends_when_every_simulation_refuses_everything(graph: ros.Context, tmp_path: Path) -> None:
     refusers = [Impostor(f"refuser_{number}", graph, answer=None) for number in range(2)]
     with spinning(graph, *refusers):
-        ended = call("coordinator", tmp_path / "data", "--config", write_config(tmp_path, trials=TRIALS))
+        ended = call("coordinator", tmp_path / "data", "--config", write_config(tmp_path, trials=TRIALS, sim=FAST))
     assert ended.returncode == 3
     assert "every simulation refuses its trials, and none was ever done" in ended.stderr
     assert "evidence: parameters: never" in ended.stderr

@@ -16,7 +16,7 @@ from mcap.exceptions import McapError
 from mcap.records import Chunk, Metadata
 from mcap.stream_reader import StreamReader
 
-from tests.e2e.collection import CONFIG, Running, call, collect, fingerprints, start, write_config
+from tests.e2e.collection import FAST, Running, call, collect, fingerprints, start, write_config
 from throwcollect.dataset.journal import read_journal
 
 pytestmark = pytest.mark.e2e
@@ -29,7 +29,7 @@ def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_config(
         tmp_path_factory.mktemp("config"),
         trials=TRIALS,
-        text=f"{CONFIG}sim: {{{{real_time_factor: 10, max_trial_s: 3}}}}\n",
+        sim=f"{FAST}, real_time_factor: 10, max_trial_s: 3",
     )
 
 
@@ -289,7 +289,7 @@ def test_simulations_that_never_start_end_the_run(
 ) -> None:
     (tmp_path / "pybullet.py").write_text(physics)
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")]))
-    said = call("up", "-n", "2", config, "--output", tmp_path / "data", "--set", option)
+    said = call("up", "-n", "2", config, "--output", tmp_path / "data", "--set", option, "--set", "sim.engine=bullet")
     assert said.returncode == 3
     assert message in said.stderr
     assert ("broken pybullet" in said.stderr) == ("broken" in physics)

@@ -20,7 +20,7 @@ from pathlib import Path
 import pytest
 
 from rclzenoh.session_config import OVERRIDE_VARIABLE, client_override
-from tests.e2e.collection import Running, call, start, write_config
+from tests.e2e.collection import FAST, Running, call, start, write_config
 from throwcollect.dataset.directory import CARD
 from throwcollect.dataset.journal import read_journal
 from throwcollect.run_key import RunKey
@@ -146,7 +146,7 @@ def _scene_in(directory: Path) -> Iterator[Scene]:
         patch.setenv(STATE_VARIABLE, str(state))
         # Runs of others on an engine of this machine are none of these tests' business.
         patch.setenv("DOCKER_HOST", f"unix://{directory}/none.sock")
-        config = write_config(directory, trials=TRIALS)
+        config = write_config(directory, trials=TRIALS, sim=FAST)
         running = start(config, directory / "data", 2, *UNTIL_STOPPED)
         elsewhere = {STATE_VARIABLE: str(directory / "elsewhere")}
         undisturbed = start(config, directory / "undisturbed", 1, **elsewhere)

@@ -10,7 +10,7 @@ import pytest
 from mcap.reader import make_reader
 
 from rclzenoh.interfaces import get_message
-from tests.e2e.collection import collect, fingerprints, start, write_config
+from tests.e2e.collection import FAST, collect, fingerprints, start, write_config
 from tests.integration.robot import connected
 from throwcollect.dataset.reader import Dataset
 from throwcollect.ros import Context, HistoryPolicy, Node, QoSProfile, SingleThreadedExecutor
@@ -84,7 +84,7 @@ def listened(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, 
     """A collection that was listened to from before its first trial, and what was heard of it."""
     directory = tmp_path_factory.mktemp("listened")
     port = free_port()
-    config = write_config(directory, trials=TRIALS)
+    config = write_config(directory, trials=TRIALS, sim=FAST)
     # Open, so that anybody may listen.
     running = start(config, directory / "data", 2, "--set", f"run.router_port={port}", "--set", "run.open=true")
     running.wait_until(lambda: is_open(port))
@@ -126,5 +126,5 @@ def test_whole_trials_are_heard(listened: tuple[Path, dict[str, Messages]]) -> N
 
 def test_a_listener_does_not_change_the_dataset(listened: tuple[Path, dict[str, Messages]], tmp_path: Path) -> None:
     directory, _ = listened
-    collect(write_config(tmp_path, trials=TRIALS), tmp_path / "data", 2)
+    collect(write_config(tmp_path, trials=TRIALS, sim=FAST), tmp_path / "data", 2)
     assert fingerprints(tmp_path / "data") == fingerprints(directory)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tests import processors
-from tests.e2e.collection import call, collect, fingerprints, start, write_config
+from tests.e2e.collection import INPROCESS, call, collect, fingerprints, start, write_config
 from throwcollect import Simulator, load
 from throwcollect.dataset.verify import verify
 
@@ -97,7 +97,14 @@ def test_every_file_is_the_same_when_a_simulation_is_killed(config: Path, refere
 
 def test_every_file_is_the_same_on_another_processor(tmp_path: Path) -> None:
     config = Path(__file__).parents[2] / "configs" / "dmp.yaml"
-    options = ("--trials", "3", "--set", "record.topics=[joint_states, ball/odometry, controller_state, tf, clock]")
+    options = (
+        "--trials",
+        "3",
+        "--set",
+        "run.replay=0",
+        "--set",
+        "record.topics=[joint_states, ball/odometry, controller_state, tf, clock]",
+    )
     collect(config, tmp_path / "here", 1, *options)
     collect(config, tmp_path / "there", 1, *options, **processors.PLAIN)
     assert fingerprints(tmp_path / "there") == fingerprints(tmp_path / "here")
@@ -106,6 +113,6 @@ def test_every_file_is_the_same_on_another_processor(tmp_path: Path) -> None:
 def test_another_seed_gives_another_digest(config: Path, reference: Path, tmp_path: Path) -> None:
     other = write_config(tmp_path, trials=2)
     other.write_text(other.read_text().replace("seed: 7", "seed: 8"))
-    collect(other, tmp_path / "data", 1)
+    collect(other, tmp_path / "data", 1, *INPROCESS)
     digests = [call("dataset", "digest", directory).stdout for directory in (reference, tmp_path / "data")]
     assert digests[0] != digests[1]

@@ -16,7 +16,7 @@ from typing import Any
 import psutil
 import pytest
 
-from tests.e2e.collection import call, collect, command, fingerprints, start, write_config
+from tests.e2e.collection import FAST, call, collect, command, fingerprints, start, write_config
 from throwcollect.cli.main import main
 from throwcollect.runs.record import Record
 from throwcollect.runs.records import STATE_VARIABLE, Records
@@ -25,16 +25,16 @@ pytestmark = pytest.mark.e2e
 TRIALS = 40
 SLOWLY = ("--set", "sim.real_time_factor=1")
 """Long enough to look at it."""
-MANY = 200
+MANY = 100
 UNTIL_STOPPED = ("--trials", str(MANY), *SLOWLY)
-"""Longer than any test: minutes, however long the commands in between take to start."""
+"""Longer than any test: more than a minute, however long the commands in between take to start."""
 
 Say = Callable[..., tuple[object, str, str]]
 
 
 @pytest.fixture(scope="module")
 def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return write_config(tmp_path_factory.mktemp("config"), trials=TRIALS)
+    return write_config(tmp_path_factory.mktemp("config"), trials=TRIALS, sim=FAST)
 
 
 @pytest.fixture(scope="module")
@@ -96,7 +96,7 @@ def until(condition: Callable[[], bool], *, seconds: float = 60) -> None:
         time.sleep(0.05)
 
 
-def in_the_middle(records: Records, run: str, ended: int = 5) -> None:
+def in_the_middle(records: Records, run: str, ended: int = 2) -> None:
     until(lambda: records.get(run).record.trials_ended >= ended)
 
 
@@ -370,7 +370,7 @@ def test_a_launcher_that_cannot_start_its_nodes_is_told_by_the_command_that_star
 def test_a_failure_is_told_to_whoever_waits(config: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "pybullet.py").write_text("raise ImportError('broken pybullet')")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    detach(config, tmp_path / "data", "--set", "run.restarts=0")
+    detach(config, tmp_path / "data", "--set", "run.restarts=0", "--set", "sim.engine=bullet")
     waited = call("wait")
     assert (waited.returncode, waited.stdout) == (3, "")
     assert "throwcollect: no simulation can be kept alive; the last, sim_" in waited.stderr

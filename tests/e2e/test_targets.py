@@ -8,7 +8,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from tests.e2e.collection import call, fingerprints, interrupt, start
+from tests.e2e.collection import INPROCESS, call, fingerprints, interrupt, start
 from throwcollect.config.loader import load
 from throwcollect.dataset.verify import verify
 
@@ -25,7 +25,7 @@ def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (yaml,) = re.findall(r"```yaml\n(.*?)```", PAGE, flags=re.DOTALL)
     assert "until: {landed: 500}" in yaml
     path = tmp_path_factory.mktemp("config") / "targets.yaml"
-    coarse = f"sim: {{physics_hz: 250}}\nrecord: {{rate_hz: 125}}\n{yaml}"
+    coarse = f"sim: {{physics_hz: 250, engine: ballistic}}\nrecord: {{rate_hz: 125}}\n{yaml}"
     path.write_text(coarse.replace("landed: 500", f"landed: {LANDED}"), encoding="utf-8")
     return path
 
@@ -34,7 +34,7 @@ def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def undisturbed(config: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     """A collection with one simulation, and what was said meanwhile."""
     directory = tmp_path_factory.mktemp("undisturbed") / "data"
-    code, _, err = start(config, directory, 1).finish()
+    code, _, err = start(config, directory, 1, *INPROCESS).finish()
     assert code == 0, err
     return directory, err
 

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from throwcollect.config.schema import Config
-from throwcollect.coordinator.prepare import checked_plan
+from throwcollect.coordinator.prepare import draw_plan
 from throwcollect.dataset.verify_episode import EpisodeCheck
 from throwcollect.episode.channels import Channels
 from throwcollect.replay.throw import Replayer
@@ -46,7 +46,7 @@ def test_nothing_is_held_against_an_honest_throw(name: str, tmp_path: Path) -> N
     rows = [[str({**default, **point}[key]) for key in default] for point in points]
     (tmp_path / "points.csv").write_text("\n".join(",".join(row) for row in [[*default], *rows]))
     config = Config.model_validate({**SETTINGS[name], "sweep": {"sampler": "list", "file": "points.csv"}})
-    plan = checked_plan(config, directory=tmp_path)
+    plan = draw_plan(config, directory=tmp_path)
     channels = Channels(config, full_description(config))
     check, replayer = EpisodeCheck(plan, {}), Replayer(config)
     run = [trial.number for trial in plan.trials if trial.refused is None]

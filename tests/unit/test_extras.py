@@ -4,7 +4,7 @@ from importlib.util import find_spec
 import pytest
 
 from throwcollect.errors import ThrowcollectError
-from throwcollect.extras import EXTRA_OF, MissingExtraError, explained, is_installed, lazily, require
+from throwcollect.extras import EXTRA_OF, MissingExtraError, explain_missing, is_installed, lazily, require
 
 
 @pytest.fixture
@@ -42,13 +42,13 @@ def test_where_another_extra_brings_it_too_that_one_is_told(without_scipy) -> No
 
 
 def test_whoever_expects_an_import_error_gets_one(without_scipy) -> None:
-    with pytest.raises(ImportError), explained():
+    with pytest.raises(ImportError), explain_missing():
         import scipy  # noqa: F401
     assert issubclass(MissingExtraError, ThrowcollectError)
 
 
 def test_a_missing_module_that_no_extra_brings_is_not_explained_away() -> None:
-    with pytest.raises(ModuleNotFoundError, match="throwcollect_of_tomorrow") as raised, explained():
+    with pytest.raises(ModuleNotFoundError, match="throwcollect_of_tomorrow") as raised, explain_missing():
         import throwcollect_of_tomorrow  # noqa: F401
     assert not isinstance(raised.value, MissingExtraError)
 

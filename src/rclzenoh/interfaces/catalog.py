@@ -148,7 +148,11 @@ def _field(name: str, description: tuple[Nodetype, Any], default: Default | None
 
 
 def _require(name: str) -> None:
-    """Read the files that define ``name`` and everything it refers to, unless that was done before."""
+    """Read the files that define ``name`` and everything it refers to, unless that was done before.
+
+    Raises:
+        ValueError: If there is no such interface.
+    """
     if name in _COMPLETE:
         return
     package, _, rest = name.partition("/")

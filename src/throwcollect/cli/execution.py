@@ -15,7 +15,7 @@ from typer.exceptions import TyperException
 
 from throwcollect.cli.streams import ReaderGone, ensure_written
 from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError
-from throwcollect.extras import explained
+from throwcollect.extras import explain_missing
 from throwcollect.interruption import stop_signals
 from throwcollect.wording import is_text, printable
 
@@ -30,7 +30,7 @@ def execute(app: typer.Typer) -> NoReturn:
         signal.signal(number, signal.default_int_handler)
     try:
         _check_surroundings()
-        with explained():
+        with explain_missing():
             code = app(prog_name="throwcollect", standalone_mode=False) or 0
         if code == Interrupted.exit_code:
             raise Interrupted("interrupted")
@@ -40,7 +40,7 @@ def execute(app: typer.Typer) -> NoReturn:
     except Exception as error:  # noqa: BLE001 - the one place where the unexpected becomes a message
         if os.environ.get("THROWCOLLECT_DEBUG"):
             traceback.print_exc()
-        message, code = _told(error)
+        message, code = _describe(error)
         if message:
             typer.echo(f"throwcollect: {printable(message)}", err=True)
     with suppress(ReaderGone):
@@ -49,7 +49,11 @@ def execute(app: typer.Typer) -> NoReturn:
 
 
 def _check_surroundings() -> None:
-    """Refuse what would end up in names of files and in records, and cannot."""
+    """Refuse what would end up in names of files and in records, and cannot.
+
+    Raises:
+        ConfigError: If the current directory is gone, or a word of the command line is not UTF-8.
+    """
     try:
         here = os.getcwd()
     except OSError as error:
@@ -61,7 +65,7 @@ def _check_surroundings() -> None:
             raise ConfigError(f"{word}: should be UTF-8 text")
 
 
-def _told(error: Exception) -> tuple[str, int]:
+def _describe(error: Exception) -> tuple[str, int]:
     """Message and exit code of an error."""
     if isinstance(error, ThrowcollectError):
         return str(error), error.exit_code

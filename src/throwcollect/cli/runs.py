@@ -40,7 +40,7 @@ def ps(
 ) -> None:
     """List the runs of this machine, with their nodes."""
     from throwcollect.runs.records import Records
-    from throwcollect.runs.selection import held_elsewhere
+    from throwcollect.runs.selection import find_held_runs
 
     records = Records()
     known: list[Run] = []
@@ -52,14 +52,14 @@ def ps(
     shown = [run for run in known if everything or run.status != "ended"]
     shown.sort(key=lambda run: run.record.started)
     ids = records.ids()
-    held = held_elsewhere()
+    held = find_held_runs()
     strangers = [each for run, each in held.items() if run not in ids]
     if json:
         documents = [_document(run) for run in shown] + [_strange_document(*each) for each in strangers]
         typer.echo(jsonlib.dumps(documents, indent=2, default=_in_json))
         return
     rows = [(_row(run), _node_lines(run, held.get(run.id))) for run in shown]
-    rows += [(_strange_row(*each), _held_node_lines(*each)) for each in strangers]
+    rows += [(_strange_row(*each), _list_held_nodes(*each)) for each in strangers]
     for line in _table(rows):
         typer.echo(line)
 
@@ -71,7 +71,7 @@ def wait(run: RunOption = None, json: JsonOption = False) -> None:
     from throwcollect.cli.terminal import display
     from throwcollect.runs.following import follow
     from throwcollect.runs.records import Records
-    from throwcollect.runs.selection import died, to_watch
+    from throwcollect.runs.selection import describe_death, to_watch
 
     found = to_watch(Records(), run, say=_tell)
     with display(quiet=json) as shown, Interruptions() as interruptions:
@@ -86,7 +86,7 @@ def wait(run: RunOption = None, json: JsonOption = False) -> None:
     if found.status == "running":
         raise Interrupted(f"left; run {found.id} goes on", hint=command("wait", "--run", found.id))
     if found.status == "died":
-        raise died(found)
+        raise describe_death(found)
     if record.summary is not None:
         print_summary(record.summary, None if record.volume else Path(record.directory), as_json=json)
     if (error := record.error) is not None:
@@ -139,7 +139,7 @@ def stop(run: RunOption = None) -> None:
     from throwcollect.cli.interruptions import Interruptions
     from throwcollect.runs import control
     from throwcollect.runs.records import Records
-    from throwcollect.runs.selection import died, require_living, to_change
+    from throwcollect.runs.selection import describe_death, require_living, to_change
 
     found = to_change(Records(), run, command="stop")
     require_living(found)
@@ -148,7 +148,7 @@ def stop(run: RunOption = None) -> None:
         found = control.stop(found, keep_on=lambda: not interruptions.count)
     if found.status == "running":
         raise Interrupted(f"not waited for; run {found.id} is stopping all the same")
-    error = died(found) if found.status == "died" else found.record.error
+    error = describe_death(found) if found.status == "died" else found.record.error
     if error is not None and not isinstance(error, Interrupted):
         raise error
     complete = "is complete" if error is None else "is not complete"
@@ -205,7 +205,7 @@ def _node_lines(run: Run, held: tuple[str, HeldRun] | None) -> list[tuple[str, .
     if run.status == "running":
         return [_node_line(node, _handle(run.record.runtime)) for node in run.record.nodes]
     # What a launcher that is gone wrote of its nodes may be true no more.
-    return _held_node_lines(*held) if held is not None else []
+    return _list_held_nodes(*held) if held is not None else []
 
 
 def _node_line(node: NodeState, handle: str) -> tuple[str, ...]:
@@ -218,7 +218,7 @@ def _node_line(node: NodeState, handle: str) -> tuple[str, ...]:
     )
 
 
-def _held_node_lines(runtime: str, held: HeldRun) -> list[tuple[str, ...]]:
+def _list_held_nodes(runtime: str, held: HeldRun) -> list[tuple[str, ...]]:
     return [(node.name, node.status, f"{_handle(runtime)} {node.handle[:12]}", "") for node in held.nodes]
 
 
@@ -235,8 +235,8 @@ def _handle(name: str) -> str:
 
 def _table(rows: Sequence[tuple[tuple[str, ...], list[tuple[str, ...]]]]) -> Iterable[str]:
     """Runs as one table, and below each run its nodes, indented."""
-    runs = _aligned([_HEADINGS, *(run for run, _ in rows)])
-    nodes = iter(_aligned([line for _, lines in rows for line in lines]))
+    runs = _align([_HEADINGS, *(run for run, _ in rows)])
+    nodes = iter(_align([line for _, lines in rows for line in lines]))
     yield runs[0]
     for text, (_, lines) in zip(runs[1:], rows, strict=True):
         yield text
@@ -244,7 +244,7 @@ def _table(rows: Sequence[tuple[tuple[str, ...], list[tuple[str, ...]]]]) -> Ite
             yield f"  {next(nodes)}"
 
 
-def _aligned(rows: Sequence[Sequence[str]]) -> list[str]:
+def _align(rows: Sequence[Sequence[str]]) -> list[str]:
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return ["  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
 

@@ -21,14 +21,14 @@ def config(
     json: JsonOption = False,
 ) -> None:
     """Print the resolved configuration."""
-    from throwcollect.config.loader import load, resolved_yaml
+    from throwcollect.config.loader import dump_yaml, load
     from throwcollect.config.reference import json_schema
 
     if schema:
         typer.echo(jsonlib.dumps(json_schema(), indent=2))
         return
     found = load(path, overrides(settings))
-    typer.echo(found.model_dump_json(indent=2) if json else resolved_yaml(found), nl=json)
+    typer.echo(found.model_dump_json(indent=2) if json else dump_yaml(found), nl=json)
 
 
 def plan(
@@ -38,12 +38,12 @@ def plan(
     json: JsonOption = False,
 ) -> None:
     """Print the trials without running them."""
-    from throwcollect.config.loader import loaded
-    from throwcollect.coordinator.prepare import checked_plan, more_trials
+    from throwcollect.config.loader import load_locating_errors
+    from throwcollect.coordinator.prepare import draw_plan, more_trials
 
     end_with_reader()
-    with loaded(path, overrides(settings, trials=trials)) as config:
-        found = checked_plan(config, directory=path.parent)
+    with load_locating_errors(path, overrides(settings, trials=trials)) as config:
+        found = draw_plan(config, directory=path.parent)
     if json:
         rows = [
             {

@@ -13,7 +13,7 @@ from ruamel.yaml.constructor import SafeConstructor
 from ruamel.yaml.error import YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
-from throwcollect.config.problems import Location, dotted, quoted
+from throwcollect.config.problems import Location, join_key, quote
 from throwcollect.config.yaml_nodes import MOST_LEVELS, MOST_VALUES, compose, line, reason
 from throwcollect.errors import ConfigError, Problem
 
@@ -62,10 +62,10 @@ class Document:
         for length in range(len(location), 0, -1):
             if location[:length] in self._lines:
                 line = self._lines[location[:length]]
-                return Problem(sentence, dotted(location), self._path if line else None, line)
-        return Problem(sentence, dotted(location), self._path)
+                return Problem(sentence, join_key(location), self._path if line else None, line)
+        return Problem(sentence, join_key(location), self._path)
 
-    def placed(self, problem: Problem) -> Problem:
+    def place(self, problem: Problem) -> Problem:
         """A problem with the place where its key was written, if it has a key and does not name a place itself."""
         if problem.path or not problem.key:
             return problem
@@ -86,12 +86,12 @@ class Document:
         key, equals, text = assignment.partition("=")
         key = key.strip()
         if not equals or not all(key.split(".")):
-            self.problems.append(Problem(f"an override should be KEY=VALUE, got {quoted(assignment)}"))
+            self.problems.append(Problem(f"an override should be KEY=VALUE, got {quote(assignment)}"))
             return
         try:
             node = compose(text)
         except YAMLError as error:
-            self.problems.append(Problem(f"not valid YAML: {reason(error)}; got {quoted(text)}", key))
+            self.problems.append(Problem(f"not valid YAML: {reason(error)}; got {quote(text)}", key))
             return
         *above, last = _parts(key)
         if len(above) >= MOST_LEVELS:
@@ -108,7 +108,7 @@ class Document:
             holder = holder[index] if _holds(holder, index) else None
         index = _index(holder, last)
         if not isinstance(holder, dict) and not _holds(holder, index):
-            self.problems.append(Problem(f"nothing of this name can be set; got {quoted(text)}", key))
+            self.problems.append(Problem(f"nothing of this name can be set; got {quote(text)}", key))
             return
         location = (*location, index)
         self._lines = {known: line for known, line in self._lines.items() if known[: len(location)] != location}
@@ -163,7 +163,7 @@ class Document:
 
     def _note(self, node: Node, location: Location, sentence: str, *, in_file: bool) -> None:
         path, line = (self._path, node.start_mark.line + 1) if in_file else (None, None)
-        self.problems.append(Problem(sentence, dotted(location), path, line))
+        self.problems.append(Problem(sentence, join_key(location), path, line))
 
 
 def _text_of(path: Path) -> str:

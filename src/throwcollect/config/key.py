@@ -56,8 +56,8 @@ class Key:
         """Whether the value may change the samples of a trial."""
         return self.effect in (Effect.PHYSICS, Effect.TASK)
 
-    def inherited_by(self, key: Key) -> Key:
-        """What holds for a key in a section that this one describes."""
+    def overlay(self, key: Key) -> Key:
+        """What holds for a key in a section that this one describes: its own word, or else that of the section."""
         own = {name: value for name, value in vars(key).items() if value is not None}
         return replace(self, **own)
 

@@ -13,7 +13,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from throwcollect.config.document import Document
-from throwcollect.config.problems import MOST_EXAMINED, Finding, Location, dotted, findings
+from throwcollect.config.problems import MOST_EXAMINED, Finding, Location, findings, join_key
 from throwcollect.config.schema import Config, Range
 from throwcollect.config.values import reason_not_sweepable, with_values
 from throwcollect.errors import ConfigError
@@ -39,12 +39,12 @@ def load(path: StrPath, overrides: Sequence[str] = ()) -> Config:
     Raises:
         ConfigError: If the file cannot be read or anything in it is wrong; it holds all problems, unknown keys first.
     """
-    with loaded(Path(path), overrides) as config:
+    with load_locating_errors(Path(path), overrides) as config:
         return config
 
 
 @contextmanager
-def loaded(path: Path, overrides: Sequence[str] = ()) -> Iterator[Config]:
+def load_locating_errors(path: Path, overrides: Sequence[str] = ()) -> Iterator[Config]:
     """Read a configuration file as `load` does, and have errors that are raised inside say where their keys stand.
 
     Args:
@@ -57,7 +57,7 @@ def loaded(path: Path, overrides: Sequence[str] = ()) -> Iterator[Config]:
     document = Document(path)
     for assignment in overrides:
         document.override(assignment)
-    config, found, more = _checked(document.values)
+    config, found, more = _check(document.values)
     problems = [document.problem(each.location, each.sentence) for each in found]
     unknown = sum(each.unknown for each in found)
     rest = sorted([*document.problems, *problems[unknown:]], key=lambda problem: problem.line or 0)
@@ -66,11 +66,11 @@ def loaded(path: Path, overrides: Sequence[str] = ()) -> Iterator[Config]:
     try:
         yield config
     except ConfigError as error:
-        problems = [document.placed(problem) for problem in error.problems]
+        problems = [document.place(problem) for problem in error.problems]
         raise type(error)(problems, expected=error.expected, hint=error.hint) from error
 
 
-def resolved_yaml(config: Config) -> str:
+def dump_yaml(config: Config) -> str:
     """A configuration with all its keys as YAML that loads back to an equal one."""
     return "".join(f"{line}\n" for line in _lines(config.model_dump(), ""))
 
@@ -93,7 +93,7 @@ def _character(character: str) -> str:
     return character if plain else f"\\U{ord(character):08x}"
 
 
-def _checked(values: dict[str, Any]) -> tuple[Config | None, list[Finding], int]:
+def _check(values: dict[str, Any]) -> tuple[Config | None, list[Finding], int]:
     """Validate values; after a problem go on with defaults in the place of what was wrong, to find what else is.
 
     Returns:
@@ -134,7 +134,7 @@ def _about(finding: Finding, location: Location) -> bool:
     if finding.location[: len(location)] == location:
         return True
     if finding.unknown:
-        return str(finding.location[-1]).startswith(f"{dotted(location)}.")
+        return str(finding.location[-1]).startswith(f"{join_key(location)}.")
     return location[-1] in re.findall(r"\w+", finding.sentence)
 
 

@@ -27,7 +27,7 @@ class DynamicMovementPrimitive(Section):
     """Trajectory family."""
     basis_functions: Annotated[int, Field(ge=2, le=500), Key(swept=False)] = 20
     """Number of Gaussian basis functions of each joint."""
-    weights: dict[Joint, list[float]] = {}
+    weights: dict[Joint, list[Annotated[float, Field(json_schema_extra={"unit": "rad"})]]] = {}
     """Weights of the forcing term of each moving joint; a joint that is absent has zero weights [rad]."""
     alpha_z: PositiveFloat = 48.0
     """Stiffness constant of the transformation system [-]; beta_z is alpha_z / 4 (critically damped)."""

@@ -46,10 +46,10 @@ class Finding:
     @property
     def key(self) -> str:
         """Dotted key of the place."""
-        return dotted(self.location)
+        return join_key(self.location)
 
 
-def dotted(location: Location) -> str:
+def join_key(location: Location) -> str:
     """Dotted key of a place."""
     return ".".join(map(str, location))
 
@@ -66,7 +66,7 @@ def unknown_key(name: str, known: list[str]) -> str:
     return "unknown key; " + (f"known keys here: {', '.join(known)}" if known else "no keys are expected here")
 
 
-def quoted(value: Any) -> str:
+def quote(value: Any) -> str:
     """A value as its author would know it again."""
     if isinstance(value, str):
         return repr(value if len(value) <= _LONGEST_QUOTE else value[:_LONGEST_QUOTE] + "…")
@@ -106,7 +106,7 @@ def _nearest(finding: Finding) -> str:
 
 
 def _findings(details: ErrorDetails, values: Any, above: Location) -> Iterator[Finding]:
-    location, shape = _located(details, values, above)
+    location, shape = _locate(details, values, above)
     kind, value = details["type"], details["input"]
     cause = details.get("ctx", {}).get("error")
     is_key = details["loc"][-1:] == ("[key]",)
@@ -118,7 +118,7 @@ def _findings(details: ErrorDetails, values: Any, above: Location) -> Iterator[F
             yield Finding((*location, *_split(key)), sentence)
     elif isinstance(cause, UnknownJointError):
         meant = _did_you_mean(cause.name, cause.joints)
-        yield Finding(location, f"{cause.robot} has no joint {quoted(cause.name)}{meant}", unknown=is_key)
+        yield Finding(location, f"{cause.robot} has no joint {quote(cause.name)}{meant}", unknown=is_key)
     elif cause is not None:
         yield Finding(location, str(cause), unknown=is_key)
     elif kind == "missing":
@@ -135,7 +135,7 @@ def _findings(details: ErrorDetails, values: Any, above: Location) -> Iterator[F
 
 def _should_be(words: str, value: Any, choices: list[str], *, strange: str = "") -> str:
     """Say what would be right, and which choice was meant; `strange` is what is said if none is like the value."""
-    return f"should be {words}, got {quoted(value)}{_did_you_mean(value, choices) or strange}"
+    return f"should be {words}, got {quote(value)}{_did_you_mean(value, choices) or strange}"
 
 
 def _did_you_mean(value: Any, choices: Sequence[str]) -> str:
@@ -150,7 +150,7 @@ def _radians(kind: str, shape: Shape, value: Any) -> str:
     return f"; angles are in radians: {value:g} degrees are {math.radians(value):.4f}"
 
 
-def _located(details: ErrorDetails, values: Any, above: Location) -> tuple[Location, Shape]:
+def _locate(details: ErrorDetails, values: Any, above: Location) -> tuple[Location, Shape]:
     """Where an error is, without the names of models and unions that pydantic mixes into its locations."""
     location, shape, here = list(above), shape_of(above), values
     parts = details["loc"]
@@ -168,7 +168,7 @@ def _located(details: ErrorDetails, values: Any, above: Location) -> tuple[Locat
 
 def _section(details: ErrorDetails, values: Any, above: Location) -> Shape:
     container = ErrorDetails(type="section", loc=details["loc"][:-1], msg="", input=None)
-    return _located(container, values, above)[1]
+    return _locate(container, values, above)[1]
 
 
 def _split(key: str) -> Location:

@@ -64,7 +64,7 @@ def _sections(shape: Shape, prefix: str) -> Iterator[str]:
             for parameter in child.child("").alternatives:
                 yield f"### `sweep.parameters.<key>`: {_sentence(parameter)}\n"
                 yield _table(parameter, "")
-            yield f"{_SAMPLERS}\n### Keys that may be swept\n\n{_swept()}\n"
+            yield f"{_SAMPLERS}\n### Keys that may be swept\n\n{_list_sweepable()}\n"
         elif len(alternatives) > 1 and all(each.keys for each in alternatives):
             for each in alternatives:
                 family = each.child("family").choices[0]
@@ -120,7 +120,7 @@ def _default(child: Shape, name: str, holder: Shape) -> str:
     return f"`{value_as_yaml(child.node['default'])}`"
 
 
-def _swept() -> str:
+def _list_sweepable() -> str:
     config = Config()
     weights = {joint: [0.0] * 2 for joint in config.task.end}
     primitive = DynamicMovementPrimitive(family="dmp", basis_functions=2, weights=weights)

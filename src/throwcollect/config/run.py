@@ -14,7 +14,7 @@ RUNTIMES = "throwcollect.runtimes"
 """Group of the entry points by which other packages add runtimes."""
 
 
-def _or_added(value: Any, validate: Callable[[Any], str]) -> str:
+def _accept_added(value: Any, validate: Callable[[Any], str]) -> str:
     """A runtime of ours, or the name of one that another package adds; for anything else, ours are what is expected."""
     try:
         return validate(value)
@@ -29,7 +29,7 @@ class RunConfig(Section):
 
     simulations: Annotated[int, Field(ge=1, le=256)] = 2
     """Number of simulations, unless `-n` says otherwise."""
-    runtime: Annotated[Literal["auto", "local", "docker", "inprocess"], WrapValidator(_or_added)] = "auto"
+    runtime: Annotated[Literal["auto", "local", "docker", "inprocess"], WrapValidator(_accept_added)] = "auto"
     """Where the nodes run: in processes (`local`) or in containers; `auto` takes containers if an engine answers.
 
     `inprocess` takes one simulation without nodes: for tests, breakpoints and Python programs."""

@@ -136,7 +136,7 @@ class RecordConfig(Section):
     """Trials in one MCAP file."""
 
     @model_validator(mode="after")
-    def _judged_topics(self) -> RecordConfig:
+    def _require_judged_topics(self) -> RecordConfig:
         if missing := [t for t in ("joint_states", "ball/odometry") if t not in self.topics]:
             raise ContradictionError({"topics": f"should hold {' and '.join(missing)}, from which throws are judged"})
         return self

@@ -8,17 +8,8 @@ from functools import cache
 from typing import Any
 
 from throwcollect.config.schema import Config
+from throwcollect.units import unit_of_name
 
-_UNITS = {
-    "_per_s": "1/s",
-    "_kgpm3": "kg/m³",
-    "_mps2": "m/s²",
-    "_kg": "kg",
-    "_hz": "Hz",
-    "_rad": "rad",
-    "_m": "m",
-    "_s": "s",
-}
 _NOUNS = {"number": "a number", "integer": "a whole number", "string": "text", "boolean": "true or false"}
 
 
@@ -44,7 +35,7 @@ class Shape:
     def alternatives(self) -> list[Shape]:
         """The shapes that a union allows; only the shape itself when it is no union."""
         nodes = self.node.get("oneOf") or self.node.get("anyOf")
-        return [Shape(_resolved(node), self.unit) for node in nodes] if nodes else [self]
+        return [Shape(_resolve(node), self.unit) for node in nodes] if nodes else [self]
 
     @property
     def keys(self) -> dict[str, Shape]:
@@ -59,7 +50,7 @@ class Shape:
     @property
     def choices(self) -> list[str]:
         """The words it allows, if there are only some."""
-        return [word for shape in self.alternatives for word in _words_allowed(shape.node)]
+        return [word for shape in self.alternatives for word in _list_words(shape.node)]
 
     def child(self, part: str | int) -> Shape:
         """The shape of what is in it under a key or an index; any value when it should hold nothing there."""
@@ -67,7 +58,7 @@ class Shape:
             rest = shape.node.get("items" if isinstance(part, int) else "additionalProperties")
             if node := shape.node.get("properties", {}).get(part) or rest:
                 inherited = self.unit if node.get("type") in ("number", "array", "object") else ""
-                return Shape(_resolved(node), node.get("unit") or _unit(str(part)) or inherited)
+                return Shape(_resolve(node), node.get("unit") or unit_of_name(str(part)) or inherited)
         return Shape({})
 
     def __str__(self) -> str:
@@ -79,6 +70,15 @@ def root() -> Shape:
     return Shape(json_schema())
 
 
+def unit_of_key(key: str) -> str:
+    """Unit of the numbers of a dotted key: that of its field, or else the one that a name in it ends with.
+
+    Args:
+        key: Dotted key, in which an index is a part of its own; of what is no key, the name alone counts.
+    """
+    return shape_of([int(part) if part.isdecimal() else part for part in key.split(".")]).unit or unit_of_name(key)
+
+
 def shape_of(parts: Sequence[str | int]) -> Shape:
     """The shape of what a key of a configuration holds."""
     shape = root()
@@ -87,18 +87,14 @@ def shape_of(parts: Sequence[str | int]) -> Shape:
     return shape
 
 
-def _resolved(node: dict[str, Any]) -> dict[str, Any]:
+def _resolve(node: dict[str, Any]) -> dict[str, Any]:
     if "$ref" not in node:
         return node
     target = json_schema()["$defs"][node["$ref"].rpartition("/")[2]]
     return {**target, **{key: value for key, value in node.items() if key != "$ref"}}
 
 
-def _unit(key: str) -> str:
-    return next((unit for suffix, unit in _UNITS.items() if key.endswith(suffix)), "")
-
-
-def _words_allowed(node: dict[str, Any]) -> list[str]:
+def _list_words(node: dict[str, Any]) -> list[str]:
     return [node["const"]] if "const" in node else list(node.get("enum", []))
 
 
@@ -106,7 +102,7 @@ def _in_words(shape: Shape) -> str:
     node = shape.node
     if own := node.get("words"):
         return str(own)
-    words = _words_allowed(node)
+    words = _list_words(node)
     if node.get("title") == "Joint":
         return "a joint's name"
     if words:

@@ -30,7 +30,7 @@ class Range(Section):
     """Number of grid points, both ends included; for the sampler `grid` only."""
 
     @model_validator(mode="after")
-    def _ordered(self) -> Range:
+    def _check_order(self) -> Range:
         wrong = {}
         if self.min > self.max:
             wrong["min"] = f"should be at most max, {self.max}, got {self.min}"
@@ -72,7 +72,7 @@ class Bins(Section):
     """Number of intervals."""
 
     @model_validator(mode="after")
-    def _ordered(self) -> Bins:
+    def _check_order(self) -> Bins:
         if self.min >= self.max:
             raise ContradictionError({"min": f"should be below max, {self.max}, got {self.min}"})
         return self

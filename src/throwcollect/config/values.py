@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 from pydantic import ValidationError
 
 from throwcollect.config.key import Effect, Key, key_of_field
-from throwcollect.config.problems import Location, dotted, findings, unknown_key
+from throwcollect.config.problems import Location, findings, join_key, unknown_key
 from throwcollect.config.schema import Config
 from throwcollect.config.section import Section
 from throwcollect.errors import ConfigError, Problem
@@ -34,7 +34,7 @@ def with_values(config: Config, values: Mapping[str, float]) -> Config:
         for part in above:
             holder = holder.setdefault(part, {})
         holder[last] = value
-    return _changed(config, changes, ())
+    return _change(config, changes, ())
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ def _find_obstacle(config: Config, leaf: Leaf) -> str | None:
 def _leaves(value: Any, location: Location, key: Key, default: Any) -> Iterator[Leaf]:
     if isinstance(value, Section):
         for name, inner in value.__dict__.items():
-            own = key.inherited_by(key_of_field(type(value), name))
+            own = key.overlay(key_of_field(type(value), name))
             yield from _leaves(inner, (*location, name), own, getattr(default, name, None))
     elif isinstance(value, dict) and value:
         for name, inner in value.items():
@@ -121,15 +121,15 @@ def _leaves(value: Any, location: Location, key: Key, default: Any) -> Iterator[
         for index, inner in enumerate(value):
             yield from _leaves(inner, (*location, index), key, None)
     else:
-        yield Leaf(dotted(location), value, key, is_default=value == default)
+        yield Leaf(join_key(location), value, key, is_default=value == default)
 
 
-def _changed(section: AnySection, changes: Mapping[str, Any], location: Location) -> AnySection:
+def _change(section: AnySection, changes: Mapping[str, Any], location: Location) -> AnySection:
     values = dict(section.__dict__)
     for part, change in changes.items():
         if part not in values:
             raise _unknown((*location, part), list(values))
-        values[part] = _replaced(values[part], change, (*location, part))
+        values[part] = _replace(values[part], change, (*location, part))
     try:
         # Strictly, so that a number in quotes is no number; sections that have not changed are not looked at again.
         return type(section).model_validate(values, strict=True)
@@ -138,19 +138,19 @@ def _changed(section: AnySection, changes: Mapping[str, Any], location: Location
         raise ConfigError([Problem(each.sentence, each.key) for each in found]) from error
 
 
-def _replaced(value: Any, change: Any, location: Location) -> Any:
+def _replace(value: Any, change: Any, location: Location) -> Any:
     if not isinstance(change, dict):
         return change
     if isinstance(value, Section):
-        return _changed(value, change, location)
+        return _change(value, change, location)
     copy: Any = dict(enumerate(value)) if isinstance(value, list) else dict(value) if isinstance(value, dict) else {}
     for part, inner in change.items():
         index = int(part) if isinstance(value, list) and part.isdecimal() else part
         if index not in copy:
             raise _unknown((*location, part), list(map(str, copy)))
-        copy[index] = _replaced(copy[index], inner, (*location, index))
+        copy[index] = _replace(copy[index], inner, (*location, index))
     return list(copy.values()) if isinstance(value, list) else copy
 
 
 def _unknown(location: Location, known: list[str]) -> ConfigError:
-    return ConfigError([Problem(unknown_key(str(location[-1]), known), dotted(location))])
+    return ConfigError([Problem(unknown_key(str(location[-1]), known), join_key(location))])

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from throwcollect.control.decision import CANCELED, Decision, Judge
 from throwcollect.control.deviations import Deviations
 from throwcollect.control.goal import Trajectory, TrajectoryGoal
-from throwcollect.control.log import repeated
+from throwcollect.control.log import mark_repeated
 from throwcollect.control.outcome import (
     ControllerState,
     GoalResult,
@@ -107,7 +107,7 @@ class JointTrajectoryController:
             return True
         rule = "Scaling factor has to be greater or equal to 0.0 - Ignoring input!"
         problem = f"{rule} (got {factor:g}; expected 0 to {_MOST_SPEED:g})"
-        self.logger.warning("%s: %s", self.name, problem, extra=repeated("speed"))
+        self.logger.warning("%s: %s", self.name, problem, extra=mark_repeated("speed"))
         return False
 
     def reset(self, time_ns: int, measured: JointState) -> None:
@@ -325,7 +325,7 @@ class JointTrajectoryController:
         if parameters.cmd_timeout and not parameters.timeout:
             values = f"({parameters.cmd_timeout:g} vs. {parameters.constraints.goal_time:g})"
             problem = f"Command timeout must be higher than goal_time tolerance {values}; it is off."
-            self.logger.warning("%s: %s", self.name, problem, extra=repeated("timeout"))
+            self.logger.warning("%s: %s", self.name, problem, extra=mark_repeated("timeout"))
 
     def _judge_with(self, tolerances: Tolerances) -> Judge:
         return Judge(tolerances, round(self._parameters.timeout * 1e9), self._parameters.joints)

@@ -61,7 +61,7 @@ class Judge:
         """
         past_end = motion.past_end
         if self.tolerances.path.any() and (first or not past_end):
-            broken = self._broken(motion, measured, self.tolerances.path)
+            broken = self._find_violations(motion, measured, self.tolerances.path)
             if broken:
                 text = f"Aborted due to path tolerance violation: {broken}"
                 return Decision(GoalStatus.ABORTED, ErrorCode.PATH_TOLERANCE_VIOLATED, text)
@@ -72,7 +72,7 @@ class Judge:
             text = f"Aborted due to command timeout: {late_ns / 1e9:f} seconds after the end"
             return Decision(GoalStatus.ABORTED, ErrorCode.GOAL_TOLERANCE_VIOLATED, text)
         goal = self.tolerances.goal
-        broken = self._broken(motion, measured, goal) if goal.any() else ""
+        broken = self._find_violations(motion, measured, goal) if goal.any() else ""
         if not broken:
             return Decision(GoalStatus.SUCCEEDED, ErrorCode.SUCCESSFUL, "Goal successfully reached!")
         if 0 < self.tolerances.goal_time_ns < late_ns:
@@ -105,5 +105,5 @@ class Judge:
         waits = bool(tolerances.goal.any()) and not self.timeout_ns
         return waits and 0 < tolerances.goal_time_ns < motion.since_end_ns
 
-    def _broken(self, motion: Motion, measured: JointState, limits: Limits) -> str:
+    def _find_violations(self, motion: Motion, measured: JointState, limits: Limits) -> str:
         return violations(motion.desired - measured.positions, limits, self.joints)

@@ -7,6 +7,6 @@ REPEATED = "repeated"
 each goal, stop or decision."""
 
 
-def repeated(about: str) -> dict[str, str]:
+def mark_repeated(about: str) -> dict[str, str]:
     """What marks a record as one of many about the same: whoever shows it may leave some out."""
     return {REPEATED: about}

@@ -75,7 +75,7 @@ class Acceptance:
         conditions = Conditions(
             build=build_digest(),
             settings=self._settings.digest,
-            values=self._settings.replaced_by(config),
+            values=self._settings.find_replaced(config),
             inputs={controller: goal.digest for controller, goal in goals.items()},
             lease="",
         )

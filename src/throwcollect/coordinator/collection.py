@@ -156,9 +156,9 @@ class TrialCollection:
         self._leases.forget(simulation)
         del self._names[simulation]
 
-    def held_by(self, simulation: str) -> int | None:
+    def find_trial(self, simulation: str) -> int | None:
         """Trial that a simulation works at; None if at none."""
-        return self._leases.held_by(simulation)
+        return self._leases.find_trial(simulation)
 
     def lease(self, simulation: str) -> tuple[int, Assignment] | None:
         """Give the next trial to a simulation that has none.
@@ -166,7 +166,7 @@ class TrialCollection:
         Returns:
             Number of the trial, and all that is worked out of it; None if the simulation gets none for now.
         """
-        if self._draining or self._leases.held_by(simulation) is not None:
+        if self._draining or self._leases.find_trial(simulation) is not None:
             return None
         trial = self._leases.lease(simulation, others=self._names)
         if trial is None:
@@ -204,7 +204,7 @@ class TrialCollection:
             reason: What happened, kept as evidence.
             refused: Whether the simulation refused the trial, so that it may refuse all others, too.
         """
-        trial = self._leases.held_by(simulation)
+        trial = self._leases.find_trial(simulation)
         if trial is not None:
             given_up = self._leases.fail(simulation, reason, refused=refused)
             self._give_back(simulation, trial, reason, given_up and given_up[1])
@@ -351,7 +351,7 @@ class TrialCollection:
             self._growth.tell(trial, result)
 
     def _tell_set_aside(self) -> None:
-        aside = {each: reason for each in self._names if (reason := self._leases.set_aside(each)) is not None}
+        aside = {each: reason for each in self._names if (reason := self._leases.why_set_aside(each)) is not None}
         for simulation in aside.keys() - self._set_aside.keys():
             self.warn(f"{simulation}: gets no more trials, as others could do what it refused: {aside[simulation]}")
         self._set_aside = aside

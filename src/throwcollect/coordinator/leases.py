@@ -61,7 +61,7 @@ class Leases:
         """Whether every trial was completed or given up."""
         return self._ended == self._total
 
-    def set_aside(self, simulation: str) -> str | None:
+    def why_set_aside(self, simulation: str) -> str | None:
         """Why a simulation gets no more trials: it has refused too many that others could do. None if it gets them."""
         if self._wrong_refusals.get(simulation, 0) < _MOST_IN_A_ROW:
             return None
@@ -83,7 +83,7 @@ class Leases:
         """The trials that will be handed out next, at most so many."""
         return [*sorted(self._returned), *islice(self._fresh, count)][:count]
 
-    def held_by(self, simulation: str) -> int | None:
+    def find_trial(self, simulation: str) -> int | None:
         """Trial that a simulation holds, or None."""
         return self._holders.get(simulation)
 
@@ -103,7 +103,7 @@ class Leases:
         if simulation in self._holders:
             raise ValueError(f"{simulation} still holds trial {self._holders[simulation]}")
         rivals = [other for other in others if other != simulation and not self._is_doubted(other)]
-        if self.set_aside(simulation) is not None or (rivals and self._is_doubted(simulation)):
+        if self.why_set_aside(simulation) is not None or (rivals and self._is_doubted(simulation)):
             return None
         trial = next((trial for trial in sorted(self._returned) if self._may_try(simulation, trial, rivals)), None)
         if trial is not None:

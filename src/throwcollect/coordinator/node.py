@@ -78,7 +78,7 @@ class Coordinator(Node):
                 besides = f", and no answer to {simulation.unanswered[0]}" if simulation.unanswered else ""
                 self._take_back(namespace, f"no episode within {self._patience_s:g} s{besides}")
             elif (missing := simulation.remind()) is not None:
-                trial = self._collection.held_by(namespace)
+                trial = self._collection.find_trial(namespace)
                 self.get_logger().warning(f"{namespace}: no answer to {missing} of trial {trial}, which is sent again")
             self._lease(namespace)
         self._notice_unreached(now)
@@ -98,7 +98,7 @@ class Coordinator(Node):
 
     def _find_simulations(self) -> None:
         self._visible.clear()
-        offered = {namespace: (name, publishers) for namespace, name, publishers in self._offered()}
+        offered = {namespace: (name, publishers) for namespace, name, publishers in self._find_offers()}
         for namespace, simulation in list(self._simulations.items()):
             name, publishers = offered.get(namespace, ("", frozenset()))
             if name != simulation.name:
@@ -122,7 +122,7 @@ class Coordinator(Node):
         self._collection.leave(namespace, reason)
         self._simulations.pop(namespace).destroy()
 
-    def _offered(self) -> Iterator[tuple[str, str, frozenset[bytes]]]:
+    def _find_offers(self) -> Iterator[tuple[str, str, frozenset[bytes]]]:
         """Each simulation in the graph, which is a node that publishes episodes: namespace, name, its publishers."""
         for topic, types in self.get_topic_names_and_types():
             above, _, last = topic.rpartition("/")
@@ -152,7 +152,7 @@ class Coordinator(Node):
 
     def _lease(self, namespace: str) -> None:
         simulation = self._simulations.get(namespace)
-        if simulation is None or simulation.hung or self._collection.held_by(namespace) is not None:
+        if simulation is None or simulation.hung or self._collection.find_trial(namespace) is not None:
             return
         if self._collection.draining or not simulation.ready() or (leased := self._collection.lease(namespace)) is None:
             return
@@ -175,7 +175,7 @@ class Coordinator(Node):
         trial = delivery.episode.header.trial
         simulation = self._simulations[namespace]
         simulation.hung = False
-        if self._collection.held_by(namespace) != trial:
+        if self._collection.find_trial(namespace) != trial:
             self.get_logger().warning(f"{namespace}: trial {trial} came too late and was dropped")
             return
         simulation.abandon()

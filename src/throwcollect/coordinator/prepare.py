@@ -17,7 +17,7 @@ from throwcollect.sweep.rounds import Rounds
 from throwcollect.tasks.trajectory import throw_trajectory
 
 
-def checked_plan(config: Config, *, directory: Path) -> Plan:
+def draw_plan(config: Config, *, directory: Path) -> Plan:
     """Draw all trials that are known before anything runs, and refuse those that the robot cannot do.
 
     Args:
@@ -49,14 +49,14 @@ def more_trials(plan: Plan) -> str:
     return f"; more follow from their results{until}, at most {rounds.limit} in all"
 
 
-def self_contained(config: Config) -> Config:
+def make_self_contained(config: Config) -> Config:
     """The configuration as a dataset has it: a list of trials lies beside it."""
     if config.sweep.file is None:
         return config
     return config.model_copy(update={"sweep": config.sweep.model_copy(update={"file": TRIALS})})
 
 
-def listed_points(config: Config, *, directory: Path) -> Points | None:
+def read_listed_points(config: Config, *, directory: Path) -> Points | None:
     """All points of the list that a configuration names, whether its plan takes them or not; None if it names none.
 
     Args:
@@ -80,9 +80,9 @@ def prepare(config: Config, directory: Path, *, sweep_directory: Path) -> Plan:
     Raises:
         ConfigError: If the sweep or the directory cannot be used; nothing is left behind then.
     """
-    plan = replace(checked_plan(config, directory=sweep_directory), config=self_contained(config))
+    plan = replace(draw_plan(config, directory=sweep_directory), config=make_self_contained(config))
     try:
-        create(directory, plan, listed=listed_points(config, directory=sweep_directory))
+        create(directory, plan, listed=read_listed_points(config, directory=sweep_directory))
     except DatasetError as error:
         # Nothing has been started yet, so what is wrong is the choice of the directory.
         raise ConfigError(error.message, hint=error.hint) from error

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from throwcollect.errors import DatasetError, WorkerError
-from throwcollect.trial.choice import chosen
+from throwcollect.trial.choice import choose_trials
 from throwcollect.wording import counted
 
 
@@ -32,7 +32,7 @@ def check_by_replay(
         DatasetError: If an episode came out otherwise.
         WorkerError: If the process failed.
     """
-    trials = chosen(sorted(digests), count=count, seed=seed)
+    trials = choose_trials(sorted(digests), count=count, seed=seed)
     if not trials:
         return None
     command = [sys.executable, "-m", "throwcollect", "simulate", str(directory), *map(str, trials)]

@@ -6,11 +6,11 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from throwcollect.config.loader import load, loaded, resolved_yaml
-from throwcollect.config.problems import quoted
+from throwcollect.config.loader import dump_yaml, load, load_locating_errors
+from throwcollect.config.problems import quote
 from throwcollect.config.schema import Config
 from throwcollect.config.values import differences
-from throwcollect.coordinator.prepare import checked_plan, listed_points, prepare, self_contained
+from throwcollect.coordinator.prepare import draw_plan, make_self_contained, prepare, read_listed_points
 from throwcollect.dataset.completeness import find_damage, is_as_written
 from throwcollect.dataset.directory import CONFIG, METADATA, PLAN, SOURCES, TRIALS, config_path
 from throwcollect.dataset.lock import held_alone
@@ -54,11 +54,11 @@ def resume(
             cannot be made again.
     """
     with held_alone(directory):
-        stored = _stored(directory)
+        stored = _read_stored_config(directory)
         if stored is not None:
-            _refuse_changes(directory, stored, self_contained(config))
-        old = _stored_plan(directory, stored, self_contained(config))
-        damaged = _damaged(directory, old, check=check, say=say)
+            _refuse_changes(directory, stored, make_self_contained(config))
+        old = _read_stored_plan(directory, stored, make_self_contained(config))
+        damaged = _find_damaged(directory, old, check=check, say=say)
         check_regular(directory / TRIALS)
         if TRIALS in damaged and sweep_directory.samefile(directory):
             raise DatasetError(
@@ -69,7 +69,7 @@ def resume(
             # It is drawn again; one that grew with the results cannot be, and stays if its trials are what they were.
             old = None
         remove_unfinished(directory)
-        return _written(config, directory, sweep_directory, stored, old, damaged)
+        return _write(config, directory, sweep_directory, stored, old, damaged)
 
 
 def prepare_or_resume(path: Path, directory: Path) -> Plan:
@@ -84,11 +84,11 @@ def prepare_or_resume(path: Path, directory: Path) -> Plan:
         DatasetError: If files cannot be written, or something is damaged that cannot be made again.
     """
     freeze = resume if begun(directory) else prepare
-    with loaded(path) as config:
+    with load_locating_errors(path) as config:
         return freeze(config, directory, sweep_directory=path.parent)
 
 
-def _written(
+def _write(
     given: Config,
     directory: Path,
     sweep_directory: Path,
@@ -96,11 +96,11 @@ def _written(
     old: Plan | None,
     damaged: Collection[str],
 ) -> Plan:
-    config = self_contained(given)
+    config = make_self_contained(given)
     if old is None or TRIALS in damaged or old.config.without_run() != config.without_run():
-        drawn = replace(checked_plan(given, directory=sweep_directory), config=config)
-        plan = _extended(directory, old, drawn)
-        if (listed := listed_points(given, directory=sweep_directory)) is not None:
+        drawn = replace(draw_plan(given, directory=sweep_directory), config=config)
+        plan = _extend(directory, old, drawn)
+        if (listed := read_listed_points(given, directory=sweep_directory)) is not None:
             write_file(directory / TRIALS, encode_points(listed))
     else:
         plan = replace(old, config=config)
@@ -114,14 +114,18 @@ def _written(
         if replanned:
             # A plan that does not belong to its configuration is nobody's; a missing one is made again.
             remove(directory / PLAN)
-        write_file(directory / CONFIG, resolved_yaml(kept).encode())
+        write_file(directory / CONFIG, dump_yaml(kept).encode())
     if replanned or PLAN in damaged:
         plan.write(directory / PLAN)
     return plan
 
 
-def _damaged(directory: Path, plan: Plan | None, *, check: bool, say: Say) -> frozenset[str]:
-    """Names of the files of a finished dataset that are missing or damaged; none if it is not finished."""
+def _find_damaged(directory: Path, plan: Plan | None, *, check: bool, say: Say) -> frozenset[str]:
+    """Names of the files of a finished dataset that are missing or damaged; none if it is not finished.
+
+    Raises:
+        DatasetError: If the list of what the dataset was derived from is among them, as nothing else has it.
+    """
     if not is_there(directory / METADATA):
         return frozenset()
     findings = find_damage(directory, plan, in_full=check)
@@ -145,18 +149,18 @@ def finished(directory: Path, plan: Plan) -> bool:
         return False
 
 
-def _stored(directory: Path) -> Config | None:
+def _read_stored_config(directory: Path) -> Config | None:
     """The configuration that a dataset was begun with; None unless it is there from its first key to its last."""
     try:
         path = config_path(directory)
         config = load(path)
-        whole = path.read_text(encoding="utf-8") == resolved_yaml(config)
+        whole = path.read_text(encoding="utf-8") == dump_yaml(config)
     except (ConfigError, OSError):
         return None
     return config if whole else None
 
 
-def _stored_plan(directory: Path, stored: Config | None, config: Config) -> Plan | None:
+def _read_stored_plan(directory: Path, stored: Config | None, config: Config) -> Plan | None:
     try:
         return Plan.read(directory / PLAN, stored or config)
     except DatasetError as error:
@@ -175,7 +179,7 @@ def _stored_plan(directory: Path, stored: Config | None, config: Config) -> Plan
 def _refuse_changes(directory: Path, stored: Config, config: Config) -> None:
     changed = differences(stored.without_run(), config.without_run())
     problems = [
-        Problem(f"{directory} was begun with {quoted(before)}, got {quoted(after)}", key=key)
+        Problem(f"{directory} was begun with {quote(before)}, got {quote(after)}", key=key)
         for key, (before, after) in changed.items()
         if key not in _MAY_GROW or not _grows(before, after, config)
     ]
@@ -186,13 +190,17 @@ def _refuse_changes(directory: Path, stored: Config, config: Config) -> None:
 def _grows(before: int | None, after: int | None, config: Config) -> bool:
     """Whether a number of trials or throws may take the place of another; none is the largest."""
     if not config.grows:
-        # `_extended` compares the trials of a plan that does not grow.
+        # `_extend` compares the trials of a plan that does not grow.
         return True
     return after is None or (before is not None and after >= before)
 
 
-def _extended(directory: Path, old: Plan | None, new: Plan) -> Plan:
-    """The new plan, which has to begin with all trials of the old one."""
+def _extend(directory: Path, old: Plan | None, new: Plan) -> Plan:
+    """The new plan, which has to begin with all trials of the old one.
+
+    Raises:
+        ConfigError: If it is shorter, or its sampler draws other trials when there are more.
+    """
     if old is None:
         return new
     count = min(len(old.trials), len(new.trials))

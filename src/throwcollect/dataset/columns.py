@@ -99,7 +99,11 @@ class StoredThrow:
     joints: tuple[str, ...]
 
     def read(self) -> Episode:
-        """The episode, from its file; see `Recorded`."""
+        """The episode, from its file; see `Recorded`.
+
+        Raises:
+            DatasetError: If the file is damaged there, or has another trial.
+        """
         with open_mcap(self.path) as contents:
             try:
                 episode = contents.episode(self.offset).episode

@@ -145,7 +145,11 @@ class _Evaluation:
         self._error = error
 
     def value(self, node: ast.expr) -> _Value:
-        """The value of a part."""
+        """The value of a part.
+
+        Raises:
+            ConfigError: If it is no part that an expression may have.
+        """
         match node:
             case ast.Constant():
                 return self._constant(node)

@@ -157,7 +157,11 @@ def read_manifest(directory: Path) -> tuple[FileEntry, ...]:
 
 
 def named_manifest(directory: Path) -> tuple[str, tuple[FileEntry, ...]]:
-    """Name of the collection that a manifest has, and its entries; see `read_manifest`."""
+    """Name of the collection that a manifest has, and its entries; see `read_manifest`.
+
+    Raises:
+        DatasetError: If the manifest is missing, or is not written as one is.
+    """
     path = directory / MANIFEST
     if not os.path.lexists(path):
         raise DatasetError("is missing", path=path, hint=command("dataset", "rebuild", directory))

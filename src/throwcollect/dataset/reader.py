@@ -259,7 +259,11 @@ class Dataset(Sequence[Throw]):
 
 
 def _as_array(which: Any) -> pa.Array:
-    """An Arrow array of booleans or integers, whatever holds them."""
+    """An Arrow array of booleans or integers, whatever holds them.
+
+    Raises:
+        ConfigError: If it holds anything else.
+    """
     if isinstance(which, pa.ChunkedArray):
         which = which.combine_chunks()
     try:

@@ -282,7 +282,11 @@ class _Sorting:
 
 
 def _find_again(path: Path, wanted: DifferingEpisode) -> Episode:
-    """An episode that was found in a file before; one at a time is in memory."""
+    """An episode that was found in a file before; one at a time is in memory.
+
+    Raises:
+        DatasetError: If it is not there any more.
+    """
     for found in scan_whole(path):
         episode = found.stored.episode
         if (episode.header.trial, episode.digest) == (wanted.trial, wanted.digest):

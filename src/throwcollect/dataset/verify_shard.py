@@ -289,7 +289,11 @@ class ShardCheck:
         return ends
 
     def _check_footer(self, contents: McapContents) -> None:
-        """Check the summary by its CRC alone, as it is not known what it should say."""
+        """Check the summary by its CRC alone, as it is not known what it should say.
+
+        Raises:
+            DatasetError: If the file does not end with a footer.
+        """
         if not self._check_magic(contents) or len(contents) < len(MAGIC) + len(_FOOTER):
             return
         footer = contents.record(len(contents) - len(MAGIC) - len(_FOOTER))

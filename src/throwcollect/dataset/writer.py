@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import pyarrow as pa
 
-from throwcollect.config.loader import load, resolved_yaml
+from throwcollect.config.loader import dump_yaml, load
 from throwcollect.config.schema import Config
 from throwcollect.dataset.bag import FileSummary
 from throwcollect.dataset.data_card import data_card
@@ -88,7 +88,7 @@ def _fill(directory: Path, plan: Plan, listed: Points | None, *, made: bool) -> 
         )
     with ExitStack() as undo:
         undo.callback(_clear, directory, remove=made)
-        write_file(directory / CONFIG, resolved_yaml(plan.config).encode())
+        write_file(directory / CONFIG, dump_yaml(plan.config).encode())
         if listed is not None:
             write_file(directory / TRIALS, encode_points(listed))
         plan.write(directory / PLAN)
@@ -328,7 +328,7 @@ class DatasetWriter:
         config = self._config.without_run()
         write_provenance(self._directory, provenance)
         write_file(self._directory / CARD, data_card(config, throws, provenance).encode())
-        write_file(self._directory / CONFIG, resolved_yaml(config).encode())
+        write_file(self._directory / CONFIG, dump_yaml(config).encode())
         recordings = [(each.summary, each.entry) for each in finished if each.summary and each.entry]
         write_description(self._directory, config.name, throws, self._channels, recordings)
         self.note("finished", wall_s=wall_s)

@@ -34,7 +34,7 @@ def list_of_trials(sources: Sequence[Source]) -> tuple[Config, Points]:
     """
     first, *others = [source.dataset for source in sources]
     keys = list(dict.fromkeys(key for source in sources for key in source.dataset.plan.keys))
-    fixed = [_fixed_values(dataset) for dataset in (first, *others)]
+    fixed = [_collect_fixed_values(dataset) for dataset in (first, *others)]
     problems = []
     for key in dict.fromkeys(key for values in fixed for key in values):
         values = [each.get(key, _ABSENT) for each in fixed]
@@ -60,7 +60,7 @@ def list_of_trials(sources: Sequence[Source]) -> tuple[Config, Points]:
     return config, Points(tuple(keys), np.array(rows, np.float64))
 
 
-def _fixed_values(dataset: Dataset) -> dict[str, Any]:
+def _collect_fixed_values(dataset: Dataset) -> dict[str, Any]:
     return {leaf.name: leaf.value for leaf in leaves(dataset.config) if leaf.key.determines_samples}
 
 

@@ -7,10 +7,9 @@ from numpy.typing import NDArray
 
 from throwcollect.episode.record import Samples
 from throwcollect.extras import lazily
+from throwcollect.units import NS_PER_S
 
 interpolate = lazily("scipy.interpolate", extra="export")
-
-_NS_PER_S = 1_000_000_000
 
 
 def count_resampled(samples: int, *, recorded_hz: int, rate_hz: int) -> int:
@@ -37,7 +36,7 @@ def resample(samples: Samples, *, recorded_hz: int, rate_hz: int) -> Samples:
     places = np.arange(count) * recorded_hz / rate_hz
     orientation = _linear(_without_flips(samples.ball_orientation_xyzw), places)
     return Samples(
-        stamps_ns=samples.stamps_ns[0] + np.round(np.arange(count) * (_NS_PER_S / rate_hz)).astype(np.int64),
+        stamps_ns=samples.stamps_ns[0] + np.round(np.arange(count) * (NS_PER_S / rate_hz)).astype(np.int64),
         position=_cubic(samples.position, samples.velocity / recorded_hz, places),
         velocity=_linear(samples.velocity, places),
         effort=_linear(samples.effort, places),

@@ -5,32 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-_SUFFIXES = {
-    "_kgpm3": "kg/m^3",
-    "_per_s": "1/s",
-    "_radps2": "rad/s^2",
-    "_radps": "rad/s",
-    "_mps2": "m/s^2",
-    "_mps": "m/s",
-    "_rad": "rad",
-    "_kg": "kg",
-    "_nm": "N m",
-    "_hz": "Hz",
-    "_m": "m",
-    "_s": "s",
-}
-_ANGLES = ("task.start.", "task.end.", "robot.posture.", "task.trajectory.weights.")
+from throwcollect.config.shape import unit_of_key
+
+_ASCII = str.maketrans({"²": "^2", "³": "^3"})
 
 
 def unit_of(column: str) -> str:
-    """Unit of a column of numbers by its name; ``1`` for counts, shares and ratios.
+    """Unit of a column of numbers in ASCII, such as ``m/s^2``; ``1`` for counts, shares and ratios.
 
     Args:
         column: Name of a column or a dotted configuration key.
     """
-    if column.startswith(_ANGLES):
-        return "rad"
-    return next((unit for suffix, unit in _SUFFIXES.items() if column.endswith(suffix)), "1")
+    return unit_of_key(column).translate(_ASCII) or "1"
 
 
 @dataclass(frozen=True)

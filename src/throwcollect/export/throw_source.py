@@ -20,8 +20,8 @@ from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.tasks.throw.outcome import Outcome
 from throwcollect.tasks.trajectory import throw_trajectory
+from throwcollect.units import NS_PER_S
 
-_NS_PER_S = 1_000_000_000
 _PLACES = ("shard", "chunk_offset")
 
 Signals = Mapping[str, NDArray[np.float64]]
@@ -162,7 +162,7 @@ def _list_entries(dataset: Dataset, rate_hz: int) -> dict[str, tuple[Entry, ...]
 
 
 def _compute_signals(samples: Samples, trajectory: JointTrajectory, start_ns: int) -> Signals:
-    time_s = (samples.stamps_ns - start_ns) / _NS_PER_S
+    time_s = (samples.stamps_ns - start_ns) / NS_PER_S
     position, velocity, acceleration = sample_quintic(trajectory, time_s)
     return {
         "time_s": time_s,

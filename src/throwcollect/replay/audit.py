@@ -12,13 +12,13 @@ from throwcollect.dataset.reader import Dataset
 from throwcollect.errors import DatasetError
 from throwcollect.extras import require
 from throwcollect.replay.comparison import Comparison, compare
-from throwcollect.trial.choice import chosen
+from throwcollect.trial.choice import choose_trials
 
 _AT_ONCE = 4
 """Trials that a process fetches at a time."""
 
 
-def chosen_trials(dataset: Dataset, *, sample: int | None) -> list[int]:
+def select_trials(dataset: Dataset, *, sample: int | None) -> list[int]:
     """Trials that have an episode, in order; of these, if asked for, a random choice that is always the same.
 
     Args:
@@ -31,10 +31,10 @@ def chosen_trials(dataset: Dataset, *, sample: int | None) -> list[int]:
     trials = [row["trial"] for row in dataset.throws.select(["trial", "shard"]).to_pylist() if row["shard"]]
     if not trials:
         raise DatasetError(f"{dataset.directory}: no trial has an episode")
-    return trials if sample is None else chosen(trials, count=sample, seed=dataset.config.seed)
+    return trials if sample is None else choose_trials(trials, count=sample, seed=dataset.config.seed)
 
 
-def replayed(directory: Path, trials: Sequence[int]) -> Iterator[Comparison]:
+def replay_throws(directory: Path, trials: Sequence[int]) -> Iterator[Comparison]:
     """Simulate stored throws again, on all cores, and compare them.
 
     Args:

@@ -12,7 +12,7 @@ from throwcollect.dataset.verify import verify
 from throwcollect.errors import DatasetError
 from throwcollect.extras import require
 from throwcollect.files import StrPath
-from throwcollect.replay.audit import chosen_trials, replayed
+from throwcollect.replay.audit import replay_throws, select_trials
 
 
 def verify_dataset(directory: StrPath, *, replay: int | None = None) -> list[Finding]:
@@ -46,7 +46,7 @@ def _replay_findings(directory: Path, count: int) -> Iterator[Finding]:
     try:
         dataset = Dataset.open(directory)
         shards = dataset.throws["shard"].to_pylist()
-        for comparison in replayed(directory, chosen_trials(dataset, sample=count)):
+        for comparison in replay_throws(directory, select_trials(dataset, sample=count)):
             if comparison.differences:
                 told = "; ".join(comparison.differences)
                 yield Finding(shards[comparison.trial], f"trial {comparison.trial}", f"comes out otherwise: {told}")

@@ -10,7 +10,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config, Range
-from throwcollect.config.shape import shape_of
+from throwcollect.config.shape import unit_of_key
 from throwcollect.report.outcomes import Outcomes
 from throwcollect.report.points import read_numbers
 
@@ -81,7 +81,7 @@ def _read_parameter(config: Config, key: str, values: NDArray[np.float64], outco
         bins = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, _BINS - 1)
     counts = np.zeros((len(edges) - 1, len(outcomes.names)), dtype=np.intp)
     np.add.at(counts, (bins, outcomes.codes), 1)
-    return Parameter(key, shape_of(key.split(".")).unit, logarithmic, values, edges, counts, steps)
+    return Parameter(key, unit_of_key(key), logarithmic, values, edges, counts, steps)
 
 
 def _surround(steps: NDArray[np.float64]) -> NDArray[np.float64]:

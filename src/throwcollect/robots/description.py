@@ -178,7 +178,11 @@ def physics_description(config: Config) -> Description:
 
 
 def _read_description(robot: Robot) -> ElementTree.Element:
-    """Read the links and joints of the robot's URDF, without the collision shapes of the hand that holds the tool."""
+    """Read the links and joints of the robot's URDF, without the collision shapes of the hand that holds the tool.
+
+    Raises:
+        ConfigError: If it cannot be read, or has no link of the hand's name.
+    """
     path = robot.urdf_path
     source = read_xml(path)
     description = ElementTree.Element("robot", name=source.get("name", robot.name))

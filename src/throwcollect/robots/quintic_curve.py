@@ -55,7 +55,11 @@ def sample_positions(trajectory: JointTrajectory, times: NDArray[np.float64]) ->
 def _polynomials_at(
     trajectory: JointTrajectory, times: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Of the segment at each time: coefficients ``(6, n_joints, n)``, and ``(n,)`` each: u, and its length [s]."""
+    """Of the segment at each time: coefficients ``(6, n_joints, n)``, and ``(n,)`` each: u, and its length [s].
+
+    Raises:
+        ValueError: If the trajectory has fewer than two points.
+    """
     knots = trajectory.times
     if len(knots) < 2:
         raise ValueError(f"a curve needs at least two points, got {len(knots)}")

@@ -60,7 +60,11 @@ def discovery_server(endpoint: str) -> Iterator[None]:
 
 @contextmanager
 def _showing_that_it_is_there(endpoint: str) -> Iterator[None]:
-    """Accept connections and close them: a port of UDP alone does not tell whether somebody listens."""
+    """Accept connections and close them: a port of UDP alone does not tell whether somebody listens.
+
+    Raises:
+        ConfigError: If the port is taken, or the address is not this machine's.
+    """
     host, _, port = endpoint.partition("/")[2].rpartition(":")
     try:
         server = socket.create_server((host, int(port)))

@@ -73,7 +73,11 @@ def write_temporarily(profile: str) -> Path:
 
 
 def _place(endpoint: str) -> tuple[str, int]:
-    """IPv4 address and port; names are looked up here, as DDS tells others the address of a server."""
+    """IPv4 address and port; names are looked up here, as DDS tells others the address of a server.
+
+    Raises:
+        ConfigError: If it is no address, or a name that nobody knows.
+    """
     host, _, port = endpoint.partition("/")[2].rpartition(":")
     try:
         return socket.gethostbyname(host), int(port)

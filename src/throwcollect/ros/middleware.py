@@ -50,7 +50,7 @@ class Middleware:
         """
         if _settled:
             return _settled[0]
-        return _installed(os.environ.get(VARIABLE) or "auto", os.environ.get(RMW_VARIABLE) or None)
+        return _choose_installed(os.environ.get(VARIABLE) or "auto", os.environ.get(RMW_VARIABLE) or None)
 
     @property
     def is_fast_dds(self) -> bool:
@@ -81,14 +81,14 @@ class Middleware:
         Raises:
             ConfigError: If the backend or its RMW is not there.
         """
-        _settled[:] = [_installed(self.backend, self.rmw if self.backend == "rclpy" else None)]
+        _settled[:] = [_choose_installed(self.backend, self.rmw if self.backend == "rclpy" else None)]
 
 
 _settled: list[Middleware] = []
 """What this process has settled on; empty while its environment decides."""
 
 
-def wanted(backend: Literal["auto", "embedded", "rclpy"]) -> Middleware:
+def choose_middleware(backend: Literal["auto", "embedded", "rclpy"]) -> Middleware:
     """What a run is to have, and its launcher, too.
 
     Args:
@@ -99,7 +99,7 @@ def wanted(backend: Literal["auto", "embedded", "rclpy"]) -> Middleware:
     """
     if backend == "auto":
         return Middleware.of_process()
-    return _installed(backend, os.environ.get(RMW_VARIABLE) or None)
+    return _choose_installed(backend, os.environ.get(RMW_VARIABLE) or None)
 
 
 def uses_rclpy() -> bool:
@@ -113,7 +113,7 @@ def uses_rclpy() -> bool:
 
 # To look for all interfaces takes milliseconds, and every name of `throwcollect.ros` asks.
 @cache
-def _installed(backend: str, rmw: str | None) -> Middleware:
+def _choose_installed(backend: str, rmw: str | None) -> Middleware:
     """The middleware that is asked for: genuine rclpy by default, if Python finds it and all interfaces.
 
     By default it is not taken where rmw_zenoh_cpp is asked for and ROS does not have it: the embedded backend speaks as

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from rclzenoh.exceptions import ConfigurationError, NoRouterError, UnreadableKeyError
 from rclzenoh.session_config import OVERRIDE_VARIABLE
 from throwcollect.errors import ConfigError, ThrowcollectError
-from throwcollect.run_key import unreadable
+from throwcollect.run_key import unreadable_key
 
 
 @contextmanager
@@ -22,7 +22,7 @@ def zenoh_errors() -> Iterator[None]:
     try:
         yield
     except UnreadableKeyError as error:
-        raise unreadable(error.path, error.reason) from error
+        raise unreadable_key(error.path, error.reason) from error
     except ConfigurationError as error:
         raise ConfigError(error.message, expected=error.expected) from error
     except NoRouterError as error:

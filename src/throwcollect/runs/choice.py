@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from throwcollect.config.schema import Config
 from throwcollect.errors import WorkerError
 from throwcollect.extras import MissingExtraError
-from throwcollect.ros.middleware import Middleware
-from throwcollect.ros.middleware import wanted as wanted_middleware
+from throwcollect.ros.middleware import Middleware, choose_middleware
 from throwcollect.runtimes.registry import AUTOMATIC, get_runtime
 from throwcollect.runtimes.runtime import Runtime
 
@@ -43,18 +42,18 @@ def choose(config: Config, *, say: Callable[[str], None], warn: Callable[[str], 
         WorkerError: If the runtime that is asked for cannot be had.
     """
     wanted = config.run.runtime
-    launcher = wanted_middleware(config.run.ros)
+    launcher = choose_middleware(config.run.ros)
     candidates = AUTOMATIC if wanted == "auto" else (wanted,)
     note = " (auto)" if wanted == "auto" else ""
     for name in candidates[:-1]:
         try:
-            return _chosen(name, config, launcher, note, say, warn)
+            return _choose(name, config, launcher, note, say, warn)
         except (MissingExtraError, WorkerError) as error:
             note = f" (auto, as {error.message})"
-    return _chosen(candidates[-1], config, launcher, note, say, warn)
+    return _choose(candidates[-1], config, launcher, note, say, warn)
 
 
-def _chosen(
+def _choose(
     name: str,
     config: Config,
     launcher: Middleware,

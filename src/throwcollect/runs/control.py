@@ -13,7 +13,7 @@ from throwcollect.errors import ConfigError, ThrowcollectError, WorkerError
 from throwcollect.ros.endpoint import answers
 from throwcollect.runs.record import Record
 from throwcollect.runs.records import Records, Run
-from throwcollect.runs.selection import held_elsewhere, id_of, require_living, to_change
+from throwcollect.runs.selection import find_held_runs, id_of, require_living, to_change
 from throwcollect.runtimes.nodes import LAUNCHER
 from throwcollect.runtimes.registry import get_runtime
 from throwcollect.wording import command
@@ -27,7 +27,7 @@ _STOP_S = 60.0
 _GRACE_S = 3.0
 _FORCE_S = 10.0
 _ANSWER_S = 10.0
-"""Time in which a router, and then a launcher, answers: the one may just start again, the other be busy ending simulations."""
+"""Time in which a router, and then a launcher, answers: one may be starting again, the other ending simulations."""
 
 
 def stop(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Run:
@@ -71,7 +71,7 @@ def down(named: str | Run | None, *, volumes: bool = False) -> tuple[str, list[s
         ConfigError: If there is no such run, or more than one.
         WorkerError: If something cannot be ended or removed.
     """
-    records, held = Records(), held_elsewhere()
+    records, held = Records(), find_held_runs()
     # What a runtime holds besides may be somebody else's, so that has to be named.
     if named is None:
         run = to_change(records, None, command="down -v" if volumes else "down", died=True).id

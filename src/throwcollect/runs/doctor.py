@@ -13,7 +13,7 @@ from typing import Literal
 
 from throwcollect import ros_installation
 from throwcollect.errors import ConfigError
-from throwcollect.extras import EXTRA_OF, MissingExtraError, explained, install_command, is_installed
+from throwcollect.extras import EXTRA_OF, MissingExtraError, explain_missing, install_command, is_installed
 from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.talos import TALOS
 from throwcollect.runtimes.registry import get_runtime, runtime_names
@@ -30,7 +30,7 @@ _ROS_ROUTER_PORT = 7447
 _LEAST_DISK_GIB = 1.0
 
 
-def _python() -> Check:
+def _check_python() -> Check:
     found = ".".join(map(str, sys.version_info[:3]))
     if not (3, 10) <= sys.version_info[:2] <= (3, 11):
         status: Literal["note", "problem"] = "note" if is_installed("pybullet") else "problem"
@@ -38,12 +38,12 @@ def _python() -> Check:
     return Check("python", "ok", found)
 
 
-def _cores() -> Check:
+def _check_cores() -> Check:
     cores = len(os.sched_getaffinity(0))
     return Check("cores", "ok", f"{cores}; up to {counted(cores, 'simulation')} side by side (`-n {cores}`)")
 
 
-def _memory() -> Check:
+def _check_memory() -> Check:
     for line in Path("/proc/meminfo").read_text(encoding="ascii").splitlines():
         if line.startswith("MemAvailable:"):
             available = int(line.split()[1]) * 1024 / _GIB
@@ -53,13 +53,13 @@ def _memory() -> Check:
     return Check("memory", "note", "/proc/meminfo does not say what is available")
 
 
-def _pybullet() -> Check:
+def _check_pybullet() -> Check:
     if not is_installed("pybullet"):
         return Check("pybullet", "problem", f"not installed; try: {MissingExtraError('pybullet').hint}")
     return Check("pybullet", "ok", version("pybullet"))
 
 
-def _robot() -> Check:
+def _check_robot() -> Check:
     try:
         joint_limits(TALOS)
         _ = TALOS.rest_posture
@@ -68,7 +68,7 @@ def _robot() -> Check:
         return Check("robot", "problem", "; try: ".join(filter(None, [error.message, error.hint])))
 
 
-def _extras() -> Check:
+def _check_extras() -> Check:
     """Extras that are installed, and those of which at least a package is missing."""
     lacking = sorted({extra for package, extra in EXTRA_OF.items() if not is_installed(package)})
     there = listed(sorted(set(EXTRA_OF.values()) - set(lacking)))
@@ -80,13 +80,13 @@ def _extras() -> Check:
 
 def _check_runtime(name: str) -> Check | None:
     try:
-        with explained():
+        with explain_missing():
             return get_runtime(name).check()
     except MissingExtraError as error:
         return Check(name, "note", f"{error.package} is not installed; try: {error.hint}")
 
 
-def _port() -> Check:
+def _check_port() -> Check:
     with socket.socket() as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
@@ -98,7 +98,7 @@ def _port() -> Check:
     return Check("ports", "ok", f"{_ROS_ROUTER_PORT}, where ROS nodes look for a router, is free")
 
 
-def _rclpy() -> Check:
+def _check_rclpy() -> Check:
     lacking = ros_installation.missing()
     if "rclpy" in lacking:
         return Check("rclpy", "note", f"not installed; to have it: {ros_installation.how_to_install()}")
@@ -109,7 +109,7 @@ def _rclpy() -> Check:
     return Check("rclpy", "ok", f"{found} and all interfaces")
 
 
-def _embedded() -> Check:
+def _check_embedded() -> Check:
     if not is_installed("zenoh"):
         return Check("embedded", "problem", f"Zenoh is not installed; try: {MissingExtraError('zenoh').hint}")
     found = f"Zenoh {version('eclipse-zenoh')}"
@@ -126,7 +126,7 @@ def _embedded() -> Check:
     return Check("embedded", "ok", f"{found}; nodes run on {chosen}, as {VARIABLE} is {value or 'not set'}")
 
 
-def _disk(directory: Path) -> Check:
+def _check_disk(directory: Path) -> Check:
     free = shutil.disk_usage(directory).free / _GIB
     status: Literal["ok", "problem"] = "ok" if free >= _LEAST_DISK_GIB else "problem"
     return Check("disk", status, f"{free:.1f} GiB free in {directory}")
@@ -141,6 +141,15 @@ def examine(directory: Path) -> list[Check]:
     Returns:
         The findings, in a fixed order.
     """
-    machine: list[Callable[[], Check]] = [_python, _extras, _cores, _memory, _pybullet, _robot, _rclpy, _embedded]
+    machine: list[Callable[[], Check]] = [
+        _check_python,
+        _check_extras,
+        _check_cores,
+        _check_memory,
+        _check_pybullet,
+        _check_robot,
+        _check_rclpy,
+        _check_embedded,
+    ]
     of_runtimes = [found for name in runtime_names() if (found := _check_runtime(name)) is not None]
-    return [*(check() for check in machine), *of_runtimes, _port(), _disk(directory)]
+    return [*(check() for check in machine), *of_runtimes, _check_port(), _check_disk(directory)]

@@ -12,7 +12,7 @@ from throwcollect.errors import ConfigError
 from throwcollect.runs.events import EVENTS, Event, parse
 from throwcollect.runs.record import Summary
 from throwcollect.runs.records import Run
-from throwcollect.runs.selection import died
+from throwcollect.runs.selection import describe_death
 from throwcollect.runtimes.node_logs import NodeLogs, Tail
 
 _POLL_S = 0.05
@@ -81,9 +81,9 @@ def wait(run: Run) -> Summary:
         time.sleep(_READ_S)
         run = run.now()
     if run.status == "died":
-        raise died(run)
+        raise describe_death(run)
     if run.record.summary is None:
-        raise run.record.error or died(run)
+        raise run.record.error or describe_death(run)
     return run.record.summary
 
 

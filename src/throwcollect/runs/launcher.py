@@ -116,7 +116,7 @@ class _Session:
         """Something that happened to the run."""
         self._write(lambda: self._events.run_event(event, **details))
 
-    def known(self, states: Sequence[NodeState]) -> None:
+    def take_over(self, states: Sequence[NodeState]) -> None:
         """Nodes of which a launcher before this one has written."""
         self._states = list(states)
 
@@ -205,7 +205,7 @@ def launch_inherited(run: str, lock: int, *, onlooker: Onlooker, interruptions: 
     Raises:
         ThrowcollectError: As `launch`, or if its record or configuration cannot be read.
     """
-    inherited = Records().inherited(run, lock)
+    inherited = Records().inherit(run, lock)
     config = load(config_path(Path(inherited.record.directory)))
     launch(inherited, config, onlooker=onlooker, interruptions=interruptions)
 

@@ -10,9 +10,9 @@ from datetime import datetime, timezone
 from pathlib import Path
 from types import TracebackType
 
-from throwcollect.config.loader import load, loaded
+from throwcollect.config.loader import load, load_locating_errors
 from throwcollect.config.schema import Config
-from throwcollect.coordinator.prepare import more_trials, self_contained
+from throwcollect.coordinator.prepare import make_self_contained, more_trials
 from throwcollect.coordinator.prepare import prepare as prepare_plan
 from throwcollect.coordinator.resume import begun, finished
 from throwcollect.coordinator.resume import resume as resume_plan
@@ -24,8 +24,8 @@ from throwcollect.runs.choice import Choice, choose
 from throwcollect.runs.launcher import SILENT, Onlooker, launch, start_launcher, wait_for_nodes
 from throwcollect.runs.record import Record, Summary
 from throwcollect.runs.records import OpenRun, Records, Run
-from throwcollect.runs.selection import busy, left_in
-from throwcollect.runtimes.ports import reserved_port
+from throwcollect.runs.selection import busy, find_left_in
+from throwcollect.runtimes.ports import reserve_port
 from throwcollect.runtimes.runtime import Place
 from throwcollect.sweep.plan import Plan
 from throwcollect.wording import command, counted
@@ -165,13 +165,13 @@ def prepare(
         DatasetError: If the dataset cannot be written.
     """
     started = datetime.now(timezone.utc)
-    with loaded(Path(config), overrides) as read:
+    with load_locating_errors(Path(config), overrides) as read:
         directory = Path(output or Path("datasets") / f"{read.name}-{datetime.now():%Y%m%d-%H%M%S}")
         records = Records()
-        if (run := _taken_over(records, directory, read, onlooker)) is not None:
+        if (run := _take_over(records, directory, read, onlooker)) is not None:
             return run
         request = _Request(read, Path(config).parent, directory, started, resumed=False)
-        return _prepared(records, request, None, onlooker)
+        return _prepare(records, request, None, onlooker)
 
 
 def resume(
@@ -205,31 +205,33 @@ def resume(
         raise ConfigError(f"{directory}: holds no dataset", expected="a directory that throwcollect up has made")
     with ExitStack() as places:
         try:
-            read = places.enter_context(loaded(Path(config) if config else config_path(directory), overrides))
+            read = places.enter_context(
+                load_locating_errors(Path(config) if config else config_path(directory), overrides)
+            )
         except ConfigError as error:
             hint = f"{command('up', 'CONFIG', '--resume', directory)}, if the dataset's own file is damaged"
             raise ConfigError(error.problems, hint=error.hint if config else hint) from error
         records = Records()
-        if (run := _taken_over(records, directory, read, onlooker)) is not None:
+        if (run := _take_over(records, directory, read, onlooker)) is not None:
             return run
         sweep_directory = directory if config is None else Path(config).parent
         plan = resume_plan(read, directory, sweep_directory=sweep_directory, check=check, say=onlooker.say)
         if finished(directory, plan):
             onlooker.say(f"{directory}: every trial has ended, nothing is left to do")
             return None
-        return _prepared(records, _Request(read, sweep_directory, directory, started, resumed=True), plan, onlooker)
+        return _prepare(records, _Request(read, sweep_directory, directory, started, resumed=True), plan, onlooker)
 
 
-def _taken_over(records: Records, directory: Path, config: Config, onlooker: Onlooker) -> PreparedRun | None:
+def _take_over(records: Records, directory: Path, config: Config, onlooker: Onlooker) -> PreparedRun | None:
     """The run into a directory whose nodes go on without a launcher, with its own configuration; None if there is none.
 
     Raises:
         ConfigError: If it collects with another configuration, or somebody else takes it over.
     """
-    if (left := left_in(records, directory)) is None:
+    if (left := find_left_in(records, directory)) is None:
         return None
     own = load(config_path(left.place.directory))
-    if own.without_run() != self_contained(config).without_run():
+    if own.without_run() != make_self_contained(config).without_run():
         raise ConfigError(
             f"{left.record.directory}: run {left.id} collects into it, with another configuration",
             hint=f"{command('down', '--run', left.id)} ends that run",
@@ -244,13 +246,17 @@ def _taken_over(records: Records, directory: Path, config: Config, onlooker: Onl
     return PreparedRun(records, run, own, directory, onlooker=onlooker)
 
 
-def _prepared(records: Records, request: _Request, plan: Plan | None, onlooker: Onlooker) -> PreparedRun:
-    """A run that is ready to be launched; nothing is left behind if that fails."""
+def _prepare(records: Records, request: _Request, plan: Plan | None, onlooker: Onlooker) -> PreparedRun:
+    """A run that is ready to be launched; nothing is left behind if that fails.
+
+    Raises:
+        ConfigError: If the dataset is in a volume, from which a collection cannot go on.
+    """
     config = request.config
     with ExitStack() as held, ExitStack() as undo:
         run = records.new(config.name)
         undo.callback(run.forget)
-        reserved_port(config.run.router_port).close()
+        reserve_port(config.run.router_port).close()
         # Getting an image may take minutes, so all that may be wrong is found before; but where there is a volume, it
         # is the runtime that decides where the dataset is.
         volume = config.containers.volume

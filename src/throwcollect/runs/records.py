@@ -231,7 +231,7 @@ class Records:
                 undo.pop_all()
             return made
 
-    def inherited(self, run: str, lock: int) -> OpenRun:
+    def inherit(self, run: str, lock: int) -> OpenRun:
         """The run that the starter of this process has handed over, with its locked descriptor."""
         return OpenRun(self._runs, run, lock)
 
@@ -314,7 +314,11 @@ def _outlived(record: Record) -> bool:
 
 
 def _state_directory() -> Path:
-    """A directory of this user alone; not that of the login, which vanishes when the last terminal is closed."""
+    """A directory of this user alone; not that of the login, which vanishes when the last terminal is closed.
+
+    Raises:
+        ConfigError: If it cannot be made, or others own it or may write there.
+    """
     named = os.environ.get(STATE_VARIABLE)
     try:
         path = Path(named).absolute() if named else Path(tempfile.gettempdir()) / f"throwcollect-{os.getuid()}"

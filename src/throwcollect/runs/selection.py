@@ -85,9 +85,9 @@ def _only(living: Sequence[Run], runs: Sequence[Run]) -> Run:
         return living[0]
     if living:
         raise ConfigError(
-            f"{len(living)} runs live", expected=_listed(_latest_first(living)), hint="name one of them with --run"
+            f"{len(living)} runs live", expected=_list(_latest_first(living)), hint="name one of them with --run"
         )
-    over = f"; of those that are over, there is {_listed(_latest_first(runs))}" if runs else ""
+    over = f"; of those that are over, there is {_list(_latest_first(runs))}" if runs else ""
     raise ConfigError(f"no run lives{over}", hint="throwcollect up -d starts one" if not runs else "name it with --run")
 
 
@@ -118,8 +118,8 @@ def id_of(records: Records, named: str) -> str:
     if len(alike) == 1:
         return alike[0]
     if alike:
-        raise ConfigError(f"{len(alike)} runs begin with {named!r}", expected=f"one of {_listed(alike)}")
-    known = _listed(_latest_first(records.all()))
+        raise ConfigError(f"{len(alike)} runs begin with {named!r}", expected=f"one of {_list(alike)}")
+    known = _list(_latest_first(records.all()))
     hint = "throwcollect ps -a lists all" if known else None
     raise ConfigError(f"no run {named!r}", expected=f"one of {known}" if known else None, hint=hint)
 
@@ -128,12 +128,12 @@ def _latest_first(runs: Sequence[Run]) -> list[str]:
     return [run.record.run for run in reversed(runs)]
 
 
-def _listed(runs: Sequence[str]) -> str:
+def _list(runs: Sequence[str]) -> str:
     more = len(runs) - _MOST_LISTED
     return ", ".join(runs[:_MOST_LISTED]) + (f" and {more} more" if more > 0 else "")
 
 
-def left_in(records: Records, directory: Path) -> Run | None:
+def find_left_in(records: Records, directory: Path) -> Run | None:
     """The run that has no launcher any more while its nodes are left, and collect or have collected into a directory.
 
     Args:
@@ -174,7 +174,7 @@ def busy(record: Record) -> ConfigError:
     )
 
 
-def died(run: Run) -> WorkerError:
+def describe_death(run: Run) -> WorkerError:
     """The error that says that the launcher of a run died before the run ended."""
     hint = f"{command('down', '--run', run.id)} cleans up"
     if again := run.place.way_on:
@@ -194,12 +194,12 @@ def require_living(run: Run) -> Record:
         WorkerError: If its launcher died.
     """
     if run.status == "died":
-        raise died(run)
+        raise describe_death(run)
     if run.status != "running":
         raise ConfigError(f"run {run.id} has ended", hint="throwcollect ps lists those that live")
     return run.record
 
 
-def held_elsewhere() -> dict[str, tuple[str, HeldRun]]:
+def find_held_runs() -> dict[str, tuple[str, HeldRun]]:
     """Runs of which a runtime holds something by their ids, each with the name of the runtime."""
-    return {held.run_id: (name, held) for name in runtime_names() for held in get_runtime(name).held()}
+    return {held.run_id: (name, held) for name in runtime_names() for held in get_runtime(name).find_held()}

@@ -63,7 +63,11 @@ class InProcess:
         """Nothing is left when `collect` has returned."""
 
     def collect(self, session: Session) -> Info:
-        """See `runtime.Host.collect`; a trial that runs is finished before anybody's wish to stop is heeded."""
+        """See `runtime.Host.collect`; a trial that runs is finished before anybody's wish to stop is heeded.
+
+        Raises:
+            Interrupted: If somebody stopped it before every trial had ended.
+        """
         # These take messages of ROS along, so they are imported when it is known what ROS is to run on.
         from throwcollect.coordinator.collection import TrialCollection
         from throwcollect.dataset.inspect import info

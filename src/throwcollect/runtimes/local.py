@@ -17,7 +17,7 @@ from throwcollect.files import open_log
 from throwcollect.interruption import die_with_parent
 from throwcollect.runtimes.node_logs import NodeLogs
 from throwcollect.runtimes.nodes import ROUTER, NodeExit, NodeHost, NodeSpec, node_environment, protocol_of
-from throwcollect.runtimes.ports import reserved_port
+from throwcollect.runtimes.ports import reserve_port
 from throwcollect.runtimes.runtime import Place, Runtime, Session
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ class LocalNodes(NodeHost):
         self.config = config
         self.data = str(place.directory)
         self.logs = NodeLogs(place.logs)
-        self._reserved = reserved_port(config.run.router_port)
+        self._reserved = reserve_port(config.run.router_port)
         self._address: tuple[str, int] = self._reserved.getsockname()
         self.listen = "{}/{}:{}".format(protocol_of(config.run, place.middleware), *self._address)
         self._environment = {**os.environ, **node_environment(self.connection_at(self.listen))}

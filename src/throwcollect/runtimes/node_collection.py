@@ -112,7 +112,7 @@ class NodeCollection:
             found = self._host.open()
             self._session.event("adopted" if found else "started", simulations=self._simulations)
             self._supervisor.start(found=found)
-            self._session.known([state for state in self._supervisor.states() if state.name in found])
+            self._session.take_over([state for state in self._supervisor.states() if state.name in found])
             self._check(self._follow())
             return self._host.info()
 

@@ -9,7 +9,7 @@ from throwcollect.errors import ConfigError, Problem
 LOOPBACK = "127.0.0.1"
 
 
-def reserved_port(wanted: int) -> socket.socket:
+def reserve_port(wanted: int) -> socket.socket:
     """A socket that keeps a port for the router until it is closed.
 
     Args:

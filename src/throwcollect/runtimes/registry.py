@@ -6,7 +6,7 @@ from importlib.metadata import EntryPoint, entry_points
 
 from throwcollect.config.run import RUNTIMES
 from throwcollect.errors import ConfigError, Problem
-from throwcollect.extras import explained
+from throwcollect.extras import explain_missing
 from throwcollect.runtimes.runtime import Runtime
 from throwcollect.wording import listed
 
@@ -39,6 +39,6 @@ def get_runtime(name: str) -> Runtime:
     if not points:
         problem = Problem(f"there is no runtime {name}", key="run.runtime")
         raise ConfigError([problem], expected=listed(runtime_names(), "or"))
-    with explained():
+    with explain_missing():
         runtime: Runtime = points[0].load()()
     return runtime

@@ -145,7 +145,7 @@ class Session(Protocol):
     def event(self, event: RunEvent, *, simulations: int | None = None) -> None:
         """Write down something that happened to the run."""
 
-    def known(self, states: Sequence[NodeState]) -> None:
+    def take_over(self, states: Sequence[NodeState]) -> None:
         """Take over nodes of which a launcher before this one has written."""
 
     def nodes(self, states: Sequence[NodeState], *, endpoint: str | None, simulations: int) -> None:
@@ -241,7 +241,7 @@ class Runtime(ABC):
         """Number of simulations that a run begins with."""
         return config.run.simulations
 
-    def held(self) -> list[HeldRun]:
+    def find_held(self) -> list[HeldRun]:
         """Runs of which there is something here; none if that cannot be found out quickly."""
         return []
 

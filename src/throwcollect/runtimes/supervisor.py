@@ -145,7 +145,7 @@ class Supervisor:
         Returns:
             How it ended; None when it had to be ended by force, or was about to be started again.
         """
-        (main,) = self._named(Role.MAIN)
+        (main,) = self._list_names(Role.MAIN)
         if main in self._due:
             return None
         self.host.signal(main, signal.SIGINT)
@@ -160,9 +160,9 @@ class Supervisor:
 
     @property
     def _workers(self) -> list[str]:
-        return self._named(Role.WORKER)
+        return self._list_names(Role.WORKER)
 
-    def _named(self, role: Role) -> list[str]:
+    def _list_names(self, role: Role) -> list[str]:
         return [node.name for node in self._roster.values() if node.role is role]
 
     def _start(self, name: str) -> None:
@@ -209,7 +209,7 @@ class Supervisor:
     def _check_hope(self) -> None:
         hint = "throwcollect logs shows what the nodes said"
         workers = self._workers
-        vital = next((self._given_up[name] for name in self._named(Role.VITAL) if name in self._given_up), None)
+        vital = next((self._given_up[name] for name in self._list_names(Role.VITAL) if name in self._given_up), None)
         lost = [name for name in workers if name in self._given_up]
         if vital is not None or (lost and len(lost) == len(workers)):
             last = vital or self._given_up[lost[-1]]

@@ -98,10 +98,10 @@ class ControllerAction:
         self._considered[self._count] = []
         self._results[self._count] = Future()
         if refusal is not None:
-            self.finish(self._aborted(self._count, refusal))
+            self.finish(self._abort(self._count, refusal))
         return GoalResponse.ACCEPT
 
-    def _aborted(self, key: int, refusal: Refusal) -> GoalResult:
+    def _abort(self, key: int, refusal: Refusal) -> GoalResult:
         return GoalResult(key, GoalStatus.ABORTED, refusal.error_code, refusal.text, self._simulation.now_ns)
 
     def _accept(self, handle: Any) -> None:

@@ -23,7 +23,7 @@ class ControllerManager(Node):
     def __init__(self, parent: Node, simulation: Simulation) -> None:
         super().__init__("controller_manager", namespace=parent.get_namespace(), context=parent.context)
         hz = simulation.config.sim.physics_hz
-        self._controllers = [_described(limb, hz) for limb in simulation.limbs.values()]
+        self._controllers = [_describe(limb, hz) for limb in simulation.limbs.values()]
         self.create_service(ListControllers, "~/list_controllers", self._list)
 
     def _list(self, _request: ListControllers.Request, response: ListControllers.Response) -> ListControllers.Response:
@@ -31,7 +31,7 @@ class ControllerManager(Node):
         return response
 
 
-def _described(limb: LimbController, hz: int) -> ControllerState:
+def _describe(limb: LimbController, hz: int) -> ControllerState:
     parameters = limb.controller.parameters
     commands, states = (
         [f"{joint}/{interface}" for joint in parameters.joints for interface in interfaces]

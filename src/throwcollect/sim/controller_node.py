@@ -102,7 +102,7 @@ class ControllerNode(Node):
         super().destroy_node()
 
     def _present_state(self) -> ControllerState:
-        return self._simulation.observed(self.controller).state(self._simulation.now_ns)
+        return self._simulation.observe(self.controller).state(self._simulation.now_ns)
 
     def _follow(self, message: JointTrajectory) -> None:
         self._simulation.follow(self.controller, read_trajectory(message))
@@ -117,7 +117,7 @@ class ControllerNode(Node):
     def _query(
         self, request: QueryTrajectoryState.Request, response: QueryTrajectoryState.Response
     ) -> QueryTrajectoryState.Response:
-        state = self._simulation.observed(self.controller).query(nanoseconds(request.time))
+        state = self._simulation.observe(self.controller).query(nanoseconds(request.time))
         response.success = state.success
         response.name = list(self._limb.controller.parameters.joints)
         response.position = state.positions

@@ -41,7 +41,7 @@ class ParameterFace:
     def __init__(self, node: Node, limb: LimbController, trial: PresentTrial) -> None:
         self._limb = limb
         self._trial = trial
-        for name, value, description, read_only in _declared(limb.controller.parameters):
+        for name, value, description, read_only in _list_declared(limb.controller.parameters):
             descriptor = ParameterDescriptor(description=description, read_only=read_only)
             if isinstance(value, float):
                 descriptor.floating_point_range = [floating_range(_LEAST.get(name, 0.0), None)]
@@ -53,14 +53,14 @@ class ParameterFace:
         if self._trial.leased:
             return SetParametersResult(successful=False, reason=self._trial.lease_in_words)
         try:
-            _changed(self._limb.controller.parameters, _values(parameters))
+            _change(self._limb.controller.parameters, _values(parameters))
         except ConfigError as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
 
     def _apply(self, parameters: list[Parameter]) -> None:
         controller = self._limb.controller
-        controller.parameters = _changed(controller.parameters, _values(parameters))
+        controller.parameters = _change(controller.parameters, _values(parameters))
 
 
 def _values(parameters: list[Parameter]) -> dict[str, Any]:
@@ -72,7 +72,7 @@ def state_interfaces(parameters: ControllerParameters) -> tuple[str, ...]:
     return ("position", "velocity") if parameters.measures_velocity else ("position",)
 
 
-def _declared(parameters: ControllerParameters) -> Iterator[tuple[str, Any, str, bool]]:
+def _list_declared(parameters: ControllerParameters) -> Iterator[tuple[str, Any, str, bool]]:
     """Name, value and description of each parameter, and whether it is read-only."""
     # Clients of ros2_controllers look for all of these, also for those that have one value here, or no effect.
     yield "joints", list(parameters.joints), "Joint names of the system", True
@@ -103,7 +103,7 @@ def _declared(parameters: ControllerParameters) -> Iterator[tuple[str, Any, str,
         yield f"{key}.max_deceleration_on_cancel", limits.max_deceleration_on_cancel, "How hard it brakes", True
 
 
-def _changed(parameters: ControllerParameters, values: Mapping[str, Any]) -> ControllerParameters:
+def _change(parameters: ControllerParameters, values: Mapping[str, Any]) -> ControllerParameters:
     """Parameters with new values for some ROS parameters that are declared.
 
     Raises:

@@ -125,7 +125,7 @@ class LimbController:
                     return self._controller.refuse(Refusal(ErrorCode.INVALID_GOAL, text))
         return None
 
-    def measured(self, positions: Sequence[float], velocities: Sequence[float]) -> JointState:
+    def measure(self, positions: Sequence[float], velocities: Sequence[float]) -> JointState:
         """State of this limb's joints.
 
         Args:
@@ -170,7 +170,7 @@ class LimbController:
         points = (desired.positions, desired.velocities, desired.accelerations, state.output.positions)
         self._points.append(np.stack([np.asarray(point) for point in points]))
 
-    def kept_states(self) -> ControllerSamples:
+    def collect_states(self) -> ControllerSamples:
         """Set points kept by `keep_state` since the last reset."""
         table = np.array(self._points).reshape(-1, 4, len(self._joints))
         elapsed = np.array(self._elapsed_ns, dtype=np.int64)

@@ -98,7 +98,11 @@ def _read_obj(content: bytes) -> Triangles:
 
 
 def _obj_index(number: int, vertices: int) -> int:
-    """Index of a vertex: OBJ counts from one, or backwards from the last one so far."""
+    """Index of a vertex: OBJ counts from one, or backwards from the last one so far.
+
+    Raises:
+        ValueError: If there is no such vertex.
+    """
     index = number - 1 if number > 0 else vertices + number
     if not (number and 0 <= index < vertices):
         raise ValueError(f"a face uses vertex {number} of {vertices}")

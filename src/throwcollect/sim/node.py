@@ -255,10 +255,14 @@ class SimulationNode(Node):
         return SetParametersResult(successful=True)
 
     def _lease(self, values: Mapping[str, Any]) -> None:
-        """Begin the trial of a lease; what it does not say is as configured, whatever was set before."""
+        """Begin the trial of a lease; what it does not say is as configured, whatever was set before.
+
+        Raises:
+            ConfigError: If the lease is incomplete, or is not signed with the key of this run.
+        """
         if missing := [name for name in (NUMBER, CONTROLLERS) if name not in values]:
             raise ConfigError(f"{LEASE}: comes without {missing[0]}")
-        number, controllers = self._checked_trial(values)
+        number, controllers = self._check_trial(values)
         physics = {key: values[key] for key in self._physics if key in values}
         lease = Lease(self.get_namespace(), number, controllers, physics)
         if not lease.is_signed(values[LEASE], self._signer):
@@ -267,19 +271,23 @@ class SimulationNode(Node):
         self._simulation.lease(TrialSetup(number, controllers, config, values[LEASE]))
 
     def _prepare(self, values: Mapping[str, Any]) -> None:
-        """Set up what the next reset prepares, unless the simulation is leased; a negative number ends the lease."""
+        """Set up what the next reset prepares, unless the simulation is leased; a negative number ends the lease.
+
+        Raises:
+            ConfigError: If the simulation is leased, so that only its coordinator may change it.
+        """
         trial = self._simulation.trial
         changed = [name for name in values if name != _FACTOR]
         if trial.leased and changed == [NUMBER] and values[NUMBER] < 0:
             trial.set_up_nothing()
         elif trial.leased and changed:
             raise ConfigError(f"{changed[0]}: {trial.lease_in_words}")
-        number, controllers = self._checked_trial(values)
+        number, controllers = self._check_trial(values)
         config = with_values(trial.setup.config, {key: values[key] for key in self._physics if key in values})
         if changed:
             trial.setup = TrialSetup(number, controllers, config)
 
-    def _checked_trial(self, values: Mapping[str, Any]) -> tuple[int, tuple[str, ...]]:
+    def _check_trial(self, values: Mapping[str, Any]) -> tuple[int, tuple[str, ...]]:
         setup = self._simulation.trial.setup
         number = int(values.get(NUMBER, setup.number))
         controllers = tuple(filter(None, values.get(CONTROLLERS, setup.controllers)))
@@ -299,13 +307,13 @@ class SimulationNode(Node):
         given = {parameter.name for parameter in parameters}
         if LEASE not in given or not self._simulation.trial.leased:
             return
-        stray = [key for key, value in self._physics.items() if key not in given and self._shown(key) != value]
+        stray = [key for key, value in self._physics.items() if key not in given and self._get_value(key) != value]
         if stray:
             self._restoring = True
             self.set_parameters([Parameter(key, value=self._physics[key]) for key in stray])
             self._restoring = False
 
-    def _shown(self, key: str) -> Any:
+    def _get_value(self, key: str) -> Any:
         return self.get_parameter(key).value
 
 

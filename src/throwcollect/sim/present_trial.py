@@ -122,5 +122,5 @@ class PresentTrial:
 
     def conditions(self) -> Conditions:
         """What the trial is, or was, simulated with."""
-        values = self._settings.replaced_by(self._used)
+        values = self._settings.find_replaced(self._used)
         return Conditions(build_digest(), self._settings.digest, values, dict(self._inputs), self.setup.lease)

@@ -74,7 +74,7 @@ def find_resources(sources: Sequence[str], robot: Robot) -> tuple[list[Resource]
     Returns:
         What was found, in order of the URIs, and what is wrong with each source that cannot be searched.
     """
-    found = list(_installed(robot))
+    found = list(_find_installed(robot))
     useless = []
     for source in sources:
         try:
@@ -90,7 +90,7 @@ def find_resources(sources: Sequence[str], robot: Robot) -> tuple[list[Resource]
 
 
 @cache
-def _installed(robot: Robot) -> tuple[Resource, ...]:
+def _find_installed(robot: Robot) -> tuple[Resource, ...]:
     share = robot.share()
 
     def uri_of(path: Path) -> str:
@@ -105,7 +105,11 @@ def _package_of(robot: Robot) -> str:
 
 
 def _search(directory: Path, uri_of: Callable[[Path], str], robot: Robot) -> list[Resource]:
-    """Descriptions below a directory whose collision shapes are all there."""
+    """Descriptions below a directory whose collision shapes are all there.
+
+    Raises:
+        RequestError: ``RESULT_NOT_FOUND`` if there are too many files to search.
+    """
     found = []
     seen = 0
     for parent, directories, files in os.walk(directory):
@@ -131,7 +135,11 @@ def _spawnable_name(path: Path, robot: Robot) -> str:
 
 
 def _locate(filename: str, directory: Path | None, robot: Robot) -> Path:
-    """File of a mesh, which may be relative to the directory of its description."""
+    """File of a mesh, which may be relative to the directory of its description.
+
+    Raises:
+        RequestError: ``MISSING_ASSETS`` if nothing says what a relative path is relative to.
+    """
     if "://" in filename:
         return _path(filename, robot, missing="MISSING_ASSETS")
     if directory is None and not filename.startswith("/"):

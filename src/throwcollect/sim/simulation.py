@@ -185,7 +185,7 @@ class Simulation:
         if self.trial.refusal(controller, goal=False) is not None:
             return False
         self.trial.note_other_input(controller)
-        cancelled = self.observed(controller).cancel(goal_id)
+        cancelled = self.observe(controller).cancel(goal_id)
         self._collect_results()
         return cancelled
 
@@ -311,13 +311,13 @@ class Simulation:
         if self._keeps_states:
             self._look(self.limbs.values())
             self._collect_results()
-            states = {name: limb.kept_states() for name, limb in self.limbs.items()}
+            states = {name: limb.collect_states() for name, limb in self.limbs.items()}
         return header, samples, states
 
-    def observed(self, controller: str) -> JointTrajectoryController:
+    def observe(self, controller: str) -> JointTrajectoryController:
         """A controller, once it has seen the present state of its joints, which its `state` and `query` need."""
         limb = self.limbs[controller]
-        limb.controller.observe(limb.measured(*self.world.joints()))
+        limb.controller.observe(limb.measure(*self.world.joints()))
         return limb.controller
 
     def watch(self, controllers: Iterable[str]) -> None:
@@ -372,7 +372,7 @@ class Simulation:
         positions, velocities = self.world.joints()
         keeps = self._keeps_states and self.world.steps % self._stride == 0
         for limb in limbs:
-            limb.update(self.now_ns, self._period_ns, limb.measured(positions, velocities), self._command)
+            limb.update(self.now_ns, self._period_ns, limb.measure(positions, velocities), self._command)
             if keeps:
                 limb.keep_state()
 

@@ -57,7 +57,11 @@ class _NoDoctype(ElementTree.TreeBuilder):
     """Builds trees of documents that define no entities, which a few lines can blow up to gigabytes."""
 
     def doctype(self, name: str, pubid: str | None, system: str | None) -> None:
-        """Refuse a document type declaration."""
+        """Refuse a document type declaration.
+
+        Raises:
+            RequestError: ``RESOURCE_PARSE_ERROR``, always.
+        """
         del pubid, system
         raise _malformed(f"document type {name!r:.40} is declared; descriptions have none")
 
@@ -178,7 +182,11 @@ class _Reader:
 
 
 def _add_motion(clean: ElementTree.Element, joint: ElementTree.Element) -> None:
-    """Add axis, limits and damping of a joint that moves."""
+    """Add axis, limits and damping of a joint that moves.
+
+    Raises:
+        RequestError: ``RESOURCE_PARSE_ERROR`` if the joint has no axis or limit, or contradictory limits.
+    """
     name = clean.get("name")
     axis_element, limit = joint.find("axis"), joint.find("limit")
     axis = [1.0, 0.0, 0.0] if axis_element is None else _numbers(axis_element, "xyz", 3, of=joint)

@@ -57,17 +57,17 @@ def check_tree(links: Sequence[str], joints: Sequence[Joint]) -> str:
     roots = [link for link in links if link not in carried]
     if len(roots) > 1:
         raise RequestError("RESOURCE_PARSE_ERROR", f"links {roots[0]} and {roots[1]} are not connected")
-    if not roots or len(_reached(roots[0], joints)) < len(links):
+    if not roots or len(_reach(roots[0], joints)) < len(links):
         raise RequestError("RESOURCE_PARSE_ERROR", "the joints form a ring")
     return roots[0]
 
 
 def rigid_root(root: str, joints: Sequence[Joint]) -> set[str]:
     """The links that are rigidly connected to the root, and the root itself."""
-    return _reached(root, [joint for joint in joints if joint.kind == "fixed"])
+    return _reach(root, [joint for joint in joints if joint.kind == "fixed"])
 
 
-def _reached(root: str, joints: Sequence[Joint]) -> set[str]:
+def _reach(root: str, joints: Sequence[Joint]) -> set[str]:
     children: dict[str, list[str]] = {}
     for joint in joints:
         children.setdefault(joint.parent, []).append(joint.child)

@@ -19,8 +19,8 @@ from throwcollect.sim.recording import BALL_HEIGHT, BALL_LINEAR_VELOCITY, to_sam
 from throwcollect.sim.scene import drag_of, physics_of, scene_of
 from throwcollect.sim.spawned import SpawnedBodies
 from throwcollect.tools.tool import tool_of
+from throwcollect.units import NS_PER_S
 
-_NS_PER_S = 1_000_000_000
 _REST_S = 0.5
 _REST_SPEED = 0.01
 
@@ -189,7 +189,7 @@ class World(Observer):
         """
         numbers = range(self.recorded)[max(first, self._forgotten) : last]
         steps = np.arange(numbers.start, numbers.stop, dtype=np.int64) * self._stride
-        stamps = self._start_ns + steps * _NS_PER_S // self._hz
+        stamps = self._start_ns + steps * NS_PER_S // self._hz
         rows = self._rows[numbers.start - self._forgotten : numbers.stop - self._forgotten]
         return to_samples(rows, stamps, self._joints, self._moving, self._locked)
 
@@ -278,7 +278,7 @@ class World(Observer):
         self._forgotten = 0
 
     def _stamp_ns(self, step: int) -> int:
-        return self._start_ns + step * _NS_PER_S // self._hz
+        return self._start_ns + step * NS_PER_S // self._hz
 
     def _judge(self, target: Sequence[float]) -> EndReason | None:
         """Whether the trial ends with the sample just recorded, and why."""

@@ -21,18 +21,18 @@ def config_digest(config: Config) -> str:
 
     Keys that came later count where they differ from their defaults, so that older digests hold.
     """
-    sections = config.model_dump(mode="json", exclude=_uncounted(config))
+    sections = config.model_dump(mode="json", exclude=_name_uncounted(config))
     return hashlib.sha256(json.dumps(sections).encode()).hexdigest()
 
 
-def _uncounted(section: Section) -> dict[str, Any]:
+def _name_uncounted(section: Section) -> dict[str, Any]:
     """Name the fields of a section, and of those in it, that do not count, as pydantic wants to have them named."""
     uncounted: dict[str, Any] = {}
     for name, value in section.__dict__.items():
         key = key_of_field(type(section), name)
         if key.effect is Effect.RUN or (key.later and value == type(section).model_fields[name].get_default()):
             uncounted[name] = True
-        elif isinstance(value, Section) and (inside := _uncounted(value)):
+        elif isinstance(value, Section) and (inside := _name_uncounted(value)):
             uncounted[name] = inside
     return uncounted
 

@@ -45,7 +45,7 @@ def draw_points(config: Config, *, directory: Path) -> Points:
     sweep = config.sweep
     if sweep.file is not None:
         points = read_points(directory / sweep.file, config)
-        return points.first(_checked_count(config.trials, len(points.values)))
+        return points.first(_check_count(config.trials, len(points.values)))
     if not sweep.parameters:
         raise PlanError(
             [Problem("nothing is swept", key="sweep.parameters")],
@@ -118,7 +118,7 @@ def _grid(parameters: dict[str, Parameter], trials: int | None) -> Points:
         raise PlanError(
             [Problem(f"the grid has {size} points", key="sweep.parameters")], expected=f"at most {_MOST_TRIALS}"
         )
-    places = np.arange(_checked_count(trials, size))
+    places = np.arange(_check_count(trials, size))
     columns = []
     for parameter in reversed(parameters.values()):
         axis = _axis(parameter)
@@ -143,7 +143,7 @@ def _count(parameter: Range) -> int:
     return parameter.count
 
 
-def _checked_count(trials: int | None, available: int) -> int:
+def _check_count(trials: int | None, available: int) -> int:
     if trials is not None and trials > available:
         raise PlanError(
             [Problem(f"should be at most {available}, as the sweep has no more points, got {trials}", key="trials")]

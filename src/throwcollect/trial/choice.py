@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 
-def chosen(trials: Sequence[int], *, count: int, seed: int) -> list[int]:
+def choose_trials(trials: Sequence[int], *, count: int, seed: int) -> list[int]:
     """Some of the trials, in their order.
 
     Args:

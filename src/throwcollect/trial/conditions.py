@@ -55,14 +55,14 @@ class Conditions:
         for key in sorted({*self.values, *expected.values}):
             used, wanted = self.values.get(key), expected.values.get(key)
             if used != wanted:
-                yield f"{key} was {_told(used)}, not {_told(wanted)}"
+                yield f"{key} was {_describe(used)}, not {_describe(wanted)}"
         for controller in sorted({*self.inputs, *expected.inputs}):
             used_goal, wanted_goal = self.inputs.get(controller), expected.inputs.get(controller)
             if used_goal != wanted_goal:
                 yield f"{controller} was given {'another goal' if used_goal and wanted_goal else _goal(wanted_goal)}"
 
 
-def _told(value: float | None) -> str:
+def _describe(value: float | None) -> str:
     return "as configured" if value is None else repr(value)
 
 
@@ -105,7 +105,7 @@ class Settings:
         lines = [f"{key}={json.dumps(value)}" for key, value in sorted(heeded.items())]
         self.digest = hashlib.sha256("\n".join(lines).encode()).hexdigest()
 
-    def replaced_by(self, trial: Config) -> dict[str, float]:
+    def find_replaced(self, trial: Config) -> dict[str, float]:
         """What the configuration of a trial replaces, by dotted key.
 
         Args:

@@ -15,7 +15,7 @@ from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.robot import Robot
 
 
-def sampled_messages(topic: Topic, recording: Recording) -> NDArray[np.uint8]:
+def encode_samples(topic: Topic, recording: Recording) -> NDArray[np.uint8]:
     """CDR messages of a topic, shape ``(n_samples, size)``."""
     messages = np.empty((len(recording.samples), len(topic.layout.template)), np.uint8)
     messages[:] = np.frombuffer(topic.layout.template, np.uint8)

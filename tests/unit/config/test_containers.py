@@ -4,7 +4,7 @@ import pytest
 from docker.models import containers as sdk
 
 from throwcollect.config.containers import ContainerOptions, ContainersConfig
-from throwcollect.config.loader import load, resolved_yaml
+from throwcollect.config.loader import dump_yaml, load
 from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError
 
@@ -57,7 +57,7 @@ def test_everything_that_may_be_said_of_containers_is_read_and_written_again(tmp
     assert config.containers.router.ports == {"80": 8080, "53/udp": 5353}
     assert config.containers.sim.options["ulimits"] == {"nofile": 9}
     again = tmp_path / "again.yaml"
-    again.write_text(resolved_yaml(config))
+    again.write_text(dump_yaml(config))
     assert load(again) == config
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -11,7 +12,9 @@ import numpy as np
 from throwcollect.control import (
     ControllerParameters,
     Deviations,
+    ErrorCode,
     GoalResult,
+    GoalStatus,
     JointConstraints,
     JointState,
     JointTolerance,
@@ -121,3 +124,38 @@ class Bench:
             self.commands[self.k] = np.array(command)
             self.plant.apply(command)
             self.collect()
+
+
+REACHED = (GoalStatus.SUCCEEDED, ErrorCode.SUCCESSFUL, "Goal successfully reached!")
+
+PREEMPTED = (GoalStatus.ABORTED, ErrorCode.INVALID_GOAL, "Current goal preempted by new incoming action.")
+
+CANCELED = (GoalStatus.CANCELED, ErrorCode.SUCCESSFUL, "")
+
+OFF_PATH = "Aborted due to path tolerance violation"
+
+TOO_LATE = "Aborted due to goal_time_tolerance exceeding by "
+
+PARTIAL = dataclasses.replace(SHIPPED, allow_partial_joints_goal=True)
+
+INTEGRATING = dataclasses.replace(
+    SHIPPED, allow_integration_in_goal_trajectories=True, allow_nonzero_velocity_at_trajectory_end=True
+)
+
+MOVING_END = dataclasses.replace(SHIPPED, allow_nonzero_velocity_at_trajectory_end=True)
+
+ZERO = (0.0, 0.0, 0.0)
+
+ONE_POINT = (point(1.0, (2.1, 2.1, 3.1)),)
+
+
+def last_velocity(value: float) -> TrajectoryGoal:
+    return goal(point(1.0, START, (0, value, 0)))
+
+
+def braking(deceleration: float, *, trajectory: float = 0.0) -> ControllerParameters:
+    limits = dict.fromkeys(JOINTS, JointConstraints(trajectory, 0.0, deceleration))
+    return dataclasses.replace(SHIPPED, constraints=Constraints(decelerate_on_cancel=True, joints=limits))
+
+
+FROZEN, OFFSET, LAG = Plant("frozen"), Plant("offset"), Plant("lag")

@@ -6,7 +6,7 @@ from tests.unit.sweep.thrower import collected, configuration, throw
 
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.growth import Growth
-from throwcollect.coordinator.prepare import checked_plan, more_trials
+from throwcollect.coordinator.prepare import draw_plan, more_trials
 from throwcollect.sweep.plan import Plan, Trial, make_plan
 from throwcollect.tasks.throw.outcome import Outcome, ThrowResult
 
@@ -39,7 +39,7 @@ def test_a_round_is_drawn_and_checked_trial_by_trial_once_it_is_due() -> None:
 
 
 def test_trials_of_later_rounds_are_refused_as_those_of_a_plan_made_at_once() -> None:
-    whole = checked_plan(config(landed=100).model_copy(update={"until": None}), directory=Path())
+    whole = draw_plan(config(landed=100).model_copy(update={"until": None}), directory=Path())
     plan = make_plan(config(landed=100))
     growth = Growth(plan)
     ended(growth, plan.trials)

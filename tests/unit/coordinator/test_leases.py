@@ -55,7 +55,7 @@ def test_every_trial_ends_exactly_once(actions: list[tuple[str, str]], retries: 
     ended: list[int] = []
 
     def act(simulation: str, action: str) -> None:
-        held = leases.held_by(simulation)
+        held = leases.find_trial(simulation)
         if action == "lease" and held is None:
             leases.lease(simulation, others="abcdz" if present else "")
         elif action == "complete" and held is not None:
@@ -120,8 +120,8 @@ def do_all(leases: Leases) -> list[int]:
 def test_a_simulation_that_refuses_everything_takes_no_trial_with_it() -> None:
     leases = Leases(range(60), retries=3)
     assert do_all(leases) == []
-    assert leases.set_aside("hole") == "no"
-    assert leases.set_aside("well") is None
+    assert leases.why_set_aside("hole") == "no"
+    assert leases.why_set_aside("well") is None
 
 
 def test_a_simulation_that_spoils_episodes_is_set_aside_too() -> None:
@@ -131,7 +131,7 @@ def test_a_simulation_that_spoils_episodes_is_set_aside_too() -> None:
         leases.deliver("hole", trial)
         assert leases.reject(trial, "not finite") is None
     assert do_all(leases) == []
-    assert leases.set_aside("hole") == "not finite"
+    assert leases.why_set_aside("hole") == "not finite"
 
 
 def test_a_returned_trial_goes_to_another_simulation_while_there_is_one() -> None:
@@ -164,8 +164,8 @@ def test_trials_that_nobody_can_do_cost_no_simulation_its_place() -> None:
                 leases.deliver(name, trial)
                 leases.complete(trial)
     assert sorted(lost) == list(range(1, 20))
-    assert leases.set_aside("a") is None
-    assert leases.set_aside("b") is None
+    assert leases.why_set_aside("a") is None
+    assert leases.why_set_aside("b") is None
 
 
 def test_there_is_no_hope_when_all_refuse_and_none_ever_did_a_trial() -> None:
@@ -195,5 +195,5 @@ def test_a_new_simulation_of_an_old_name_is_not_blamed() -> None:
     do_all(leases)
     leases.add([60])
     leases.forget("hole")
-    assert leases.set_aside("hole") is None
+    assert leases.why_set_aside("hole") is None
     assert leases.lease("hole", others=BOTH) == 60

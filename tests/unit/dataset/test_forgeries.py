@@ -13,7 +13,7 @@ import pytest
 from tests.unit.dataset.conftest import SETTINGS, Change, Collection, throw
 
 from throwcollect.config.schema import Config
-from throwcollect.coordinator.prepare import checked_plan, feasibility_check
+from throwcollect.coordinator.prepare import draw_plan, feasibility_check
 from throwcollect.dataset.throws_table import ThrowsTable
 from throwcollect.dataset.verify import verify
 from throwcollect.dataset.verify_episode import EpisodeCheck
@@ -211,7 +211,7 @@ def test_refusals_that_are_invented_or_dropped_are_found(tmp_path: Path) -> None
     collection = Collection(
         {"trials": 2, "sweep": {"sampler": "grid", "parameters": {"task.duration_s": {"values": [0.3, 1.0]}}}}
     )
-    honest = checked_plan(collection.config, directory=tmp_path)
+    honest = draw_plan(collection.config, directory=tmp_path)
     assert [trial.refused is None for trial in honest.trials] == [False, True]
     assert list(find_refusal_problems(honest, (), feasibility_check)) == []
     forged = replace(

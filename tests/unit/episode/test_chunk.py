@@ -185,7 +185,7 @@ def test_records_of_other_topics_hold_no_samples(encoder: ChunkEncoder, make_sam
         counted = bytearray(contents[: len(contents) // 2])
         assert struct.unpack_from("<I", counted, COUNT_OF_NAMES) == (32,)
         struct.pack_into("<I", counted, COUNT_OF_NAMES, length)
-        with pytest.raises(DatasetError, match="JointState|joint states"):
+        with pytest.raises(DatasetError, match=r"JointState|joint states"):
             _ = MessageTable(counted, 1).samples
 
 
@@ -197,9 +197,9 @@ def test_samples_have_the_joints_that_the_recording_names(
     renamed = Episode(header, as_chunk(contents.replace(b"head_1_joint", b"neck_1_joint")))
     assert renamed.table.joints == tuple(joint.replace("head_1", "neck_1") for joint in TALOS.joints)
     assert renamed.samples().position.tolist() == make_samples(50).position.tolist()
-    with pytest.raises(DatasetError, match="joint 29 of the joint states is neck_1_joint\n.*head_1_joint"):
+    with pytest.raises(DatasetError, match=r"joint 29 of the joint states is neck_1_joint\n.*head_1_joint"):
         renamed.samples(TALOS.joints)
-    with pytest.raises(DatasetError, match="joint states of 32 joints\n.*2"):
+    with pytest.raises(DatasetError, match=r"joint states of 32 joints\n.*2"):
         renamed.samples(("shoulder_joint", "elbow_joint"))
 
 

@@ -16,7 +16,7 @@ from rclzenoh.interfaces.catalog import DEFINITIONS
 from rclzenoh.interfaces.typed_names import ACTIONS, MESSAGES, SERVICES
 from throwcollect.errors import ConfigError
 from throwcollect.ros import embedded
-from throwcollect.ros.middleware import RMW_VARIABLE, VARIABLE, _installed, uses_rclpy
+from throwcollect.ros.middleware import RMW_VARIABLE, VARIABLE, _choose_installed, uses_rclpy
 from throwcollect.ros_installation import PACKAGES, how_to_install, missing, module_name
 
 ROOT = Path(__file__).parents[3]
@@ -24,9 +24,9 @@ ROOT = Path(__file__).parents[3]
 
 @pytest.fixture(autouse=True)
 def _fresh():
-    _installed.cache_clear()
+    _choose_installed.cache_clear()
     yield
-    _installed.cache_clear()
+    _choose_installed.cache_clear()
 
 
 def test_the_embedded_backend_can_be_asked_for(monkeypatch):
@@ -61,7 +61,7 @@ def ros(monkeypatch, tmp_path):
 
 def test_rclpy_is_taken_where_it_and_all_interfaces_are_found(ros, monkeypatch):
     assert uses_rclpy()
-    _installed.cache_clear()
+    _choose_installed.cache_clear()
     monkeypatch.setenv(VARIABLE, "embedded")
     assert not uses_rclpy()
 
@@ -80,7 +80,7 @@ def test_an_rclpy_without_all_interfaces_is_taken_only_if_asked_for_and_then_say
     (ros / package / files).unlink()
     assert missing() == [lacking]
     assert not uses_rclpy()
-    _installed.cache_clear()
+    _choose_installed.cache_clear()
     monkeypatch.setenv(VARIABLE, "rclpy")
     with pytest.raises(ConfigError, match=f"THROWCOLLECT_ROS is rclpy, but Python does not find {lacking}\n  try: "):
         uses_rclpy()
@@ -115,7 +115,7 @@ def test_an_rmw_that_is_not_installed_is_one_message(ros, monkeypatch):
 def test_where_ros_has_no_zenoh_the_embedded_backend_speaks_it(ros, monkeypatch):
     monkeypatch.setenv(RMW_VARIABLE, "rmw_zenoh_cpp")
     assert not uses_rclpy()
-    _installed.cache_clear()
+    _choose_installed.cache_clear()
     monkeypatch.setenv(VARIABLE, "rclpy")
     with pytest.raises(ConfigError, match="rmw_zenoh_cpp, which is not installed"):
         uses_rclpy()

@@ -5,7 +5,14 @@ import os
 import pytest
 
 from throwcollect.errors import ConfigError
-from throwcollect.ros.middleware import RMW_VARIABLE, VARIABLE, Middleware, _installed, uses_rclpy, wanted
+from throwcollect.ros.middleware import (
+    RMW_VARIABLE,
+    VARIABLE,
+    Middleware,
+    _choose_installed,
+    choose_middleware,
+    uses_rclpy,
+)
 
 EMBEDDED, FAST_DDS = Middleware(), Middleware("rclpy", "rmw_fastrtps_cpp")
 ZENOH, OTHER = Middleware("rclpy", "rmw_zenoh_cpp"), Middleware("rclpy", "rmw_cyclonedds_cpp")
@@ -17,9 +24,9 @@ def _fresh(monkeypatch):
         # Both calls, so that whatever a test leaves there is taken away.
         monkeypatch.setenv(variable, "")
         monkeypatch.delenv(variable)
-    _installed.cache_clear()
+    _choose_installed.cache_clear()
     yield
-    _installed.cache_clear()
+    _choose_installed.cache_clear()
 
 
 @pytest.fixture
@@ -67,10 +74,10 @@ def test_a_process_settles_it_whatever_its_environment_says_and_leaves_that_alon
 
 
 def test_a_configuration_may_leave_it_open_or_ask_for_a_backend(rclpy, monkeypatch):
-    assert wanted("auto") == FAST_DDS
-    assert wanted("embedded") == EMBEDDED
+    assert choose_middleware("auto") == FAST_DDS
+    assert choose_middleware("embedded") == EMBEDDED
     assert Middleware.of_process() == FAST_DDS
-    _installed.cache_clear()
+    _choose_installed.cache_clear()
     monkeypatch.setattr("throwcollect.ros.middleware.missing", lambda: ["rclpy"])
     with pytest.raises(ConfigError, match="THROWCOLLECT_ROS is rclpy, but Python does not find rclpy"):
-        wanted("rclpy")
+        choose_middleware("rclpy")

@@ -153,7 +153,7 @@ def test_containers_get_what_their_image_has_and_the_launcher_can_join(
 ) -> None:
     monkeypatch.setattr(docker_image, "ensure", lambda *_, **__: None)
     monkeypatch.setattr(docker_image, "rmw_of", lambda *_: rmw)
-    monkeypatch.setattr(choice, "wanted_middleware", lambda _: launcher)
+    monkeypatch.setattr(choice, "choose_middleware", lambda _: launcher)
     said: list[str] = []
     found = choice.choose(Config(run=RunConfig(runtime="docker", ros=ros)), say=said.append, warn=said.append)
     assert found.middleware == expected
@@ -172,7 +172,7 @@ def test_rclpy_that_is_asked_for_and_cannot_be_had_in_containers_is_an_error(
 ) -> None:
     monkeypatch.setattr(docker_image, "ensure", lambda *_, **__: None)
     monkeypatch.setattr(docker_image, "rmw_of", lambda *_: rmw)
-    monkeypatch.setattr(choice, "wanted_middleware", lambda _: FAST_DDS)
+    monkeypatch.setattr(choice, "choose_middleware", lambda _: FAST_DDS)
     if host is not None:
         monkeypatch.setenv("DOCKER_HOST", host)
     with pytest.raises(ConfigError, match=problem) as caught:

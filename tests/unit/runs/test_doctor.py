@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from throwcollect.ros.middleware import VARIABLE, _installed
+from throwcollect.ros.middleware import VARIABLE, _choose_installed
 from throwcollect.runs.doctor import examine
 from throwcollect.runtimes.docker.image import SOURCES_LABEL, default_tag
 
@@ -32,9 +32,9 @@ def test_a_machine_that_runs_the_tests_has_no_problem(tmp_path: Path) -> None:
 
 
 def backends(directory: Path) -> dict[str, tuple[str, str]]:
-    _installed.cache_clear()
+    _choose_installed.cache_clear()
     found = {check.name: (check.status, check.finding) for check in examine(directory)}
-    _installed.cache_clear()
+    _choose_installed.cache_clear()
     return {name: found[name] for name in ("rclpy", "embedded")}
 
 

@@ -132,7 +132,7 @@ def test_a_run_is_handed_to_another_process_without_ever_seeming_dead(state: Pat
     run = records.new("small")
     run.write(record(run))
     with subprocess.Popen(["/bin/cat"], stdin=-1, pass_fds=[run.lock]) as process:
-        inherited = records.inherited(run.run, os.dup(run.lock))
+        inherited = records.inherit(run.run, os.dup(run.lock))
         run.close()
         inherited.close()
         assert records.lives(run.run)

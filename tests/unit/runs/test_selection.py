@@ -9,7 +9,14 @@ from tests.unit.runtimes.docker.engine import Engine, engine_at
 from throwcollect.errors import ConfigError, DatasetError, Interrupted, ThrowcollectError, WorkerError
 from throwcollect.runs.record import Failure, Record
 from throwcollect.runs.records import STATE_VARIABLE, Records, Run
-from throwcollect.runs.selection import died, held_elsewhere, left_in, require_living, to_change, to_watch
+from throwcollect.runs.selection import (
+    describe_death,
+    find_held_runs,
+    find_left_in,
+    require_living,
+    to_change,
+    to_watch,
+)
 from throwcollect.runtimes.docker import engine as docker_engine
 from throwcollect.runtimes.docker.options import NODE_LABEL, RUN_LABEL
 
@@ -212,8 +219,8 @@ def test_only_a_living_run_can_be_changed(records: Records, make: Make) -> None:
 def test_a_directory_into_which_a_living_run_collects_is_refused(records: Records, make: Make, tmp_path: Path) -> None:
     make("a", "lives")
     with pytest.raises(ConfigError, match=r"/a: run a-0123 collects into it\n  try: throwcollect wait --run a-0123"):
-        left_in(records, tmp_path / "a")
-    assert left_in(records, tmp_path / "b") is None
+        find_left_in(records, tmp_path / "a")
+    assert find_left_in(records, tmp_path / "b") is None
 
 
 @pytest.fixture
@@ -248,7 +255,7 @@ def test_containers_outlive_their_launcher(
     record = make("a", "died", **fields)
     for name in nodes:
         engine.create(f"throwcollect-a-0123-{name}", {RUN_LABEL: "a-0123", NODE_LABEL: name})
-    run = left_in(records, tmp_path / "a")
+    run = find_left_in(records, tmp_path / "a")
     assert (run is not None) == left
     assert run is None or run.record == record
 
@@ -262,7 +269,7 @@ def test_a_directory_into_which_containers_may_still_collect_is_refused_while_th
     with pytest.raises(
         WorkerError, match=r"/a: containers of run a-0123 may still collect into it: .*no answer in time"
     ):
-        left_in(records, tmp_path / "a")
+        find_left_in(records, tmp_path / "a")
 
 
 def test_an_engine_that_is_gone_holds_no_containers_that_run(
@@ -270,7 +277,7 @@ def test_an_engine_that_is_gone_holds_no_containers_that_run(
 ) -> None:
     make("a", "died", runtime="docker")
     monkeypatch.setenv("DOCKER_HOST", f"unix://{tmp_path}/none.sock")
-    assert left_in(records, tmp_path / "a") is None
+    assert find_left_in(records, tmp_path / "a") is None
 
 
 def test_the_record_of_containers_that_are_left_is_kept(records: Records, make: Make) -> None:
@@ -282,7 +289,7 @@ def test_the_record_of_containers_that_are_left_is_kept(records: Records, make: 
 
 def test_the_way_on_after_the_death_of_a_launcher_depends_on_where_the_dataset_is(records: Records, make: Make) -> None:
     def told(record: Record) -> str:
-        return str(died(records.get(record.run)))
+        return str(describe_death(records.get(record.run)))
 
     again = "try: throwcollect resume /b goes on where it ended, or with its containers if they live; throwcollect down"
     assert again in told(make("a", "died", directory="/b"))
@@ -292,4 +299,4 @@ def test_the_way_on_after_the_death_of_a_launcher_depends_on_where_the_dataset_i
 
 def test_an_engine_that_is_not_there_is_not_waited_for(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("DOCKER_HOST", f"unix://{tmp_path}/none.sock")
-    assert held_elsewhere() == {}
+    assert find_held_runs() == {}

@@ -56,7 +56,7 @@ def test_a_member_says_what_it_is_and_holds_nothing_of_a_run_that_never_was(
     member = get_runtime(name)
     assert member.in_words(Config())
     assert member.simulations(Config()) in (1, Config().run.simulations)
-    assert member.held() == []
+    assert member.find_held() == []
     assert member.is_left("never-0000") is False
     assert member.outlives_launcher == (name == "docker")
 

@@ -53,7 +53,7 @@ def advance(simulation: Simulation, action: ControllerAction) -> None:
     for _, result in simulation.pop_results():
         action.finish(result)
     if action.owes_feedback:
-        action.publish_feedback(simulation.observed(ARM).state(simulation.now_ns))
+        action.publish_feedback(simulation.observe(ARM).state(simulation.now_ns))
 
 
 @pytest.mark.parametrize("slices_before", [0, 1, 3])

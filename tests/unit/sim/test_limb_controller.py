@@ -119,10 +119,10 @@ def stopped(**options: object) -> tuple[np.ndarray, np.ndarray]:
     world = Simulation(Config.model_validate({"controllers": options, "robot": {"effort_scale": 0.2}}))
     world.submit(ARM, 1, goal(0.4, elbow=-0.3))
     world.step(150)
-    before = world.observed(ARM).state(world.now_ns)
+    before = world.observe(ARM).state(world.now_ns)
     assert world.cancel(ARM, 1)
     world.step(1)
-    after = world.observed(ARM).state(world.now_ns)
+    after = world.observe(ARM).state(world.now_ns)
     return np.array([[each.output.positions[ELBOW], each.actual.positions[ELBOW]] for each in (before, after)])
 
 
@@ -138,11 +138,11 @@ def test_joints_can_brake_when_a_goal_is_cancelled() -> None:
     world = simulation(hold="decelerate", max_deceleration_radps2=5.0)
     world.submit(ARM, 1, goal(0.5, elbow=-1.4))
     world.step(150)
-    speed = world.observed(ARM).state(world.now_ns).actual.velocities[ELBOW]
+    speed = world.observe(ARM).state(world.now_ns).actual.velocities[ELBOW]
     assert speed == pytest.approx(1.0, abs=0.05)
-    position = world.observed(ARM).state(world.now_ns).actual.positions[ELBOW]
+    position = world.observe(ARM).state(world.now_ns).actual.positions[ELBOW]
     world.cancel(ARM, 1)
     world.step(300)
-    state = world.observed(ARM).state(world.now_ns)
+    state = world.observe(ARM).state(world.now_ns)
     assert state.output.positions[ELBOW] == pytest.approx(position + speed**2 / 2 / 5.0, abs=1e-6)
     assert state.actual.positions[ELBOW] == pytest.approx(state.output.positions[ELBOW], abs=0.005)

@@ -120,12 +120,12 @@ def test_joints_are_at_the_trajectory_when_their_sample_is_taken(simulation: Sim
 def test_what_a_controller_desires_and_measures_is_of_the_same_instant(simulation: Simulation) -> None:
     simulation.submit(ARM, 1, goal(ARM, 2.0, arm_right_4_joint=-0.5))
     simulation.step(500)
-    state, now_ns = simulation.observed(ARM).state(simulation.now_ns), simulation.now_ns
+    state, now_ns = simulation.observe(ARM).state(simulation.now_ns), simulation.now_ns
     elbow = TALOS.controllers[ARM].index("arm_right_4_joint")
     assert state.stamp_ns == state.desired.time_from_start_ns == state.actual.time_from_start_ns == now_ns
     assert abs(state.desired.velocities[elbow]) > 0.5
     assert state.error.positions == pytest.approx(np.zeros(len(TALOS.controllers[ARM])), abs=1e-4)
-    assert simulation.observed(HEAD).state(simulation.now_ns).stamp_ns == now_ns
+    assert simulation.observe(HEAD).state(simulation.now_ns).stamp_ns == now_ns
 
 
 def test_a_goal_that_moves_a_locked_joint_is_refused_by_name(simulation: Simulation) -> None:

@@ -94,10 +94,10 @@ def test_settings_cover_what_simulations_heed(key: str, value: object) -> None:
 def test_what_a_trial_replaces_is_named_key_by_key() -> None:
     settings = Settings(CONFIG)
     physics = sweepable_keys(CONFIG, Effect.PHYSICS)
-    assert settings.replaced_by(CONFIG) == {}
+    assert settings.find_replaced(CONFIG) == {}
     trial = with_values(CONFIG, {"ball.mass_kg": 0.06, "task.start.arm_right_4_joint": -1.8, "task.duration_s": 1.3})
     assert {"ball.mass_kg", "task.start.arm_right_4_joint"} <= set(physics)
-    assert settings.replaced_by(trial) == {"ball.mass_kg": 0.06, "task.start.arm_right_4_joint": -1.8}
+    assert settings.find_replaced(trial) == {"ball.mass_kg": 0.06, "task.start.arm_right_4_joint": -1.8}
 
 
 def test_a_build_has_one_digest() -> None:

@@ -3,7 +3,7 @@ from dataclasses import replace
 import pytest
 
 from throwcollect.run_key import Signer
-from throwcollect.trial.choice import chosen
+from throwcollect.trial.choice import choose_trials
 from throwcollect.trial.lease import Lease
 
 SIGNER = Signer(b"key of the run")
@@ -42,10 +42,10 @@ def test_what_was_signed_with_another_key_is_refused() -> None:
 
 def test_a_choice_of_trials_is_the_same_for_the_same_seed() -> None:
     trials = list(range(0, 200, 2))
-    few = chosen(trials, count=5, seed=7)
-    assert few == chosen(trials, count=5, seed=7) == sorted(set(few))
+    few = choose_trials(trials, count=5, seed=7)
+    assert few == choose_trials(trials, count=5, seed=7) == sorted(set(few))
     assert len(few) == 5
     assert set(few) < set(trials)
-    assert few != chosen(trials, count=5, seed=8)
-    assert chosen(trials, count=100, seed=7) == chosen(trials, count=500, seed=7) == trials
-    assert chosen(trials, count=0, seed=7) == []
+    assert few != choose_trials(trials, count=5, seed=8)
+    assert choose_trials(trials, count=100, seed=7) == choose_trials(trials, count=500, seed=7) == trials
+    assert choose_trials(trials, count=0, seed=7) == []

@@ -28,22 +28,22 @@ def rebuild_dataset(directory: DatasetArgument, json: JsonOption = False) -> Non
     if rejudged := rebuilt.rejudged:
         changes = [f"trial {each.trial}: {each.before} -> {each.after}" for each in rejudged]
         verb = "is" if len(rejudged) == 1 else "are"
-        typer.echo(f"{counted(len(rejudged), 'throw')} {verb} judged otherwise: {_named(changes)}")
+        typer.echo(f"{counted(len(rejudged), 'throw')} {verb} judged otherwise: {_join(changes)}")
     if rebuilt.lost:
-        typer.echo(f"lost: {_named([str(trial) for trial in rebuilt.lost])}")
+        typer.echo(f"lost: {_join([str(trial) for trial in rebuilt.lost])}")
 
 
-def _named(things: Sequence[str]) -> str:
+def _join(things: Sequence[str]) -> str:
     return ", ".join(things[:_MOST_NAMED]) + (" and more" if len(things) > _MOST_NAMED else "")
 
 
 def repair_dataset(directory: DatasetArgument, output: OutputArgument, json: JsonOption = False) -> None:
     """Write a sound dataset with all that is whole in a damaged one; exit code 5 if trials are lost."""
-    from throwcollect.coordinator.prepare import checked_plan
+    from throwcollect.coordinator.prepare import draw_plan
     from throwcollect.dataset.directory import THROWS
     from throwcollect.dataset.repair import repair
 
-    repaired = repair(directory, output, remake=lambda config: checked_plan(config, directory=directory))
+    repaired = repair(directory, output, remake=lambda config: draw_plan(config, directory=directory))
     if json:
         typer.echo(jsonlib.dumps(repaired.as_dict(), indent=2))
     else:

@@ -26,7 +26,7 @@ def replay_dataset(
 ) -> None:
     """Simulate stored throws again and compare them bit for bit; exit code 4 if any differs."""
     from throwcollect.dataset.reader import Dataset
-    from throwcollect.replay.audit import chosen_trials, replayed
+    from throwcollect.replay.audit import replay_throws, select_trials
 
     if bool(trials) == everything:
         raise ConfigError("which throws?", expected="either --trial K, which may be repeated, or --all")
@@ -35,9 +35,9 @@ def replay_dataset(
     dataset = Dataset.open(directory)
     for trial in trials or ():
         dataset.episode(trial)
-    chosen = list(dict.fromkeys(trials or ())) or chosen_trials(dataset, sample=sample)
+    chosen = list(dict.fromkeys(trials or ())) or select_trials(dataset, sample=sample)
     found = []
-    for comparison in replayed(directory, chosen):
+    for comparison in replay_throws(directory, chosen):
         found.append(comparison)
         if comparison.differences and not json:
             typer.echo(f"trial {comparison.trial}: {'; '.join(comparison.differences)}")

@@ -42,13 +42,13 @@ def verify_dataset(
         raise DatasetError(f"{directory}: {counted(len(findings), 'finding')}")
     dataset = Dataset.open(directory)
     if not json:
-        typer.echo(f"{directory}: nothing wrong\n{_not_checked(dataset, replay)}")
+        typer.echo(f"{directory}: nothing wrong\n{_describe_unchecked(dataset, replay)}")
     if left_out := unchecked(dataset.config):
         typer.echo(f"not checked without the extra collect: {', '.join(left_out)}", err=json)
         typer.echo(f"  try: {install_command('collect')}", err=json)
 
 
-def _not_checked(dataset: Dataset, replay: int | None) -> str:
+def _describe_unchecked(dataset: Dataset, replay: int | None) -> str:
     """What was not looked at in a dataset in which nothing is wrong, and the command that does."""
     from throwcollect.dataset.verify_plan import CHECKED_AGAIN
     from throwcollect.robots.description import is_available

@@ -48,7 +48,7 @@ def send_goal(
         client = ros.ActionClient(session.node, action_type, name)
         if not client.server_is_ready():
             raise ConfigError(f"nobody offers {name} as {kind}", expected=", ".join(actions[name]))
-        print(f"Sending goal:\n{_indented(message)}", flush=True)
+        print(f"Sending goal:\n{_indent(message)}", flush=True)
         sent = client.send_goal_async(message, feedback_callback=_show_feedback if feedback else None)
         handle = session.answer(sent, alive=client.server_is_ready, who=name)
         if not handle.accepted:
@@ -62,7 +62,7 @@ def send_goal(
             _cancel(session, client, handle, name)
             raise Interrupted("") from None
         status = _STATUSES[response.status]
-        print(f"Result:\n{_indented(response.result)}")
+        print(f"Result:\n{_indent(response.result)}")
         print(f"Goal finished with status: {status}", flush=True)
     if status != "SUCCEEDED":
         raise ThrowcollectError(f"{name}: the goal was not reached: {status}")
@@ -75,10 +75,10 @@ def _cancel(session: Session, client: ros.ActionClient, handle: Any, name: str) 
 
 
 def _show_feedback(message: Any) -> None:
-    print(f"Feedback:\n{_indented(message.feedback)}", flush=True)
+    print(f"Feedback:\n{_indent(message.feedback)}", flush=True)
 
 
-def _indented(message: Any) -> str:
+def _indent(message: Any) -> str:
     from throwcollect.cli.ros.values import plain, yaml_text
 
     return "".join(f"    {line}\n" for line in yaml_text(plain(message)).splitlines())

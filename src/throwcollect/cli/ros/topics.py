@@ -96,7 +96,7 @@ def echo(
                 message = getattr(message, part)
             print(yaml_text(plain(message, None if full else SHORT)), end="---\n", flush=True)
 
-        session.node.create_subscription(message_type, name, show, _offered_qos(session, name))
+        session.node.create_subscription(message_type, name, show, _find_offered_qos(session, name))
         session.spin_until(lambda: once and heard)
 
 
@@ -146,7 +146,11 @@ def _types(session: Session, topic: str) -> tuple[str, list[str]]:
 
 
 def _message_type(session: Session, topic: str, kind: str | None) -> tuple[str, Any]:
-    """Absolute name and class of a topic."""
+    """Absolute name and class of a topic.
+
+    Raises:
+        ConfigError: If the topic has several types and none is named, or does not have the one that is.
+    """
     name, kinds = _types(session, topic)
     if kind is None:
         require_name("topic", name, (each for each in _names(session) if not is_hidden(each) or each == name))
@@ -171,7 +175,7 @@ def _check_field(message_type: Any, path: list[str]) -> None:
         value = getattr(value, part)
 
 
-def _offered_qos(session: Session, name: str) -> ros.QoSProfile:
+def _find_offered_qos(session: Session, name: str) -> ros.QoSProfile:
     """What all publishers of a topic offer."""
     offered = [info.qos_profile for info in session.node.get_publishers_info_by_topic(name)]
     profile = ros.QoSProfile(depth=_DEPTH, reliability=ros.ReliabilityPolicy.BEST_EFFORT)

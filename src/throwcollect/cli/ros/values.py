@@ -63,12 +63,12 @@ def fill(message: Any, values: object, where: str = "") -> None:
             fill(current, value, f"{path}.")
             continue
         try:
-            setattr(message, name, _converted(types[name], value, path))
+            setattr(message, name, _convert(types[name], value, path))
         except (TypeError, ValueError, AssertionError) as error:
             raise ConfigError(f"{path}: should be {types[name]}, got {value!r:.80}") from error
 
 
-def _converted(kind: str, value: object, path: str) -> Any:
+def _convert(kind: str, value: object, path: str) -> Any:
     if found := _ARRAY.fullmatch(kind):
         if not isinstance(value, list):
             raise TypeError
@@ -76,7 +76,7 @@ def _converted(kind: str, value: object, path: str) -> Any:
         most, length = found["most"], found["length"]
         if (most and len(value) > int(most)) or (length and len(value) != int(length)):
             raise ValueError
-        return [_converted(element, each, f"{path}[{index}]") for index, each in enumerate(value)]
+        return [_convert(element, each, f"{path}[{index}]") for index, each in enumerate(value)]
     if _is_message(kind):
         package, _, short = kind.partition("/")
         message = get_message(f"{package}/msg/{short}")()

@@ -141,15 +141,15 @@ class BallisticEngine(Engine):
         moment = self._position, self._velocity, self._touching
         left = len(steps.velocities)
         if self._touching == self._carried_by:
-            for moment in self._carried(steps):
+            for moment in self._carry(steps):
                 left -= 1
                 yield moment
         for _ in range(left):
             if moment[2] != _ON_GROUND:
-                moment = self._flown(moment[0], moment[1], steps.drag_kgpm / self._physics.ball_mass_kg)
+                moment = self._fly(moment[0], moment[1], steps.drag_kgpm / self._physics.ball_mass_kg)
             yield moment
 
-    def _carried(self, steps: Steps) -> Iterator[_Moment]:
+    def _carry(self, steps: Steps) -> Iterator[_Moment]:
         """The ball in its seat, up to the step in which the tool would have to pull it."""
         place, turn = self._tool_path.along(steps.targets[1:])
         hz = self._physics.hz
@@ -163,7 +163,7 @@ class BallisticEngine(Engine):
         for position, velocity in zip(path[1 : last + 1].tolist(), velocities[1 : last + 1].tolist(), strict=True):
             yield tuple(position), tuple(velocity), self._carried_by
 
-    def _flown(self, position: Vector, velocity: Vector, drag_per_m: float) -> _Moment:
+    def _fly(self, position: Vector, velocity: Vector, drag_per_m: float) -> _Moment:
         """The ball one step of free flight later, or on the ground if that stops it."""
         dt = 1 / self._physics.hz
         (x, y, z), (vx, vy, vz) = position, velocity

@@ -16,7 +16,7 @@ from throwcollect.runtimes.docker.engine import engine_address, engine_errors
 from throwcollect.runtimes.docker.image import default_tag
 from throwcollect.runtimes.docker.options import RUN_LABEL, RunPlace, image, mount_source, section_of
 from throwcollect.runtimes.nodes import COORDINATOR, ROUTER
-from throwcollect.runtimes.ports import reserved_port
+from throwcollect.runtimes.ports import reserve_port
 
 _NODES = {"router": ROUTER, "sim": "sim_0", "coordinator": COORDINATOR}
 
@@ -47,7 +47,7 @@ def check(client: DockerClient, place: RunPlace, config: Config) -> None:
     if problems := list(_problems(config, networks, root)):
         raise ConfigError(problems)
     if config.run.router_port and not begun:
-        reserved_port(config.run.router_port).close()
+        reserve_port(config.run.router_port).close()
 
 
 def _problems(config: Config, networks: set[str], root: str) -> Iterator[Problem]:

@@ -39,14 +39,14 @@ class EngineClock:
 
     def attend(self, client: DockerClient) -> None:
         """Count every answer that a client gets."""
-        client.api.hooks["response"].append(self._answered)
+        client.api.hooks["response"].append(self._note_answer)
 
     def ignore(self, client: DockerClient) -> None:
         """Count the answers that a client gets no more."""
         with suppress(ValueError):
-            client.api.hooks["response"].remove(self._answered)
+            client.api.hooks["response"].remove(self._note_answer)
 
-    def heard(self) -> None:
+    def note_arrival(self) -> None:
         """Take note of something that arrived, such as a part of a stream."""
         self._silent_s = 0.0
 
@@ -54,8 +54,8 @@ class EngineClock:
         """Stop counting."""
         self._closed.set()
 
-    def _answered(self, _response: Any, *_: Any, **__: Any) -> None:
-        self.heard()
+    def _note_answer(self, _response: Any, *_: Any, **__: Any) -> None:
+        self.note_arrival()
 
     def _count(self) -> None:
         while not self._closed.wait(_TICK_S):

@@ -19,7 +19,7 @@ _GRACE_S = 3
 _AT_ONCE = 8
 
 
-def held_runs(client: DockerClient) -> list[HeldRun]:
+def find_held_runs(client: DockerClient) -> list[HeldRun]:
     """All runs of which an engine holds containers or a network, by name.
 
     Raises:

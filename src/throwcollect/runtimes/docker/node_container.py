@@ -140,7 +140,7 @@ class NodeContainer:
                 try:
                     known = log.tell() - offset
                     for chunk in container.logs(stream=True, follow=True):
-                        self._clock.heard()
+                        self._clock.note_arrival()
                         log.write(chunk[known:])
                         known = max(0, known - len(chunk))
                     container.reload()

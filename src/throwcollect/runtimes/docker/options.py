@@ -120,7 +120,7 @@ def published(config: Config) -> bool:
     return bool(config.run.router_port or any(node.ports for node in each))
 
 
-def confined(place: RunPlace, config: Config) -> dict[str, Any]:
+def confine(place: RunPlace, config: Config) -> dict[str, Any]:
     """Keywords for `containers.create` that every container of a run gets: it can do little but compute."""
     return {
         "image": image(config),
@@ -152,7 +152,7 @@ def node_options(
     """
     section = section_of(config, node.name)
     options: dict[str, Any] = dict(section.options)
-    general = confined(place, config)
+    general = confine(place, config)
     own = {
         **node_environment(Connection(router_endpoint(config, middleware), KEY, config.run.domain_id, middleware)),
         # What nodes would say otherwise, a random id and /data, means nothing outside of the container.

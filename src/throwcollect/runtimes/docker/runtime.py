@@ -88,15 +88,15 @@ class DockerRuntime(Runtime):
             return Check("docker", "note", f"{error.message}; runs use processes")
         return Check("docker", "ok", f"{found}, with the image {default_tag()}")
 
-    def held(self) -> list[HeldRun]:
+    def find_held(self) -> list[HeldRun]:
         """Runs of which the engine holds something; none if there is no engine that answers quickly."""
         if "DOCKER_HOST" not in os.environ and not Path(_SOCKET).exists():
             return []
         from throwcollect.runtimes.docker.engine import connect
-        from throwcollect.runtimes.docker.held_runs import held_runs
+        from throwcollect.runtimes.docker.held_runs import find_held_runs
 
         try:
-            return held_runs(connect(timeout_s=_LOOK_S))
+            return find_held_runs(connect(timeout_s=_LOOK_S))
         except WorkerError:
             return []
 
@@ -107,10 +107,10 @@ class DockerRuntime(Runtime):
             WorkerError: If the engine does not answer in time.
         """
         from throwcollect.runtimes.docker.engine import connect, timed_out
-        from throwcollect.runtimes.docker.held_runs import held_runs
+        from throwcollect.runtimes.docker.held_runs import find_held_runs
 
         try:
-            return any(found.nodes for found in held_runs(connect()) if found.run_id == run)
+            return any(found.nodes for found in find_held_runs(connect()) if found.run_id == run)
         except WorkerError as error:
             if error.__cause__ is None or not timed_out(error.__cause__):
                 return False

@@ -20,7 +20,7 @@ from throwcollect.dataset.summary import Info
 from throwcollect.errors import DatasetError
 from throwcollect.run_key import RunKey
 from throwcollect.runtimes.docker.engine import ENGINE_ERRORS, engine_errors
-from throwcollect.runtimes.docker.options import DATA, KEY, KEY_LABEL, RunPlace, confined
+from throwcollect.runtimes.docker.options import DATA, KEY, KEY_LABEL, RunPlace, confine
 
 _IN_MEMORY = 16 * 1024**2
 _INFO_S = 120
@@ -46,7 +46,7 @@ def place_directory(client: DockerClient, place: RunPlace, config: Config, direc
         _single(client, place, config, ["--version"], place.mount(read_only=False)) as container,
     ):
         with tarfile.open(fileobj=packed, mode="w") as archive:
-            archive.add(directory, arcname=place.run_id, filter=_owned_by_caller)
+            archive.add(directory, arcname=place.run_id, filter=_give_to_caller)
         packed.seek(0)
         container.put_archive(DATA, packed)
 
@@ -73,7 +73,7 @@ def place_key(client: DockerClient, place: RunPlace, config: Config, key: RunKey
         packed = io.BytesIO()
         with tarfile.open(fileobj=packed, mode="w") as archive:
             for path in (key.certificate, key.private_key):
-                archive.add(path, arcname=path.name, filter=_readable_by_caller)
+                archive.add(path, arcname=path.name, filter=_let_caller_read)
         with _single(client, place, config, ["--version"], place.key_mount(read_only=False)) as container:
             container.put_archive(str(KEY.directory), packed.getvalue())
 
@@ -104,15 +104,15 @@ def dataset_info(client: DockerClient, place: RunPlace, config: Config) -> Info:
     return _INFO.validate_json(output)
 
 
-def _owned_by_caller(member: tarfile.TarInfo) -> tarfile.TarInfo:
+def _give_to_caller(member: tarfile.TarInfo) -> tarfile.TarInfo:
     member.uid, member.gid = os.getuid(), os.getgid()
     member.uname = member.gname = ""
     return member
 
 
-def _readable_by_caller(member: tarfile.TarInfo) -> tarfile.TarInfo:
+def _let_caller_read(member: tarfile.TarInfo) -> tarfile.TarInfo:
     member.mode = 0o400
-    return _owned_by_caller(member)
+    return _give_to_caller(member)
 
 
 @contextmanager
@@ -120,9 +120,7 @@ def _single(
     client: DockerClient, place: RunPlace, config: Config, command: list[str], mount: Mount
 ) -> Iterator[Container]:
     """A container of the run that is no node of it, without a network; removed at the end."""
-    container = client.containers.create(
-        **confined(place, config), command=command, mounts=[mount], network_mode="none"
-    )
+    container = client.containers.create(**confine(place, config), command=command, mounts=[mount], network_mode="none")
     try:
         yield container
     finally:

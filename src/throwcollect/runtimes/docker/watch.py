@@ -102,7 +102,7 @@ class EngineWatch:
             try:
                 self._stream = self._client.events(decode=True, filters=filters)
                 for event in self._stream:
-                    self._clock.heard()
+                    self._clock.note_arrival()
                     self.look(event["id"])
             except ENGINE_ERRORS as error:
                 self._note(error)

@@ -34,7 +34,7 @@ def chosen(monkeypatch: pytest.MonkeyPatch) -> list[int]:
         yield from (DIFFERENT if trial == 5 else Comparison(trial, "aa", "aa", ()) for trial in wanted)
 
     monkeypatch.setattr(reader, "Dataset", SimpleNamespace(open=lambda _: dataset))
-    monkeypatch.setattr(audit, "replayed", replayed)
+    monkeypatch.setattr(audit, "replay_throws", replayed)
     return trials
 
 

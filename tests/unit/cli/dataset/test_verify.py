@@ -27,7 +27,7 @@ def replays(monkeypatch: pytest.MonkeyPatch) -> list[int]:
         trials.extend(wanted)
         yield from (Comparison(trial, "aa", "bb", ("effort: otherwise",) * (trial == 1)) for trial in wanted)
 
-    monkeypatch.setattr("throwcollect.replay.verification.replayed", replayed)
+    monkeypatch.setattr("throwcollect.replay.verification.replay_throws", replayed)
     return trials
 
 

@@ -1,0 +1,121 @@
+"""What a documented function raises stands in its docstring.
+
+The linter's rule of this kind (ruff's DOC501) cannot be used: it takes functions that make an error for errors, as in
+``raise unreadable(...)``, asks for what a function itself catches, and would put ``Raises:`` into the help of commands.
+DOC502, by which only what a function itself raises may stand there, would take away what callers need: what passes
+through counts, too.
+"""
+
+from __future__ import annotations
+
+import ast
+import builtins
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+MODULES = {path: path.read_text(encoding="utf-8") for path in sorted((ROOT / "src").rglob("*.py"))}
+RAISES = re.compile(r"^ *Raises:\n((?: +.*\n?|\n)+)", flags=re.MULTILINE)
+
+
+def last_name(node: ast.expr | None) -> str:
+    """The name behind the last dot of a class or function, called or not."""
+    match node:
+        case ast.Call(func=inner) | ast.Subscript(value=inner):
+            return last_name(inner)
+        case ast.Attribute(attr=name) | ast.Name(id=name) | ast.Constant(value=str(name)):
+            return name
+    return ""
+
+
+class Errors:
+    """Classes of errors with those that they descend from, and the functions that make one."""
+
+    def __init__(self, texts: Mapping[Path, str]) -> None:
+        self._bases: dict[str, list[str]] = {}
+        self._makers: dict[str, str] = {}
+        for node in (node for text in texts.values() for node in ast.walk(ast.parse(text))):
+            if isinstance(node, ast.ClassDef):
+                self._bases[node.name] = list(map(last_name, node.bases))
+            elif isinstance(node, ast.FunctionDef) and (name := last_name(node.returns)):
+                self._makers[node.name] = name
+
+    def ancestors(self, name: str) -> set[str]:
+        """A class of errors and all that it descends from; empty if it is none."""
+        if name in self._bases:
+            above = {each for base in self._bases[name] for each in self.ancestors(base)}
+            return above and {name, *above}
+        kind = getattr(builtins, name, None)
+        is_error = isinstance(kind, type) and issubclass(kind, BaseException)
+        return {each.__name__ for each in kind.__mro__[:-1]} if is_error else set()
+
+    def raised(self, node: ast.Raise) -> str:
+        """Name of the class that is raised; empty if it cannot be told, as of ``raise error``."""
+        name = last_name(node.exc) if isinstance(node.exc, ast.Call) else ""
+        return next((each for each in (name, self._makers.get(name, "")) if self.ancestors(each)), "")
+
+
+def raises(node: ast.AST, errors: Errors, caught: frozenset[str] = frozenset()) -> Iterator[str]:
+    """Classes that leave a piece of code, without those that it catches and those of functions inside of it."""
+    if isinstance(node, ast.Raise):
+        name = errors.raised(node)
+        if name and not errors.ancestors(name) & caught:
+            yield name
+    for field, value in ast.iter_fields(node):
+        handled = caught
+        if isinstance(node, ast.Try) and field == "body":
+            kinds = [handler.type for handler in node.handlers]
+            parts = [part for kind in kinds for part in (kind.elts if isinstance(kind, ast.Tuple) else [kind])]
+            handled |= {last_name(part) for part in parts}
+        for inner in value if isinstance(value, list) else [value]:
+            if isinstance(inner, ast.AST) and not isinstance(inner, ast.FunctionDef | ast.Lambda | ast.ClassDef):
+                yield from raises(inner, errors, handled)
+
+
+def undocumented(path: Path, text: str, errors: Errors) -> Iterator[str]:
+    for function in (node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.FunctionDef)):
+        docstring = ast.get_docstring(function)
+        is_command = "cli" in path.parts and not function.name.startswith("_")
+        if docstring is None or is_command:  # The docstring of a command is its help.
+            continue
+        section = RAISES.search(docstring)
+        documented = set(re.findall(r"^ +(\w+): ", section[1], flags=re.MULTILINE)) if section else set()
+        for name in dict.fromkeys(raises(function, errors)):
+            if not errors.ancestors(name) & documented:
+                yield f"{function.name} raises {name}"
+
+
+def test_raises_are_documented() -> None:
+    errors = Errors(MODULES)
+    found = {str(path.relative_to(ROOT)): list(undocumented(path, text, errors)) for path, text in MODULES.items()}
+    assert {path: each for path, each in found.items() if each} == {}
+
+
+def test_the_rule_sees_what_it_should() -> None:
+    text = '''
+class OwnError(ValueError): ...
+def made(path) -> OwnError: ...
+def silent():
+    raise OwnError
+def says_too_little():
+    """Do it."""
+    try:
+        raise KeyError("caught")
+    except LookupError:
+        raise made(1) from None
+def says_it():
+    """Do it.
+
+    Raises:
+        ValueError: If it cannot
+            be done.
+        OSError: If the disk fails.
+    """
+    def inner():
+        raise KeyError("not its own")
+    raise made(2)
+'''
+    errors = Errors({Path(): text})
+    assert list(undocumented(Path("room/a.py"), text, errors)) == ["says_too_little raises OwnError"]
+    assert list(undocumented(Path("cli/a.py"), text, errors)) == []

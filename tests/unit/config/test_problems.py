@@ -1,0 +1,267 @@
+"""What is wrong in a configuration is named with its place, its value and what would be right."""
+
+from pathlib import Path
+
+import pytest
+
+from throwcollect.config.loader import load, load_locating_errors
+from throwcollect.errors import ConfigError, PlanError, Problem
+
+KNOWN_IN_RUN = (
+    "simulations, runtime, router_port, open, ros, root_namespace, domain_id, trial_timeout_s, start_timeout_s, "
+    "grace_s, retries, replay, restarts"
+)
+
+
+JOINT_LIST = "joint names, each with a number from -6.3 to 6.3 rad"
+
+
+@pytest.mark.parametrize(
+    ("text", "messages"),
+    [
+        ("trails: 3", ["run.yaml:1: trails: unknown key; did you mean 'trials'?"]),
+        ("run: {x: 3}", [f"run.yaml:1: run.x: unknown key; known keys here: {KNOWN_IN_RUN}"]),
+        (
+            "task:\n  trajectory:\n    family: dmp\n    gamma: 1",
+            [
+                "run.yaml:4: task.trajectory.gamma: unknown key; known keys here: "
+                "family, basis_functions, weights, alpha_z, alpha_x"
+            ],
+        ),
+        (
+            "task: {trajectory: {family: dpm}}",
+            ["run.yaml:1: task.trajectory.family: should be 'minimum_jerk' or 'dmp', got 'dpm'; did you mean 'dmp'?"],
+        ),
+        (
+            "task: {trajectory: fast}",
+            ["run.yaml:1: task.trajectory: should be keys and values or {family: …}, got 'fast'"],
+        ),
+        (
+            "ball:\n  mass_kg: heavy",
+            ["run.yaml:2: ball.mass_kg: should be a number above 0 and up to 2 kg, got 'heavy'"],
+        ),
+        ("ball:\n  mass_kg: '1'", ["run.yaml:2: ball.mass_kg: should be a number above 0 and up to 2 kg, got '1'"]),
+        ("ball:\n  mass_kg: true", ["run.yaml:2: ball.mass_kg: should be a number above 0 and up to 2 kg, got true"]),
+        ("ball:\n  mass_kg: .nan", ["run.yaml:2: ball.mass_kg: should be a number above 0 and up to 2 kg, got nan"]),
+        ("ball:\n  mass_kg: 0", ["run.yaml:2: ball.mass_kg: should be a number above 0 and up to 2 kg, got 0"]),
+        ("ball:\n  radius_m: [1]", ["run.yaml:2: ball.radius_m: should be a number from 0.005 to 0.1 m, got a list"]),
+        ("ball:", ["run.yaml:1: ball: should be keys and values, got nothing"]),
+        (
+            "sim: {physics_hz: 240.0}",
+            ["run.yaml:1: sim.physics_hz: should be a whole number from 100 to 10000 Hz, got 240.0"],
+        ),
+        ("seed: -1", ["run.yaml:1: seed: should be a whole number from 0 to 4294967295, got -1"]),
+        ("run: {trial_timeout_s: 0}", ["run.yaml:1: run.trial_timeout_s: should be a number above 0 s, got 0"]),
+        (
+            "name: Über",
+            ["run.yaml:1: name: should be lower-case letters, digits, - and _, first a letter or digit, got 'Über'"],
+        ),
+        (
+            "robot: {locked: torso_1_joint}",
+            ["run.yaml:1: robot.locked: should be 'auto' or 'none' or a list of joint names, got 'torso_1_joint'"],
+        ),
+        (
+            "robot: {locked: [torso_2_joint, torso_3_joint]}",
+            ["run.yaml:1: robot.locked.1: Talos has no joint 'torso_3_joint'; did you mean 'torso_2_joint'?"],
+        ),
+        ("task:\n  end: [1]", [f"run.yaml:2: task.end: should be {JOINT_LIST}, got a list"]),
+        (
+            "task:\n  end:\n    arm_rihgt_4_joint: 1",
+            [
+                "run.yaml:3: task.end.arm_rihgt_4_joint: Talos has no joint 'arm_rihgt_4_joint'; "
+                "did you mean 'arm_right_4_joint'?"
+            ],
+        ),
+        ("robot: {posture: {knee: 1}}", ["run.yaml:1: robot.posture.knee: Talos has no joint 'knee'"]),
+        (
+            "task:\n  end:\n    arm_right_4_joint: -60",
+            [
+                "run.yaml:3: task.end.arm_right_4_joint: should be a number from -6.3 to 6.3 rad, got -60; "
+                "angles are in radians: -60 degrees are -1.0472"
+            ],
+        ),
+        ("task: {end: {}}", ["run.yaml:1: task.end: names no joint, so nothing would move"]),
+        (
+            "task: {end: {arm_left_1_joint: 0}}",
+            ["run.yaml:1: task.end.arm_left_1_joint: start should name this joint, too"],
+        ),
+        (
+            "record: {rate_hz: 300}",
+            ["run.yaml:1: record.rate_hz: should divide sim.physics_hz, 500, got 300"],
+        ),
+        (
+            "record: {topics: [joint_states]}",
+            ["run.yaml:1: record.topics: should hold ball/odometry, from which throws are judged"],
+        ),
+        (
+            "record: {topics: [joint_states, ball/odometry, clok]}",
+            [
+                "run.yaml:1: record.topics.2: should be one of 'joint_states', 'ball/odometry', 'controller_state', "
+                "'tf', 'clock', got 'clok'; did you mean 'clock'?"
+            ],
+        ),
+        (
+            "robot: {locked: [torso_1_joint]}",
+            ["run.yaml:1: robot.locked: should not hold joints that task.end moves, got torso_1_joint"],
+        ),
+        (
+            "robot: {posture: {torso_1_joint: 0.1}}",
+            ["run.yaml:1: robot.posture.torso_1_joint: should be left out, as task.start sets this joint"],
+        ),
+        (
+            "tool: {cup_rim_radius_m: 0.003}",
+            [
+                "run.yaml:1: tool.cup_rim_radius_m: 0.003 m should be above cup_floor_radius_m, 0.004 m, "
+                "or the cup holds no ball"
+            ],
+        ),
+        (
+            "task:\n  trajectory:\n    family: dmp\n    basis_functions: 2\n    weights: {torso_1_joint: [1, 2, 3]}",
+            ["run.yaml:5: task.trajectory.weights.torso_1_joint: should be basis_functions = 2 numbers, got 3"],
+        ),
+        (
+            "task:\n  trajectory:\n    family: dmp\n    basis_functions: 2\n    weights: {head_1_joint: [1, 2]}",
+            ["run.yaml:5: task.trajectory.weights.head_1_joint: end does not name this joint, so it does not move"],
+        ),
+    ],
+)
+def test_wrong_values_are_named_with_place_and_expectation(problems_of, text, messages):
+    assert problems_of(text) == messages
+
+
+def test_all_problems_are_reported_at_once_and_unknown_keys_first(problems_of):
+    found = problems_of(
+        """
+        seed: x
+        ball: {mass_kg: heavy, radius_m: 1}
+        tool: {cup_rim_radius_m: 0.003}
+        sim: {solver_iterations: 0}
+        record: {rate_hz: 300}
+        trails: 3
+        robot: {locked: [torso_1_joint]}
+        sweep:
+          parameters:
+            task.duraton_s: {min: 1, max: 2}
+            ball.mass_kg: {min: -1, max: 1}
+        """
+    )
+    assert [problem.split(": ")[1] for problem in found] == [
+        "trails",
+        "sweep.parameters.task.duraton_s",
+        "trials",
+        "seed",
+        "ball.mass_kg",
+        "ball.radius_m",
+        "tool.cup_rim_radius_m",
+        "sim.solver_iterations",
+        "record.rate_hz",
+        "robot.locked",
+        "sweep.parameters.ball.mass_kg.min",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "swept", "meant"),
+    [
+        ("task: {duration_s: 100}", "task.durations_s", "task.duration_s"),
+        ("ball: {mass_kg: 0}", "ball.mas_kg", "ball.mass_kg"),
+        ("ball: {mass_kg: 0}", "ball.mass_kgs", "ball.mass_kg"),
+    ],
+)
+def test_a_misspelt_swept_key_is_found_beside_a_wrong_value_of_the_right_one(problems_of, text, swept, meant):
+    found = problems_of(f"trials: 1\n{text}\nsweep: {{parameters: {{{swept}: {{values: [1]}}}}}}")
+    assert len(found) == 2
+    assert found[0] == f"run.yaml:3: sweep.parameters.{swept}: unknown key; did you mean '{meant}'?"
+    assert found[1].startswith(f"run.yaml:2: {meant}: should be ")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "sim: {physics_hz: fast}\nrecord: {rate_hz: 300}",
+        "task:\n  end: {arm_left_1_joint: 0}\n  start: {arm_left_1_joint: far}",
+        "task: {end: {head_1_joint: far}}\nsweep: {parameters: {task.end.head_1_joint: {values: [0]}}}\ntrials: 1",
+        "task: {trajectory: {family: dpm}}\n"
+        "sweep: {parameters: {task.trajectory.weights.torso_1_joint.0: {values: [0]}}}\ntrials: 1",
+        "sweep: {sampler: lost, parameters: {ball.mass_kg: {min: 1, max: 2, count: 3}}}\ntrials: 1",
+    ],
+)
+def test_a_default_in_the_place_of_a_wrong_value_causes_no_further_problems(problems_of, text):
+    assert len(problems_of(text)) == 1
+
+
+def test_problems_carry_their_facts_as_fields(write):
+    path = write("name: x\nball:\n  mass_kg: heavy")
+    with pytest.raises(ConfigError, match="heavy") as caught:
+        load(path)
+    problem = caught.value.problems[0]
+    assert (problem.path, problem.line, problem.key) == (path, 3, "ball.mass_kg")
+
+
+@pytest.mark.parametrize(
+    ("key", "where"),
+    [
+        ("trials", "run.yaml:1: "),
+        ("sweep.parameters.task.duration_s.max", "run.yaml:4: "),
+        ("sweep.parameters.task.duration_s", "run.yaml:4: "),
+        ("record.topics.1", "run.yaml:7: "),
+        ("ball.mass_kg", "run.yaml: "),
+        ("run.router_port", ""),
+        ("sweep", "run.yaml:2: "),
+    ],
+)
+def test_what_is_found_later_is_named_with_the_place_of_its_key(write, key, where):
+    path = write("""
+        trials: 3
+        sweep:
+          parameters:
+            task.duration_s: {min: 1, max: 2}
+        record:
+          topics: [joint_states,
+                   ball/odometry]
+        """)
+    found = PlanError([Problem("all too fast", key)], expected="slower ones", hint="slow down")
+    with pytest.raises(PlanError, match="all too fast") as caught, load_locating_errors(path, ["run.router_port=7447"]):
+        raise found
+    assert caught.value.message.replace(f"{path.parent}/", "") == f"{where}{key}: all too fast"
+    assert (caught.value.expected, caught.value.hint) == (found.expected, found.hint)
+
+
+@pytest.mark.parametrize("problem", [Problem("torn", "trials", Path("list.csv"), 8), Problem("torn")])
+def test_what_has_another_place_or_none_keeps_it(write, problem):
+    with pytest.raises(ConfigError, match="torn") as caught, load_locating_errors(write("trials: 3")):
+        raise ConfigError([problem])
+    assert caught.value.problems == [problem]
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("unknown_{}: 1\n", "unknown_0: unknown key; known keys here: name"),
+        ("name: a\n", "name: the key is here twice, first in line 1"),
+    ],
+)
+def test_of_very_many_problems_the_first_are_told_and_the_others_counted(line, message, tmp_path):
+    path = tmp_path / "many.yaml"
+    path.write_text("name: a\n" + "".join(line.format(number) for number in range(500)))
+    with pytest.raises(ConfigError) as caught:
+        load(path)
+    lines = str(caught.value).splitlines()
+    assert len(lines) == 21
+    assert lines[0].startswith(f"{path}:2: {message}")
+    assert lines[-1] == "and 480 more"
+
+
+def test_suggestions_are_not_looked_for_where_nobody_would_read_them(tmp_path, monkeypatch):
+    asked = []
+
+    def near(word, known, count):
+        asked.append(word)
+        return []
+
+    monkeypatch.setattr("throwcollect.config.problems.get_close_matches", near)
+    path = tmp_path / "many.yaml"
+    path.write_text("task: {end: {" + ", ".join(f"joint_{number}: 1" for number in range(500)) + "}}\n")
+    with pytest.raises(ConfigError, match=r"task\.end\.joint_0: Talos has no joint 'joint_0'\n"):
+        load(path)
+    assert len(asked) <= 200

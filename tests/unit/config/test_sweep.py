@@ -1,0 +1,162 @@
+"""What is wrong with samplers, targets and the end of a collection is named in the words of the file."""
+
+import pytest
+
+from throwcollect.config.loader import dump_yaml, load
+
+
+@pytest.mark.parametrize(
+    ("sweep", "messages"),
+    [
+        ("task.duraton_s: {min: 1, max: 2}", ["task.duraton_s: unknown key; did you mean 'task.duration_s'?"]),
+        ("sim.physics_hz: {values: [500]}", ["sim.physics_hz: cannot vary from trial to trial"]),
+        ("task.points_hz: {values: [50]}", ["task.points_hz: cannot vary from trial to trial"]),
+        ("task.trajectory.family: {values: [5]}", ["task.trajectory.family: cannot be swept, as it is not a number"]),
+        (
+            "task.start.arm_right_3_joint: {min: -1, max: -0.9}",
+            [
+                "task.start.arm_right_3_joint: cannot vary from trial to trial, "
+                "as task.end does not name arm_right_3_joint"
+            ],
+        ),
+        ("task.duration_s: 1", ["task.duration_s: should be {min: …, max: …} or {values: …}, got 1"]),
+        ("task.duration_s: {min: 1}", ["task.duration_s.max: missing; should be a number in s"]),
+        ("task.duration_s: {min: 1, mx: 2}", ["task.duration_s.mx: unknown key; did you mean 'max'?"]),
+        ("task.duration_s: {min: 2, max: 1}", ["task.duration_s.min: should be at most max, 1.0, got 2.0"]),
+        (
+            "task.duration_s: {values: []}",
+            ["task.duration_s.values: should be a list of numbers in s, got an empty list"],
+        ),
+        (
+            "ball.drag_coefficient: {min: 0, max: 1, scale: log}",
+            ["ball.drag_coefficient.min: should be above 0 on a logarithmic scale, got 0.0"],
+        ),
+        (
+            "task.duration_s: {min: 0, max: 2}",
+            ["task.duration_s.min: should be a number from 0.1 to 10 s, got 0.0"],
+        ),
+        (
+            "ball.friction: {values: [1, 3]}",
+            ["ball.friction.values.1: should be a number from 0 to 2, got 3.0"],
+        ),
+        (
+            "task.end.arm_right_4_joint: {min: -60, max: 0}",
+            [
+                "task.end.arm_right_4_joint.min: should be a number from -6.3 to 6.3 rad, got -60.0; "
+                "angles are in radians: -60 degrees are -1.0472"
+            ],
+        ),
+        (
+            "task.duration_s: {min: 1, max: 2, count: 2}",
+            ["task.duration_s.count: should be left out, as the sampler sobol has no grid"],
+        ),
+    ],
+)
+def test_wrong_sweeps_are_named_with_place_and_expectation(problems_of, sweep, messages):
+    text = f"trials: 1\nsweep:\n  parameters:\n    {sweep}"
+    assert problems_of(text) == [f"run.yaml:4: sweep.parameters.{message}" for message in messages]
+
+
+@pytest.mark.parametrize(
+    ("sweep", "message"),
+    [
+        (
+            "{sampler: sobel}",
+            "sweep.sampler: should be one of 'grid', 'uniform', 'latin_hypercube', 'sobol', 'list', "
+            "got 'sobel'; did you mean 'sobol'?",
+        ),
+        ("{sampler: list}", "sweep.file: missing; the sampler list should have a CSV or Parquet file"),
+        ("{file: a.csv}", "sweep.file: should be left out, as the sampler sobol reads no file"),
+        (
+            "{sampler: list, file: a.csv, parameters: {ball.mass_kg: {values: [1]}}}",
+            "sweep.parameters: should be left out, as the sampler list takes keys and values from its file",
+        ),
+        (
+            "{sampler: grid, parameters: {ball.mass_kg: {min: 1, max: 2}}}",
+            "sweep.parameters.ball.mass_kg.count: missing; the sampler grid should know how many points to take",
+        ),
+        (
+            "{sampler: grid, parameters: {ball.mass_kg: {min: 1, max: 2, count: 1}}}",
+            "sweep.parameters.ball.mass_kg.count: should be 2 or more, as both min and max are grid points",
+        ),
+    ],
+)
+def test_samplers_get_what_they_need_and_nothing_else(problems_of, sweep, message):
+    assert problems_of(f"trials: 1\nsweep: {sweep}") == [f"run.yaml:2: {message}"]
+
+
+def test_samplers_that_draw_need_a_number_of_trials(problems_of):
+    assert problems_of("sweep: {parameters: {ball.mass_kg: {min: 1, max: 2}}}") == [
+        "run.yaml: trials: missing; the sampler sobol should know how many trials to draw, or until how many have "
+        "landed"
+    ]
+
+
+PARAMETERS = "parameters: {task.duration_s: {min: 1, max: 1.2}}"
+
+
+@pytest.mark.parametrize(
+    ("target", "message"),
+    [
+        ("{}", "distance_m: missing; at least one of distance_m, height_m and hit_angle_rad should be there"),
+        ("{distance_m: {min: -1, max: 2, bins: 4}}", "distance_m.min: should be 0 or more, got -1.0"),
+        ("{distance_m: {min: 2, max: 1, bins: 4}}", "distance_m.min: should be below max, 1.0, got 2.0"),
+        (
+            "{hit_angle_rad: {min: 1, max: 70, bins: 4}}",
+            "hit_angle_rad.max: should be from -1.5708 to 1.5708 rad, got 70.0",
+        ),
+        (
+            "{hit_angle_rad: {min: -2, max: 1, bins: 4}}",
+            "hit_angle_rad.min: should be from -1.5708 to 1.5708 rad, got -2.0",
+        ),
+        (
+            "{height_m: {min: 0, max: 1, bins: 4}}",
+            "height_m: should be left out, as scene.landing_height_m is not swept",
+        ),
+        ("{distance_m: {min: 1, max: 2}}", "distance_m.bins: missing; should be a whole number from 1 to 1000"),
+        ("{distnace_m: {min: 1, max: 2, bins: 4}}", "distnace_m: unknown key; did you mean 'distance_m'?"),
+        (
+            "{distance_m: {min: 1, max: 2, bins: 200}, hit_angle_rad: {min: 1, max: 1.2, bins: 100}}",
+            "hit_angle_rad.bins: makes 20000 cells together with the others; there may be 10000",
+        ),
+    ],
+)
+def test_targets_that_cannot_be_spread_over_are_named(problems_of, target, message):
+    assert problems_of(f"trials: 9\nsweep: {{{PARAMETERS}, target: {target}}}") == [
+        f"run.yaml:2: sweep.target.{message}"
+    ]
+
+
+def test_a_target_begins_with_sobol_and_has_parameters(problems_of):
+    target = "target: {distance_m: {min: 1, max: 2, bins: 4}}"
+    assert problems_of(f"trials: 9\nsweep: {{sampler: uniform, {PARAMETERS}, {target}}}") == [
+        "run.yaml:2: sweep.sampler: should be sobol, with which the search for target begins, got uniform"
+    ]
+    assert problems_of(f"trials: 9\nsweep: {{{target}}}") == [
+        "run.yaml:2: sweep.parameters: missing; target should have parameters to reach it with"
+    ]
+    assert problems_of(f"sweep: {{{PARAMETERS}, {target}}}") == [
+        "run.yaml: trials: missing; the sampler sobol should know how many trials to draw, or until how many have "
+        "landed"
+    ]
+
+
+def test_until_wants_a_number_and_a_sampler_that_goes_on(problems_of):
+    assert problems_of("until: 5") == ["run.yaml:1: until: should be {landed: …} or null, got 5"]
+    assert problems_of("until: {landed: 0}") == [
+        "run.yaml:1: until.landed: should be a whole number from 1 to 1000000, got 0"
+    ]
+    assert problems_of("until: {landed: 5}\nsweep: {sampler: list, file: a.csv}") == [
+        "run.yaml:1: until: should be left out, as the file of the sampler list is not part of the dataset"
+    ]
+
+
+def test_until_is_enough_for_samplers_that_draw(tmp_path):
+    path = tmp_path / "run.yaml"
+    path.write_text(f"until: {{landed: 5}}\nsweep: {{{PARAMETERS}}}")
+    config = load(path)
+    assert config.until is not None
+    assert config.until.landed == 5
+    assert config.grows
+    path.write_text(dump_yaml(config))
+    assert load(path) == config

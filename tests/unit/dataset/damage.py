@@ -1,0 +1,51 @@
+"""How files of a dataset are damaged in tests: one bit, one value, one line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+from mcap.opcode import Opcode
+
+from throwcollect.dataset.mcap_reader import Record, StoredEpisode, open_mcap
+
+SHARD = "quick_00001.mcap"
+
+
+FIRST = 3
+"""First trial of that shard."""
+
+
+def stored(path: Path, trial: int) -> StoredEpisode:
+    offset = pq.read_table(path.parent / "throws.parquet")["chunk_offset"].to_pylist()[trial]
+    with open_mcap(path) as contents:
+        return contents.episode(offset)
+
+
+def record_of(path: Path, opcode: Opcode, *, holding: bytes = b"", last: bool = False) -> Record:
+    with open_mcap(path) as contents:
+        found = [record for record in contents.records() if record.opcode == opcode and holding in record.data]
+    return found[-1] if last else found[0]
+
+
+def flip(path: Path, offset: int, bit: int = 1) -> None:
+    data = bytearray(path.read_bytes())
+    data[offset] ^= bit
+    path.write_bytes(data)
+
+
+def change_table(path: Path, column: str, row: int, value: object) -> None:
+    table = pq.read_table(path)
+    values = table[column].to_pylist()
+    values[row] = value
+    index = table.schema.get_field_index(column)
+    pq.write_table(
+        table.set_column(index, table.schema.field(index), pa.array(values, table.schema.types[index])), path
+    )
+
+
+def replace_text(path: Path, old: str, new: str) -> None:
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))

@@ -1,0 +1,335 @@
+"""Defects of a shard that tests plant, and what has to be said of each."""
+
+from __future__ import annotations
+
+import hashlib
+import zlib
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import zstandard
+from mcap.opcode import Opcode
+from tests.unit.dataset.conftest import Collection
+from tests.unit.dataset.damage import SHARD, flip, record_of, stored
+
+from throwcollect.config.loader import load
+from throwcollect.dataset.mcap_file import McapFile, episode_run
+from throwcollect.episode.channels import Channels
+from throwcollect.episode.message import Episode
+from throwcollect.episode.topics import joint_states
+from throwcollect.robots.description import full_description
+from throwcollect.robots.talos import TALOS
+
+
+def chunk_contents(directory: Path) -> None:
+    flip(directory / SHARD, stored(directory / SHARD, 4).offset + 2000)
+
+
+def chunk_crc(directory: Path) -> None:
+    flip(directory / SHARD, stored(directory / SHARD, 4).offset + 9 + 24)
+
+
+def chunk_end_time(directory: Path) -> None:
+    flip(directory / SHARD, stored(directory / SHARD, 4).offset + 9 + 8)
+
+
+def message_index(directory: Path) -> None:
+    flip(directory / SHARD, stored(directory / SHARD, 5).chunks[0].indexes[4].offset + 200)
+
+
+def stored_digest(directory: Path) -> None:
+    facts = stored(directory / SHARD, 3).facts
+    flip(directory / SHARD, facts.offset + facts.data.index(b"digest") + 12)
+
+
+def records_hash(directory: Path) -> None:
+    facts = stored(directory / SHARD, 3).facts
+    place = facts.offset + facts.data.index(b"records_sha256") + len(b"records_sha256") + 4
+    data = bytearray((directory / SHARD).read_bytes())
+    data[place] = ord("0") if data[place] != ord("0") else ord("1")
+    (directory / SHARD).write_bytes(data)
+
+
+def header_contact(directory: Path) -> None:
+    facts = stored(directory / SHARD, 3).facts
+    # The contact ends 1 ns later: valid, but not what was hashed.
+    flip(directory / SHARD, facts.offset + facts.data.index(b'"end_ns":64400000000') + len('"end_ns":64400000000') - 1)
+
+
+def torn(directory: Path) -> None:
+    data = (directory / SHARD).read_bytes()
+    (directory / SHARD).write_bytes(data[: len(data) * 2 // 3])
+
+
+def missing_footer(directory: Path) -> None:
+    footer = record_of(directory / SHARD, Opcode.FOOTER)
+    (directory / SHARD).write_bytes((directory / SHARD).read_bytes()[: footer.offset])
+
+
+def trailing_bytes(directory: Path) -> None:
+    data = (directory / SHARD).read_bytes()
+    (directory / SHARD).write_bytes(data + data[-8:])
+
+
+def statistics(directory: Path) -> None:
+    flip(directory / SHARD, record_of(directory / SHARD, Opcode.STATISTICS).offset + 9)
+
+
+def chunk_index(directory: Path) -> None:
+    flip(directory / SHARD, record_of(directory / SHARD, Opcode.CHUNK_INDEX, last=True).offset + 9 + 16)
+
+
+def footer_crc(directory: Path) -> None:
+    flip(directory / SHARD, record_of(directory / SHARD, Opcode.FOOTER).offset + 9 + 16)
+
+
+def data_crc(directory: Path) -> None:
+    flip(directory / SHARD, record_of(directory / SHARD, Opcode.DATA_END).offset + 9)
+
+
+def profile(directory: Path) -> None:
+    flip(directory / SHARD, record_of(directory / SHARD, Opcode.HEADER).offset + 9 + 4)
+
+
+def channel_qos(directory: Path) -> None:
+    channel = record_of(directory / SHARD, Opcode.CHANNEL, holding=b"/ball/odometry")
+    flip(directory / SHARD, channel.offset + channel.data.index(b"depth: 10") + 8)
+
+
+def schema_name(directory: Path) -> None:
+    schema = record_of(directory / SHARD, Opcode.SCHEMA)
+    flip(directory / SHARD, schema.offset + 9 + 2 + 4, bit=0x20)
+
+
+def bag_copy(directory: Path) -> None:
+    copy = record_of(directory / SHARD, Opcode.METADATA, holding=b"serialized_metadata")
+    flip(directory / SHARD, copy.offset + copy.data.index(b"version: 9") + 9)
+
+
+def shard_gone(directory: Path) -> None:
+    (directory / SHARD).unlink()
+
+
+def shards_swapped(directory: Path) -> None:
+    one, other = (directory / "quick_00000.mcap").read_bytes(), (directory / SHARD).read_bytes()
+    (directory / "quick_00000.mcap").write_bytes(other)
+    (directory / SHARD).write_bytes(one)
+
+
+def open_shard_left(directory: Path) -> None:
+    (directory / "quick_00003.mcap.part").write_bytes(b"")
+
+
+def written(path: Path, episodes: list[Episode]) -> None:
+    """A file of these episodes, in which everything fits."""
+    config = load(path.parent / "config.yaml")
+    with path.open("wb") as file:
+        mcap = McapFile(file.write, Channels(config, full_description(config)), start_ns=episodes[0].chunk.start_ns)
+        for episode in episodes:
+            mcap.append(episode_run(episode))
+        mcap.finish(path.name)
+
+
+def episodes_of(directory: Path) -> list[Episode]:
+    return [stored(directory / SHARD, trial).episode for trial in (3, 4, 5)]
+
+
+def duplicate_episode(directory: Path) -> None:
+    first, second, third = episodes_of(directory)
+    written(directory / SHARD, [first, second, second, third])
+
+
+def episodes_in_another_order(directory: Path) -> None:
+    first, second, third = episodes_of(directory)
+    written(directory / SHARD, [first, third, second])
+
+
+def episode_missing(directory: Path) -> None:
+    first, _, third = episodes_of(directory)
+    written(directory / SHARD, [first, third])
+
+
+def episode_of_another_shard(directory: Path) -> None:
+    first, second, _ = episodes_of(directory)
+    written(directory / SHARD, [first, second, stored(directory / "quick_00000.mcap", 1).episode])
+
+
+def episode_of_another_dataset(directory: Path) -> None:
+    first, second, third = episodes_of(directory)
+    other = Collection({"ball": {"mass_kg": 0.1}, "seed": 1}).episode(4)
+    assert other.digest != second.digest
+    written(directory / SHARD, [first, other, third])
+
+
+def altered_with_all_hashes_made_to_fit(directory: Path) -> None:
+    first, second, third = episodes_of(directory)
+    contents = bytearray(second.chunk.decompress())
+    contents[31 + joint_states(TALOS.joints).layout.dtype.fields["position"][1] + 6] ^= 1
+    data = zstandard.ZstdCompressor(level=1).compress(bytes(contents))
+    chunk = replace(second.chunk, data=data, crc=zlib.crc32(contents))
+    written(directory / SHARD, [first, Episode(second.header, chunk, hashlib.sha256(contents).hexdigest()), third])
+
+
+def schema_text(directory: Path) -> None:
+    schema = record_of(directory / SHARD, Opcode.SCHEMA, holding=b"nav_msgs/msg/Odometry")
+    flip(directory / SHARD, schema.end - 40)
+
+
+def schema_length(directory: Path) -> None:
+    schema = record_of(directory / SHARD, Opcode.SCHEMA, holding=b"nav_msgs/msg/Odometry")
+    flip(directory / SHARD, schema.offset + 2)
+
+
+def first_magic(directory: Path) -> None:
+    flip(directory / SHARD, 3)
+
+
+def last_magic(directory: Path) -> None:
+    flip(directory / SHARD, (directory / SHARD).stat().st_size - 3)
+
+
+def latched_chunk(directory: Path) -> None:
+    flip(directory / SHARD, record_of(directory / SHARD, Opcode.CHUNK).end - 500)
+
+
+def latched_index(directory: Path) -> None:
+    flip(directory / SHARD, record_of(directory / SHARD, Opcode.MESSAGE_INDEX).offset + 15)
+
+
+def chunk_opcode(directory: Path) -> None:
+    flip(directory / SHARD, stored(directory / SHARD, 4).offset, bit=0x10)
+
+
+def chunk_length(directory: Path) -> None:
+    flip(directory / SHARD, stored(directory / SHARD, 4).offset + 2)
+
+
+def index_length(directory: Path) -> None:
+    flip(directory / SHARD, stored(directory / SHARD, 4).chunks[0].indexes[4].offset + 2)
+
+
+def metadata_name(directory: Path) -> None:
+    flip(directory / SHARD, stored(directory / SHARD, 4).facts.offset + 9 + 4)
+
+
+def metadata_length(directory: Path) -> None:
+    flip(directory / SHARD, stored(directory / SHARD, 5).facts.offset + 1)
+
+
+def header_json(directory: Path) -> None:
+    facts = stored(directory / SHARD, 4).facts
+    flip(directory / SHARD, facts.offset + facts.data.index(b'{"trial"'))
+
+
+def zeroed_sector(directory: Path) -> None:
+    data = bytearray((directory / SHARD).read_bytes())
+    start = stored(directory / SHARD, 4).chunks[0].indexes[3].offset - 100
+    data[start : start + 512] = bytes(512)
+    (directory / SHARD).write_bytes(data)
+
+
+def bytes_inserted(directory: Path) -> None:
+    data = (directory / SHARD).read_bytes()
+    place = stored(directory / SHARD, 4).facts.end
+    (directory / SHARD).write_bytes(data[:place] + b"between" + data[place:])
+
+
+def cut_in_the_header(directory: Path) -> None:
+    (directory / SHARD).write_bytes((directory / SHARD).read_bytes()[:12])
+
+
+def cut_in_the_first_episode(directory: Path) -> None:
+    end = stored(directory / SHARD, 3).chunks[0].record.end
+    (directory / SHARD).write_bytes((directory / SHARD).read_bytes()[: end - 100])
+
+
+def cut_after_an_episode(directory: Path) -> None:
+    end = stored(directory / SHARD, 4).facts.end
+    (directory / SHARD).write_bytes((directory / SHARD).read_bytes()[:end])
+
+
+def emptied(directory: Path) -> None:
+    (directory / SHARD).write_bytes(b"")
+
+
+def a_directory_instead(directory: Path) -> None:
+    (directory / SHARD).unlink()
+    (directory / SHARD).mkdir()
+
+
+def summary_record_missing(directory: Path) -> None:
+    path = directory / SHARD
+    index = record_of(path, Opcode.CHUNK_INDEX, last=True)
+    data = path.read_bytes()
+    path.write_bytes(data[: index.offset] + data[index.end :])
+
+
+def extra_shard(directory: Path) -> None:
+    (directory / "quick_00003.mcap").write_bytes((directory / SHARD).read_bytes())
+
+
+SHARD_DEFECTS: dict[Callable[[Path], None], tuple[str, str, str]] = {
+    chunk_contents: (SHARD, "trial 4", "cannot be decompressed|CRC differs"),
+    chunk_crc: (SHARD, "trial 4", "CRC differs"),
+    chunk_end_time: (SHARD, "trial 4", "times differ"),
+    message_index: (SHARD, "trial 5", "message indexes"),
+    records_hash: (SHARD, "trial 3", "SHA-256 of its records is"),
+    stored_digest: (SHARD, "trial 3", "metadata at byte"),
+    header_contact: (SHARD, "trial 3", "metadata at byte"),
+    torn: (SHARD, "", "cut off|beyond the end"),
+    missing_footer: (SHARD, "summary", "a footer is missing"),
+    trailing_bytes: (SHARD, "", "its records have"),
+    statistics: (SHARD, "byte", "statistics does not fit"),
+    chunk_index: (SHARD, "byte", "chunk_index does not fit"),
+    footer_crc: (SHARD, "byte", "footer does not fit"),
+    data_crc: (SHARD, "byte", "CRC of the data section"),
+    profile: (SHARD, "byte", "profile ros2"),
+    channel_qos: (SHARD, "channels", "/ball/odometry"),
+    schema_name: (SHARD, "schemas", "std_msgs/msg/String is another one"),
+    bag_copy: (SHARD, "byte", "copy of the bag's metadata"),
+    shard_gone: (SHARD, "", "cannot be read"),
+    shards_swapped: (SHARD, "trial 0", "does not place here"),
+    open_shard_left: ("quick_00003.mcap.part", "", "not written to its end"),
+    duplicate_episode: (SHARD, "trial 4", r"byte \d+: the file has an episode of this trial already, at byte \d+"),
+    episodes_in_another_order: (SHARD, "trial 4", "comes after trial 5"),
+    episode_missing: (SHARD, "trial 4", "the file has no whole one"),
+    episode_of_another_shard: (SHARD, "trial 1", "does not place here"),
+    episode_of_another_dataset: (SHARD, "trial 4", "throws.parquet has .* more columns differ"),
+    altered_with_all_hashes_made_to_fit: (SHARD, "trial 4", "throws.parquet has digest"),
+    schema_text: (SHARD, "schemas", "nav_msgs/msg/Odometry is another one"),
+    schema_length: (SHARD, "byte", "beyond the end"),
+    first_magic: (SHARD, "byte 0", "does not begin as an MCAP file does"),
+    last_magic: (SHARD, "byte", "does not end as an MCAP file does"),
+    latched_chunk: (SHARD, "byte", "latched topics: chunk: "),
+    latched_index: (SHARD, "byte", "message indexes of the latched topics"),
+    chunk_opcode: (SHARD, "byte", r"a record 0x16 where .*; the next episode is at byte \d+$"),
+    chunk_length: (SHARD, "byte", r"the next episode is at byte \d+$"),
+    index_length: (SHARD, "byte", r"the next episode is at byte \d+$"),
+    metadata_name: (SHARD, "byte", "where the metadata of an episode should be"),
+    metadata_length: (SHARD, "", "metadata record is not readable|metadata at byte .* do not fit"),
+    header_json: (SHARD, "byte", "episode header: .* Invalid JSON"),
+    zeroed_sector: (SHARD, "byte", "a record 0x00 where"),
+    bytes_inserted: (SHARD, "byte", "beyond the end"),
+    cut_in_the_header: (SHARD, "byte 8", "cut off"),
+    cut_in_the_first_episode: (SHARD, "byte", "beyond the end"),
+    cut_after_an_episode: (SHARD, "byte", "cut off"),
+    emptied: (SHARD, "", "has 0 bytes"),
+    a_directory_instead: (SHARD, "", "not a file"),
+    summary_record_missing: (SHARD, "byte", "a metadata_index where a chunk_index should be"),
+    extra_shard: ("quick_00003.mcap", "", "no row of throws"),
+}
+"""File, place and problem that are to be named."""
+
+
+SHARD_CONSEQUENCES: dict[Callable[[Path], None], tuple[str, ...]] = {
+    records_hash: ("metadata.yaml",),
+    header_contact: ("metadata.yaml",),
+    duplicate_episode: ("metadata.yaml",),
+    episode_missing: ("metadata.yaml",),
+    episode_of_another_shard: ("metadata.yaml",),
+    episode_of_another_dataset: ("metadata.yaml",),
+    altered_with_all_hashes_made_to_fit: ("metadata.yaml",),
+    shards_swapped: ("quick_00000.mcap", "metadata.yaml"),
+}
+"""Other files that a defect contradicts."""
