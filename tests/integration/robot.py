@@ -17,8 +17,7 @@ import pytest
 from rclzenoh.interfaces import Message
 from rclzenoh.session_config import CONFIG_FILE_VARIABLE, OVERRIDE_VARIABLE
 from throwcollect.config.schema import Config
-from throwcollect.robots.description import start_posture
-from throwcollect.robots.talos import TALOS
+from throwcollect.robots.description import robot_of, start_posture
 from throwcollect.ros import (
     ActionClient,
     Context,
@@ -144,7 +143,7 @@ def duration(seconds: float) -> Any:
 
 def trajectory(controller: str, seconds: float = 1.0, **ends: float) -> Any:
     """From the start posture to other angles of some joints [rad], and to rest there."""
-    joints = TALOS.controllers[controller]
+    joints = robot_of(CONFIG).controllers[controller]
     still = [0.0] * len(joints)
     postures = [[POSTURE[joint] for joint in joints], [ends.get(joint, POSTURE[joint]) for joint in joints]]
     points = [
@@ -243,12 +242,13 @@ class Robot:
 
     def joint(self, name: str) -> float:
         """Measured angle of a joint, by the state of its controller."""
-        controller = next(key for key, joints in TALOS.controllers.items() if name in joints)
+        robot = robot_of(CONFIG)
+        controller = robot.controller_of(name)
         kind = "control_msgs/msg/JointTrajectoryControllerState"
         with self.listening(kind, f"{controller}/controller_state") as heard:
             # A request makes an idle simulation look around, and tell its state.
             self.wait_until(lambda: self.state() in (PLAYING, PAUSED) and bool(heard), "a controller state")
-        return float(heard[-1].feedback.positions[TALOS.controllers[controller].index(name)])
+        return float(heard[-1].feedback.positions[robot.controllers[controller].index(name)])
 
     @contextmanager
     def listening(

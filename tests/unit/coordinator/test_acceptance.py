@@ -6,11 +6,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+import zstandard
 
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.acceptance import Acceptance
 from throwcollect.episode.channels import Channels
-from throwcollect.episode.chunk import ChunkEncoder
+from throwcollect.episode.chunk import Chunk, ChunkEncoder
 from throwcollect.episode.message import Delivery, Episode
 from throwcollect.episode.record import Contact, EpisodeHeader, Samples
 from throwcollect.replay.throw import Replayer
@@ -85,6 +86,13 @@ def late(episode: Episode) -> Episode:
     return encoded(episode.header, replace(samples, stamps_ns=samples.stamps_ns + 4))
 
 
+def of_another_robot(episode: Episode) -> Episode:
+    contents = episode.state.contents.replace(b"head_1_joint", b"neck_1_joint")
+    start_ns, end_ns = episode.chunk.start_ns, episode.chunk.end_ns
+    chunk = Chunk.of(contents, zstandard.compress(contents), start_ns=start_ns, end_ns=end_ns)
+    return Episode(episode.header, chunk)
+
+
 def misdated(episode: Episode) -> Episode:
     return Episode(replace(episode.header, start_ns=5), episode.chunk)
 
@@ -94,6 +102,7 @@ def misdated(episode: Episode) -> Episode:
     [
         (late, "differ|starts at"),
         (misdated, "times differ"),
+        (of_another_robot, "joint 29 of the joint states is neck_1_joint"),
     ],
 )
 def test_what_is_wrong_is_said(
