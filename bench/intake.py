@@ -20,7 +20,7 @@ from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.episode.message import pack, unpack
 from throwcollect.run_key import Signer
 from throwcollect.sweep.plan import Plan
-from throwcollect.tasks.throw.judge import judge
+from throwcollect.tasks.task import task_of
 
 _SIGNER = Signer(b"key of a run")
 
@@ -54,12 +54,7 @@ def _taken_in(
         assignment = assignments[episode.header.trial]
         if acceptance.foreign(delivery, assignment, "") or acceptance.unsound(episode, assignment):
             raise ValueError(f"trial {episode.header.trial} is refused")
-        result = judge(
-            episode.samples(),
-            episode.header,
-            config=assignment.config,
-            trajectory=assignment.trajectory,
-        )
+        result = task_of(assignment.config).judge(episode.samples(), episode.header, assignment.trajectory)
         writer.append(episode, result)
     seconds = time.perf_counter() - began
     writer.close()

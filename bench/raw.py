@@ -17,14 +17,14 @@ from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.robots.talos import TALOS
 from throwcollect.sim.world import World
 from throwcollect.sweep.plan import Plan
-from throwcollect.tasks.trajectory import throw_trajectory
+from throwcollect.tasks.task import task_of
 
 Commands = tuple[list[list[float]], list[list[float]]]
 
 
 def commands_of(config: Config, moving: tuple[str, ...]) -> Commands:
     """Positions and feed-forward velocities of every physics step of a trial, until its longest duration."""
-    trajectory = throw_trajectory(config)
+    trajectory = task_of(config).trajectory()
     steps = int(config.sim.max_trial_s * config.sim.physics_hz)
     times = np.minimum(np.arange(steps + 1) / config.sim.physics_hz, trajectory.times[-1])
     positions = sample_quintic(trajectory, times)[0]

@@ -139,7 +139,7 @@ class Simulator:
     def _throw(self, trial: Trial) -> Throw:
         episode = self._replayer.run(trial)
         keys = tuple(trial.values)
-        table = ThrowsTable(keys, tuple(self.config.task.end))
+        table = ThrowsTable(keys, self.config)
         row = table.row(trial, judge_episode(with_values(self.config, trial.values), episode), None)
         row |= {"samples": episode.header.samples, "digest": episode.digest}
         return Throw(table.table([row]), 0, keys, _Simulated(episode), self._source)

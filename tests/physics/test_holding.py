@@ -12,9 +12,8 @@ from throwcollect.robots.description import joint_model, start_posture
 from throwcollect.robots.talos import TALOS
 from throwcollect.robots.tool_motion import ToolMotion
 from throwcollect.sim.world import World
-from throwcollect.tasks.throw.judge import judge
-from throwcollect.tasks.throw.outcome import Outcome
-from throwcollect.tasks.trajectory import throw_trajectory
+from throwcollect.tasks.task import task_of
+from throwcollect.tasks.throw.outcome import ThrowOutcome
 from throwcollect.tools.tool import tool_of
 
 START = Config().task.start
@@ -75,12 +74,12 @@ def test_spoon_is_where_the_physics_has_it():
 
 @pytest.mark.parametrize(
     ("start", "outcome"),
-    [({}, Outcome.LANDED), ({"arm_right_5_joint": 1.5}, Outcome.DROPPED)],
+    [({}, ThrowOutcome.LANDED), ({"arm_right_5_joint": 1.5}, ThrowOutcome.DROPPED)],
 )
 def test_ball_of_a_spoon_that_does_not_hold_it_is_dropped(start, outcome, thrower):
     one = thrower(task={"start": {**START, **start}})
     samples = one.throw()
     header = EpisodeHeader(0, int(samples.stamps_ns[0]), "landed", one.world.contacts(), (), len(samples))
-    result = judge(samples, header, config=one.config, trajectory=throw_trajectory(one.config))
+    result = task_of(one.config).judge(samples, header, task_of(one.config).trajectory())
     assert result.outcome is outcome
     assert result.landing is not None

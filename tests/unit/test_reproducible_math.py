@@ -27,7 +27,7 @@ from throwcollect.config.loader import load
 from throwcollect.episode.frames import MovingFrame
 from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.sweep.plan import make_plan
-from throwcollect.tasks.trajectory import throw_trajectory
+from throwcollect.tasks.task import task_of
 
 
 def show(name, *arrays):
@@ -38,7 +38,7 @@ for path in sorted(Path("configs").glob("*.yaml")):
     plan = make_plan(load(path), directory=path.parent)
     show(path.name, *([*trial.values.values()] for trial in plan.trials[:100]))
     for trial in plan.trials[:20]:
-        trajectory = throw_trajectory(plan.config_of(trial))
+        trajectory = task_of(plan.config_of(trial)).trajectory()
         show("sent", trajectory.times, trajectory.positions, trajectory.velocities, trajectory.accelerations)
         show("desired", *sample_quintic(trajectory, np.linspace(0, 2, 500)))
 show("grown", *([*trial.values.values()] for trial in collected(configuration(trials=384))))

@@ -152,7 +152,8 @@ def _remove(values: dict[str, Any], location: Location) -> bool:
 def _sweep_findings(config: Config) -> Iterator[Finding]:
     sampler = config.sweep.sampler
     if config.sweep.parameters and sampler != "grid" and config.trials is None and config.until is None:
-        sentence = f"missing; the sampler {sampler} should know how many trials to draw, or until how many have landed"
+        until = f"until how many have {config.task.success}"
+        sentence = f"missing; the sampler {sampler} should know how many trials to draw, or {until}"
         yield Finding(("trials",), sentence)
     for key, parameter in config.sweep.parameters.items():
         location: Location = (*_PARAMETERS, key)

@@ -124,9 +124,10 @@ def _findings(details: ErrorDetails, values: Any, above: Location) -> Iterator[F
     elif kind == "missing":
         yield Finding(location, f"missing; should be {shape}")
     elif kind == "union_tag_not_found" and isinstance(value, Mapping):
-        families = [word for each in shape.alternatives for word in each.child("family").choices]
-        words = " or ".join(f"'{family}'" for family in families)
-        yield Finding((*location, "family"), _should_be(words, value["family"], families))
+        tag = "family" if "family" in value else "name"
+        choices = [word for each in shape.alternatives for word in each.child(tag).choices]
+        words = " or ".join(f"'{each}'" for each in choices)
+        yield Finding((*location, tag), _should_be(words, value[tag], choices))
     else:
         strange = "; no package that is installed brings it" if location in _MEMBERS else ""
         sentence = _should_be(str(shape), value, shape.choices, strange=strange)

@@ -7,11 +7,12 @@ Units are part of the name: ``_s``, ``_m``, ``_kg``, ``_hz``, ``_mps2``; angles 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterable
 from functools import reduce
 from operator import or_
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import Discriminator, Field, PositiveInt, model_validator
+from pydantic import Discriminator, Field, PositiveInt, Tag, model_validator
 
 from throwcollect.config.containers import ContainersConfig
 from throwcollect.config.controllers import ControllersConfig
@@ -23,6 +24,7 @@ from throwcollect.config.section import Section
 from throwcollect.config.sweep import Parameter, Range, SweepConfig, Values
 from throwcollect.config.task import TaskConfig
 from throwcollect.config.tool import ToolConfig
+from throwcollect.config.until import UntilConfig
 from throwcollect.members import load_member, names_of
 
 __all__ = ["Config", "DynamicMovementPrimitive", "MinimumJerk", "Parameter", "Range", "SweepConfig", "Values"]
@@ -30,9 +32,44 @@ __all__ = ["Config", "DynamicMovementPrimitive", "MinimumJerk", "Parameter", "Ra
 
 def _sections_of(family: str) -> Any:
     """Make the kind of a key that holds the section of any member of a family; its key `name` says which."""
-    sections = [load_member(family, name) for name in names_of(family)]
-    union = reduce(or_, sections)
-    return union if len(sections) == 1 else Annotated[union, Discriminator("name")]
+    sections = {name: load_member(family, name) for name in names_of(family)}
+    default = next(iter(sections))
+
+    def choose(value: Any) -> str | None:
+        """Find the class of the section that is meant; without a name, it is that of the family's first member."""
+        if isinstance(value, Section):
+            return type(value).__name__
+        name = value.get("name", default) if isinstance(value, dict) else None
+        return str(sections[name].__name__) if isinstance(name, str) and name in sections else None
+
+    return _any_of(sections.values(), choose)
+
+
+def _untils() -> Any:
+    """Make the kind of the key `until`, which holds the section that the task wants; its only key says which."""
+    sections = {each.until.outcome(): each.until for each in (load_member("tasks", name) for name in names_of("tasks"))}
+
+    def choose(value: Any) -> str | None:
+        """Find the class of the section that is meant; one with unknown keys is meant to be the first."""
+        if isinstance(value, Section):
+            return type(value).__name__
+        outcome = next((each for each in sections if isinstance(value, dict) and each in value), next(iter(sections)))
+        return str(sections[outcome].__name__)
+
+    return _any_of(sections.values(), choose)
+
+
+def _any_of(sections: Iterable[type[Section]], choose: Callable[[Any], str | None]) -> Any:
+    """Make the kind of a key that holds one of some sections.
+
+    Args:
+        sections: Their classes.
+        choose: Finds the name of the class for the contents of the key; None for none.
+    """
+    kinds = list(dict.fromkeys(sections))
+    if len(kinds) == 1:
+        return kinds[0]
+    return Annotated[reduce(or_, [Annotated[kind, Tag(kind.__name__)] for kind in kinds]), Discriminator(choose)]
 
 
 if TYPE_CHECKING:
@@ -40,12 +77,14 @@ if TYPE_CHECKING:
     EngineName = str
     AnyTool = ToolConfig
     AnyTask = TaskConfig
+    AnyUntil = UntilConfig
 else:
     # Which members there are is known when the program runs; what all of them have in common, before.
     RobotName = Literal[names_of("robots")]
     EngineName = Literal[names_of("engines")]
     AnyTool = _sections_of("tools")
     AnyTask = _sections_of("tasks")
+    AnyUntil = _untils()
 
 _BETWEEN_TRIALS_S = 10
 """Simulated time between the slots of two trials: results of a trial's goals expire before the next one."""
@@ -142,13 +181,6 @@ class RecordConfig(Section):
         return self
 
 
-class UntilConfig(Section):
-    """When enough has been collected."""
-
-    landed: Annotated[int, Field(ge=1, le=1_000_000)]
-    """Throws that should land, at least; trials are added to the plan until so many have."""
-
-
 class Config(Section):
     """One collection: from the robot to the dataset."""
 
@@ -159,7 +191,7 @@ class Config(Section):
     trials: Annotated[Annotated[int, Field(ge=1, le=10_000_000)] | None, Key(Effect.PLAN)] = None
     """Number of trials, with `until` the largest one; none means all points for `grid` and `list`, ten for each throw
     that should land with `until`."""
-    until: Annotated[UntilConfig | None, Key(Effect.PLAN, later=True)] = None
+    until: Annotated[AnyUntil | None, Key(Effect.PLAN, later=True)] = None
     """Collects until enough throws have landed, or `trials` are used up."""
     robot: Annotated[RobotConfig, Key(Effect.PHYSICS)] = RobotConfig()
     """The robot."""
@@ -213,6 +245,10 @@ class Config(Section):
         for joint in self.robot.posture:
             if joint in self.task.start:
                 wrong[f"robot.posture.{joint}"] = "should be left out, as task.start sets this joint"
+        if self.until is not None and not isinstance(self.until, self.task.until):
+            wrong[f"until.{self.until.outcome()}"] = f"should be {self.task.success}, as the task is {self.task.name}"
+        if self.sweep.target is not None and not self.task.throws:
+            wrong["sweep.target"] = f"should be left out, as the task {self.task.name} throws no ball"
         if self.until is not None and self.sweep.sampler == "list":
             wrong["until"] = "should be left out, as the file of the sampler list is not part of the dataset"
         if self.containers.sim.ports and self.run.simulations > 1:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from pydantic import Field, model_validator
 
@@ -10,10 +10,23 @@ from throwcollect.config.key import Effect, Key
 from throwcollect.config.kinds import Angle, ContradictionError, Joint
 from throwcollect.config.motion import DynamicMovementPrimitive, MinimumJerk, Trajectory
 from throwcollect.config.section import Section
+from throwcollect.config.until import UntilConfig
 
 
 class TaskConfig(Section):
-    """Base of the sections of tasks; a member of the family ``tasks`` is a class that is derived from it."""
+    """Base of the sections of tasks; a member of the family ``tasks`` is a class that is derived from it.
+
+    Attributes:
+        implementation: The task itself, ``module:class``: a `Task` that is made of a whole configuration. It is
+            imported where it is needed, so that reading a configuration stays cheap.
+        until: The section `until` of a configuration of this task; its key is the outcome of a trial that succeeded.
+        throws: Whether the ball is thrown: then the tool has to move, and `sweep.target` can ask for landings, as
+            results are `ThrowResult`.
+    """
+
+    implementation: ClassVar[str]
+    until: ClassVar[type[UntilConfig]]
+    throws: ClassVar[bool] = False
 
     name: str
     """Task."""
@@ -27,6 +40,16 @@ class TaskConfig(Section):
     """How the joints go from start to end."""
     points_hz: Annotated[float, Field(ge=5, le=1000)] = 25.0
     """Points per second of the joint trajectories that are sent to the controllers (quintic between them)."""
+
+    @property
+    def success(self) -> str:
+        """Outcome of a trial that succeeded."""
+        return self.until.outcome()
+
+    @property
+    def noun(self) -> str:
+        """What one of its trials is called."""
+        return "throw" if self.throws else "trial"
 
     @model_validator(mode="after")
     def _moving_joints_start_somewhere(self) -> TaskConfig:

@@ -21,7 +21,7 @@ from throwcollect.errors import DatasetError
 from throwcollect.robots.description import full_description, robot_of, start_posture, touchable_bodies
 from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.sweep.plan import Plan, Trial
-from throwcollect.tasks.trajectory import throw_trajectory
+from throwcollect.tasks.task import task_of
 from throwcollect.trial.conditions import Conditions, Settings, conditions_from_json
 from throwcollect.trial.lease import Lease
 
@@ -69,7 +69,7 @@ class Acceptance:
     def assign(self, plan: Plan, trial: Trial) -> Assignment:
         """Work out a trial."""
         config = plan.config_of(trial)
-        trajectory = throw_trajectory(config)
+        trajectory = task_of(config).trajectory()
         goals = trial_goals(robot_of(config), trajectory, start_posture(config))
         physics = {key: value for key, value in trial.values.items() if key in self._physics}
         conditions = Conditions(

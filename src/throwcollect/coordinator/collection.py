@@ -25,8 +25,8 @@ from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.episode.message import Delivery, Episode
 from throwcollect.errors import Interrupted, WorkerError
 from throwcollect.sweep.plan import Trial
-from throwcollect.tasks.throw.judge import judge
-from throwcollect.tasks.throw.outcome import Outcome, ThrowResult
+from throwcollect.tasks.result import Result
+from throwcollect.tasks.task import task_of
 from throwcollect.wording import command, counted
 
 _RATE_WINDOW_S = 10.0
@@ -82,7 +82,7 @@ class TrialCollection:
             ConfigError: If its ``config.yaml`` is wrong.
         """
         writer = DatasetWriter.open(directory)
-        there: list[tuple[int, ThrowResult]] = []
+        there: list[tuple[int, Result]] = []
         if found := writer.recover(lambda trial, result: there.append((trial, result))):
             say(f"keeps {counted(found, 'episode')} of an earlier collection")
         collection = cls(writer)
@@ -130,7 +130,7 @@ class TrialCollection:
             self._draining = True
             self._drain_deadline = time.monotonic() + self._config.run.grace_s
 
-    def recall(self, trial: int, result: ThrowResult) -> None:
+    def recall(self, trial: int, result: Result) -> None:
         """Count a trial as ended whose episode is in the dataset already, before anything is leased.
 
         Args:
@@ -224,12 +224,7 @@ class TrialCollection:
                 simulation, trial, f"its episode is refused: {problem}", self._leases.reject(trial, problem)
             )
             return
-        result = judge(
-            episode.samples(),
-            episode.header,
-            config=assignment.config,
-            trajectory=assignment.trajectory,
-        )
+        result = task_of(assignment.config).judge(episode.samples(), episode.header, assignment.trajectory)
         self.writer.append(episode, result)
         self._leases.complete(trial)
         self._tell_set_aside()
@@ -277,7 +272,7 @@ class TrialCollection:
         while self._ends[0][0] < now - _RATE_WINDOW_S:
             self._ends.popleft()
         since, before = self._ends[0]
-        # Of a plan that ends when enough throws have landed, nobody knows how many trials it will have.
+        # Of a plan that ends when enough trials have succeeded, nobody knows how many trials it will have.
         expected = self._growth.most if self._growth is not None and self._config.until is None else 0
         return Progress(
             total=self._leases.total + expected,
@@ -286,7 +281,9 @@ class TrialCollection:
             simulations=len(self._names),
             throws_per_s=(ended - before) / (now - since) if now > since else 0.0,
             hung=sorted(hung),
-            wanted=self._config.until.landed if self._config.until else None,
+            wanted=self._config.until.wanted if self._config.until else None,
+            success=self._config.task.success,
+            noun=self._config.task.noun,
             set_aside={self.name_of(simulation): reason for simulation, reason in self._set_aside.items()},
         )
 
@@ -345,7 +342,7 @@ class TrialCollection:
             self.on_more_trials()
         return trials is not None
 
-    def _note(self, trial: int, result: ThrowResult) -> None:
+    def _note(self, trial: int, result: Result) -> None:
         self._outcomes[result.outcome.value] += 1
         if self._growth is not None:
             self._growth.tell(trial, result)
@@ -363,4 +360,4 @@ class TrialCollection:
         if given_up is not None:
             del self._assignments[trial]
             self.writer.append_lost(trial, "; ".join(given_up))
-            self._note(trial, ThrowResult(Outcome.LOST, reason="; ".join(given_up)))
+            self._note(trial, task_of(self._config).lose("; ".join(given_up)))

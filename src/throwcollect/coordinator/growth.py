@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from throwcollect.coordinator.prepare import feasibility_check
 from throwcollect.sweep.plan import Check, Plan, Trial, make_trials
 from throwcollect.sweep.rounds import Rounds
-from throwcollect.tasks.throw.outcome import ThrowResult
+from throwcollect.tasks.result import Result
 
 
 class Growth:
@@ -38,7 +38,7 @@ class Growth:
         """Number of trials that may follow at most."""
         return 0 if self.over else self._rounds.limit - self._rounds.planned
 
-    def tell(self, trial: int, result: ThrowResult) -> None:
+    def tell(self, trial: int, result: Result) -> None:
         """Take in what came of a trial."""
         self._rounds.tell(trial, result)
 

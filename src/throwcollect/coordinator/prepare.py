@@ -14,7 +14,7 @@ from throwcollect.sweep.plan import Check, Plan, make_plan
 from throwcollect.sweep.point_file import read_points
 from throwcollect.sweep.points import Points
 from throwcollect.sweep.rounds import Rounds
-from throwcollect.tasks.trajectory import throw_trajectory
+from throwcollect.tasks.task import task_of
 
 
 def draw_plan(config: Config, *, directory: Path) -> Plan:
@@ -37,7 +37,7 @@ def feasibility_check(config: Config) -> Check:
         ConfigError: If the robot's files cannot be read.
     """
     feasibility = Feasibility(config)
-    return lambda trial: feasibility.check(trial, throw_trajectory(trial))
+    return lambda trial: feasibility.check(trial, task_of(trial).trajectory())
 
 
 def more_trials(plan: Plan) -> str:
@@ -45,7 +45,8 @@ def more_trials(plan: Plan) -> str:
     rounds = Rounds(plan.config) if plan.config.grows else None
     if rounds is None or len(plan.trials) >= rounds.limit:
         return ""
-    until = f", until {plan.config.until.landed} have landed" if plan.config.until else ""
+    wanted = plan.config.until
+    until = f", until {wanted.wanted} have {wanted.outcome()}" if wanted else ""
     return f"; more follow from their results{until}, at most {rounds.limit} in all"
 
 

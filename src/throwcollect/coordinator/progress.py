@@ -22,8 +22,10 @@ class Progress:
         simulations: Number of simulations in the ROS graph.
         throws_per_s: Trials that ended per second of the last ten seconds.
         hung: Names of the simulations that took too long for a trial and have not been heard of since.
-        wanted: Number of throws that are to land; None if the collection ends with its plan.
+        wanted: Number of trials that are to succeed; None if the collection ends with its plan.
         set_aside: Why simulations get no more trials, by their names.
+        success: Outcome of trials that succeeded.
+        noun: What a trial is called.
     """
 
     total: int
@@ -34,11 +36,13 @@ class Progress:
     hung: list[str]
     wanted: int | None = None
     set_aside: Mapping[str, str] = field(default_factory=dict)
+    success: str = "landed"
+    noun: str = "throw"
 
     @property
-    def landed(self) -> int:
-        """Number of throws whose outcome is ``landed``."""
-        return self.outcomes.get("landed", 0)
+    def succeeded(self) -> int:
+        """Number of trials that succeeded."""
+        return self.outcomes.get(self.success, 0)
 
     @property
     def lost(self) -> int:
@@ -47,34 +51,35 @@ class Progress:
 
     @property
     def failed(self) -> int:
-        """Number of throws with any other outcome."""
-        return sum(self.outcomes.values()) - self.landed - self.lost
+        """Number of trials with any other outcome."""
+        return sum(self.outcomes.values()) - self.succeeded - self.lost
 
     @property
     def steps(self) -> tuple[int, int]:
-        """How far it has come and has to go: in throws that landed if a number of them is wanted, else in trials."""
+        """How far it has come and has to go: in trials that succeeded if a number of them is wanted, else in trials."""
         if self.wanted is None:
             return self.ended, self.total
-        return min(self.landed, self.wanted), self.wanted
+        return min(self.succeeded, self.wanted), self.wanted
 
     @property
     def counts(self) -> str:
-        """Landed and failed throws, simulations and speed, in one line."""
-        parts = [f"{self.landed} landed", *self._others]
+        """Trials that succeeded and that failed, simulations and speed, in one line."""
+        parts = [f"{self.succeeded} {self.success}", *self._others]
         return ", ".join(parts)
 
     @property
     def line(self) -> str:
         """All of it that people want to see, in one line."""
         if self.wanted is None:
-            return f"{self.ended}/{counted(self.total, 'throw')}: {self.counts}"
-        return f"{counted(self.ended, 'throw')}: {', '.join([f'{self.landed}/{self.wanted} landed', *self._others])}"
+            return f"{self.ended}/{counted(self.total, self.noun)}: {self.counts}"
+        succeeded = f"{self.succeeded}/{self.wanted} {self.success}"
+        return f"{counted(self.ended, self.noun)}: {', '.join([succeeded, *self._others])}"
 
     @property
     def _others(self) -> list[str]:
         lost = [f"{self.lost} lost"] if self.lost else []
         simulations = counted(self.simulations, "simulation")
-        return [f"{self.failed} failed", *lost, simulations, f"{self.throws_per_s:.1f} throws/s"]
+        return [f"{self.failed} failed", *lost, simulations, f"{self.throws_per_s:.1f} {self.noun}s/s"]
 
     def to_json(self) -> str:
         """All of it as JSON, as `read` takes it."""

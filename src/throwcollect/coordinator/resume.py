@@ -21,12 +21,12 @@ from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError, Pro
 from throwcollect.files import check_regular, is_there, remove, write_file
 from throwcollect.sweep.plan import Plan, Trial
 from throwcollect.sweep.point_file import encode_points
-from throwcollect.tasks.throw.outcome import Outcome
+from throwcollect.tasks.result import LOST
 from throwcollect.wording import command
 
 Say = Callable[[str], None]
 
-_MAY_GROW = ("trials", "until.landed")
+_MAY_GROW = ("trials", "until")
 
 
 def begun(directory: Path) -> bool:
@@ -144,7 +144,7 @@ def finished(directory: Path, plan: Plan) -> bool:
     if not (directory / METADATA).is_file():
         return False
     try:
-        return Outcome.LOST.value not in read_throws(directory, plan)["outcome"].to_pylist()
+        return LOST not in read_throws(directory, plan)["outcome"].to_pylist()
     except DatasetError:
         return False
 
@@ -181,14 +181,14 @@ def _refuse_changes(directory: Path, stored: Config, config: Config) -> None:
     problems = [
         Problem(f"{directory} was begun with {quote(before)}, got {quote(after)}", key=key)
         for key, (before, after) in changed.items()
-        if key not in _MAY_GROW or not _grows(before, after, config)
+        if key.partition(".")[0] not in _MAY_GROW or not _grows(before, after, config)
     ]
     if problems:
         raise ConfigError(problems, expected="the same configuration, but for `run`, `containers` and more `trials`")
 
 
 def _grows(before: int | None, after: int | None, config: Config) -> bool:
-    """Whether a number of trials or throws may take the place of another; none is the largest."""
+    """Whether a number of trials may take the place of another; none is the largest."""
     if not config.grows:
         # `_extend` compares the trials of a plan that does not grow.
         return True

@@ -122,5 +122,6 @@ def _tell_drawing(config: Config) -> list[str]:
         ]
         lines.append(f"After {FIRST_TRIALS} trials, values were chosen that spread landings over {', '.join(bins)}.")
     if config.until is not None:
-        lines.append(f"Collected until {config.until.landed} throws had landed, or all trials had been used up.")
+        wanted = f"{config.until.wanted} {config.task.noun}s had {config.until.outcome()}"
+        lines.append(f"Collected until {wanted}, or all trials had been used up.")
     return lines

@@ -15,7 +15,7 @@ from throwcollect.dataset.journal import collected_s
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.summary import Info
 from throwcollect.errors import DatasetError, LossError
-from throwcollect.tasks.throw.outcome import Outcome
+from throwcollect.tasks.result import LOST
 from throwcollect.wording import counted
 
 
@@ -57,8 +57,8 @@ def summary(dataset: Dataset) -> Info:
         trials=len(dataset.throws),
         episodes=episodes,
         outcomes=count_outcomes(dataset.throws),
-        wanted=dataset.config.until.landed if dataset.config.until else None,
-        landing=_landing(dataset.throws),
+        wanted=dataset.config.until.wanted if dataset.config.until else None,
+        landing=_landing(dataset.throws) if dataset.config.task.throws else None,
         samples=samples,
         duration_s=(samples - episodes) / dataset.config.record.rate_hz,
         shards=len(shards),
@@ -67,6 +67,8 @@ def summary(dataset: Dataset) -> Info:
         topics=topics,
         digest=dataset.digest,
         wall_s=collected_s(directory),
+        success=dataset.config.task.success,
+        noun=dataset.config.task.noun,
     )
 
 
@@ -77,7 +79,7 @@ def loss(outcomes: Mapping[str, int], *, hint: str | None) -> LossError | None:
         outcomes: Number of trials of each outcome.
         hint: How to go on.
     """
-    lost, all_of_them = outcomes.get(Outcome.LOST.value, 0), sum(outcomes.values())
+    lost, all_of_them = outcomes.get(LOST, 0), sum(outcomes.values())
     if not lost:
         return None
     verb = "is" if lost == 1 else "are"

@@ -8,12 +8,11 @@ from throwcollect.config.schema import Config
 from throwcollect.episode.message import Episode
 from throwcollect.errors import DatasetError
 from throwcollect.robots.description import robot_of
-from throwcollect.tasks.throw.judge import judge
-from throwcollect.tasks.throw.outcome import ThrowResult
-from throwcollect.tasks.trajectory import throw_trajectory
+from throwcollect.tasks.result import Result
+from throwcollect.tasks.task import task_of
 
 
-def judge_episode(config: Config, episode: Episode) -> ThrowResult:
+def judge_episode(config: Config, episode: Episode) -> Result:
     """What came of a trial.
 
     Args:
@@ -26,9 +25,6 @@ def judge_episode(config: Config, episode: Episode) -> ThrowResult:
     samples = episode.samples(robot_of(config).joints)
     if (np.diff(samples.stamps_ns) <= 0).any():
         raise DatasetError("chunk: the stamps do not increase")
-    return judge(
-        samples,
-        episode.header,
-        config=config,
-        trajectory=throw_trajectory(config),
-    )
+    task = task_of(config)
+    result: Result = task.judge(samples, episode.header, task.trajectory())
+    return result

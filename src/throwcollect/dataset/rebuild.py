@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pyarrow as pa
 
@@ -30,7 +31,8 @@ from throwcollect.errors import DatasetError
 from throwcollect.files import read_text, write_file
 from throwcollect.robots.description import full_description
 from throwcollect.sweep.plan import Plan, Trial
-from throwcollect.tasks.throw.outcome import Outcome, ThrowResult
+from throwcollect.tasks.result import LOST
+from throwcollect.tasks.task import Task, task_of
 from throwcollect.wording import command
 
 NO_EPISODE = "no file holds an episode of it"
@@ -114,9 +116,9 @@ def _rebuild(directory: Path) -> Rebuilt:
                 raise DatasetError(str(findings[0]), path=directory, hint=repair)
         elif any(row["shard"] == name for row in earlier.values()):
             raise DatasetError(f"{name} is missing", path=directory, hint=repair)
-    table = ThrowsTable.of(plan)
+    table, task = ThrowsTable.of(plan), task_of(config)
     rows = [
-        recordings.rows.get(trial.number) or _row_without_episode(table, trial, earlier.get(trial.number))
+        recordings.rows.get(trial.number) or _row_without_episode(table, task, trial, earlier.get(trial.number))
         for trial in plan.trials
     ]
     throws = table.table(rows)
@@ -139,7 +141,7 @@ def _rebuild(directory: Path) -> Rebuilt:
     channels = recordings.channels or Channels(config, full_description(config))
     files = [(summary, entry_of_file(directory / summary.path)) for summary in recordings.summaries]
     write_description(directory, config.name, throws, channels, files)
-    lost = tuple(row["trial"] for row in rows if row["outcome"] == Outcome.LOST.value)
+    lost = tuple(row["trial"] for row in rows if row["outcome"] == LOST)
     return Rebuilt(len(rows), len(recordings.rows), lost, rejudged, tuple(written))
 
 
@@ -162,16 +164,16 @@ def read_earlier_rows(directory: Path, plan: Plan) -> Mapping[int, Row]:
     return {}
 
 
-def _row_without_episode(table: ThrowsTable, trial: Trial, earlier: Row | None) -> Row:
+def _row_without_episode(table: ThrowsTable, task: Task[Any], trial: Trial, earlier: Row | None) -> Row:
     """Row of a trial that has no episode; one that was lost before keeps its reason."""
     if trial.refused is not None:
         return table.refused_row(trial)
-    return table.row(trial, ThrowResult(Outcome.LOST, reason=reason_lost(earlier) or NO_EPISODE), None)
+    return table.row(trial, task.lose(reason_lost(earlier) or NO_EPISODE), None)
 
 
 def reason_lost(earlier: Row | None) -> str | None:
     """Why a trial was lost already when a row was written; None if it was not."""
-    if earlier is None or earlier["outcome"] != Outcome.LOST.value:
+    if earlier is None or earlier["outcome"] != LOST:
         return None
     return str(earlier["reason"] or NO_EPISODE)
 

@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
-from throwcollect.episode.record import Contact, EpisodeHeader, Samples
+from throwcollect.episode.record import NS_PER_S, Contact, EpisodeHeader, Samples
 from throwcollect.robots.trajectory import JointTrajectory
-from throwcollect.tasks.throw.flight import NS_PER_S
 
 _short = reprlib.Repr()
 _short.maxstring = 60

@@ -23,7 +23,7 @@ from throwcollect.episode.channels import Channels
 from throwcollect.errors import DatasetError
 from throwcollect.files import is_there, remove, unwritable
 from throwcollect.sweep.plan import Plan
-from throwcollect.tasks.throw.outcome import ThrowResult
+from throwcollect.tasks.result import Result
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class RecoveredEpisode:
     trial: int
     samples: int
     digest: str
-    result: ThrowResult
+    result: Result
 
 
 @dataclass(frozen=True)

@@ -178,7 +178,7 @@ def _plan_of_table(path: Path, config: Config) -> Plan:
     rows = table.to_pylist()
     if (
         any(reason_not_sweepable(config, key) for key in keys)
-        or not table.schema.equals(ThrowsTable(keys, tuple(config.task.end)).schema)
+        or not table.schema.equals(ThrowsTable(keys, config).schema)
         or not rows
         or [row["trial"] for row in rows] != list(range(len(rows)))
         or any(row[key] is None for row in rows for key in keys)

@@ -15,8 +15,9 @@ class Info:
         trials: Number of planned trials.
         episodes: Number of trials with an episode.
         outcomes: Number of trials of each outcome, most frequent first.
-        wanted: Number of throws that were to land; None if there was no such number.
-        landing: Lowest and highest ``x_m`` and ``y_m`` at which a ball landed [m], in world; None if none did.
+        wanted: Number of trials that were to succeed; None if there was no such number.
+        landing: Lowest and highest ``x_m`` and ``y_m`` at which a ball landed [m], in world; None if none did, or
+            the task throws no ball.
         samples: Number of samples in all episodes.
         duration_s: Simulated time of all episodes together [s].
         shards: Number of MCAP files.
@@ -25,6 +26,8 @@ class Info:
         topics: Number of messages of each topic.
         digest: Hash over all episodes in order of trials, as it was written.
         wall_s: Real time for which it was collected, without pauses [s]; None if no journal tells.
+        success: Outcome of trials that succeeded.
+        noun: What a trial is called.
     """
 
     name: str
@@ -41,6 +44,8 @@ class Info:
     topics: Mapping[str, int]
     digest: str
     wall_s: float | None = None
+    success: str = "landed"
+    noun: str = "throw"
 
     def as_dict(self) -> dict[str, object]:
         """The same for JSON."""

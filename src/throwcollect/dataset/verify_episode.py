@@ -23,7 +23,7 @@ from throwcollect.episode.record import NS_PER_S, Samples
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.robots.description import robot_of, touchable_bodies
 from throwcollect.sweep.plan import Plan
-from throwcollect.tasks.trajectory import throw_trajectory
+from throwcollect.tasks.task import task_of
 from throwcollect.wording import counted
 
 _RELATIVE_TOLERANCE = 1e-9
@@ -143,7 +143,7 @@ class EpisodeCheck:
         if infinite := list(find_infinite_columns(samples)):
             yield from infinite
             return
-        trial = RecordedTrial(samples, episode.header, config, throw_trajectory(config))
+        trial = RecordedTrial(samples, episode.header, config, task_of(config).trajectory())
         # Numbers of a forger may be as large as they like.
         with np.errstate(all="ignore"):
             problems = list(find_header_problems(trial, self._bodies))

@@ -9,8 +9,8 @@ from collections.abc import Collection, Iterator
 import numpy as np
 
 from throwcollect.dataset.recorded_trial import RecordedTrial
+from throwcollect.episode.record import NS_PER_S
 from throwcollect.robots.description import robot_of
-from throwcollect.tasks.throw.flight import NS_PER_S
 
 _END_REASONS = ("landed", "rest", "timeout")
 _REST_S = 0.5
@@ -89,7 +89,7 @@ def _find_end_problems(trial: RecordedTrial) -> Iterator[str]:
     if last > most:
         yield f"has {last + 1} samples; the longest trial has {most + 1}"
     height = samples.ball_position[:, 2] - config.scene.landing_height_m - config.ball.radius_m
-    held = trial.find_pressed([contact for contact in header.contacts if contact.body == "spoon"])
+    held = trial.find_pressed([contact for contact in header.contacts if contact.body == config.tool.name])
     crossings = np.flatnonzero((height[1:] < 0) & (height[:-1] >= 0) & ~held[1:]) + 1
     if len(crossings) and crossings[0] < last:
         crossed = trial.tell_time(int(samples.stamps_ns[crossings[0]]))
@@ -97,7 +97,10 @@ def _find_end_problems(trial: RecordedTrial) -> Iterator[str]:
     elif len(crossings) and header.end_reason != "landed":
         yield f"ended as {header.end_reason}, although the ball crossed the landing plane"
     elif header.end_reason == "landed" and not len(crossings):
-        yield "ended as landed, but its last samples do not enclose a crossing of the landing plane out of the spoon"
+        yield (
+            "ended as landed, but its last samples do not enclose a crossing of the landing plane out of the "
+            f"{config.tool.name}"
+        )
     if header.end_reason == "timeout" and last < most:
         yield f"ended as timeout after {last + 1} samples; the longest trial has {most + 1}"
     if header.end_reason == "rest" and (problem := _explain_unrest(trial)):

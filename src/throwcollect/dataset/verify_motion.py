@@ -18,7 +18,7 @@ from throwcollect.episode.record import Samples
 from throwcollect.robots.description import locked_joints, robot_of, start_posture
 from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.quintic_curve import sample_positions
-from throwcollect.tasks.throw.flight import ballistic_steps
+from throwcollect.tasks.free_flight import ballistic_steps
 
 _POSITION_M = 1e-11
 _VELOCITY_MPS = 1e-10

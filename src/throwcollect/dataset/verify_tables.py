@@ -18,9 +18,9 @@ from throwcollect.sweep.digest import trial_digests
 from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.point_file import read_points
 from throwcollect.sweep.points import Points
-from throwcollect.tasks.throw.outcome import Outcome
+from throwcollect.tasks.result import LOST
 
-WITHOUT_EPISODE = (REFUSED, Outcome.LOST.value)
+WITHOUT_EPISODE = (REFUSED, LOST)
 
 
 @dataclass

@@ -46,10 +46,11 @@ from throwcollect.robots.description import full_description
 from throwcollect.sweep.plan import Plan, Trial
 from throwcollect.sweep.point_file import encode_points
 from throwcollect.sweep.points import Points
-from throwcollect.tasks.throw.outcome import Outcome, ThrowResult
+from throwcollect.tasks.result import Result
+from throwcollect.tasks.task import task_of
 from throwcollect.wording import command, counted
 
-Tell = Callable[[int, ThrowResult], None]
+Tell = Callable[[int, Result], None]
 """Receives the number of a trial and its result."""
 
 
@@ -242,7 +243,7 @@ class DatasetWriter:
         for number in list(self._shards):
             self._finish_shard_if_complete(number)
 
-    def append(self, episode: Episode, result: ThrowResult) -> None:
+    def append(self, episode: Episode, result: Result) -> None:
         """Write an episode.
 
         Args:
@@ -273,7 +274,7 @@ class DatasetWriter:
         """
         number = self._waiting_shard(trial)
         self._shards[number].missing.remove(trial)
-        self._rows[number][trial] = self._row(trial, ThrowResult(Outcome.LOST, reason=reason), None)
+        self._rows[number][trial] = self._row(trial, task_of(self._config).lose(reason), None)
         self.note("lost", trial=trial, reason=reason)
         self._finish_shard_if_complete(number)
 
@@ -355,7 +356,7 @@ class DatasetWriter:
                     self._rows[number][trial.number] = self._table.refused_row(trial)
             self._finish_shard_if_complete(number)
 
-    def _row(self, trial: int, result: ThrowResult, place: Place | None) -> Row:
+    def _row(self, trial: int, result: Result, place: Place | None) -> Row:
         return self._table.row(self.plan.trials[trial], result, place)
 
     def _waiting_shard(self, trial: int) -> int:

@@ -29,9 +29,12 @@ _GYM = 2
 
 def describe(source: Source) -> Layout:
     """Say how `write` lays a source out."""
+    task = source.dataset.config.task
+    success, measure = task.success, "landing_x_m" if task.throws else "outcome"
     return Layout(
         files={
-            "throws.hdf5": "the throw of trial N is the group `data/demo_N`; `mask/landed` lists those that landed; "
+            "throws.hdf5": "the throw of trial N is the group `data/demo_N`; "
+            f"`mask/{success}` lists those that {success}; "
             "`throws/` is the table of all trials, one dataset a column, with NaN, -1 or an empty string where there "
             "is nothing.",
         },
@@ -40,10 +43,10 @@ import h5py
 
 file = h5py.File("throws.hdf5")
 ball_position_m = file["data/demo_{source.entries[0].trial}/obs/ball_position_m"][:]
-landing_x_m = file["throws/landing_x_m"][:]""",
+{measure} = file["throws/{measure}"][:]""",
         notes=(
             "The layout is that of robomimic. Each group of a throw has `obs/` with what is measured, `actions`, the "
-            "commanded positions of the moving joints, `rewards`, 1 in the last sample of a throw that landed, and "
+            f"commanded positions of the moving joints, `rewards`, 1 in the last sample of a throw that {success}, and "
             "`dones`, 1 in the last sample; and beside them `time_s` and the commanded velocities and accelerations. "
             "Every dataset has the attributes `unit` and `description`, and `components` where it has several columns.",
             "In robomimic, set `train.hdf5_load_next_obs` to false, as next observations are not stored twice. "
@@ -66,8 +69,8 @@ def write(source: Source, directory: Path) -> None:
         for throw in source.throws(source.entries):
             _add_throw(data.create_group(f"demo_{throw.trial}"), throw, source)
             output.check()
-        landed = [f"demo_{entry.trial}" for entry in source.entries if entry.landed]
-        file["mask/landed"] = np.array(landed, dtype="S")
+        succeeded = [f"demo_{entry.trial}" for entry in source.entries if entry.succeeded]
+        file[f"mask/{config.task.success}"] = np.array(succeeded, dtype="S")
         _add_table(file.create_group("throws"), source.table, h5py.string_dtype())
 
 
@@ -113,11 +116,11 @@ class _Output(io.FileIO):
 def _add_throw(group: Any, throw: Throw, source: Source) -> None:
     group.attrs["num_samples"] = len(throw)
     group.attrs["trial"] = throw.trial
-    group.attrs["landed"] = throw.landed
+    group.attrs[source.dataset.config.task.success] = throw.succeeded
     last = np.zeros(len(throw))
     last[-1] = 1
     group["dones"] = last.astype(np.int64)
-    group["rewards"] = last * throw.landed
+    group["rewards"] = last * throw.succeeded
     for signal in source.signals:
         name = signal.name if signal.name in _BESIDE else "actions" if signal.name == ACTION else f"obs/{signal.name}"
         stored = group.create_dataset(name, data=throw.signals[signal.name], **_COMPRESSION)

@@ -79,17 +79,18 @@ def list_features(moving: Sequence[str]) -> dict[str, Feature]:
 
 def describe(source: Source) -> Layout:
     """Say how `write` lays a source out."""
+    success = source.dataset.config.task.success
     return Layout(
         files={
             "data/": "one row a frame.",
             "meta/": "features, statistics, tasks, episodes; `meta/episodes/` has the columns of the table below, too.",
             THROWS: "one row a trial, also of those without episode; `episode_index` says which frames are its own.",
         },
-        loading="""\
+        loading=f"""\
 from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
 dataset = LeRobotDataset("me/throws", root=".")
-landed = LeRobotDataset("me/throws", root=".", episode_filter=lambda episode: episode["outcome"] == "landed")""",
+{success} = LeRobotDataset("me/throws", root=".", episode_filter=lambda episode: episode["outcome"] == "{success}")""",
         notes=(
             f"A LeRobot dataset of version {_VERSION.removeprefix('v')}; each episode is a throw. Frames are float32, "
             "as usual there. Joints that do not move, orientation and spin of the ball, and commanded velocities are "
@@ -102,8 +103,8 @@ landed = LeRobotDataset("me/throws", root=".", episode_filter=lambda episode: ep
             "| `observation.effort` | N m | torques of their motors |",
             "| `observation.environment_state` | m, m/s | position and velocity of the ball's centre, in world |",
             "| `action` | rad | their commanded positions, on the trajectory that controllers were sent |",
-            "| `next.reward` | 1 | 1 in the last frame of a throw that landed, 0 in all others |",
-            "| `next.success` | | true in the last frame of a throw that landed |",
+            f"| `next.reward` | 1 | 1 in the last frame of a throw that {success}, 0 in all others |",
+            f"| `next.success` | | true in the last frame of a throw that {success} |",
             "| `next.done` | | true in the last frame of a throw |",
             "",
             *list_joints(source),
@@ -177,8 +178,8 @@ def _compute_frames(
         "observation.effort": signals["joint_effort_nm"][:, moving],
         "observation.environment_state": np.hstack([signals["ball_position_m"], signals["ball_velocity_mps"]]),
         "action": signals["command_position_rad"],
-        "next.reward": done * throw.landed,
-        "next.success": done * throw.landed,
+        "next.reward": done * throw.succeeded,
+        "next.success": done * throw.succeeded,
         "next.done": done,
         "timestamp": index / source.rate_hz,
         "frame_index": index,

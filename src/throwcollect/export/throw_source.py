@@ -18,8 +18,7 @@ from throwcollect.export.resampling import count_resampled, resample
 from throwcollect.export.signals import Signal, list_signals, unit_of
 from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.robots.trajectory import JointTrajectory
-from throwcollect.tasks.throw.outcome import Outcome
-from throwcollect.tasks.trajectory import throw_trajectory
+from throwcollect.tasks.task import task_of
 from throwcollect.units import NS_PER_S
 
 _PLACES = ("shard", "chunk_offset")
@@ -34,12 +33,12 @@ class Entry:
     Attributes:
         trial: Number of its trial.
         samples: Number of samples to give.
-        landed: Whether its outcome is ``landed``.
+        succeeded: Whether it is one that succeeded.
     """
 
     trial: int
     samples: int
-    landed: bool
+    succeeded: bool
 
 
 @dataclass(frozen=True)
@@ -48,13 +47,13 @@ class Throw:
 
     Attributes:
         trial: Number of its trial.
-        landed: Whether its outcome is ``landed``.
+        succeeded: Whether it is one that succeeded.
         signals: Each signal of the source by name, ``(n_samples, ...)``.
         trajectory: The trajectory that the controllers were sent.
     """
 
     trial: int
-    landed: bool
+    succeeded: bool
     signals: Signals
     trajectory: JointTrajectory
 
@@ -137,9 +136,9 @@ class Source:
             DatasetError: If an episode is damaged, or not where the table says.
         """
         for entry in entries:
-            yield self._throw(entry.trial, landed=entry.landed)
+            yield self._throw(entry.trial, succeeded=entry.succeeded)
 
-    def _throw(self, trial: int, *, landed: bool) -> Throw:
+    def _throw(self, trial: int, *, succeeded: bool) -> Throw:
         dataset = self.dataset
         episode = dataset.episode(trial)
         try:
@@ -147,8 +146,8 @@ class Source:
         except DatasetError as error:
             raise DatasetError(f"{dataset.directory}: trial {trial}: {error}") from error
         samples = resample(recorded, recorded_hz=dataset.config.record.rate_hz, rate_hz=self.rate_hz)
-        trajectory = throw_trajectory(dataset.plan.config_of(dataset.plan.trials[trial]))
-        return Throw(trial, landed, _compute_signals(samples, trajectory, episode.header.start_ns), trajectory)
+        trajectory = task_of(dataset.plan.config_of(dataset.plan.trials[trial])).trajectory()
+        return Throw(trial, succeeded, _compute_signals(samples, trajectory, episode.header.start_ns), trajectory)
 
 
 def _list_entries(dataset: Dataset, rate_hz: int) -> dict[str, tuple[Entry, ...]]:
@@ -156,7 +155,7 @@ def _list_entries(dataset: Dataset, rate_hz: int) -> dict[str, tuple[Entry, ...]
     for row in dataset.throws.select(["trial", "outcome", "shard", "samples"]).to_pylist():
         if row["shard"] is not None:
             count = count_resampled(row["samples"], recorded_hz=dataset.config.record.rate_hz, rate_hz=rate_hz)
-            entry = Entry(row["trial"], count, row["outcome"] == Outcome.LANDED.value)
+            entry = Entry(row["trial"], count, row["outcome"] == dataset.config.task.success)
             found.setdefault(Path(row["shard"]).stem, []).append(entry)
     return {shard: tuple(entries) for shard, entries in found.items()}
 

@@ -14,7 +14,7 @@ from throwcollect.robots.description import full_description, robot_of, start_po
 from throwcollect.sim.present_trial import TrialSetup
 from throwcollect.sim.simulation import Simulation
 from throwcollect.sweep.plan import Trial
-from throwcollect.tasks.trajectory import throw_trajectory
+from throwcollect.tasks.task import task_of
 
 
 class Replayer:
@@ -54,7 +54,7 @@ class Replayer:
         """
         simulation = self._simulation
         config = with_values(self._config, trial.values)
-        goals = trial_goals(robot_of(config), throw_trajectory(config), start_posture(config))
+        goals = trial_goals(robot_of(config), task_of(config).trajectory(), start_posture(config))
         physics = with_values(self._config, {key: trial.values[key] for key in trial.values if key in self._physics})
         simulation.trial.setup = TrialSetup(trial.number, tuple(goals), physics)
         simulation.reset()

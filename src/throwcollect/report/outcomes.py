@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.dataset.throws_table import REFUSED
-from throwcollect.tasks.throw.outcome import Outcome
+from throwcollect.tasks.result import LIMIT_VIOLATED, LOST, TRACKING_FAILED
+from throwcollect.tasks.throw.outcome import ThrowOutcome
 
 
 @dataclass(frozen=True)
@@ -25,18 +26,18 @@ class Style:
     symbol: str
 
 
-LANDED = Outcome.LANDED.value
+LANDED = ThrowOutcome.LANDED.value
 
 _STYLES = {
     LANDED: Style("#0072B2", "circle"),
-    Outcome.LIMIT_VIOLATED.value: Style("#E69F00", "diamond"),
-    Outcome.SELF_HIT.value: Style("#D55E00", "x"),
-    Outcome.RECAUGHT.value: Style("#CC79A7", "triangle-up"),
-    Outcome.NOT_RELEASED.value: Style("#56B4E9", "square"),
-    Outcome.DROPPED.value: Style("#8A63D2", "star-triangle-down"),
-    Outcome.TIMEOUT.value: Style("#009E73", "triangle-down"),
-    Outcome.TRACKING_FAILED.value: Style("#999933", "cross"),
-    Outcome.LOST.value: Style("#7F7F7F", "hexagon"),
+    LIMIT_VIOLATED: Style("#E69F00", "diamond"),
+    ThrowOutcome.SELF_HIT.value: Style("#D55E00", "x"),
+    ThrowOutcome.RECAUGHT.value: Style("#CC79A7", "triangle-up"),
+    ThrowOutcome.NOT_RELEASED.value: Style("#56B4E9", "square"),
+    ThrowOutcome.DROPPED.value: Style("#8A63D2", "star-triangle-down"),
+    ThrowOutcome.TIMEOUT.value: Style("#009E73", "triangle-down"),
+    TRACKING_FAILED: Style("#999933", "cross"),
+    LOST: Style("#7F7F7F", "hexagon"),
     REFUSED: Style("#B3B3B3", "star"),
 }
 _UNKNOWN = Style("#882255", "pentagon")

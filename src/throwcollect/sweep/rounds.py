@@ -18,7 +18,7 @@ from throwcollect.config.schema import Config
 from throwcollect.sweep.plan import FIRST_TRIALS, ROUND_TRIALS, Trial
 from throwcollect.sweep.points import Points
 from throwcollect.sweep.samplers import draw_points
-from throwcollect.tasks.throw.outcome import Outcome, ThrowResult
+from throwcollect.tasks.result import Result
 
 if TYPE_CHECKING:
     from throwcollect.sweep.target import TargetSampler
@@ -38,7 +38,8 @@ class Rounds:
 
     def __init__(self, config: Config) -> None:
         self._points = draw_points(config, directory=Path())
-        self._wanted = config.until.landed if config.until else None
+        self._wanted = config.until.wanted if config.until else None
+        self._success = config.task.success
         self._sampler = _target_sampler(config)
         targets = self._sampler.dimensions if self._sampler else 0
         self._trials: list[Trial] = []
@@ -46,7 +47,7 @@ class Rounds:
         self._places = np.empty((0, targets))
         self._waiting: set[int] = set()
         self._running: list[int] = []
-        self._landed: list[int] = []
+        self._succeeded: list[int] = []
 
     @property
     def limit(self) -> int:
@@ -64,7 +65,7 @@ class Rounds:
         if self.planned >= self.limit:
             return True
         before = self._decisive
-        return self._wanted is not None and before > 0 and self.due and sum(self._landed[:before]) >= self._wanted
+        return self._wanted is not None and before > 0 and self.due and sum(self._succeeded[:before]) >= self._wanted
 
     @property
     def due(self) -> bool:
@@ -88,18 +89,18 @@ class Rounds:
         for trial in trials:
             if trial.number % ROUND_TRIALS == 0:
                 self._running.append(0)
-                self._landed.append(0)
+                self._succeeded.append(0)
             if trial.refused is None:
                 self._running[-1] += 1
                 self._waiting.add(trial.number)
 
-    def tell(self, number: int, result: ThrowResult) -> None:
+    def tell(self, number: int, result: Result) -> None:
         """Take in what came of a trial; a second result of the same trial changes nothing."""
         if number not in self._waiting:
             return
         self._waiting.remove(number)
         self._running[number // ROUND_TRIALS] -= 1
-        self._landed[number // ROUND_TRIALS] += result.outcome is Outcome.LANDED
+        self._succeeded[number // ROUND_TRIALS] += result.outcome.value == self._success
         if self._sampler is not None:
             self._places[number] = self._sampler.place(self._trials[number], result)
 

@@ -21,7 +21,7 @@ from throwcollect.sweep.points import Points
 qmc = lazily("scipy.stats.qmc")
 
 _MOST_TRIALS = 10_000_000
-_TRIALS_PER_LANDED = 10
+_TRIALS_PER_SUCCESS = 10
 """Trials for each throw that should land, at most, where a configuration says how many should and no more."""
 
 UnitSampler = Callable[[int, int, np.random.Generator], NDArray[np.float64]]
@@ -55,7 +55,7 @@ def draw_points(config: Config, *, directory: Path) -> Points:
         return _grid(sweep.parameters, config.trials)
     trials = config.trials
     if trials is None and config.until is not None:
-        trials = _TRIALS_PER_LANDED * config.until.landed
+        trials = _TRIALS_PER_SUCCESS * config.until.wanted
     if trials is None:
         raise PlanError([Problem(f"missing; the sampler {sweep.sampler} draws any number of trials", key="trials")])
     randomness = np.random.default_rng(np.random.SeedSequence(config.seed))

@@ -13,7 +13,8 @@ from throwcollect.sweep.inverse import InverseModel
 from throwcollect.sweep.plan import ROUND_TRIALS, Trial
 from throwcollect.sweep.samplers import places, spread
 from throwcollect.sweep.target_cells import NOWHERE, Cells, Thinness
-from throwcollect.tasks.throw.outcome import Outcome, ThrowResult
+from throwcollect.tasks.result import Result
+from throwcollect.tasks.throw.outcome import ThrowOutcome, ThrowResult
 
 _RANDOMNESS = 0
 """First number of the spawn keys of rounds; those of trials have one number alone."""
@@ -46,9 +47,9 @@ class TargetSampler:
         """Number of targets."""
         return len(self._cells.shape)
 
-    def place(self, trial: Trial, result: ThrowResult) -> NDArray[np.float64]:
+    def place(self, trial: Trial, result: Result) -> NDArray[np.float64]:
         """What `draw` wants to know of a trial, shape ``(n_targets,)``: where it landed in bins; NaN if it did not."""
-        if result.outcome is not Outcome.LANDED:
+        if not isinstance(result, ThrowResult) or result.outcome is not ThrowOutcome.LANDED:
             return np.full(self.dimensions, np.nan)
         return self._cells.place(trial, result)
 

@@ -16,12 +16,11 @@ from throwcollect.episode.frames import WORLD
 from throwcollect.episode.record import NS_PER_S
 from throwcollect.episode.topics import BALL
 from throwcollect.errors import ConfigError
-from throwcollect.tasks.throw.outcome import Outcome
 from throwcollect.view.robot import BALL_RGBA, DrawnRobot, Rgba
 from throwcollect.view.viewed import ViewedThrow
 
 _HELD: Rgba = (0.6, 0.6, 0.6, 0.8)
-_LANDED: Rgba = (0.0, 0.75, 0.35, 1.0)
+_SUCCEEDED: Rgba = (0.0, 0.75, 0.35, 1.0)
 _FAILED: Rgba = (0.9, 0.1, 0.1, 1.0)
 _PLANE: Rgba = (0.3, 0.5, 0.9, 0.15)
 _LABEL: Rgba = (1.0, 1.0, 1.0, 1.0)
@@ -128,10 +127,10 @@ def path_cloud(throw: ViewedThrow) -> Any:
 def _path(namespace: str, throw: ViewedThrow, stamp_ns: int, *, width: float, alpha: float) -> Any:
     """A line, grey while the ball was held, with the colour of the outcome from its release on."""
     point, color = get_message("geometry_msgs/msg/Point"), get_message("std_msgs/msg/ColorRGBA")
-    rate, released, last = throw.config.record.rate_hz, throw.row["release_time_s"], len(throw.path) - 1
+    rate, released, last = throw.config.record.rate_hz, throw.row.get("release_time_s"), len(throw.path) - 1
     chosen = [*range(0, last, max(1, rate // _POINTS_PER_S)), last]
     release = math.inf if released is None else released * rate
-    flown = _LANDED if throw.row["outcome"] == Outcome.LANDED else _FAILED
+    flown = _SUCCEEDED if throw.row["outcome"] == throw.config.task.success else _FAILED
     colors = {held: color(r=r, g=g, b=b, a=a * alpha) for held, (r, g, b, a) in ((True, _HELD), (False, flown))}
     marker = get_message("visualization_msgs/msg/Marker")
     line = _marker(
@@ -144,16 +143,16 @@ def _path(namespace: str, throw: ViewedThrow, stamp_ns: int, *, width: float, al
 
 def _point(name: str, row: Row, stamp_ns: int) -> list[Any]:
     """A dot with a label; nothing if the throw has no such point."""
-    x, y, z = (row[f"{name}_{axis}_m"] for axis in "xyz")
-    if x is None:
+    if row.get(f"{name}_x_m") is None:
         return []
+    x, y, z = (row[f"{name}_{axis}_m"] for axis in "xyz")
     marker = get_message("visualization_msgs/msg/Marker")
     text = {
         "release": lambda: f"release {row['release_time_s']:.2f} s, {_norm(row, 'release'):.2f} m/s",
         "apex": lambda: f"apex {z:.2f} m",
         "landing": lambda: f"landing x {x:.2f} m, y {y:.2f} m, {_norm(row, 'landing'):.2f} m/s",
     }[name]()
-    dot = _marker(name, marker.SPHERE, _LANDED, (_POINT_M,) * 3, stamp_ns)
+    dot = _marker(name, marker.SPHERE, _SUCCEEDED, (_POINT_M,) * 3, stamp_ns)
     label = _marker(name, marker.TEXT_VIEW_FACING, _LABEL, (0.0, 0.0, _TEXT_M), stamp_ns, number=1)
     label.text = text
     _place(dot, x, y, z)

@@ -5,30 +5,29 @@ from __future__ import annotations
 from typing import Any
 
 from rclzenoh.interfaces import get_message
-from throwcollect.dataset.throws_table import Row
 from throwcollect.episode.record import NS_PER_S
-from throwcollect.tasks.throw.outcome import Outcome
+from throwcollect.view.viewed import ViewedThrow
 
 NAME = "throw"
 HARDWARE = "throwcollect"
 """By these two names a viewer chooses the status to show."""
 
 
-def throw_facts(row: Row, stamp_ns: int) -> Any:
-    """A row of the table of throws, without the columns that are null.
+def throw_facts(throw: ViewedThrow) -> Any:
+    """The row of a throw in the table of throws, without the columns that are null.
 
     Args:
-        row: The row.
-        stamp_ns: Stamp of the message [ns].
+        throw: The throw.
 
     Returns:
-        A diagnostic_msgs/DiagnosticArray with one status: OK if the throw landed, else a warning.
+        A diagnostic_msgs/DiagnosticArray with one status: OK if the trial succeeded, else a warning.
     """
+    row = throw.row
     status, pair = (get_message(f"diagnostic_msgs/msg/{name}") for name in ("DiagnosticStatus", "KeyValue"))
-    sec, nanosec = divmod(stamp_ns, NS_PER_S)
+    sec, nanosec = divmod(throw.start_ns, NS_PER_S)
     stamp = get_message("builtin_interfaces/msg/Time")(sec=sec, nanosec=nanosec)
     shown = status(
-        level=status.OK if row["outcome"] == Outcome.LANDED else status.WARN,
+        level=status.OK if row["outcome"] == throw.config.task.success else status.WARN,
         name=NAME,
         hardware_id=HARDWARE,
         message=": ".join(part for part in (f"trial {row['trial']} {row['outcome']}", row["reason"]) if part),

@@ -109,7 +109,7 @@ class ViewRecording:
         for throw in throws:
             self._put("/view/throw", throw.start_ns, throw_markers(throw))
             self._put("/view/path", throw.start_ns, path_cloud(throw))
-            self._put("/view/facts", throw.start_ns, throw_facts(throw.row, throw.start_ns))
+            self._put("/view/facts", throw.start_ns, throw_facts(throw))
             self._put_samples(samples(throw), throw.start_ns)
 
     def finish(self, name: str) -> FileSummary:

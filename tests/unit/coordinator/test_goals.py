@@ -9,11 +9,11 @@ from throwcollect.coordinator.goals import FollowJointTrajectory, goal_message, 
 from throwcollect.robots.description import start_posture
 from throwcollect.robots.talos import TALOS
 from throwcollect.sim.controller_messages import read_goal
-from throwcollect.tasks.trajectory import throw_trajectory
+from throwcollect.tasks.task import task_of
 
 CONFIG = Config()
 ARM = "arm_right_controller"
-TRAJECTORY = throw_trajectory(CONFIG)
+TRAJECTORY = task_of(CONFIG).trajectory()
 POSTURE = start_posture(CONFIG)
 
 

@@ -8,7 +8,7 @@ from throwcollect.config.schema import Config
 from throwcollect.coordinator.growth import Growth
 from throwcollect.coordinator.prepare import draw_plan, more_trials
 from throwcollect.sweep.plan import Plan, Trial, make_plan
-from throwcollect.tasks.throw.outcome import Outcome, ThrowResult
+from throwcollect.tasks.throw.outcome import ThrowOutcome, ThrowResult
 
 FAST = {"task.duration_s": {"min": 0.4, "max": 1.2}, "task.trajectory.gamma": {"min": 1.0, "max": 1.4}}
 
@@ -19,7 +19,7 @@ def config(trials: int | None = 150, landed: int | None = None) -> Config:
 
 def ended(growth: Growth, trials: tuple[Trial, ...]) -> None:
     for trial in trials:
-        growth.tell(trial.number, ThrowResult(Outcome.RECAUGHT))
+        growth.tell(trial.number, ThrowResult(ThrowOutcome.RECAUGHT))
 
 
 def test_a_round_is_drawn_and_checked_trial_by_trial_once_it_is_due() -> None:

@@ -14,7 +14,7 @@ from throwcollect.robots.description import start_posture
 from throwcollect.robots.talos import TALOS
 from throwcollect.ros import ActionServer, GoalResponse
 from throwcollect.ros.router import router
-from throwcollect.tasks.trajectory import throw_trajectory
+from throwcollect.tasks.task import task_of
 from throwcollect.trial.lease import Lease
 
 GetParameters = get_service("rcl_interfaces/srv/GetParameters")
@@ -22,7 +22,7 @@ NAMING = "ros1"
 CONFIG = Config()
 GOALS = {
     name: goal_message(goal)
-    for name, goal in trial_goals(TALOS, throw_trajectory(CONFIG), start_posture(CONFIG)).items()
+    for name, goal in trial_goals(TALOS, task_of(CONFIG).trajectory(), start_posture(CONFIG)).items()
 }
 
 

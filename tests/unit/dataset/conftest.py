@@ -22,10 +22,9 @@ from throwcollect.robots.description import full_description, start_posture
 from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.robots.talos import TALOS
 from throwcollect.sweep.plan import Plan, make_plan
-from throwcollect.tasks.throw.flight import ballistic_positions
-from throwcollect.tasks.throw.judge import judge
+from throwcollect.tasks.free_flight import ballistic_positions
+from throwcollect.tasks.task import task_of
 from throwcollect.tasks.throw.outcome import ThrowResult
-from throwcollect.tasks.trajectory import throw_trajectory
 
 SETTINGS: dict[str, Any] = {
     "name": "quick",
@@ -53,7 +52,7 @@ def throw(config: Config, trial: int) -> tuple[Samples, EpisodeHeader]:
     times = np.arange(count) / rate
     position = np.tile(list(start_posture(config).values()), (count, 1))
     velocity = np.zeros((count, len(TALOS.joints)))
-    trajectory = throw_trajectory(config)
+    trajectory = task_of(config).trajectory()
     moving = [TALOS.joints.index(joint) for joint in trajectory.joints]
     position[:, moving], velocity[:, moving] = sample_quintic(trajectory, times)[:2]
     effort = np.zeros((count, len(TALOS.joints)))
@@ -120,12 +119,8 @@ class Collection:
 
     def result(self, episode: Episode) -> ThrowResult:
         config = self.plan.config_of(self.plan.trials[episode.header.trial])
-        return judge(
-            episode.samples(),
-            episode.header,
-            config=config,
-            trajectory=throw_trajectory(config),
-        )
+        task = task_of(config)
+        return task.judge(episode.samples(), episode.header, task.trajectory())
 
     def fill(
         self, writer: DatasetWriter, trials: Iterable[int], *, lost: Iterable[int] = (), change: Change | None = None

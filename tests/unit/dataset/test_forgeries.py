@@ -26,7 +26,7 @@ from throwcollect.sweep.digest import trial_digests
 from throwcollect.sweep.plan import Plan, make_trials
 from throwcollect.sweep.points import Points
 from throwcollect.sweep.samplers import draw_points
-from throwcollect.tasks.throw.outcome import Outcome, ThrowResult
+from throwcollect.tasks.throw.outcome import ThrowOutcome, ThrowResult
 
 FORGED = 2
 """The trial that is forged."""
@@ -247,7 +247,7 @@ def test_the_rounds_of_a_plan_that_grew_follow_from_the_results(
     config = Config.model_validate({**SETTINGS, "trials": None, "until": {"landed": 60}})
     plan = Plan(config, tuple(make_trials(config, draw_points(config, directory=tmp_path).first(trials))))
     table = ThrowsTable.of(plan)
-    outcomes = [Outcome.LANDED if number < landed else Outcome.TIMEOUT for number in range(trials)]
+    outcomes = [ThrowOutcome.LANDED if number < landed else ThrowOutcome.TIMEOUT for number in range(trials)]
     made = [table.row(trial, ThrowResult(outcomes[trial.number]), None) for trial in plan.trials]
     rows = {row["trial"]: row for row in table.table(made).to_pylist()}
     assert [finding.problem for finding in find_drawing_problems(tmp_path, plan, rows)] == (

@@ -4,7 +4,7 @@ from tests.unit.dataset.conftest import Collection
 
 from throwcollect.dataset.throws_table import Place, ThrowsTable
 from throwcollect.episode.record import Contact, EpisodeHeader, Samples
-from throwcollect.tasks.throw.outcome import Outcome
+from throwcollect.tasks.throw.outcome import ThrowOutcome
 
 
 def held(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
@@ -24,4 +24,4 @@ def test_results_come_back_from_the_table(collection: Collection) -> None:
         (stored,) = table.table([row]).to_pylist()
         assert table.result(stored) == result
         outcomes.add(result.outcome)
-    assert outcomes == {Outcome.LANDED, Outcome.NOT_RELEASED, Outcome.TRACKING_FAILED}
+    assert outcomes == {ThrowOutcome.LANDED, ThrowOutcome.NOT_RELEASED, ThrowOutcome.TRACKING_FAILED}

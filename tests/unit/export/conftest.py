@@ -17,7 +17,7 @@ from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.export.formats import export
 from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.robots.talos import TALOS
-from throwcollect.tasks.trajectory import throw_trajectory
+from throwcollect.tasks.task import task_of
 
 SETTINGS: dict[str, Any] = {
     "trials": 6,
@@ -75,7 +75,7 @@ def throws_of(directory: Path, step: int = 1) -> Iterator[tuple[int, Arrays]]:
         trial = episode.header.trial
         samples = episode.samples()[::step]
         time_s = (samples.stamps_ns - episode.header.start_ns) / 1e9
-        trajectory = throw_trajectory(dataset.plan.config_of(dataset.plan.trials[trial]))
+        trajectory = task_of(dataset.plan.config_of(dataset.plan.trials[trial])).trajectory()
         path, speed, acceleration = sample_quintic(trajectory, time_s)
         yield (
             trial,

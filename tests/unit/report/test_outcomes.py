@@ -2,7 +2,7 @@ from __future__ import annotations
 
 from throwcollect.dataset.throws_table import REFUSED
 from throwcollect.report.outcomes import Outcomes, style_of
-from throwcollect.tasks.throw.outcome import Outcome
+from throwcollect.tasks.throw.outcome import ThrowOutcome
 
 
 def test_outcomes_come_in_one_order_and_unknown_ones_last() -> None:
@@ -15,6 +15,6 @@ def test_outcomes_come_in_one_order_and_unknown_ones_last() -> None:
 
 
 def test_every_outcome_is_drawn_in_a_way_of_its_own() -> None:
-    styles = [style_of(name) for name in (*(outcome.value for outcome in Outcome), REFUSED, "unheard of")]
+    styles = [style_of(name) for name in (*(outcome.value for outcome in ThrowOutcome), REFUSED, "unheard of")]
     for part in ("colour", "symbol"):
         assert len({getattr(style, part) for style in styles}) == len(styles)

@@ -11,7 +11,7 @@ from throwcollect.dataset.throws_table import REFUSED
 from throwcollect.report.contents import Panel
 from throwcollect.report.outcomes import style_of
 from throwcollect.report.painter import MARKERS, paint
-from throwcollect.tasks.throw.outcome import Outcome
+from throwcollect.tasks.throw.outcome import ThrowOutcome
 
 RED = (1.0, 0.0, 0.0)
 
@@ -80,7 +80,7 @@ def test_subplots_go_where_their_domains_are(tmp_path: Path) -> None:
 
 
 def test_every_outcome_has_a_marker_of_its_own() -> None:
-    names = (*(outcome.value for outcome in Outcome), REFUSED, "unheard of")
+    names = (*(outcome.value for outcome in ThrowOutcome), REFUSED, "unheard of")
     assert len({MARKERS[style_of(name).symbol] for name in names}) == len(names)
 
 

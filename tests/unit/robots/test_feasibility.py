@@ -14,7 +14,7 @@ from throwcollect.robots.feasibility import Feasibility
 from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.robots.talos import TALOS
-from throwcollect.tasks.trajectory import throw_trajectory
+from throwcollect.tasks.task import task_of
 from throwcollect.tools.tool import tool_of
 
 JOINTS = TALOS.joints
@@ -43,13 +43,13 @@ def feasibility():
 
 @pytest.fixture
 def reason(feasibility):
-    return lambda config: feasibility.check(config, throw_trajectory(config))
+    return lambda config: feasibility.check(config, task_of(config).trajectory())
 
 
 def shares(feasibility, config):
     """Largest effort over limit, and speed over limit, of the moving joints."""
     times = np.linspace(0, config.task.duration_s, 501)
-    trajectory = throw_trajectory(config)
+    trajectory = task_of(config).trajectory()
     columns = [JOINTS.index(joint) for joint in trajectory.joints]
     posture = np.array([{**TALOS.rest_posture, **config.robot.posture, **config.task.start}[joint] for joint in JOINTS])
     motion = tuple(np.tile(rest, (501, 1)) for rest in (posture, 0 * posture, 0 * posture))
@@ -220,7 +220,7 @@ def test_unsettled_choice_of_joints_is_an_error(feasibility):
     config = Config(robot={"locked": ["head_1_joint"]})
     bad = config.model_copy(update={"robot": config.robot.model_copy(update={"locked": ["arm_right_4_joint"]})})
     with pytest.raises(ConfigError, match="arm_right_4_joint"):
-        feasibility.check(bad, throw_trajectory(bad))
+        feasibility.check(bad, task_of(bad).trajectory())
 
 
 def test_broad_phase_finds_what_all_distances_find():

@@ -7,11 +7,12 @@ import pytest
 from throwcollect.config.containers import ContainersConfig, NodeContainerConfig
 from throwcollect.config.controllers import ControllersConfig
 from throwcollect.config.run import RunConfig
-from throwcollect.config.schema import Config, Range, RecordConfig, SweepConfig, UntilConfig
+from throwcollect.config.schema import Config, Range, RecordConfig, SweepConfig
 from throwcollect.config.sweep import TargetConfig
 from throwcollect.config.values import values_by_key, with_values
 from throwcollect.sweep.digest import config_digest, trial_digests
 from throwcollect.sweep.points import Points
+from throwcollect.tasks.throw.config import UntilLanded
 
 WITHOUT_EFFECT = {"name", "trials", "until", "sim.real_time_factor", "record.zstd_level", "record.trials_per_shard"}
 POINTS = Points(("ball.mass_kg", "task.duration_s"), np.array([[0.1, 1.0], [0.2, 1.0]]))
@@ -51,7 +52,7 @@ def test_it_does_not_matter_whether_a_value_was_swept_or_fixed():
         {"sim": Config().sim.model_copy(update={"real_time_factor": 1.0})},
         {"record": Config().record.model_copy(update={"zstd_level": 9, "trials_per_shard": 9})},
         {"controllers": ControllersConfig(names="ros1")},
-        {"until": UntilConfig(landed=9)},
+        {"until": UntilLanded(landed=9)},
         {"sweep": SweepConfig(parameters={"ball.mass_kg": Range(min=0.1, max=0.2)}, target=TARGET)},
     ],
 )
@@ -104,4 +105,4 @@ def test_a_plan_made_before_targets_still_belongs_to_its_configuration():
     config = Config(name="old", sweep=sweep, record=RECORD_OF_OLD)
     assert config_digest(config) == before
     assert config_digest(config.model_copy(update={"sweep": sweep.model_copy(update={"target": TARGET})})) != before
-    assert config_digest(config.model_copy(update={"until": UntilConfig(landed=5)})) != before
+    assert config_digest(config.model_copy(update={"until": UntilLanded(landed=5)})) != before

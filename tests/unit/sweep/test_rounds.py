@@ -11,14 +11,14 @@ from throwcollect.errors import PlanError
 from throwcollect.sweep.plan import Trial, make_plan, make_trials
 from throwcollect.sweep.rounds import Rounds
 from throwcollect.sweep.samplers import draw_points
-from throwcollect.tasks.throw.outcome import Outcome, ThrowResult
+from throwcollect.tasks.throw.outcome import ThrowOutcome, ThrowResult
 
 LANDED = throw(make_plan(configuration()).trials[0])
-FAILED = ThrowResult(Outcome.RECAUGHT)
+FAILED = ThrowResult(ThrowOutcome.RECAUGHT)
 
 
 def test_the_analytic_thrower_throws() -> None:
-    assert LANDED.outcome is Outcome.LANDED
+    assert LANDED.outcome is ThrowOutcome.LANDED
 
 
 def growing(**options: object) -> tuple[Rounds, list[Trial]]:
@@ -93,7 +93,7 @@ def test_until_serves_the_points_of_the_sampler_in_whole_rounds(sampler: str) ->
     config = configuration(trials=2000, target=None, landed=300, sampler=sampler)
     trials = collected(config)
     assert len(trials) % 64 == 0
-    landings = [throw(trial).outcome is Outcome.LANDED for trial in trials]
+    landings = [throw(trial).outcome is ThrowOutcome.LANDED for trial in trials]
     assert sum(landings) >= 300
     assert sum(landings[:-192]) < 300, "each round is there because those two before it were not enough"
     points = draw_points(config, directory=Path()).values[: len(trials)]

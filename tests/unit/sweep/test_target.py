@@ -14,7 +14,8 @@ from tests.unit.sweep.thrower import DISTANCE, HIT_ANGLE, PARAMETERS, TARGET, co
 from throwcollect.config.sweep import TargetConfig
 from throwcollect.sweep.plan import Trial, make_plan
 from throwcollect.sweep.target_cells import Cells, Thinness
-from throwcollect.tasks.throw.outcome import BallState, Outcome, ThrowResult
+from throwcollect.tasks.measures import BallState
+from throwcollect.tasks.throw.outcome import ThrowOutcome, ThrowResult
 
 TRIALS = 960
 
@@ -22,7 +23,7 @@ TRIALS = 960
 def counts(trials: Iterable[Trial], target: dict[str, object] = TARGET) -> NDArray[np.int64]:
     """Number of throws that landed in each cell."""
     cells = Cells(TargetConfig.model_validate(target))
-    places = [cells.place(trial, result) for trial in trials if (result := throw(trial)).outcome is Outcome.LANDED]
+    places = [cells.place(trial, result) for trial in trials if (result := throw(trial)).outcome is ThrowOutcome.LANDED]
     found = cells.cells_of(np.array(places))
     return np.bincount(found[found >= 0], minlength=cells.count)
 
@@ -108,7 +109,7 @@ def test_while_almost_nothing_lands_sobol_goes_on() -> None:
     config = configuration(trials=320)
 
     def unlucky(trial: Trial) -> ThrowResult:
-        return throw(trial) if trial.number < 5 else ThrowResult(Outcome.RECAUGHT)
+        return throw(trial) if trial.number < 5 else ThrowResult(ThrowOutcome.RECAUGHT)
 
     sobol = make_plan(configuration(trials=320, target=None)).trials
     assert tuple(collected(config, throw=unlucky)) == sobol
@@ -141,7 +142,7 @@ def test_a_place_is_in_bins_of_distance_from_the_base_and_hit_angle() -> None:
     x, y, _ = result.landing.position
     expected = [(math.hypot(x, y) - 1) / 0.5, (result.hit_angle_rad - 0.9) / 0.075]
     assert CELLS.place(trial, result) == pytest.approx(expected)
-    assert np.isnan(CELLS.place(trial, ThrowResult(Outcome.TIMEOUT))).all()
+    assert np.isnan(CELLS.place(trial, ThrowResult(ThrowOutcome.TIMEOUT))).all()
 
 
 def test_both_ends_of_the_bins_are_inside() -> None:
@@ -192,7 +193,7 @@ def test_rounds_that_run_at_the_same_time_do_not_throw_at_the_same_cells() -> No
 
     def straight(trial: Trial) -> ThrowResult:
         landing = BallState(1.0, (1.0 + trial.values["ball.friction"], 0.0, 0.0), (1.0, 0.0, -1.0))
-        return ThrowResult(Outcome.LANDED, landing=landing, hit_angle_rad=0.785)
+        return ThrowResult(ThrowOutcome.LANDED, landing=landing, hit_angle_rad=0.785)
 
     cells = Cells(TargetConfig.model_validate(line))
     trials = collected(configuration(trials=256, target=line), throw=straight)

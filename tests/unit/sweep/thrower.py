@@ -9,7 +9,8 @@ from typing import Any
 from throwcollect.config.schema import Config
 from throwcollect.sweep.plan import Trial, make_plan, make_trials
 from throwcollect.sweep.rounds import Rounds
-from throwcollect.tasks.throw.outcome import BallState, Outcome, ThrowResult
+from throwcollect.tasks.measures import BallState
+from throwcollect.tasks.throw.outcome import ThrowOutcome, ThrowResult
 
 PARAMETERS = {
     "task.duration_s": {"min": 0.5, "max": 2.0},
@@ -39,13 +40,13 @@ def throw(trial: Trial) -> ThrowResult:
     duration, gamma, mass, friction, height = (trial.values[key] for key in PARAMETERS)
     swing, late, heavy = (duration - 0.5) / 1.5, (gamma - 0.67) / 1.33, math.log10(mass) / 2 + 1
     if (swing < 0.25 and heavy > 0.6) or late + friction > 1.8:
-        return ThrowResult(Outcome.SELF_HIT)
+        return ThrowResult(ThrowOutcome.SELF_HIT)
     speed = 1 + 3 * swing**1.5 * (0.6 + 0.4 * late)
     elevation = 0.9 - 1.3 * heavy * friction + 0.3 * math.sin(3 * swing)
     level, up = speed * math.cos(elevation), speed * math.sin(elevation)
     time = (up + math.sqrt(up**2 + 2 * 9.81 * (1.3 - height))) / 9.81
     landing = BallState(time, (0.6 * level * time, -0.8 * level * time, height), (level, 0.0, up - 9.81 * time))
-    return ThrowResult(Outcome.LANDED, landing=landing, hit_angle_rad=math.atan2(9.81 * time - up, level))
+    return ThrowResult(ThrowOutcome.LANDED, landing=landing, hit_angle_rad=math.atan2(9.81 * time - up, level))
 
 
 def go_on(

@@ -9,7 +9,7 @@ from throwcollect.config.schema import Config, DynamicMovementPrimitive
 from throwcollect.errors import ConfigError
 from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.tasks.dmp import basis, dmp_trajectory, fit_dmp, roll_out
-from throwcollect.tasks.trajectory import throw_trajectory
+from throwcollect.tasks.task import task_of
 
 ELBOW = "arm_right_4_joint"
 PLAIN = DynamicMovementPrimitive(family="dmp")
@@ -25,7 +25,7 @@ def rolled(times, *, weights, family=PLAIN, tau=0.8, refinement=1):
 def demonstration(gamma=1.2, samples=401):
     config = Config(task={"trajectory": {"family": "minimum_jerk", "gamma": gamma}})
     times = np.linspace(0, 1, samples)
-    points = throw_trajectory(config)
+    points = task_of(config).trajectory()
     return points.joints, times, *sample_quintic(points, times)
 
 
@@ -89,7 +89,7 @@ def test_fitted_weights_repeat_the_demonstrated_motion(count, gamma, bound):
         joints, times, positions, velocities=velocities, accelerations=accelerations, basis_functions=count
     )
     config = Config(task={"trajectory": family.model_dump()})
-    repeated = throw_trajectory(config)
+    repeated = task_of(config).trajectory()
     curve, speed, _ = sample_quintic(repeated, times)
     assert np.abs(curve - positions).max() < bound
     assert np.abs(speed - velocities).max() < 50 * bound
@@ -101,7 +101,7 @@ def test_positions_alone_are_enough_to_fit():
     uneven = np.sort(np.random.default_rng(0).permutation(401)[:300])
     uneven[0], uneven[-1] = 0, 400
     family = fit_dmp(joints, times[uneven], positions[uneven])
-    curve, _, _ = sample_quintic(throw_trajectory(Config(task={"trajectory": family.model_dump()})), times)
+    curve, _, _ = sample_quintic(task_of(Config(task={"trajectory": family.model_dump()})).trajectory(), times)
     assert np.abs(curve - positions).max() < 2e-3
 
 

@@ -57,7 +57,7 @@ def describe(found: Info) -> str:
     outcomes = ", ".join(f"{count} {outcome}" for outcome, count in found.outcomes.items())
     lines = {
         "trials": f"{found.trials}: {outcomes}{_missing(found)}",
-        "landing": _landing(found.landing),
+        **({"landing": _landing(found.landing)} if found.noun == "throw" else {}),
         "episodes": f"{found.episodes}, {found.samples} samples, {found.duration_s:.0f} s of simulated time",
         "files": f"{found.shards} MCAP of {found.recordings_bytes / 1e6:.1f} MB, "
         f"{found.size_bytes / 1e6:.1f} MB in all",
@@ -66,7 +66,7 @@ def describe(found: Info) -> str:
     }
     if found.wall_s:
         speed = found.episodes / found.wall_s
-        lines["took"] = f"{found.wall_s:.1f} s, {speed:.1f} throws/s, start-up included"
+        lines["took"] = f"{found.wall_s:.1f} s, {speed:.1f} {found.noun}s/s, start-up included"
     if isinstance(found, Summary) and found.open:
         lines["open"] = "anybody who reached the router could join, read and disturb the run"
     width = max(map(len, lines))
@@ -74,9 +74,9 @@ def describe(found: Info) -> str:
 
 
 def _missing(found: Info) -> str:
-    if found.wanted is None or found.outcomes.get("landed", 0) >= found.wanted:
+    if found.wanted is None or found.outcomes.get(found.success, 0) >= found.wanted:
         return ""
-    return f"; {found.wanted} should have landed, but all trials were used up"
+    return f"; {found.wanted} should have {found.success}, but all trials were used up"
 
 
 def _landing(landing: Mapping[str, tuple[float, float]] | None) -> str:

@@ -8,13 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from throwcollect.config.schema import Config
 from throwcollect.dataset.reader import Dataset
+from throwcollect.episode.record import NS_PER_S, EpisodeHeader
 from throwcollect.report.outcomes import LANDED, Outcomes
 from throwcollect.report.throw.landings import Landings
 from throwcollect.robots.quintic_curve import sample_positions
+from throwcollect.tasks.task import task_of
 from throwcollect.tasks.throw.config import throw_section
-from throwcollect.tasks.throw.flight import NS_PER_S, flight_residual, release_of
-from throwcollect.tasks.trajectory import throw_trajectory
+from throwcollect.tasks.throw.flight import flight_residual, release_of
 
 MOST_RESIDUALS = 2000
 """Episodes whose flight is computed again, some 15 s of work; `verify` computes them all."""
@@ -138,7 +140,7 @@ def read_paths(dataset: Dataset, trials: Sequence[int]) -> Iterator[BallPath]:
     for trial in trials:
         episode = dataset.episode(trial)
         samples = episode.samples()
-        release_ns = release_of(episode.header.contacts, gap_s=throw_section(dataset.config.task).recatch_gap_s)
+        release_ns = _find_release(episode.header, dataset.config)
         release = None if release_ns is None else int(np.searchsorted(samples.stamps_ns, release_ns))
         yield BallPath(trial, outcomes[trial].as_py(), samples.ball_position, release)
 
@@ -152,10 +154,10 @@ def read_motion(dataset: Dataset, trial: int) -> JointMotion:
     episode = dataset.episode(trial)
     samples = episode.samples(dataset.joints)
     config = dataset.plan.config_of(dataset.plan.trials[trial])
-    trajectory = throw_trajectory(config)
+    trajectory = task_of(config).trajectory()
     times = (samples.stamps_ns - episode.header.start_ns) / NS_PER_S
     columns = [dataset.joints.index(joint) for joint in trajectory.joints]
-    release_ns = release_of(episode.header.contacts, gap_s=throw_section(config.task).recatch_gap_s)
+    release_ns = _find_release(episode.header, config)
     return JointMotion(
         trial=trial,
         joints=trajectory.joints,
@@ -164,6 +166,11 @@ def read_motion(dataset: Dataset, trial: int) -> JointMotion:
         measured=samples.position[:, columns],
         release_s=None if release_ns is None else (release_ns - episode.header.start_ns) / NS_PER_S,
     )
+
+
+def _find_release(header: EpisodeHeader, config: Config) -> int | None:
+    gap_s = throw_section(config.task).recatch_gap_s
+    return release_of(header.contacts, tool=config.tool.name, gap_s=gap_s)
 
 
 def _find_recorded(dataset: Dataset) -> NDArray[np.int64]:

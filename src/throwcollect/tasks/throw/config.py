@@ -2,17 +2,30 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
 from throwcollect.config.key import Effect, Key
 from throwcollect.config.kinds import Angle, Joint
 from throwcollect.config.task import TaskConfig
+from throwcollect.config.until import UntilConfig, Wanted
+from throwcollect.errors import ConfigError, Problem
+
+
+class UntilLanded(UntilConfig):
+    """When enough has been collected."""
+
+    landed: Wanted
+    """Throws that should land, at least; trials are added to the plan until so many have."""
 
 
 class ThrowConfig(TaskConfig):
     """The task `throw`: the arm swings from `start` to `end`; the ball leaves the spoon when the spoon brakes."""
+
+    implementation: ClassVar[str] = "throwcollect.tasks.throw.throw_task:ThrowTask"
+    until: ClassVar[type[UntilConfig]] = UntilLanded
+    throws: ClassVar[bool] = True
 
     name: Literal["throw"] = "throw"
     """Task."""
@@ -41,11 +54,11 @@ class ThrowConfig(TaskConfig):
 
 
 def throw_section(task: TaskConfig) -> ThrowConfig:
-    """Return the section of a task that is known to be a throw.
+    """Return the section of a task that is a throw.
 
     Raises:
-        TypeError: If it is another task's.
+        ConfigError: If it is another task's.
     """
     if not isinstance(task, ThrowConfig):
-        raise TypeError(f"the task is {task.name}, not throw")
+        raise ConfigError([Problem(f"should be 'throw', got {task.name!r}", key="task.name")])
     return task

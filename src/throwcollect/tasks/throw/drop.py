@@ -1,4 +1,4 @@
-"""Whether the spoon threw the ball, or the ball left it by its own weight."""
+"""Whether the tool threw the ball, or the ball left it by its own weight."""
 
 from __future__ import annotations
 
@@ -8,12 +8,10 @@ import operator
 import numpy as np
 
 from throwcollect.config.schema import Config
-from throwcollect.episode.record import EpisodeHeader, Samples
+from throwcollect.episode.record import NS_PER_S, EpisodeHeader, Samples
 from throwcollect.robots.tool_motion import ToolMotion
-from throwcollect.tasks.throw.outcome import BallState
+from throwcollect.tasks.measures import BallState
 from throwcollect.tools.tool import tool_of
-
-_NS_PER_S = 1_000_000_000
 
 _LEAST_SHARE = 0.25
 """Least speed of a throwing spoon, over the speed of a fall through the depth of its cup [-]: 0.20 m/s by default.
@@ -29,59 +27,63 @@ and down to -2.1 J/kg when the ball was thrown with 1.8 m/s in a downward swing.
 
 
 def lost_before_start(samples: Samples, header: EpisodeHeader, *, config: Config) -> str | None:
-    """Reason why a trial began without a ball in the spoon, if it did.
+    """Reason why a trial began without a ball in the tool, if it did.
 
-    A ball that is not pressed on the spoon at the start may be on a small bounce: it counts as in the spoon if it is
-    there no farther than the rim's radius from where it rests, and touches the spoon later.
+    A ball that is not pressed on the tool at the start may be on a small bounce: it counts as in the tool if it is
+    there no farther than the rim's radius from where it rests, and touches the tool later.
 
     Args:
         samples: The whole trial.
         header: Its contacts and its start.
         config: Configuration of the trial.
     """
-    held = [contact.start_ns for contact in header.contacts if contact.body == "spoon"]
+    held = [contact.start_ns for contact in header.contacts if contact.body == config.tool.name]
     if held and min(held) > header.start_ns:
         seat = ToolMotion(config).place(samples.position[0])
         if math.dist(samples.ball_position[0], seat) > tool_of(config.tool).rim_radius_m:
             held = []
     if held:
         return None
-    return f"the ball had left the spoon before the start, in the sim.settle_s = {config.sim.settle_s} s for settling"
+    return (
+        f"the ball had left the {config.tool.name} before the start, in the sim.settle_s = {config.sim.settle_s} s for "
+        "settling"
+    )
 
 
 def drop(samples: Samples, header: EpisodeHeader, release: BallState, *, config: Config) -> str | None:
-    """Reason why a ball that left the spoon was not thrown by it, if it was not.
+    """Reason why a ball that left the tool was not thrown by it, if it was not.
 
-    The spoon threw the ball if it moved the way that the ball then took, at a quarter or more of the speed of a fall
-    through the depth of the cup. A spoon that brakes lets the ball roll on over its rim; so its highest speed counts
+    The tool threw the ball if it moved the way that the ball then took, at a quarter or more of the speed of a fall
+    through the depth of the cup. A tool that brakes lets the ball roll on over its rim; so its highest speed counts
     of the time that the ball, at its speed, needs for the radius of the rim.
 
     Args:
         samples: The whole trial.
         header: Its start.
-        release: The ball when it left the spoon.
+        release: The ball when it left the tool.
         config: Configuration of the trial.
     """
     speed = math.hypot(*release.velocity)
     direction = [part / (speed or 1.0) for part in release.velocity]
     least = _LEAST_SHARE * math.sqrt(2 * config.scene.gravity_mps2 * tool_of(config.tool).depth_m)
-    release_ns = header.start_ns + round(release.time_s * _NS_PER_S)
-    since_ns = release_ns - (tool_of(config.tool).rim_radius_m / speed * _NS_PER_S if speed else math.inf)
+    release_ns = header.start_ns + round(release.time_s * NS_PER_S)
+    since_ns = release_ns - (tool_of(config.tool).rim_radius_m / speed * NS_PER_S if speed else math.inf)
     last = min(int(np.searchsorted(samples.stamps_ns, release_ns)), len(samples) - 1)
-    spoon = ToolMotion(config)
+    tool = ToolMotion(config)
     fastest = -math.inf
     for row in range(last, -1, -1):
-        velocity = spoon.velocity(samples.position[row], samples.velocity[row]).tolist()
+        velocity = tool.velocity(samples.position[row], samples.velocity[row]).tolist()
         fastest = max(fastest, sum(map(operator.mul, direction, velocity)))
         if fastest >= least:
             return None
         if samples.stamps_ns[row] <= since_ns:
             break
-    moved = math.dist(spoon.place(samples.position[last]), spoon.place(samples.position[0]))
+    moved = math.dist(tool.place(samples.position[last]), tool.place(samples.position[0]))
     height = release.position[2] - samples.ball_position[0, 2]
     work = config.scene.gravity_mps2 * height + (speed**2 - math.hypot(*samples.ball_linear_velocity[0]) ** 2) / 2
+    name = config.tool.name
     return (
-        f"the spoon did not throw the ball: it left at {release.time_s:.3f} s with {speed:.2f} m/s, and the spoon went "
-        f"that way at {fastest:z.2f} m/s, not {least:.2f} m/s; until then, the spoon had moved by "
+        f"the {name} did not throw the ball: it left at {release.time_s:.3f} s with {speed:.2f} m/s, and the {name} "
+        f"went that way at {fastest:z.2f} m/s, not {least:.2f} m/s; until then, the {name} had moved by "
         f"{moved * 1000:.1f} mm and done {work:z.2f} J/kg of work on the ball"
     )

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
-from throwcollect.episode.record import Contact, EpisodeHeader, Samples
+from throwcollect.episode.record import NS_PER_S, Contact, EpisodeHeader, Samples
+from throwcollect.tasks.free_flight import ballistic_positions
+from throwcollect.tasks.measures import BallState
 from throwcollect.tasks.throw.config import throw_section
-from throwcollect.tasks.throw.outcome import BallState
 
-NS_PER_S = 1_000_000_000
 BALLISTIC_TOLERANCE_M = 1e-9
 """A recorded flight and the computed one differ by rounding, below 1e-12 m; the smallest kick moves a ball by more."""
 
@@ -140,18 +140,19 @@ def without_impact(flight: Flight, impact_s: float, *, config: Config) -> Flight
     )
 
 
-def release_of(contacts: tuple[Contact, ...], *, gap_s: float) -> int | None:
-    """Instant at which the ball left the spoon [ns].
+def release_of(contacts: tuple[Contact, ...], *, tool: str, gap_s: float) -> int | None:
+    """Instant at which the ball left the tool [ns].
 
     Args:
         contacts: All contacts of the ball.
-        gap_s: Time out of the spoon that makes a release [s].
+        tool: Name of the tool.
+        gap_s: Time out of the tool that makes a release [s].
 
     Returns:
-        End of the first contact with the spoon that no other one follows within `gap_s`; None if the ball never was
-        in the spoon or never left it. The gap after the last contact may be cut short by the end of the record.
+        End of the first contact with the tool that no other one follows within `gap_s`; None if the ball never was
+        in the tool or never left it. The gap after the last contact may be cut short by the end of the record.
     """
-    held = sorted((contact for contact in contacts if contact.body == "spoon"), key=lambda contact: contact.start_ns)
+    held = sorted((contact for contact in contacts if contact.body == tool), key=lambda contact: contact.start_ns)
     for number, contact in enumerate(held, start=1):
         if contact.end_ns is None:
             return None
@@ -165,7 +166,7 @@ def flight_residual(samples: Samples, header: EpisodeHeader, *, config: Config) 
 
     The motion takes, per physics step dt, ``v += (g + drag(v)) dt``, then ``x += v dt``, as the physics does. It starts
     at the first sample `task.recatch_gap_s` after the release, because the contact solver may leave friction impulses
-    on a ball that slides off the spoon in the steps after its normal force has gone: up to 12 ms were seen, which
+    on a ball that slides off the tool in the steps after its normal force has gone: up to 12 ms were seen, which
     moved the landing by 1 mm. It ends with the first contact after the release, or with the record.
 
     Both sides then do the same arithmetic in double precision, so they differ by its rounding alone: at most about
@@ -181,11 +182,12 @@ def flight_residual(samples: Samples, header: EpisodeHeader, *, config: Config) 
     Returns:
         The largest distance [m]; None without a release, or with fewer than two such samples.
     """
-    release_ns = release_of(header.contacts, gap_s=throw_section(config.task).recatch_gap_s)
+    gap_s = throw_section(config.task).recatch_gap_s
+    release_ns = release_of(header.contacts, tool=config.tool.name, gap_s=gap_s)
     if release_ns is None:
         return None
     later = [contact.start_ns for contact in header.contacts if contact.start_ns >= release_ns]
-    free_ns = release_ns + round(throw_section(config.task).recatch_gap_s * NS_PER_S)
+    free_ns = release_ns + round(gap_s * NS_PER_S)
     first = int(np.searchsorted(samples.stamps_ns, free_ns))
     # A contact acts in the physics step that ends at its start, so what comes before that instant is untouched.
     stop = int(np.searchsorted(samples.stamps_ns, min(later))) if later else len(samples.stamps_ns)
@@ -199,65 +201,6 @@ def flight_residual(samples: Samples, header: EpisodeHeader, *, config: Config) 
         config=config,
     )
     return float(np.linalg.norm(samples.ball_position[first:stop] - predicted[::stride], axis=1).max())
-
-
-def ballistic_positions(
-    position: NDArray[np.float64], velocity: NDArray[np.float64], *, steps: int, config: Config
-) -> NDArray[np.float64]:
-    """Ball in free flight, step by step as the physics computes it.
-
-    Args:
-        position: Ball centre at the start [m], shape ``(3,)``.
-        velocity: At the start [m/s], shape ``(3,)``.
-        steps: Number of physics steps.
-        config: Gravity, air, ball and physics rate.
-
-    Returns:
-        Ball centre [m] at the start and after each step, shape ``(steps + 1, 3)``.
-    """
-    dt = 1 / config.sim.physics_hz
-    ball, scene = config.ball, config.scene
-    area = math.pi * ball.radius_m**2
-    drag_per_m = 0.5 * scene.air_density_kgpm3 * ball.drag_coefficient * area / ball.mass_kg
-    x, y, z = map(float, position)
-    vx, vy, vz = map(float, velocity)
-    path = [(x, y, z)]
-    for _ in range(steps):
-        braking = drag_per_m * math.sqrt(vx * vx + vy * vy + vz * vz)
-        vx -= braking * vx * dt
-        vy -= braking * vy * dt
-        vz -= (scene.gravity_mps2 + braking * vz) * dt
-        x += vx * dt
-        y += vy * dt
-        z += vz * dt
-        path.append((x, y, z))
-    return np.array(path)
-
-
-def ballistic_steps(
-    position: NDArray[np.float64], velocity: NDArray[np.float64], *, steps: int, config: Config
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Many balls after some physics steps of free flight each, by the arithmetic of `ballistic_positions`.
-
-    Args:
-        position: Ball centres at the start [m], shape ``(n, 3)``.
-        velocity: At the start [m/s], shape ``(n, 3)``.
-        steps: Number of physics steps.
-        config: Gravity, air, ball and physics rate.
-
-    Returns:
-        Positions [m] and velocities [m/s] after the last step, each of shape ``(n, 3)``.
-    """
-    dt = 1 / config.sim.physics_hz
-    ball, scene = config.ball, config.scene
-    area = math.pi * ball.radius_m**2
-    drag_per_m = 0.5 * scene.air_density_kgpm3 * ball.drag_coefficient * area / ball.mass_kg
-    gravity = np.array([0.0, 0.0, -scene.gravity_mps2])
-    for _ in range(steps):
-        braking = drag_per_m * np.linalg.norm(velocity, axis=1, keepdims=True)
-        velocity = velocity + (gravity - braking * velocity) * dt
-        position = position + velocity * dt
-    return position, velocity
 
 
 def _root(cubic: tuple[float, float, float, float]) -> float:

@@ -8,7 +8,7 @@ from throwcollect.config.schema import Config
 from throwcollect.episode.record import Contact, EpisodeHeader, GoalOutcome, Samples
 from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.robots.talos import TALOS
-from throwcollect.tasks.trajectory import throw_trajectory
+from throwcollect.tasks.task import task_of
 
 START_NS = 7_000_000_000
 RELEASE_S = 0.6373
@@ -44,7 +44,7 @@ def episode(
     count = round(duration_s * rate_hz) + 1
     stamps = START_NS + np.arange(count) * (1_000_000_000 // rate_hz)
     times = (stamps - START_NS) / 1e9
-    trajectory = throw_trajectory(config)
+    trajectory = task_of(config).trajectory()
     position = np.tile([{**TALOS.rest_posture, **config.task.start}[joint] for joint in TALOS.joints], (count, 1))
     velocity = np.zeros((count, 32))
     columns = [TALOS.joints.index(joint) for joint in trajectory.joints]

@@ -8,7 +8,8 @@ import pytest
 
 from throwcollect.config.schema import Config
 from throwcollect.episode.record import Contact
-from throwcollect.tasks.throw.flight import ballistic_positions, flight_residual
+from throwcollect.tasks.free_flight import ballistic_positions
+from throwcollect.tasks.throw.flight import flight_residual
 
 from .episodes import RELEASE_S, episode
 

@@ -5,11 +5,11 @@ import pytest
 from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError
 from throwcollect.robots.talos import TALOS
-from throwcollect.tasks.trajectory import throw_trajectory
+from throwcollect.tasks.task import task_of
 
 
 def test_joints_are_the_moving_ones_in_the_order_of_the_robot():
-    points = throw_trajectory(Config())
+    points = task_of(Config()).trajectory()
     assert set(points.joints) == set(Config().task.end)
     assert list(points.joints) == [joint for joint in TALOS.joints if joint in points.joints]
     assert points.positions.shape == points.velocities.shape == points.accelerations.shape == (26, 5)
@@ -17,14 +17,14 @@ def test_joints_are_the_moving_ones_in_the_order_of_the_robot():
 
 def test_each_column_goes_from_the_start_to_the_end_of_its_joint():
     task = Config().task
-    points = throw_trajectory(Config())
+    points = task_of(Config()).trajectory()
     assert points.positions[0].tolist() == [task.start[joint] for joint in points.joints]
     assert points.positions[-1].tolist() == [task.end[joint] for joint in points.joints]
 
 
 def test_family_is_that_of_the_task():
     config = Config(task={"trajectory": {"family": "dmp"}, "duration_s": 2.0})
-    points = throw_trajectory(config)
+    points = task_of(config).trajectory()
     assert points.positions[-1].tolist() == [config.task.end[joint] for joint in points.joints]
     assert points.accelerations[0].any()
 
@@ -32,4 +32,4 @@ def test_family_is_that_of_the_task():
 def test_motion_that_cannot_be_computed_is_refused():
     weights = {"arm_right_4_joint": [1e6] * 20}
     with pytest.raises(ConfigError, match="settle"):
-        throw_trajectory(Config(task={"trajectory": {"family": "dmp", "weights": weights}}))
+        task_of(Config(task={"trajectory": {"family": "dmp", "weights": weights}})).trajectory()

@@ -13,10 +13,9 @@ from throwcollect.episode.record import Contact, GoalOutcome
 from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.talos import TALOS
 from throwcollect.robots.tool_motion import ToolMotion
-from throwcollect.tasks.throw.flight import ballistic_positions
-from throwcollect.tasks.throw.judge import judge
-from throwcollect.tasks.throw.outcome import Outcome
-from throwcollect.tasks.trajectory import throw_trajectory
+from throwcollect.tasks.free_flight import ballistic_positions
+from throwcollect.tasks.task import task_of
+from throwcollect.tasks.throw.outcome import ThrowOutcome
 
 from .episodes import GRAVITY, ORIGIN, RELEASE_S, VELOCITY, episode, landing_time, parabola
 
@@ -27,13 +26,13 @@ RADIUS = Config().ball.radius_m
 
 
 def judged(samples, header, config=None):
-    config = config or Config()
-    return judge(samples, header, config=config, trajectory=throw_trajectory(config))
+    task = task_of(config or Config())
+    return task.judge(samples, header, task.trajectory())
 
 
 def test_landed_throw_has_all_its_numbers():
     result = judged(*episode())
-    assert (result.outcome, result.reason) == (Outcome.LANDED, None)
+    assert (result.outcome, result.reason) == (ThrowOutcome.LANDED, None)
     assert result.release.time_s == pytest.approx(RELEASE_S, abs=1e-9)
     end = landing_time(RADIUS)
     position, velocity = parabola(np.array([end]))
@@ -102,7 +101,7 @@ def test_landing_between_samples_is_exact_for_a_parabola(height, rate, vx, vz):
 
 def test_ball_that_stays_in_the_spoon_is_not_released():
     result = judged(*episode(contacts=(("spoon", 0.0, None),), end_reason="timeout"))
-    assert result.outcome is Outcome.NOT_RELEASED
+    assert result.outcome is ThrowOutcome.NOT_RELEASED
     assert result.reason == "the ball stayed in the spoon"
     assert (result.release, result.apex, result.landing, result.recontacts) == (None, None, None, None)
     assert result.velocity_peak is not None
@@ -111,9 +110,9 @@ def test_ball_that_stays_in_the_spoon_is_not_released():
 def test_ball_that_had_left_the_spoon_before_the_start_is_dropped_even_if_the_spoon_hits_it_later():
     lost = "the ball had left the spoon before the start, in the sim.settle_s = 0.05 s for settling"
     result = judged(*episode(contacts=()))
-    assert (result.outcome, result.reason, result.release) == (Outcome.DROPPED, lost, None)
+    assert (result.outcome, result.reason, result.release) == (ThrowOutcome.DROPPED, lost, None)
     result = judged(*episode(contacts=(("spoon", 0.6, RELEASE_S),)))
-    assert (result.outcome, result.reason) == (Outcome.DROPPED, lost)
+    assert (result.outcome, result.reason) == (ThrowOutcome.DROPPED, lost)
     assert result.landing is not None
 
 
@@ -121,7 +120,7 @@ def test_ball_on_a_bounce_at_the_start_is_in_the_spoon():
     samples, header = episode(contacts=(("spoon", 0.01, RELEASE_S),))
     samples.ball_position[0] = ToolMotion(Config()).place(samples.position[0])
     samples.ball_position[0, 2] += 0.01
-    assert judged(samples, header).outcome is Outcome.LANDED
+    assert judged(samples, header).outcome is ThrowOutcome.LANDED
 
 
 def test_ball_that_leaves_a_still_spoon_is_dropped_with_the_evidence_and_keeps_its_landing():
@@ -131,7 +130,7 @@ def test_ball_that_leaves_a_still_spoon_is_dropped_with_the_evidence_and_keeps_i
     samples, header = episode(config)
     samples.ball_linear_velocity[samples.stamps_ns < header.start_ns + RELEASE_S * 1e9] = 0.0
     result = judged(samples, header, config)
-    assert result.outcome is Outcome.DROPPED
+    assert result.outcome is ThrowOutcome.DROPPED
     assert result.reason.startswith("the spoon did not throw the ball: it left at 0.637 s with ")
     assert "and the spoon went that way at 0.00 m/s, not 0.20 m/s; until then, the spoon had moved by 0.0 mm" in (
         result.reason
@@ -141,23 +140,23 @@ def test_ball_that_leaves_a_still_spoon_is_dropped_with_the_evidence_and_keeps_i
 
 
 def test_ball_that_leaves_before_the_swing_is_dropped():
-    assert judged(*episode(contacts=(("spoon", 0.0, 0.044),))).outcome is Outcome.DROPPED
+    assert judged(*episode(contacts=(("spoon", 0.0, 0.044),))).outcome is ThrowOutcome.DROPPED
 
 
 def test_ball_that_leaves_against_the_swing_is_dropped():
-    assert judged(*episode(velocity=-VELOCITY)).outcome is Outcome.DROPPED
+    assert judged(*episode(velocity=-VELOCITY)).outcome is ThrowOutcome.DROPPED
 
 
 def test_ball_that_leaves_at_rest_is_dropped():
     samples, header = episode(velocity=np.zeros(3))
     samples.velocity[:] = 0.0
-    assert judged(samples, header).outcome is Outcome.DROPPED
+    assert judged(samples, header).outcome is ThrowOutcome.DROPPED
 
 
 def test_ball_that_rolls_on_over_the_rim_of_a_spoon_that_brakes_is_thrown():
     samples, header = episode()
     times = (samples.stamps_ns - header.start_ns) / 1e9
-    for stop, outcome in ((RELEASE_S - 0.01, Outcome.LANDED), (RELEASE_S - 0.1, Outcome.DROPPED)):
+    for stop, outcome in ((RELEASE_S - 0.01, ThrowOutcome.LANDED), (RELEASE_S - 0.1, ThrowOutcome.DROPPED)):
         samples.velocity[times > stop] = 0.0
         assert judged(samples, header).outcome is outcome
 
@@ -172,7 +171,7 @@ def test_ball_that_is_thrown_downwards_is_thrown():
     assert down[2] < -0.3
     samples, header = episode(config, velocity=down, origin=ORIGIN - [0.0, 0.0, 0.4])
     samples.ball_position[0] = ORIGIN
-    assert judged(samples, header, config).outcome is Outcome.LANDED
+    assert judged(samples, header, config).outcome is ThrowOutcome.LANDED
 
 
 @pytest.mark.parametrize(("gap", "released_at"), [(0.0199, 0.65), (0.02, 0.6)])
@@ -183,7 +182,7 @@ def test_hop_shorter_than_the_gap_is_no_release(gap, released_at):
 
 def test_ball_back_in_the_spoon_is_recaught_at_its_first_release():
     result = judged(*episode(contacts=(HELD, ("spoon", 0.7, 0.72), ("spoon", 0.8, 0.81))))
-    assert result.outcome is Outcome.RECAUGHT
+    assert result.outcome is ThrowOutcome.RECAUGHT
     assert result.reason == "the spoon touched the ball again at 0.700 s"
     assert result.release.time_s == pytest.approx(RELEASE_S)
     assert result.recontacts == 2
@@ -192,23 +191,23 @@ def test_ball_back_in_the_spoon_is_recaught_at_its_first_release():
 
 def test_ball_against_a_link_hits_the_robot():
     result = judged(*episode(contacts=(HELD, ("head_2_link", 0.7, 0.71), ("spoon", 0.8, 0.81))))
-    assert (result.outcome, result.reason) == (Outcome.SELF_HIT, "the ball touched head_2_link at 0.700 s")
+    assert (result.outcome, result.reason) == (ThrowOutcome.SELF_HIT, "the ball touched head_2_link at 0.700 s")
     assert result.recontacts == 2
 
 
 def test_link_that_is_still_touched_after_the_release_is_hit():
-    assert judged(*episode(contacts=(("arm_right_7_link", 0.6, 0.64), HELD))).outcome is Outcome.SELF_HIT
-    assert judged(*episode(contacts=(("arm_right_7_link", 0.6, RELEASE_S), HELD))).outcome is Outcome.LANDED
+    assert judged(*episode(contacts=(("arm_right_7_link", 0.6, 0.64), HELD))).outcome is ThrowOutcome.SELF_HIT
+    assert judged(*episode(contacts=(("arm_right_7_link", 0.6, RELEASE_S), HELD))).outcome is ThrowOutcome.LANDED
 
 
 def test_what_the_ball_touches_after_landing_does_not_count():
     contacts = (HELD, ("ground", landing_time(RADIUS), 1.38), ("leg_left_6_link", 1.39, None))
-    assert judged(*episode(contacts=contacts)).outcome is Outcome.LANDED
+    assert judged(*episode(contacts=contacts)).outcome is ThrowOutcome.LANDED
 
 
 def test_ball_that_does_not_come_down_in_time_is_a_timeout():
     result = judged(*episode(duration_s=1.2, end_reason="timeout"))
-    assert result.outcome is Outcome.TIMEOUT
+    assert result.outcome is ThrowOutcome.TIMEOUT
     assert result.reason == "the ball did not reach the landing plane; the trial ended as timeout"
     assert (result.landing, result.flight_time_s, result.hit_angle_rad) == (None, None, None)
     assert result.apex is not None
@@ -218,7 +217,7 @@ def test_ball_on_the_ground_below_the_plane_has_not_hit_the_robot():
     origin = np.array([0.0, 0.0, 1.2])
     config = Config(scene={"landing_height_m": 1.5})
     samples, header = episode(config, origin=origin, contacts=(HELD, ("ground", 1.1, None)), end_reason="rest")
-    assert judged(samples, header, config).outcome is Outcome.TIMEOUT
+    assert judged(samples, header, config).outcome is ThrowOutcome.TIMEOUT
 
 
 @pytest.mark.parametrize("drag", [0.0, 0.47])
@@ -235,7 +234,7 @@ def test_impact_on_the_ground_does_not_bend_the_landing_just_above_it(drag):
     start_ns = int(free.stamps_ns[end]) - round(step * 1e9)
     impact = Contact("ground", start_ns, None)
     stopped = judged(free, replace(header, contacts=(*header.contacts, impact)), config)
-    assert stopped.outcome is Outcome.LANDED
+    assert stopped.outcome is ThrowOutcome.LANDED
     assert stopped.landing.position == pytest.approx(undisturbed.landing.position, abs=1e-12)
     assert stopped.landing.velocity == pytest.approx(undisturbed.landing.velocity, abs=1e-9)
     assert judged(free, header, config).landing.time_s != pytest.approx(undisturbed.landing.time_s, abs=1e-5)
@@ -254,7 +253,7 @@ def test_saturated_effort_violates_a_limit_but_keeps_the_landing():
     samples, header = episode()
     samples.effort[100:110, ELBOW] = -joint_limits(TALOS).effort[ELBOW]
     result = judged(samples, header)
-    assert result.outcome is Outcome.LIMIT_VIOLATED
+    assert result.outcome is ThrowOutcome.LIMIT_VIOLATED
     assert "arm_right_4_joint reached 1.000 of its effort limit" in result.reason
     assert result.landing is not None
     assert result.effort_saturated_share == pytest.approx(10 / 351)
@@ -264,7 +263,7 @@ def test_effort_limits_scale_with_the_robot():
     samples, header = episode()
     samples.effort[100, ELBOW] = joint_limits(TALOS).effort[ELBOW]
     result = judged(samples, header, Config(robot={"effort_scale": 2.0}))
-    assert result.outcome is Outcome.LANDED
+    assert result.outcome is ThrowOutcome.LANDED
     assert (result.effort_peak.joint, result.effort_peak.share) == ("arm_right_4_joint", pytest.approx(0.5))
 
 
@@ -272,7 +271,7 @@ def test_speed_above_the_limit_of_any_joint_violates_it():
     samples, header = episode()
     samples.velocity[5, GRIPPER] = -1.2
     result = judged(samples, header)
-    assert result.outcome is Outcome.LIMIT_VIOLATED
+    assert result.outcome is ThrowOutcome.LIMIT_VIOLATED
     assert result.reason == "gripper_left_joint moved at 1.200 of its velocity limit"
 
 
@@ -280,7 +279,7 @@ def test_moving_joint_beyond_its_range_violates_it():
     samples, header = episode()
     samples.position[5, ELBOW] = 0.05
     result = judged(samples, header)
-    assert result.outcome is Outcome.LIMIT_VIOLATED
+    assert result.outcome is ThrowOutcome.LIMIT_VIOLATED
     assert result.reason.startswith("arm_right_4_joint left its range")
     assert result.tracking_error_rad["arm_right_4_joint"] == pytest.approx(0.05 + 1.9, abs=1e-3)
 
@@ -288,7 +287,7 @@ def test_moving_joint_beyond_its_range_violates_it():
 def test_held_joint_may_rest_beyond_the_end_of_its_range():
     samples, header = episode()
     samples.position[:, GRIPPER] = 1e-3
-    assert judged(samples, header).outcome is Outcome.LANDED
+    assert judged(samples, header).outcome is ThrowOutcome.LANDED
 
 
 @pytest.mark.parametrize(
@@ -298,7 +297,7 @@ def test_goal_that_was_not_carried_out_is_a_tracking_failure(status, outcome):
     goal = GoalOutcome("arm_right_controller", status, -4, "path tolerance of arm_right_4_joint")
     result = judged(*episode(goals=(goal,)))
     assert result.outcome.value == outcome
-    if result.outcome is Outcome.TRACKING_FAILED:
+    if result.outcome is ThrowOutcome.TRACKING_FAILED:
         assert result.reason.endswith("its goal: path tolerance of arm_right_4_joint")
         assert result.landing is not None
 
@@ -315,20 +314,20 @@ def test_tracking_error_is_that_of_each_moving_joint():
 def test_outcomes_come_in_their_documented_order():
     samples, header = episode(contacts=(HELD, ("head_2_link", 0.7, 0.71)), duration_s=1.2, end_reason="rest")
     samples.effort[100, ELBOW] = 1e3
-    assert judged(samples, header).outcome is Outcome.SELF_HIT
+    assert judged(samples, header).outcome is ThrowOutcome.SELF_HIT
     later = header.contacts[1].start_ns
     header = replace(header, contacts=header.contacts[:1])
-    assert judged(samples, header).outcome is Outcome.TIMEOUT
+    assert judged(samples, header).outcome is ThrowOutcome.TIMEOUT
     still = replace(samples, velocity=0 * samples.velocity)
     assert judged(still, replace(header, contacts=(*header.contacts, Contact("head_2_link", later, None)))).outcome is (
-        Outcome.DROPPED
+        ThrowOutcome.DROPPED
     )
     lasting = (replace(header.contacts[0], end_ns=None),)
-    assert judged(still, replace(header, contacts=lasting)).outcome is Outcome.NOT_RELEASED
-    assert judged(samples, replace(header, contacts=())).outcome is Outcome.DROPPED
+    assert judged(still, replace(header, contacts=lasting)).outcome is ThrowOutcome.NOT_RELEASED
+    assert judged(samples, replace(header, contacts=())).outcome is ThrowOutcome.DROPPED
     goal = GoalOutcome("torso_controller", 6, -5, "")
     result = judged(samples, replace(header, contacts=(), goals=(goal,)))
-    assert result.outcome is Outcome.TRACKING_FAILED
+    assert result.outcome is ThrowOutcome.TRACKING_FAILED
     assert result.reason == "torso_controller aborted its goal with error code -5"
 
 
@@ -337,7 +336,7 @@ def test_diverged_simulation_is_a_tracking_failure_without_numbers(field):
     samples, header = episode()
     getattr(samples, field)[300, 0] = np.nan
     result = judged(samples, header)
-    assert result.outcome is Outcome.TRACKING_FAILED
+    assert result.outcome is ThrowOutcome.TRACKING_FAILED
     assert result.landing is None
     assert result.velocity_peak is None
 
@@ -356,8 +355,8 @@ def test_diverged_simulation_is_a_tracking_failure_without_numbers(field):
 def test_any_contacts_give_an_outcome_without_nan(contacts):
     spans = [(body, start, None if length is None else min(start + length, 1.4)) for body, start, length in contacts]
     result = judged(*episode(contacts=tuple(spans)))
-    assert (result.reason is None) == (result.outcome is Outcome.LANDED)
-    assert result.release is not None or result.outcome in (Outcome.NOT_RELEASED, Outcome.DROPPED)
+    assert (result.reason is None) == (result.outcome is ThrowOutcome.LANDED)
+    assert result.release is not None or result.outcome in (ThrowOutcome.NOT_RELEASED, ThrowOutcome.DROPPED)
     if result.release is not None:
         assert result.apex.position[2] >= result.release.position[2]
     for state in (result.release, result.apex, result.landing):

@@ -1,0 +1,188 @@
+"""How the fields of a result stand in the table of throws: declared once, on the field, for writing and for reading.
+
+A field of a result says which columns it has by what it is made with::
+
+    release: BallState | None = measured(BallColumns("when it left the {tool}"))
+    flight_time_s: float | None = measured(Number("From release to landing [s]."))
+
+A description may name the ``{tool}``, by which contacts with it are recorded.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import Field, dataclass, field
+from typing import Any, Literal
+
+from throwcollect.tasks.measures import BallState, Peak
+
+_DECLARED = "columns"
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of the table.
+
+    Attributes:
+        name: Its name.
+        kind: What it holds: numbers, whole numbers, or text; null where there is nothing.
+        description: One sentence, with units.
+    """
+
+    name: str
+    kind: Literal["number", "count", "text"]
+    description: str
+
+
+class Columns(ABC):
+    """The columns of one field of a result; the values of all of them are null where the field is None."""
+
+    @abstractmethod
+    def declare(self, name: str, joints: Sequence[str]) -> list[Column]:
+        """List the columns.
+
+        Args:
+            name: Name of the field.
+            joints: Joints that the task moves.
+        """
+
+    @abstractmethod
+    def split(self, value: Any, joints: Sequence[str]) -> Sequence[object]:
+        """Split a value of the field, which is not None, into one value for each column."""
+
+    @abstractmethod
+    def join(self, values: Sequence[Any], joints: Sequence[str]) -> Any:
+        """Make the field's value of the columns' values, none of which is null."""
+
+
+@dataclass(frozen=True)
+class Number(Columns):
+    """A number, in a column that has the field's name.
+
+    Attributes:
+        description: What it is, with its unit.
+    """
+
+    description: str
+
+    def declare(self, name: str, joints: Sequence[str]) -> list[Column]:
+        """List the column; see `Columns`."""
+        return [Column(name, "number", self.description)]
+
+    def split(self, value: float, joints: Sequence[str]) -> Sequence[object]:
+        """Return the number alone; see `Columns`."""
+        return (value,)
+
+    def join(self, values: Sequence[Any], joints: Sequence[str]) -> Any:
+        """Return the number; see `Columns`."""
+        return values[0]
+
+
+@dataclass(frozen=True)
+class Count(Number):
+    """A whole number, in a column that has the field's name."""
+
+    def declare(self, name: str, joints: Sequence[str]) -> list[Column]:
+        """List the column; see `Columns`."""
+        return [Column(name, "count", self.description)]
+
+
+@dataclass(frozen=True)
+class BallColumns(Columns):
+    """A `BallState`: ``<field>_time_s``, ``<field>_x_m`` and so on.
+
+    Attributes:
+        when: At which instant, as the end of a sentence.
+    """
+
+    when: str
+
+    def declare(self, name: str, joints: Sequence[str]) -> list[Column]:
+        """List the columns; see `Columns`."""
+        descriptions = [
+            f"Time since the start of the trial {self.when} [s].",
+            *(f"Ball centre in world {self.when}, {axis} [m]." for axis in "xyz"),
+            *(f"Velocity of the ball in world {self.when}, {axis} [m/s]." for axis in "xyz"),
+        ]
+        return [Column(column, "number", text) for column, text in zip(ball_columns(name), descriptions, strict=True)]
+
+    def split(self, value: BallState, joints: Sequence[str]) -> Sequence[object]:
+        """Return time, position and velocity; see `Columns`."""
+        return (value.time_s, *value.position, *value.velocity)
+
+    def join(self, values: Sequence[Any], joints: Sequence[str]) -> Any:
+        """Return the state; see `Columns`."""
+        return join_ball(values)
+
+
+def ball_columns(name: str) -> list[str]:
+    """List the names of the columns of a `BallState`: time, position and velocity."""
+    return [f"{name}_time_s", *(f"{name}_{axis}_m" for axis in "xyz"), *(f"{name}_v{axis}_mps" for axis in "xyz")]
+
+
+def join_ball(values: Sequence[float]) -> BallState:
+    """Make a state of the values of its columns."""
+    time_s, x, y, z, vx, vy, vz = values
+    return BallState(time_s, (x, y, z), (vx, vy, vz))
+
+
+@dataclass(frozen=True)
+class PeakColumns(Columns):
+    """A `Peak`: ``<field>_share`` and ``<field>_joint``.
+
+    Attributes:
+        of: What the share is, as the beginning of a sentence.
+    """
+
+    of: str
+
+    def declare(self, name: str, joints: Sequence[str]) -> list[Column]:
+        """List the columns; see `Columns`."""
+        return [
+            Column(f"{name}_share", "number", f"{self.of} [-]; 1 is at the limit."),
+            Column(f"{name}_joint", "text", f"Joint that had {name}_share."),
+        ]
+
+    def split(self, value: Peak, joints: Sequence[str]) -> Sequence[object]:
+        """Return share and joint; see `Columns`."""
+        return (value.share, value.joint)
+
+    def join(self, values: Sequence[Any], joints: Sequence[str]) -> Any:
+        """Return the peak; see `Columns`."""
+        share, joint = values
+        return Peak(joint, share)
+
+
+@dataclass(frozen=True)
+class JointColumns(Columns):
+    """A number for each joint that the task moves, by joint: ``<joint>_<field>``.
+
+    Attributes:
+        description: What it is, with its unit; ``{joint}`` stands for the joint.
+    """
+
+    description: str
+
+    def declare(self, name: str, joints: Sequence[str]) -> list[Column]:
+        """List the columns; see `Columns`."""
+        return [Column(f"{joint}_{name}", "number", self.description.replace("{joint}", joint)) for joint in joints]
+
+    def split(self, value: Mapping[str, float], joints: Sequence[str]) -> Sequence[object]:
+        """Return the numbers in the order of the joints; see `Columns`."""
+        return [value[joint] for joint in joints]
+
+    def join(self, values: Sequence[Any], joints: Sequence[str]) -> Any:
+        """Return the numbers by joint; see `Columns`."""
+        return dict(zip(joints, values, strict=True))
+
+
+def measured(columns: Columns) -> Any:
+    """Make a field of a result that is None where there is nothing to measure, and stands in these columns."""
+    return field(default=None, metadata={_DECLARED: columns})
+
+
+def columns_of(declared: Field[Any]) -> Columns | None:
+    """Return the columns that a field of a result was declared with; None if it is no measure."""
+    columns: Columns | None = declared.metadata.get(_DECLARED)
+    return columns

@@ -1,0 +1,69 @@
+"""The ball in free flight, step by step as the physics computes it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from throwcollect.config.schema import Config
+
+
+def ballistic_positions(
+    position: NDArray[np.float64], velocity: NDArray[np.float64], *, steps: int, config: Config
+) -> NDArray[np.float64]:
+    """Ball in free flight, step by step as the physics computes it.
+
+    Args:
+        position: Ball centre at the start [m], shape ``(3,)``.
+        velocity: At the start [m/s], shape ``(3,)``.
+        steps: Number of physics steps.
+        config: Gravity, air, ball and physics rate.
+
+    Returns:
+        Ball centre [m] at the start and after each step, shape ``(steps + 1, 3)``.
+    """
+    dt = 1 / config.sim.physics_hz
+    ball, scene = config.ball, config.scene
+    area = math.pi * ball.radius_m**2
+    drag_per_m = 0.5 * scene.air_density_kgpm3 * ball.drag_coefficient * area / ball.mass_kg
+    x, y, z = map(float, position)
+    vx, vy, vz = map(float, velocity)
+    path = [(x, y, z)]
+    for _ in range(steps):
+        braking = drag_per_m * math.sqrt(vx * vx + vy * vy + vz * vz)
+        vx -= braking * vx * dt
+        vy -= braking * vy * dt
+        vz -= (scene.gravity_mps2 + braking * vz) * dt
+        x += vx * dt
+        y += vy * dt
+        z += vz * dt
+        path.append((x, y, z))
+    return np.array(path)
+
+
+def ballistic_steps(
+    position: NDArray[np.float64], velocity: NDArray[np.float64], *, steps: int, config: Config
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Many balls after some physics steps of free flight each, by the arithmetic of `ballistic_positions`.
+
+    Args:
+        position: Ball centres at the start [m], shape ``(n, 3)``.
+        velocity: At the start [m/s], shape ``(n, 3)``.
+        steps: Number of physics steps.
+        config: Gravity, air, ball and physics rate.
+
+    Returns:
+        Positions [m] and velocities [m/s] after the last step, each of shape ``(n, 3)``.
+    """
+    dt = 1 / config.sim.physics_hz
+    ball, scene = config.ball, config.scene
+    area = math.pi * ball.radius_m**2
+    drag_per_m = 0.5 * scene.air_density_kgpm3 * ball.drag_coefficient * area / ball.mass_kg
+    gravity = np.array([0.0, 0.0, -scene.gravity_mps2])
+    for _ in range(steps):
+        braking = drag_per_m * np.linalg.norm(velocity, axis=1, keepdims=True)
+        velocity = velocity + (gravity - braking * velocity) * dt
+        position = position + velocity * dt
+    return position, velocity

@@ -1,0 +1,107 @@
+"""What every task measures of the joints in an episode, and what of it fails a trial."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from throwcollect.config.schema import Config
+from throwcollect.episode.record import NS_PER_S, EpisodeHeader, Samples
+from throwcollect.robots.description import robot_of
+from throwcollect.robots.limits import joint_limits
+from throwcollect.robots.quintic_curve import sample_positions
+from throwcollect.robots.trajectory import JointTrajectory
+from throwcollect.tasks.measures import Peak
+from throwcollect.tasks.result import Result
+
+_SLACK = 1e-3
+_AT_LIMIT = 1 - _SLACK
+_FAILED_GOALS = {5: "canceled", 6: "aborted"}
+
+
+@dataclass(frozen=True)
+class JointMeasures:
+    """What is measured of the joints; the attributes are those of `Result`."""
+
+    position_peak: Peak
+    velocity_peak: Peak
+    effort_peak: Peak
+    effort_saturated_share: float
+    tracking_error_rad: Mapping[str, float]
+
+
+def measure_joints(
+    samples: Samples, start_ns: int, *, config: Config, trajectory: JointTrajectory
+) -> JointMeasures | None:
+    """Measure how close the joints came to their limits, and how well they followed their trajectory.
+
+    Args:
+        samples: The recorded trial, at least two samples.
+        start_ns: Its start, at which the trajectory starts [ns].
+        config: Configuration of the trial.
+        trajectory: What the controllers were sent, followed as quintic curve and then held at its end.
+
+    Returns:
+        The measures; None if the samples of the joints are not finite.
+    """
+    robot = robot_of(config)
+    limits = joint_limits(robot)
+    effort_limits = limits.effort * config.robot.effort_scale
+    velocity_peak = _peak(np.abs(samples.velocity).max(axis=0) / limits.velocity, robot.joints)
+    effort_peak = _peak(np.abs(samples.effort).max(axis=0) / effort_limits, robot.joints)
+    if not math.isfinite(velocity_peak.share + effort_peak.share + samples.position.sum()):
+        return None
+    moving = [robot.joints.index(joint) for joint in trajectory.joints]
+    middle = (limits.lower[moving] + limits.upper[moving]) / 2
+    # A row a joint, so that arithmetic runs along memory.
+    measured = samples.position.T[moving]
+    positions = np.abs(measured - middle[:, np.newaxis]).max(axis=1) / (limits.upper[moving] - middle)
+    desired = sample_positions(trajectory, (samples.stamps_ns - start_ns) / NS_PER_S).T
+    errors = np.abs(measured - desired).max(axis=1)
+    saturated = 0.0
+    if effort_peak.share >= _AT_LIMIT:
+        saturated = float((np.abs(samples.effort) / effort_limits >= _AT_LIMIT).any(axis=1).mean())
+    return JointMeasures(
+        position_peak=_peak(positions, trajectory.joints),
+        velocity_peak=velocity_peak,
+        effort_peak=effort_peak,
+        effort_saturated_share=saturated,
+        tracking_error_rad=dict(zip(trajectory.joints, errors.tolist(), strict=True)),
+    )
+
+
+def explain_failed_goal(header: EpisodeHeader) -> str | None:
+    """Say which controller did not carry out its trajectory, and why; None if all did."""
+    for goal in header.goals:
+        if goal.status in _FAILED_GOALS:
+            detail = f": {goal.error_string}" if goal.error_string else f" with error code {goal.error_code}"
+            return f"{goal.controller} {_FAILED_GOALS[goal.status]} its goal{detail}"
+    return None
+
+
+def explain_violation(result: Result) -> str | None:
+    """Say which joint violated a limit; None if none did.
+
+    The measured position or velocity of a joint may not exceed its limit, and its torque may not reach it. Limits count
+    with a tolerance of 0.1 % (of half the range, for positions). Held joints may rest at the end of their range, so
+    positions count for the moving joints only, velocities and torques for all.
+    """
+    if (peak := result.position_peak) and peak.share > 1 + _SLACK:
+        return f"{peak.joint} left its range: {peak.share:.3f} of the way from its middle to its limit"
+    if (peak := result.velocity_peak) and peak.share > 1 + _SLACK:
+        return f"{peak.joint} moved at {peak.share:.3f} of its velocity limit"
+    if (peak := result.effort_peak) and result.effort_saturated_share:
+        return (
+            f"{peak.joint} reached {peak.share:.3f} of its effort limit; efforts were saturated in "
+            f"{result.effort_saturated_share:.1%} of the samples"
+        )
+    return None
+
+
+def _peak(shares: NDArray[np.float64], joints: tuple[str, ...]) -> Peak:
+    column = int(shares.argmax())
+    return Peak(joint=joints[column], share=float(shares[column]))

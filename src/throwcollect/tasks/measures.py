@@ -1,0 +1,33 @@
+"""What results are made of besides numbers: the ball at one instant, and how close a joint came to its limit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class BallState:
+    """The ball at one instant; world frame.
+
+    Attributes:
+        time_s: Time since the start of the trial [s].
+        position: Centre [m].
+        velocity: [m/s].
+    """
+
+    time_s: float
+    position: tuple[float, float, float]
+    velocity: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Peak:
+    """Largest value of a kind during a trial.
+
+    Attributes:
+        joint: Joint that had it.
+        share: Value over limit [-]; 1 is at the limit.
+    """
+
+    joint: str
+    share: float

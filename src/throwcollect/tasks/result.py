@@ -1,0 +1,108 @@
+"""What came of a trial of any task: a word, a reason, and what all tasks measure of the joints."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import Field, dataclass, fields
+from enum import Enum
+from typing import Any, Generic, TypeVar
+
+from throwcollect.tasks.columns import Column, Columns, JointColumns, Number, PeakColumns, columns_of, measured
+from throwcollect.tasks.measures import Peak
+
+LIMIT_VIOLATED, TRACKING_FAILED, LOST = "limit_violated", "tracking_failed", "lost"
+"""Outcomes that every task has: it succeeded, but a joint violated a limit; a controller did not carry out its
+trajectory, or the simulation diverged; no simulation returned an episode."""
+
+
+class Outcome(str, Enum):
+    """How a trial ended; each task has outcomes of its own, among them `LIMIT_VIOLATED`, `TRACKING_FAILED`, `LOST`."""
+
+
+@dataclass(frozen=True)
+class Result:
+    """Outcome and key numbers of a trial; None where there is nothing to measure.
+
+    Tasks derive results of their own from it, whose fields are declared with their columns (see `tasks.columns`).
+
+    Attributes:
+        outcome: How the trial ended.
+        reason: One sentence on why the trial did not simply succeed; None if it did.
+        position_peak: Of the moving joints: distance from the middle of the range over half the range.
+        velocity_peak: Of all joints: speed over its limit.
+        effort_peak: Of all joints: torque over its limit.
+        effort_saturated_share: Share of samples in which some joint's torque is at its limit [-].
+        tracking_error_rad: Of each moving joint: largest distance from the commanded trajectory [rad].
+    """
+
+    outcome: Outcome
+    reason: str | None = None
+    position_peak: Peak | None = measured(
+        PeakColumns("Largest distance of a moving joint from the middle of its range over half the range")
+    )
+    velocity_peak: Peak | None = measured(PeakColumns("Largest speed of a joint over its limit"))
+    effort_peak: Peak | None = measured(PeakColumns("Largest torque of a joint over its limit"))
+    effort_saturated_share: float | None = measured(
+        Number("Share of samples in which some joint's torque is at its limit [-].")
+    )
+    tracking_error_rad: Mapping[str, float] | None = measured(
+        JointColumns("Largest distance of {joint} from its commanded trajectory [rad].")
+    )
+
+
+AnyResult = TypeVar("AnyResult", bound=Result)
+
+
+class ResultColumns(Generic[AnyResult]):
+    """The columns of the results of a task, by which these are written into a table and read from it.
+
+    Attributes:
+        columns: What the task measures, then what all tasks measure.
+
+    Args:
+        results: Class of the results.
+        joints: Joints that the task moves.
+        tool: Name of the tool.
+    """
+
+    def __init__(self, results: type[AnyResult], joints: Sequence[str], *, tool: str) -> None:
+        self._results = results
+        self._joints = tuple(joints)
+        self._fields = [
+            (each.name, columns, columns.declare(each.name, joints)) for each, columns in _declared(results)
+        ]
+        self.columns = tuple(
+            Column(column.name, column.kind, column.description.replace("{tool}", tool))
+            for _, _, declared in self._fields
+            for column in declared
+        )
+
+    def write(self, result: AnyResult) -> dict[str, object]:
+        """Values of all columns, by name; None where there is nothing."""
+        values: dict[str, object] = {}
+        for name, columns, declared in self._fields:
+            value = getattr(result, name)
+            parts = [None] * len(declared) if value is None else columns.split(value, self._joints)
+            values |= zip((column.name for column in declared), parts, strict=True)
+        return values
+
+    def read(self, outcome: Outcome, reason: str | None, row: Mapping[str, Any]) -> AnyResult:
+        """The result whose values stand in a row of the table.
+
+        Args:
+            outcome: Its outcome.
+            reason: Its reason.
+            row: Values by column.
+        """
+        measures = {}
+        for name, columns, declared in self._fields:
+            values = [row[column.name] for column in declared]
+            measures[name] = None if None in values else columns.join(values, self._joints)
+        return self._results(outcome, reason, **measures)
+
+
+def _declared(results: type[Result]) -> list[tuple[Field[Any], Columns]]:
+    """The fields of a result that have columns: first those that the task adds."""
+    common = {each.name for each in fields(Result)}
+    found = [(each, columns) for each in fields(results) if (columns := columns_of(each)) is not None]
+    return sorted(found, key=lambda pair: pair[0].name in common)

@@ -1,0 +1,136 @@
+"""What a task is: how the robot moves in a trial, and what comes of it."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Generic
+
+from throwcollect.config.motion import MinimumJerk
+from throwcollect.config.schema import Config
+from throwcollect.episode.record import EpisodeHeader, Samples
+from throwcollect.members import load_object
+from throwcollect.robots.description import robot_of
+from throwcollect.robots.trajectory import JointTrajectory
+from throwcollect.tasks.dmp import dmp_trajectory
+from throwcollect.tasks.joint_measures import explain_failed_goal, explain_violation, measure_joints
+from throwcollect.tasks.minimum_jerk import minimum_jerk_trajectory
+from throwcollect.tasks.result import LIMIT_VIOLATED, LOST, TRACKING_FAILED, AnyResult, Outcome, ResultColumns
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Why a trial is not the success that it would otherwise be.
+
+    Attributes:
+        outcome: How it ended instead.
+        reason: Why, in one sentence.
+    """
+
+    outcome: Outcome
+    reason: str
+
+
+class Task(ABC, Generic[AnyResult]):
+    """A task, with the configuration of one trial of it, or of a whole collection.
+
+    A member of the family ``tasks`` is a section of the configuration (`TaskConfig`) whose `implementation` is derived
+    from this class.
+
+    Attributes:
+        outcomes: All its outcomes.
+        results: Class of its results, whose fields are declared with their columns of the table.
+        reasons: What the column of reasons holds, in a sentence.
+        report: What its trials add to a report, ``module:function``: a function that takes a `Dataset` and its
+            `Outcomes` and returns a `TaskReport`. It is imported when a report is made; empty if they add nothing.
+
+    Args:
+        config: The configuration.
+    """
+
+    outcomes: ClassVar[type[Outcome]]
+    results: type[AnyResult]
+    reasons: ClassVar[str] = "Why the trial is no simple success; null if it is."
+    report: ClassVar[str] = ""
+
+    def __init__(self, config: Config) -> None:
+        self.config = config
+
+    @property
+    def columns(self) -> ResultColumns[AnyResult]:
+        """The columns of its results, in the table of a collection of this configuration."""
+        return ResultColumns(self.results, tuple(self.config.task.end), tool=self.config.tool.name)
+
+    def trajectory(self) -> JointTrajectory:
+        """Plan the motion of a trial: by the family of `task.trajectory`, from `task.start` to `task.end`.
+
+        Returns:
+            Points over the joints of `task.end`, in the order of `Robot.joints`; the first one is at time 0 and at
+            `task.start`, the last one at rest and exactly at `task.end`.
+
+        Raises:
+            ConfigError: If the trajectory family has no usable motion for these parameters: a DMP that does not settle.
+        """
+        task = self.config.task
+        end = {joint: task.end[joint] for joint in robot_of(self.config).joints if joint in task.end}
+        family = task.trajectory
+        if isinstance(family, MinimumJerk):
+            return minimum_jerk_trajectory(
+                task.start, end, duration_s=task.duration_s, family=family, points_hz=task.points_hz
+            )
+        return dmp_trajectory(task.start, end, duration_s=task.duration_s, family=family, points_hz=task.points_hz)
+
+    def judge(self, samples: Samples, header: EpisodeHeader, trajectory: JointTrajectory) -> AnyResult:
+        """Find the outcome and the numbers of one trial.
+
+        The first of these that holds is the outcome; whatever can be measured is measured all the same:
+
+        1. ``tracking_failed``: a sample is not finite (then nothing is measured), or a goal was canceled or aborted.
+        2. What the task itself finds wrong (see `assess`).
+        3. ``limit_violated``: a joint violated a limit (see `explain_violation`).
+        4. The success of the task.
+
+        Args:
+            samples: The recorded trial, at least two samples.
+            header: Contacts, goals and start of the trial; the trajectory starts at its `start_ns`.
+            trajectory: What the controllers were sent, followed as quintic curve and then held at its end.
+        """
+        joints = measure_joints(samples, header.start_ns, config=self.config, trajectory=trajectory)
+        if not (joints and math.isfinite(samples.ball_position.sum() + samples.ball_linear_velocity.sum())):
+            reason = "the samples hold numbers that are not finite"
+            return self.results(self.outcomes(TRACKING_FAILED), reason=reason)
+        success = self.outcomes(self.config.task.success)
+        result, failure = self.assess(self.results(success, **vars(joints)), samples, header)
+        if refusal := explain_failed_goal(header):
+            failure = Failure(self.outcomes(TRACKING_FAILED), refusal)
+        elif failure is None and (violation := explain_violation(result)):
+            failure = Failure(self.outcomes(LIMIT_VIOLATED), violation)
+        return replace(result, outcome=failure.outcome, reason=failure.reason) if failure else result
+
+    @abstractmethod
+    def assess(self, result: AnyResult, samples: Samples, header: EpisodeHeader) -> tuple[AnyResult, Failure | None]:
+        """Measure what only this task does, and say what kept a trial from success.
+
+        Args:
+            result: A success, with the measures of the joints.
+            samples: The recorded trial, at least two samples; joints' numbers and the ball's path are finite.
+            header: Contacts, goals and start of the trial.
+
+        Returns:
+            The result with the measures of this task, and the failure that this task sees in it, if there is one.
+        """
+
+    def lose(self, reason: str) -> AnyResult:
+        """Make the result of a trial of which no simulation returned an episode."""
+        return self.results(self.outcomes(LOST), reason=reason)
+
+
+def task_of(config: Config) -> Task[Any]:
+    """Make the task that a configuration describes.
+
+    Args:
+        config: Configuration of one trial, or of a whole collection.
+    """
+    task: Task[Any] = load_object(config.task.implementation)(config)
+    return task

@@ -1,0 +1,111 @@
+"""The task of throwing: from recorded samples and contacts to an outcome and its numbers."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from throwcollect.episode.record import NS_PER_S, Contact, EpisodeHeader, Samples
+from throwcollect.tasks.measures import BallState
+from throwcollect.tasks.task import Failure, Task
+from throwcollect.tasks.throw.config import throw_section
+from throwcollect.tasks.throw.drop import drop, lost_before_start
+from throwcollect.tasks.throw.flight import Flight, flight_after, release_of, without_impact
+from throwcollect.tasks.throw.outcome import ThrowOutcome, ThrowResult
+
+
+class ThrowTask(Task[ThrowResult]):
+    """The arm swings from start to end, and the ball leaves the tool when the tool brakes.
+
+    Of these, which come between ``tracking_failed`` and ``limit_violated`` (see `Task.judge`), the first one that holds
+    is the outcome. Whatever can be measured is measured all the same, so that a throw that landed keeps its landing
+    under any outcome:
+
+    1. ``dropped``: the ball was not in the tool at the start.
+    2. ``not_released``: no contact with the tool ended for at least `task.recatch_gap_s` or to the end of the record.
+    3. ``dropped``: the tool hardly moved, or not the way of the ball, when the ball left it (see `drop`).
+    4. ``self_hit`` or ``recaught``: between release and landing the ball touched a link of the robot, or the tool
+       again; what it touched first decides.
+    5. ``timeout``: the ball's lowest point did not cross the landing plane downwards after the release.
+
+    Release, apex and landing lie between samples: positions on the cubic through the positions and velocities of both
+    neighbours, velocities linear between them. If the ground has pressed on the ball by the sample after the landing,
+    as it can below a low landing plane, free flight takes that sample's place.
+    """
+
+    outcomes = ThrowOutcome
+    results = ThrowResult
+    reasons = "Why the throw did not simply land; null if it did."
+    report = "throwcollect.report.throw.sections:report_throws"
+
+    def assess(
+        self, result: ThrowResult, samples: Samples, header: EpisodeHeader
+    ) -> tuple[ThrowResult, Failure | None]:
+        """Measure the flight, and find what kept the ball from landing; see `Task.assess`."""
+        config = self.config
+        release_ns = release_of(header.contacts, tool=config.tool.name, gap_s=throw_section(config.task).recatch_gap_s)
+        touched: list[Contact] = []
+        if release_ns is not None and release_ns <= samples.stamps_ns[-1]:
+            flight = flight_after(samples, start_ns=header.start_ns, release_ns=release_ns)
+            if impacts := [contact.start_ns for contact in header.contacts if contact.body == "ground"]:
+                flight = without_impact(flight, (min(impacts) - header.start_ns) / NS_PER_S, config=config)
+            result = self._measure_flight(result, flight)
+            touched = self._touches(header, release_ns, result.landing.time_s if result.landing else math.inf)
+            result = replace(result, recontacts=len(touched))
+        return result, self._failure(result, samples, header, touched)
+
+    def _failure(
+        self, result: ThrowResult, samples: Samples, header: EpisodeHeader, touched: list[Contact]
+    ) -> Failure | None:
+        tool = self.config.tool.name
+        if reason := lost_before_start(samples, header, config=self.config):
+            return Failure(ThrowOutcome.DROPPED, reason)
+        if result.release is None:
+            return Failure(ThrowOutcome.NOT_RELEASED, f"the ball stayed in the {tool}")
+        if reason := drop(samples, header, result.release, config=self.config):
+            return Failure(ThrowOutcome.DROPPED, reason)
+        if touched:
+            first = touched[0]
+            time_s = (first.start_ns - header.start_ns) / NS_PER_S
+            if first.body == tool:
+                return Failure(ThrowOutcome.RECAUGHT, f"the {tool} touched the ball again at {time_s:.3f} s")
+            return Failure(ThrowOutcome.SELF_HIT, f"the ball touched {first.body} at {time_s:.3f} s")
+        if result.landing is None:
+            reason = f"the ball did not reach the landing plane; the trial ended as {header.end_reason}"
+            return Failure(ThrowOutcome.TIMEOUT, reason)
+        return None
+
+    def _touches(self, header: EpisodeHeader, release_ns: int, end_s: float) -> list[Contact]:
+        """Contacts with tool or robot that began, or with the robot also lasted, between release and landing."""
+
+        def counts(contact: Contact) -> bool:
+            if contact.body == "ground" or (contact.start_ns - header.start_ns) / NS_PER_S >= end_s:
+                return False
+            if contact.body == self.config.tool.name:
+                return contact.start_ns >= release_ns
+            return contact.end_ns is None or contact.end_ns > release_ns
+
+        return sorted(filter(counts, header.contacts), key=lambda contact: contact.start_ns)
+
+    def _measure_flight(self, result: ThrowResult, flight: Flight) -> ThrowResult:
+        release = flight.knot_state(0)
+        found = flight.landing(self.config.scene.landing_height_m + self.config.ball.radius_m)
+        last, landing = found or (len(flight.times) - 1, None)
+        speed, elevation = _direction(release)
+        return replace(
+            result,
+            release=release,
+            release_speed_mps=speed,
+            release_elevation_rad=elevation,
+            apex=flight.apex(last + 1),
+            landing=landing,
+            flight_time_s=landing.time_s - release.time_s if landing else None,
+            hit_angle_rad=-_direction(landing)[1] if landing else None,
+        )
+
+
+def _direction(ball: BallState) -> tuple[float, float]:
+    """Speed [m/s] and elevation of the direction of flight above the horizontal [rad]."""
+    vx, vy, vz = ball.velocity
+    level = math.hypot(vx, vy)
+    return math.hypot(level, vz), math.atan2(vz, level)
