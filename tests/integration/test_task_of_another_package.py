@@ -111,7 +111,7 @@ def test_it_is_exported_and_reported(reached: Path, tmp_path: Path) -> None:
     assert "simulated trials of the task reach" in (tmp_path / "parquet" / "README.md").read_text()
     throwcollect("dataset", "report", reached, "--output", tmp_path / "report.html")
     page = (tmp_path / "report.html").read_text()
-    assert "128 simulated trials of the task reach" in page
+    assert "128 simulated trials of the task reach by the humanoid robot Talos" in page
     assert "How trials end, and where failures lie" in page
     assert "Where the balls land" not in page
 

@@ -53,8 +53,8 @@ def data_card(config: Config, throws: pa.Table, provenance: Provenance) -> str:
         "",
         f"# {config.name}",
         "",
-        f"{episodes} simulated {config.task.subject} by {robot_of(config).introduction}, each with the joint states of the "
-        f"robot and the odometry of the ball at {config.record.rate_hz} Hz. Made with throwcollect.",
+        f"{episodes} simulated {config.task.subject} by {robot_of(config).introduction}, each with the joint states of "
+        f"the robot and the odometry of the ball at {config.record.rate_hz} Hz. Made with throwcollect.",
         "",
         *outcome_lines(throws),
         "",

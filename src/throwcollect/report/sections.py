@@ -21,6 +21,7 @@ from throwcollect.report.outcomes import LANDED, Outcomes, in_words
 from throwcollect.report.provenance import config_text, provenance
 from throwcollect.report.swept_keys import Parameter, read_parameters
 from throwcollect.report.throughput import Throughput, measure_throughput
+from throwcollect.robots.description import robot_of
 from throwcollect.tasks.task import task_of
 
 _MOST_FAILURES = 40
@@ -93,7 +94,8 @@ def _report_task(dataset: Dataset, outcomes: Outcomes) -> TaskReport:
         Tile(f"{trials:,}", "trials planned"),
         Tile(format_share(outcomes.succeeded, trials), f"{in_words(outcomes.success)} as planned"),
     )
-    return TaskReport(f"simulated {dataset.config.task.subject}", tiles, results=(), episodes=())
+    by = robot_of(dataset.config).introduction
+    return TaskReport(f"simulated {dataset.config.task.subject} by {by}", tiles, results=(), episodes=())
 
 
 def _show_parameters(parameters: tuple[Parameter, ...], outcomes: Outcomes) -> Section:

@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
-from throwcollect.episode.record import NS_PER_S, EpisodeHeader, Samples
+from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.robots.description import robot_of
 from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.quintic_curve import sample_positions
 from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.tasks.measures import Peak
 from throwcollect.tasks.result import Result
+from throwcollect.units import NS_PER_S
 
 _SLACK = 1e-3
 _AT_LIMIT = 1 - _SLACK

@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
 from throwcollect.dataset.reader import Dataset
-from throwcollect.episode.record import NS_PER_S, EpisodeHeader
+from throwcollect.episode.record import EpisodeHeader
 from throwcollect.report.outcomes import LANDED, Outcomes
 from throwcollect.report.throw.landings import Landings
 from throwcollect.robots.quintic_curve import sample_positions
 from throwcollect.tasks.task import task_of
 from throwcollect.tasks.throw.config import throw_section
 from throwcollect.tasks.throw.flight import flight_residual, release_of
+from throwcollect.units import NS_PER_S
 
 MOST_RESIDUALS = 2000
 """Episodes whose flight is computed again, some 15 s of work; `verify` computes them all."""

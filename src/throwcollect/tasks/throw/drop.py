@@ -8,10 +8,11 @@ import operator
 import numpy as np
 
 from throwcollect.config.schema import Config
-from throwcollect.episode.record import NS_PER_S, EpisodeHeader, Samples
+from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.robots.tool_motion import ToolMotion
 from throwcollect.tasks.measures import BallState
 from throwcollect.tools.tool import tool_of
+from throwcollect.units import NS_PER_S
 
 _LEAST_SHARE = 0.25
 """Least speed of a throwing spoon, over the speed of a fall through the depth of its cup [-]: 0.20 m/s by default.

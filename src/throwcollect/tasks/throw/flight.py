@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
-from throwcollect.episode.record import NS_PER_S, Contact, EpisodeHeader, Samples
+from throwcollect.episode.record import Contact, EpisodeHeader, Samples
 from throwcollect.tasks.free_flight import ballistic_positions
 from throwcollect.tasks.measures import BallState
 from throwcollect.tasks.throw.config import throw_section
+from throwcollect.units import NS_PER_S
 
 BALLISTIC_TOLERANCE_M = 1e-9
 """A recorded flight and the computed one differ by rounding, below 1e-12 m; the smallest kick moves a ball by more."""

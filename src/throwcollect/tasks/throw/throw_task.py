@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from throwcollect.episode.record import NS_PER_S, Contact, EpisodeHeader, Samples
+from throwcollect.episode.record import Contact, EpisodeHeader, Samples
 from throwcollect.tasks.measures import BallState
 from throwcollect.tasks.task import Failure, Task
 from throwcollect.tasks.throw.config import throw_section
 from throwcollect.tasks.throw.drop import drop, lost_before_start
 from throwcollect.tasks.throw.flight import Flight, flight_after, release_of, without_impact
 from throwcollect.tasks.throw.outcome import ThrowOutcome, ThrowResult
+from throwcollect.units import NS_PER_S
 
 
 class ThrowTask(Task[ThrowResult]):
