@@ -35,7 +35,9 @@ class Shape:
     def alternatives(self) -> list[Shape]:
         """The shapes that a union allows; only the shape itself when it is no union."""
         nodes = self.node.get("oneOf") or self.node.get("anyOf")
-        return [Shape(_resolve(node), self.unit) for node in nodes] if nodes else [self]
+        if not nodes:
+            return [self]
+        return [each for node in nodes for each in Shape(_resolve(node), self.unit).alternatives]
 
     @property
     def keys(self) -> dict[str, Shape]:

@@ -51,6 +51,16 @@ class TaskConfig(Section):
         """What one of its trials is called."""
         return "throw" if self.throws else "trial"
 
+    @property
+    def keyword(self) -> str:
+        """By what its datasets are found on a hub."""
+        return "throwing" if self.throws else self.name
+
+    @property
+    def subject(self) -> str:
+        """What its trials are, in a sentence behind their number."""
+        return "throws of a ball" if self.throws else f"trials of the task {self.name}"
+
     @model_validator(mode="after")
     def _moving_joints_start_somewhere(self) -> TaskConfig:
         wrong = {f"end.{joint}": "start should name this joint, too" for joint in self.end if joint not in self.start}

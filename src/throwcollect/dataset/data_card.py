@@ -38,11 +38,12 @@ def data_card(config: Config, throws: pa.Table, provenance: Provenance) -> str:
     """
     episodes = len(throws) - throws["digest"].null_count
     size = next((label for limit, label in _SIZES if episodes < limit), _MORE)
+    measures = "release, apex, landing" if config.task.throws else "measures"
     header = {
         "license": "apache-2.0",
         "pretty_name": config.name,
         "task_categories": ["robotics"],
-        "tags": ["robotics", "throwing", "ros2", "mcap", config.robot.name, "simulation"],
+        "tags": ["robotics", config.task.keyword, "ros2", "mcap", config.robot.name, "simulation"],
         "size_categories": [size],
         "configs": [{"config_name": "throws", "data_files": "throws.parquet"}],
     }
@@ -52,15 +53,15 @@ def data_card(config: Config, throws: pa.Table, provenance: Provenance) -> str:
         "",
         f"# {config.name}",
         "",
-        f"{episodes} simulated throws of a ball by {robot_of(config).introduction}, each with the joint states of the "
-        f"robot and the odometry of the ball at {config.record.rate_hz} Hz. Made with throwcollect.",
+        f"{episodes} simulated {config.task.subject} by {robot_of(config).introduction}, each with the joint states of "
+        f"the robot and the odometry of the ball at {config.record.rate_hz} Hz. Made with throwcollect.",
         "",
         *outcome_lines(throws),
         "",
         "## Files",
         "",
         "- `metadata.yaml` and `*.mcap`: the recordings, a rosbag2 bag (`ros2 bag info`, Foxglove, `rosbags`, `mcap`).",
-        "- `throws.parquet`: one row a trial: swept values, outcome, release, apex, landing, place of its recording.",
+        f"- `throws.parquet`: one row a trial: swept values, outcome, {measures}, place of its recording.",
         "- `plan.parquet`: the trials, each as it was drawn before it ran.",
         "- `config.yaml`: the configuration; collecting with it again yields the same data.",
         *([f"- `{TRIALS}`: the list of points that the configuration reads."] if config.sweep.file else []),
@@ -68,7 +69,7 @@ def data_card(config: Config, throws: pa.Table, provenance: Provenance) -> str:
         *_ranges(config, throws),
         "## Limits",
         "",
-        _limits(config.sim.engine) + " Throws that failed are kept; `outcome` says how.",
+        _limits(config.sim.engine) + f" {config.task.noun.capitalize()}s that failed are kept; `outcome` says how.",
         "",
         "## Provenance",
         "",

@@ -37,7 +37,7 @@ class ContactInterval:
     """An interval in which the ball was pressed against one body.
 
     Attributes:
-        body: ``spoon``, ``ground``, or the name of the robot's link.
+        body: Name of the tool, ``ground``, or the name of the robot's link.
         start_s: When it began, since the start of the trial [s].
         end_s: When it ended [s]; None when it lasted to the end.
     """
@@ -154,7 +154,7 @@ class Events:
     """What happened to the ball.
 
     Attributes:
-        release: When it left the spoon; None if it never did.
+        release: When it left the tool; None if it never did.
         apex: At the highest point of its flight; None without a release.
         landing: When it crossed the landing plane; None if it never did.
     """
@@ -247,7 +247,7 @@ class Throw:
 
     @property
     def reason(self) -> str | None:
-        """Why the throw did not simply land; None if it did."""
+        """Why the trial did not simply succeed, such as why a throw did not land; None if it did."""
         reason: str | None = self.row["reason"]
         return reason
 

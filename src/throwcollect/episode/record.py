@@ -67,7 +67,7 @@ class Contact:
     """An interval in which the ball was pressed against one body (normal force above zero).
 
     Attributes:
-        body: ``spoon``, ``ground``, or the name of the robot link.
+        body: Name of the tool, ``ground``, or the name of the robot link.
         start_ns: Simulated time of the first physics step with force [ns].
         end_ns: Simulated time of the first physics step without [ns]; None when it lasted to the end.
     """

@@ -23,7 +23,6 @@ from throwcollect.export.throw_source import Source, Throw
 from throwcollect.sweep.parquet_file import encode_table
 
 _VERSION = "v3.0"
-_TASK = "Throw the ball."
 _VIDEO_MEGABYTES = 200
 _EPISODES_PER_GROUP = 100
 
@@ -121,7 +120,7 @@ dataset = LeRobotDataset("me/throws", root=".")
 
 def write(source: Source, directory: Path) -> None:
     """Write a dataset in LeRobot's format; see `formats.Format.write`."""
-    features = list_features(source.moving)
+    features, task = list_features(source.moving), _say_task(source)
     table = _number_episodes(source)
     (directory / THROWS).write_bytes(encode_table(table))
     moments: dict[str, Moments] = {}
@@ -138,7 +137,7 @@ def write(source: Source, directory: Path) -> None:
                 frames = _compute_frames(throw, source, features, episode=number, first=first)
                 chunk, file = data.place()
                 data.append(_tabulate_frames(frames, features, source))
-                rows.append(_describe_episode(frames, number=number, first=first, chunk=chunk, file=file))
+                rows.append(_describe_episode(frames, task, number=number, first=first, chunk=chunk, file=file))
                 for name, values in frames.items():
                     more = Moments.of(values)
                     moments[name] = moments[name].with_more(more) if name in moments else more
@@ -147,7 +146,7 @@ def write(source: Source, directory: Path) -> None:
     _write_json(directory / "meta" / "info.json", _describe_dataset(source, features, frames=first))
     statistics = {name: summarise_all(moments[name], _read_feature(data.paths, name)) for name in features}
     _write_json(directory / "meta" / "stats.json", statistics)
-    pq.write_table(_tabulate_tasks(), directory / "meta" / "tasks.parquet")
+    pq.write_table(_tabulate_tasks(task), directory / "meta" / "tasks.parquet")
 
 
 def _number_episodes(source: Source) -> pa.Table:
@@ -202,11 +201,13 @@ def _tabulate_frames(frames: dict[str, Frames], features: dict[str, Feature], so
     return pa.table(columns, schema.with_metadata({"throwcollect.digest": source.digest}))
 
 
-def _describe_episode(frames: dict[str, Frames], *, number: int, first: int, chunk: int, file: int) -> dict[str, Any]:
+def _describe_episode(
+    frames: dict[str, Frames], task: str, *, number: int, first: int, chunk: int, file: int
+) -> dict[str, Any]:
     length = len(frames["index"])
     row = {
         "episode_index": number,
-        "tasks": [_TASK],
+        "tasks": [task],
         "length": length,
         "data/chunk_index": chunk,
         "data/file_index": file,
@@ -256,14 +257,20 @@ def _describe_dataset(source: Source, features: dict[str, Feature], *, frames: i
     }
 
 
-def _tabulate_tasks() -> pa.Table:
+def _say_task(source: Source) -> str:
+    """What the robot is to do, in words."""
+    task = source.dataset.config.task
+    return "Throw the ball." if task.throws else f"{task.name.replace('_', ' ').capitalize()}."
+
+
+def _tabulate_tasks(task: str) -> pa.Table:
     """One row for the one task; its text is the index of the table, as pandas stores it."""
     columns = [
         {"name": name, "field_name": name, "pandas_type": kind, "numpy_type": stored, "metadata": None}
         for name, kind, stored in (("task_index", "int64", "int64"), ("task", "unicode", "object"))
     ]
     pandas = {"index_columns": ["task"], "column_indexes": [], "columns": columns}
-    return pa.table({"task_index": [0], "task": [_TASK]}).replace_schema_metadata({"pandas": json.dumps(pandas)})
+    return pa.table({"task_index": [0], "task": [task]}).replace_schema_metadata({"pandas": json.dumps(pandas)})
 
 
 def _write_json(path: Path, value: object) -> None:

@@ -15,7 +15,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config, DynamicMovementPrimitive
-from throwcollect.errors import DatasetError
+from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.export.npz import to_array
 from throwcollect.export.readme import Layout, list_joints
 from throwcollect.export.throw_source import Entry, Source, Throw
@@ -77,7 +77,17 @@ _FIELDS = (
 
 
 def write(source: Source, directory: Path) -> None:
-    """Write a dataset as MATLAB files of version 5; see `formats.Format.write`."""
+    """Write a dataset as MATLAB files of version 5; see `formats.Format.write`.
+
+    Raises:
+        ConfigError: If the dataset is not one of throws.
+    """
+    task = source.dataset.config.task
+    if not task.throws:
+        raise ConfigError(
+            f"--to: mat has the structure of a throwing database, and the task {task.name} throws no ball",
+            expected="another format",
+        )
     columns = {_name_field(field.name): _to_column(source.table[field.name]) for field in source.table.schema}
     units = {
         _name_field(field.name): (field.metadata or {}).get(b"unit", b"").decode() for field in source.table.schema

@@ -20,9 +20,10 @@ _ROWS_PER_GROUP = 30_000
 
 def describe(source: Source) -> Layout:
     """Say how `write` lays a source out."""
+    measures = "release, apex, landing" if source.dataset.config.task.throws else "measures"
     return Layout(
         files={
-            THROWS: "one row a trial: swept values, outcome, release, apex, landing.",
+            THROWS: f"one row a trial: swept values, outcome, {measures}.",
             f"{_TRAJECTORIES}/": "one row a sample, throw after throw; `trial` says of which. No throw is divided "
             "between files or row groups.",
         },

@@ -50,9 +50,9 @@ def render_card(source: Source, layout: Layout) -> str:
         *(_render_front_matter(config, layout.hub) if layout.hub else []),
         f"# {config.name}",
         "",
-        f"{len(source.table)} simulated throws of a ball by {robot_of(config).introduction}; {len(source.entries)} of "
-        f"them have time series, at {source.rate_hz} Hz. Exported by throwcollect {__version__} from the "
-        f"dataset with the digest `{source.digest}`.",
+        f"{len(source.table)} simulated {config.task.subject} by {robot_of(config).introduction}; "
+        f"{len(source.entries)} of them have time series, at {source.rate_hz} Hz. "
+        f"Exported by throwcollect {__version__} from the dataset with the digest `{source.digest}`.",
         "",
         *outcome_lines(source.table),
         "",
@@ -84,7 +84,7 @@ def _render_front_matter(config: Config, hub: Mapping[str, Any]) -> list[str]:
         "license": "apache-2.0",
         "pretty_name": config.name,
         "task_categories": ["robotics"],
-        "tags": [*hub["tags"], "robotics", "throwing", config.robot.name, "simulation"],
+        "tags": [*hub["tags"], "robotics", config.task.keyword, config.robot.name, "simulation"],
         "configs": hub["configs"],
     }
     return ["---", to_yaml(header) + "---", ""]

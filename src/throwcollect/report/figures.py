@@ -44,7 +44,7 @@ def draw_parameter_matrix(parameters: Sequence[Parameter], outcomes: Outcomes) -
     figure = go.Figure()
     for code, name in enumerate(outcomes.names):
         trials = chosen[outcomes.codes[chosen] == code]
-        style = style_of(name)
+        style = outcomes.style_of(name)
         for row in range(1, count):
             for column in range(row):
                 figure.add_scatter(
@@ -128,7 +128,7 @@ def draw_outcome_bars(outcomes: Outcomes) -> go.Figure:
         text=[f"{count} ({count / total:.1%})" for _, count in rows],
         textposition="outside",
         orientation="h",
-        marker_color=[style_of(name).colour for name, _ in rows],
+        marker_color=[outcomes.style_of(name).colour for name, _ in rows],
     )
     figure = go.Figure(bars).update_xaxes(title="trials", range=[0, 1.3 * most], showgrid=False)
     return figure.update_layout(height=72 + 41 * len(rows))
@@ -151,7 +151,7 @@ def draw_outcome_shares(parameter: Parameter, outcomes: Outcomes) -> go.Figure:
             y=shares[:, code],
             customdata=np.stack([parameter.counts[:, code], totals], axis=1),
             name=in_words(name),
-            marker_color=style_of(name).colour,
+            marker_color=outcomes.style_of(name).colour,
             hovertemplate=f"%{{customdata[0]}} of %{{customdata[1]}} (%{{y:.1%}})<extra>{in_words(name)}</extra>",
         )
     figure.update_xaxes(**axis, title=f"value [{parameter.unit or '-'}]", showgrid=False)
@@ -182,8 +182,13 @@ def draw_limit_boxes(peaks: Sequence[JointPeaks]) -> go.Figure:
     return figure.update_layout(height=120 + 46 * len(rows))
 
 
-def draw_throughput(throughput: Throughput) -> go.Figure:
-    """Draw throws a second over the time spent collecting."""
+def draw_throughput(throughput: Throughput, noun: str) -> go.Figure:
+    """Draw trials a second over the time spent collecting.
+
+    Args:
+        throughput: What was measured.
+        noun: What a trial is called.
+    """
     total_s = throughput.edges_s[-1]
     unit, seconds = ("h", 3600) if total_s > 7200 else ("min", 60) if total_s > 120 else ("s", 1)
     edges = throughput.edges_s / seconds
@@ -194,8 +199,8 @@ def draw_throughput(throughput: Throughput) -> go.Figure:
             mode="lines",
             fill="tozeroy",
             line={"color": BLUE, "width": 1.5},
-            name="throws",
-            hovertemplate="%{y:.1f} throws/s<extra></extra>",
+            name=f"{noun}s",
+            hovertemplate=f"%{{y:.1f}} {noun}s/s<extra></extra>",
         )
     )
     for times_s, name, symbol, colour in (
@@ -209,7 +214,7 @@ def draw_throughput(throughput: Throughput) -> go.Figure:
     for time_s in throughput.resumed_s:
         figure.add_vline(x=time_s / seconds, line=MOMENT_LINE)
     figure.update_xaxes(title=f"time spent collecting [{unit}]", range=[0, edges[-1]])
-    figure.update_yaxes(title="throws per second [1/s]", rangemode="tozero")
+    figure.update_yaxes(title=f"{noun}s per second [1/s]", rangemode="tozero")
     return figure.update_layout(height=300, legend=LEGEND_ABOVE, showlegend=len(figure.data) > 1)
 
 

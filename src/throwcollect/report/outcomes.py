@@ -58,21 +58,23 @@ class Outcomes:
     """The outcomes of all trials.
 
     Attributes:
-        names: Those that occur; ``landed`` first, then always in the same order.
+        names: Those that occur; the success first, then always in the same order.
         codes: Index into `names` of each trial, shape ``(n_trials,)``.
+        success: Outcome of a trial that succeeded.
     """
 
     names: tuple[str, ...]
     codes: NDArray[np.intp]
+    success: str = LANDED
 
     @classmethod
-    def of(cls, outcomes: Iterable[str]) -> Outcomes:
+    def of(cls, outcomes: Iterable[str], *, success: str = LANDED) -> Outcomes:
         """Outcomes in the order of trials."""
         listed = list(outcomes)
-        order = list(_STYLES)
+        order = [success, *_STYLES]
         names = sorted(set(listed), key=lambda name: (order.index(name) if name in order else len(order), name))
         index = {name: code for code, name in enumerate(names)}
-        return cls(tuple(names), np.array([index[name] for name in listed], dtype=np.intp))
+        return cls(tuple(names), np.array([index[name] for name in listed], dtype=np.intp), success)
 
     @property
     def counts(self) -> dict[str, int]:
@@ -80,9 +82,13 @@ class Outcomes:
         return dict(zip(self.names, np.bincount(self.codes, minlength=len(self.names)).tolist(), strict=True))
 
     @property
-    def landed(self) -> int:
-        """Number of trials that landed."""
-        return self.counts.get(LANDED, 0)
+    def succeeded(self) -> int:
+        """Number of trials that succeeded."""
+        return self.counts.get(self.success, 0)
+
+    def style_of(self, name: str) -> Style:
+        """How an outcome is drawn: the success of any task as a landing is."""
+        return style_of(LANDED if name == self.success else name)
 
     def are(self, name: str) -> NDArray[np.bool_]:
         """Which trials have an outcome, shape ``(n_trials,)``."""

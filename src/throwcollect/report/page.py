@@ -9,7 +9,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from plotly.offline import get_plotlyjs
 
 from throwcollect.report.amounts import format_share
-from throwcollect.report.outcomes import in_words, style_of
+from throwcollect.report.outcomes import in_words
 from throwcollect.report.sections import Report
 from throwcollect.version import __version__
 
@@ -26,7 +26,7 @@ def render_page(report: Report) -> str:
     )
     # What plotly leaves in a figure besides numbers, texts and dictionaries are sequences.
     templates.policies["json.dumps_kwargs"] = {"separators": (",", ":"), "allow_nan": False, "default": list}
-    templates.filters |= {"specify": _specify, "in_words": in_words, "style_of": style_of, "share": format_share}
+    templates.filters |= {"specify": _specify, "in_words": in_words, "share": format_share}
     page = templates.get_template("page.html")
     return page.render(report=report, version=__version__, plotly=get_plotlyjs())
 

@@ -11,16 +11,18 @@ from throwcollect.dataset.inspect import summary
 from throwcollect.dataset.journal import read_journal
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.summary import Info
+from throwcollect.members import load_object
 from throwcollect.report import figures
 from throwcollect.report.amounts import format_duration, format_share, format_size
-from throwcollect.report.contents import Listing, Panel, Row, Section, Table, Tile
+from throwcollect.report.contents import Listing, Panel, Row, Section, Table, TaskReport, Tile
 from throwcollect.report.failures import Failure, group_failures
 from throwcollect.report.limits import KINDS, JointPeaks, summarise_peaks
-from throwcollect.report.outcomes import Outcomes, in_words
+from throwcollect.report.outcomes import LANDED, Outcomes, in_words
 from throwcollect.report.provenance import config_text, provenance
 from throwcollect.report.swept_keys import Parameter, read_parameters
 from throwcollect.report.throughput import Throughput, measure_throughput
-from throwcollect.report.throw.sections import report_throws
+from throwcollect.robots.description import robot_of
+from throwcollect.tasks.task import task_of
 
 _MOST_FAILURES = 40
 _CODE = Markup("<code>{}</code>")
@@ -36,6 +38,7 @@ class Report:
         tiles: Key numbers.
         outcomes: Outcomes of all its trials.
         sections: In the order of the page; one that has nothing to show says so.
+        noun: What a trial is called.
     """
 
     name: str
@@ -43,6 +46,7 @@ class Report:
     tiles: tuple[Tile, ...]
     outcomes: Outcomes
     sections: tuple[Section, ...]
+    noun: str = "throw"
 
 
 def report_dataset(dataset: Dataset) -> Report:
@@ -52,11 +56,11 @@ def report_dataset(dataset: Dataset) -> Report:
         DatasetError: If a table or an episode is damaged.
     """
     throws, info = dataset.throws, summary(dataset)
-    outcomes = Outcomes.of(throws["outcome"].to_pylist())
+    outcomes = Outcomes.of(throws["outcome"].to_pylist(), success=dataset.config.task.success)
     parameters = read_parameters(dataset.config, throws, outcomes)
     reasons = zip(*(throws[name].to_pylist() for name in ("trial", "outcome", "reason")), strict=True)
     facts = provenance(dataset, info)
-    task = report_throws(dataset, outcomes)
+    task, noun = _report_task(dataset, outcomes), dataset.config.task.noun
     finished = f", finished on {facts['finished'][:10]}" if "finished" in facts else ""
     return Report(
         name=info.name,
@@ -70,13 +74,28 @@ def report_dataset(dataset: Dataset) -> Report:
         sections=(
             *task.results,
             _show_parameters(parameters, outcomes),
-            _show_outcomes(outcomes, parameters, group_failures(reasons)),
-            _show_limits({kind: summarise_peaks(throws, kind) for kind in KINDS}),
+            _show_outcomes(outcomes, parameters, group_failures(reasons), noun),
+            _show_limits({kind: summarise_peaks(throws, kind) for kind in KINDS}, noun),
             *task.episodes,
             _show_throughput(measure_throughput(read_journal(dataset.directory / JOURNAL)), info),
             _show_provenance(facts, config_text(dataset)),
         ),
+        noun=noun,
     )
+
+
+def _report_task(dataset: Dataset, outcomes: Outcomes) -> TaskReport:
+    """What the task adds; of one that adds nothing, how many trials there are and how many succeeded."""
+    if path := task_of(dataset.config).report:
+        added: TaskReport = load_object(path)(dataset, outcomes)
+        return added
+    trials = len(outcomes.codes)
+    tiles = (
+        Tile(f"{trials:,}", "trials planned"),
+        Tile(format_share(outcomes.succeeded, trials), f"{in_words(outcomes.success)} as planned"),
+    )
+    by = robot_of(dataset.config).introduction
+    return TaskReport(f"simulated {dataset.config.task.subject} by {by}", tiles, results=(), episodes=())
 
 
 def _show_parameters(parameters: tuple[Parameter, ...], outcomes: Outcomes) -> Section:
@@ -110,15 +129,18 @@ def _show_parameters(parameters: tuple[Parameter, ...], outcomes: Outcomes) -> S
     return Section("parameters", "Parameters", title, text, ((panel,), table))
 
 
-def _show_outcomes(outcomes: Outcomes, parameters: tuple[Parameter, ...], failures: tuple[Failure, ...]) -> Section:
-    title, trials = "How throws end, and where failures lie", len(outcomes.codes)
+def _show_outcomes(
+    outcomes: Outcomes, parameters: tuple[Parameter, ...], failures: tuple[Failure, ...], noun: str
+) -> Section:
+    title, trials = f"How {noun}s end, and where failures lie", len(outcomes.codes)
     # At the head of the page is a bar with the same numbers.
     bars = Panel("all", title, figures.draw_outcome_bars(outcomes), picture="outcomes", on_page=False)
     blocks: list[Row | Table] = [(bars,)]
-    failed = trials - outcomes.landed
-    text = f"All {trials:,} throws landed as planned."
+    failed = trials - outcomes.succeeded
+    text = f"All {trials:,} {noun}s {in_words(outcomes.success)} as planned."
     if failed:
-        text = f"{failed:,} of {trials:,} throws ({format_share(failed, trials)}) did not land as planned."
+        did_not = "land" if outcomes.success == LANDED else "succeed"
+        text = f"{failed:,} of {trials:,} {noun}s ({format_share(failed, trials)}) did not {did_not} as planned."
     if failures:
         blocks.append(_tabulate(failures))
     if failed and len(outcomes.names) > 1 and parameters:
@@ -143,7 +165,7 @@ def _tabulate(failures: tuple[Failure, ...]) -> Table:
     return Table(head=head, rows=tuple(rows), number_columns=(2,))
 
 
-def _show_limits(peaks: dict[str, tuple[JointPeaks, ...]]) -> Section:
+def _show_limits(peaks: dict[str, tuple[JointPeaks, ...]], noun: str) -> Section:
     title = "How close the joints come to their limits"
     panels = tuple(
         Panel(
@@ -157,11 +179,11 @@ def _show_limits(peaks: dict[str, tuple[JointPeaks, ...]]) -> Section:
         if joints
     )
     if not panels:
-        return Section("limits", "Limits", title, "No throw was measured.")
+        return Section("limits", "Limits", title, f"No {noun} was measured.")
     reached = (f"{sum(each.reached for each in joints):,} of {kind}" for kind, joints in peaks.items())
     text = (
-        "Of each throw, the joint that came closest; 1 is at the limit. Boxes span the quartiles, whiskers all throws. "
-        f"Throws that reached a limit: {', '.join(reached)}."
+        f"Of each {noun}, the joint that came closest; 1 is at the limit. Boxes span the quartiles, whiskers all "
+        f"{noun}s. {noun.capitalize()}s that reached a limit: {', '.join(reached)}."
     )
     return Section("limits", "Limits", title, text, (panels,))
 
@@ -170,15 +192,15 @@ def _show_throughput(throughput: Throughput | None, info: Info) -> Section:
     title = "How fast it was collected"
     if throughput is None:
         no_journal = Markup(
-            "This dataset has no journal of its collection (<code>logs/journal.jsonl</code>) with throws in it."
-        )
+            "This dataset has no journal of its collection (<code>logs/journal.jsonl</code>) with {}s in it."
+        ).format(info.noun)
         return Section("throughput", "Throughput", title, no_journal)
     wall_s = info.wall_s or float(throughput.edges_s[-1])
     mean = throughput.commits / wall_s
-    text = f"{throughput.commits:,} throws in {wall_s:,.1f} s, {mean:.1f} a second on average, start-up included."
+    text = f"{throughput.commits:,} {info.noun}s in {wall_s:,.1f} s, {mean:.1f} a second on average, start-up included."
     if resumed := len(throughput.resumed_s):
         text += f" It was resumed {f'{resumed} times' if resumed > 1 else 'once'} (dotted); the pauses are left out."
-    panel = Panel("rate", "Throws a second", figures.draw_throughput(throughput))
+    panel = Panel("rate", f"{info.noun.capitalize()}s a second", figures.draw_throughput(throughput, info.noun))
     return Section("throughput", "Throughput", title, text, ((panel,),))
 
 

@@ -56,14 +56,14 @@ class Feasibility:
         self._clearance = Clearance(self._robot, self._model, self._tool)
 
     def check(self, config: Config, trajectory: JointTrajectory) -> str | None:
-        """Reason why the robot cannot throw with a trajectory, if there is one.
+        """Reason why the robot cannot do a trial with a trajectory, if there is one.
 
         The curve between the points is checked at 100 Hz and at 100 instants at least, for collisions whenever a joint
         has gone on by 0.02 rad. Joints that the trajectory does not move rest at the trial's start posture. Torques are
         those of inverse dynamics plus viscous friction; the tool and the ball count as part of the hand throughout,
         also after the ball has left. The effort of locked joints is not limited, as they are simulated as rigid.
         Collisions are those of the robot and the tool; what the ball hits is for the judge of the throw. The tool
-        has to move, and to hold the ball in the start posture (see `Tool.way_out`).
+        has to move if the task throws, and to hold the ball in the start posture (see `Tool.way_out`).
 
         Args:
             config: Configuration of the trial.
@@ -91,7 +91,7 @@ class Feasibility:
                 f"{' and '.join(approach.links)} {_gap(approach.distance_m)} at {times[rows[approach.index]]:.3f} s; "
                 f"they must stay {MARGIN_M * 1000:.3g} mm apart"
             )
-        if np.ptp(positions[:, self._carrying], axis=0).max() <= _POSITION_SLACK_RAD:
+        if config.task.throws and np.ptp(positions[:, self._carrying], axis=0).max() <= _POSITION_SLACK_RAD:
             carrying = ", ".join(joints[column] for column in self._carrying)
             return f"task.end moves no joint that carries the {tool.name}; these do: {carrying}"
         return self._loss(config, posture)
@@ -152,7 +152,7 @@ class Feasibility:
             [Nm], shape ``(n, n_joints)``, in the order of `Robot.joints`.
 
         Raises:
-            ConfigError: If the ball does not fit the spoon.
+            ConfigError: If the ball does not fit the tool.
         """
         tool = self._tool_of(config)
         seat = np.array(tool.ball_seat(config.ball.radius_m))

@@ -1,4 +1,4 @@
-"""The rules of a trial, on any physics engine: one robot with a spoon, one ball, from the start state to the end."""
+"""The rules of a trial, on any physics engine: one robot with a tool, one ball, from the start state to the end."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class World(Observer):
     `reset` puts it into the start state of a trial, which is a pure function of the trial's configuration, bit for bit.
     `run` then takes physics steps until the trial ends:
 
-    - ``landed``: the ball's lowest point has crossed the landing plane downwards, out of the spoon;
+    - ``landed``: the ball's lowest point has crossed the landing plane downwards, out of the tool;
     - ``rest``: the arm has moved and stands still, and the ball has been lying on something for half a second;
     - ``timeout``: the longest duration is over.
 
@@ -104,7 +104,7 @@ class World(Observer):
             start_ns: Simulated time of the start state [ns].
 
         Raises:
-            ConfigError: If the posture or the choice of locked joints is wrong, the ball falls through the spoon, or
+            ConfigError: If the posture or the choice of locked joints is wrong, the ball falls through the tool, or
                 the robot's files cannot be read.
         """
         key = (trial.robot, trial.tool, trial.ball, trial.scene, trial.sim, trial.task.start, tuple(trial.task.end))

@@ -9,7 +9,7 @@ def test_outcomes_come_in_one_order_and_unknown_ones_last() -> None:
     found = Outcomes.of(["lost", "landed", "odd", "self_hit", "landed"])
     assert found.names == ("landed", "self_hit", "lost", "odd")
     assert found.codes.tolist() == [2, 0, 3, 1, 0]
-    assert found.landed == 2
+    assert found.succeeded == 2
     assert found.are("landed").tolist() == [False, True, False, False, True]
     assert found.are("recaught").tolist() == [False] * 5
 

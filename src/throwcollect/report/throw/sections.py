@@ -55,7 +55,10 @@ def report_throws(dataset: Dataset, outcomes: Outcomes) -> TaskReport:
             _show_landings(landings, outcomes, coverage, height_m=height_m),
             _show_releases(landings, outcomes),
         ),
-        episodes=(_show_examples(paths, motion, height_m=height_m), _show_physics(measure_residuals(dataset))),
+        episodes=(
+            _show_examples(paths, motion, tool=dataset.config.tool.name, height_m=height_m),
+            _show_physics(measure_residuals(dataset)),
+        ),
     )
 
 
@@ -68,7 +71,7 @@ def _choose_middle(paths: Sequence[BallPath]) -> int:
 def _show_key_numbers(landings: Landings, outcomes: Outcomes) -> Iterator[Tile]:
     trials = len(outcomes.codes)
     yield Tile(f"{trials:,}", "throws planned")
-    yield Tile(format_share(outcomes.landed, trials), "landed as planned")
+    yield Tile(format_share(outcomes.succeeded, trials), "landed as planned")
     if len(landings):
         distance, speed = landings.distance_m, landings.speed_mps
         yield Tile(f"{distance.min():.2f}–{distance.max():.2f} m", "landing distance")
@@ -131,11 +134,13 @@ def _say_how_many(landings: Landings) -> str:
     return f"{MOST_POINTS:,} of {count:,} throws, chosen at random." if count > MOST_POINTS else ""
 
 
-def _show_examples(paths: Sequence[BallPath], motion: JointMotion | None, *, height_m: float | None) -> Section:
+def _show_examples(
+    paths: Sequence[BallPath], motion: JointMotion | None, *, tool: str, height_m: float | None
+) -> Section:
     title = "A few throws"
     if motion is None:
         return Section("throws", "Throws", title, "No trial has an episode.")
-    text = "Dotted while the spoon holds the ball; a ring marks the release."
+    text = f"Dotted while the {tool} holds the ball; a ring marks the release."
     if (landed := sum(path.outcome == LANDED for path in paths)) > 1:
         text = f"{landed} throws that landed, from the nearest to the farthest. {text}"
     side, above = figures.draw_ball_views(paths, height_m)

@@ -1,0 +1,146 @@
+"""A task that only moves, in a package of its own (`tests/plugins/reach`), goes all the way that a throw goes."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+PLUGINS = Path(__file__).parents[1] / "plugins"
+REACH = """\
+name: reach
+task: {name: reach}
+sim: {engine: ballistic, max_trial_s: 1.6}
+until: {reached: 30}
+trials: 200
+sweep: {parameters: {task.duration_s: {min: 0.8, max: 2.4}}}
+record: {rate_hz: 50}
+"""
+READ = """\
+import json, sys, throwcollect
+dataset = throwcollect.load(sys.argv[1])
+trial = dataset.select("outcome == 'missed'")[0]
+print(json.dumps({
+    "columns": dataset.throws.column_names,
+    "description": dataset.throws.schema.field("outcome").metadata[b"description"].decode(),
+    "landing": trial.events.landing,
+    "reason": trial.reason,
+    "end_rad": float(trial.joints.position[-1, trial.joints.names.index("torso_1_joint")]),
+    "end_error_rad": trial.row["torso_1_joint_end_error_rad"],
+}))
+"""
+
+
+def run(*arguments: str) -> subprocess.CompletedProcess[str]:
+    """Run Python where the packages of `tests/plugins` are installed."""
+    path = os.pathsep.join([str(PLUGINS), os.environ.get("PYTHONPATH", "")])
+    return subprocess.run(
+        [sys.executable, *arguments],
+        env={**os.environ, "PYTHONPATH": path},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def throwcollect(*arguments: object) -> str:
+    """Run a command that has to succeed, and return what it prints."""
+    done = run("-m", "throwcollect", *map(str, arguments))
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def refusal(*arguments: object) -> str:
+    """Run a command that has to be refused, and return why it is."""
+    done = run("-m", "throwcollect", *map(str, arguments))
+    assert done.returncode == 2, done.stderr
+    assert "Traceback" not in done.stderr
+    return done.stderr
+
+
+@pytest.fixture(scope="module")
+def reached(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    directory = tmp_path_factory.mktemp("reach")
+    (directory / "reach.yaml").write_text(REACH)
+    throwcollect("up", directory / "reach.yaml", "--runtime", "inprocess", "--output", directory / "data")
+    return directory / "data"
+
+
+def test_until_counts_what_the_task_calls_a_success(reached: Path) -> None:
+    info: dict[str, Any] = json.loads(throwcollect("dataset", "info", reached, "--json"))
+    assert info["trials"] == 128  # of 200: two rounds hold more than the 30 that were wanted
+    assert info["outcomes"]["reached"] >= info["wanted"] == 30
+    assert set(info["outcomes"]) == {"reached", "missed"}
+    assert (info["success"], info["noun"], info["landing"]) == ("reached", "trial", None)
+    assert "landing" not in throwcollect("dataset", "info", reached)
+
+
+def test_what_it_measures_stands_in_the_table(reached: Path) -> None:
+    done = run("-c", READ, str(reached))
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    own = found["columns"].index("torso_1_joint_end_error_rad")
+    assert own < found["columns"].index("position_peak_share")
+    assert not [column for column in found["columns"] if column.startswith(("release", "landing"))]
+    assert found["description"] == "reached, missed, limit_violated, tracking_failed, lost or refused."
+    assert found["landing"] is None
+    assert found["end_error_rad"] == pytest.approx(0.2 - found["end_rad"])
+    assert found["reason"] == f"torso_1_joint ended {found['end_error_rad']:.3g} rad away from its end"
+
+
+def test_it_is_verified_judged_again_and_rebuilt(reached: Path) -> None:
+    assert "nothing wrong" in throwcollect("dataset", "verify", reached)
+    table = (reached / "throws.parquet").read_bytes()
+    (reached / "throws.parquet").unlink()
+    throwcollect("dataset", "rebuild", reached)
+    assert (reached / "throws.parquet").read_bytes() == table
+    throwcollect("dataset", "replay", reached, "--trial", "3")
+
+
+def test_datasets_are_made_of_it(reached: Path, tmp_path: Path) -> None:
+    throwcollect("dataset", "filter", reached, tmp_path / "some", "--where", "torso_1_joint_end_error_rad > 0.01")
+    info = json.loads(throwcollect("dataset", "info", tmp_path / "some", "--json"))
+    assert list(info["outcomes"]) == ["missed"]
+
+
+def test_it_is_exported_and_reported(reached: Path, tmp_path: Path) -> None:
+    throwcollect("dataset", "export", reached, tmp_path / "parquet", "--to", "parquet")
+    assert "simulated trials of the task reach" in (tmp_path / "parquet" / "README.md").read_text()
+    throwcollect("dataset", "report", reached, "--output", tmp_path / "report.html")
+    page = (tmp_path / "report.html").read_text()
+    assert "128 simulated trials of the task reach by the humanoid robot Talos" in page
+    assert "How trials end, and where failures lie" in page
+    assert "Where the balls land" not in page
+
+
+def test_what_only_throws_have_is_refused_in_words(reached: Path, tmp_path: Path) -> None:
+    said = refusal("dataset", "export", reached, tmp_path / "mat", "--to", "mat")
+    assert "mat has the structure of a throwing database, and the task reach throws no ball" in said
+    path = tmp_path / "wrong.yaml"
+    path.write_text(
+        REACH.replace("sweep: {", "sweep: {target: {distance_m: {min: 1, max: 2, bins: 3}}, ").replace(
+            "until: {reached: 30}", "until: {landed: 30}"
+        )
+    )
+    said = refusal("config", path)
+    assert f"{path}:4: until.landed: should be reached, as the task is reach" in said
+    assert f"{path}:6: sweep.target: should be left out, as the task reach throws no ball" in said
+
+
+def test_configurations_that_name_no_task_throw_all_the_same(tmp_path: Path) -> None:
+    path = tmp_path / "throws.yaml"
+    path.write_text("task: {duration_s: 1.1}\nuntil: {landed: 3}\n")
+    printed = throwcollect("config", path)
+    assert "  name: throw\n" in printed
+    assert "until:\n  landed: 3\n" in printed
+
+
+def test_a_task_that_there_is_not_is_refused_in_words(tmp_path: Path) -> None:
+    path = tmp_path / "wrong.yaml"
+    path.write_text("task: {name: reech, duration_s: 1.1}\nuntil: {lands: 3}\n")
+    said = refusal("config", path)
+    assert f"{path}:1: task.name: should be 'throw' or 'reach', got 'reech'; did you mean 'reach'?" in said
+    assert f"{path}:2: until.lands: unknown key; did you mean 'landed'?" in said

@@ -1,0 +1,71 @@
+"""What holds for every task of the table, and for one of another package."""
+
+import sys
+from dataclasses import fields
+from pathlib import Path
+
+import pytest
+
+from throwcollect.config.schema import Config
+from throwcollect.config.task import TaskConfig
+from throwcollect.members import load_member, load_object, names_of
+from throwcollect.tasks.result import LIMIT_VIOLATED, LOST, TRACKING_FAILED, Result
+from throwcollect.tasks.task import Task, task_of
+
+sys.path.append(str(Path(__file__).parents[2] / "plugins"))
+
+from reach.config import ReachConfig
+
+SECTIONS = [*(load_member("tasks", name) for name in names_of("tasks")), ReachConfig]
+
+of_every_task = pytest.mark.parametrize("section", SECTIONS, ids=lambda section: section().name)
+
+
+def described(section: type[TaskConfig]) -> Task:
+    """The task in a configuration, as if its package were installed."""
+    return task_of(Config().model_copy(update={"task": section()}))
+
+
+@of_every_task
+def test_it_has_the_outcomes_that_all_tasks_have_and_its_success(section: type[TaskConfig]) -> None:
+    words = {each.value for each in described(section).outcomes}
+    assert {LIMIT_VIOLATED, TRACKING_FAILED, LOST, section().success} <= words
+
+
+@of_every_task
+def test_it_is_found_by_the_name_in_the_table(section: type[TaskConfig]) -> None:
+    assert section.model_fields["name"].default == section().name
+    assert isinstance(described(section), Task)
+
+
+@of_every_task
+def test_every_measure_of_its_results_has_columns(section: type[TaskConfig]) -> None:
+    task = described(section)
+    columns = [column.name for column in task.columns.columns]
+    assert len(set(columns)) == len(columns)
+    for each in fields(task.results):
+        if each.name not in {"outcome", "reason"}:
+            assert any(each.name in column for column in columns), each.name
+    assert all("{" not in column.description for column in task.columns.columns)
+
+
+@of_every_task
+def test_results_come_back_from_their_columns(section: type[TaskConfig]) -> None:
+    task = described(section)
+    lost = task.lose("nobody did it")
+    assert isinstance(lost, Result)
+    assert task.columns.read(lost.outcome, lost.reason, task.columns.write(lost)) == lost
+
+
+@of_every_task
+def test_the_motion_ends_where_the_configuration_says(section: type[TaskConfig]) -> None:
+    task = described(section)
+    trajectory = task.trajectory()
+    assert dict(zip(trajectory.joints, trajectory.positions[-1].tolist(), strict=True)) == task.config.task.end
+
+
+@of_every_task
+def test_what_it_adds_to_a_report_can_be_loaded(section: type[TaskConfig]) -> None:
+    pytest.importorskip("plotly")
+    if path := described(section).report:
+        assert callable(load_object(path))
