@@ -32,7 +32,7 @@ from throwcollect.wording import command, counted
 _RATE_WINDOW_S = 10.0
 """Throws per second are averaged over this time."""
 _SYNC_EVERY_S = 1.0
-"""What a power cut may cost."""
+"""Real time of collecting that a power cut may cost."""
 
 
 class TrialCollection:

@@ -36,7 +36,7 @@ class Leases:
         self._refusals: dict[str, list[tuple[int, str]]] = {}
         """Trials that a simulation has refused since it could do one, with the reasons."""
         self._wrong_refusals: dict[str, int] = {}
-        """How many of them others could do."""
+        """Number of trials that each simulation has refused and another one could do."""
         self._total = len(self._fresh)
         self._ended = 0
         self._completed = 0

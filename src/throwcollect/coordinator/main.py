@@ -17,7 +17,7 @@ from throwcollect.ros.self_check import check_answers
 
 _IDLE_S = 0.05
 _TELL_EVERY_S = 10.0
-"""For whoever reads the log; the topic has it more often."""
+"""Real time between two lines of progress in the log; the topic has it more often."""
 
 
 def run(directory: Path) -> None:
@@ -50,7 +50,7 @@ def run(directory: Path) -> None:
         executor = ros.SingleThreadedExecutor()
         executor.add_node(node)
         check_answers(node, executor)
-        # What is here now stays until the end; the garbage collector need not go through it again and again.
+        # All objects of now stay until the end, so the garbage collector need not go through them again and again.
         gc.freeze()
         heartbeat = Heartbeat()
 

@@ -22,13 +22,13 @@ from throwcollect.run_key import Signer
 _DISCOVERY_PERIOD_S = 0.1
 _REPORT_PERIOD_S = 0.2
 _UNREADABLE_PERIOD_S = 10.0
-"""Whoever publishes garbage may do so often."""
+"""Time between two warnings of episodes that cannot be read, as whoever publishes such may do so often."""
 _SHARED_PERIOD_S = 10.0
 """Time between two warnings of simulations that share a namespace."""
 _UNKNOWN = "_NODE_NAME_UNKNOWN_"
 """What an RMW calls a node that it has not heard of yet, unlike its publisher."""
 _REACH_S = 6.0
-"""Nodes that see each other are connected within a second, also on a busy machine."""
+"""Time after which a simulation counts as out of reach: nodes that see each other are connected within a second."""
 
 
 class Coordinator(Node):
@@ -49,7 +49,7 @@ class Coordinator(Node):
         self._visible: set[str] = set()
         self._unreached: dict[str, float] = {}
         self._signer = Signer.of_environment()
-        # A simulation that is held back for onlookers needs its time, and is not lost.
+        # With a real-time factor a trial takes as long as onlookers were promised, so the simulation is not lost.
         slowed_s = config.sim.max_trial_s / (config.sim.real_time_factor or math.inf)
         self._patience_s = config.run.trial_timeout_s + slowed_s
         robot, naming = robot_of(config), config.controllers.names
@@ -92,7 +92,7 @@ class Coordinator(Node):
 
     @property
     def _unreachable(self) -> set[str]:
-        """Names of simulations that have been out of reach for too long; a new connection is a matter of luck."""
+        """Names of simulations that have been out of reach for too long; started again, they may well be within it."""
         latest = time.monotonic() - _REACH_S
         return {self._collection.name_of(namespace) for namespace, since in self._unreached.items() if since < latest}
 
@@ -104,7 +104,7 @@ class Coordinator(Node):
             if name != simulation.name:
                 self._lose(namespace, "left the ROS graph")
             elif publishers - simulation.publishers:
-                # Where nodes are silent for a while before they count as gone, its successor is there first.
+                # A node that died may count as there for a while, so the one in its place is seen first.
                 self._lose(namespace, "was started again")
         for namespace in offered.keys() - self._simulations.keys():
             self._simulations[namespace] = SimulationClient(

@@ -21,7 +21,7 @@ h5py = lazily("h5py")
 
 ACTION = "command_position_rad"
 _BESIDE = ("time_s", "command_velocity_radps", "command_acceleration_radps2")
-"""Signals that are neither observed nor acted on."""
+"""Signals that are neither an observation nor an action, so they stand beside both."""
 _COMPRESSION = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
 _GYM = 2
 """robomimic's number for environments that are not of robosuite."""
@@ -109,7 +109,7 @@ class _Output(io.FileIO):
 
     def __exit__(self, kind: type[BaseException] | None, *rest: Any) -> None:
         super().__exit__(kind, *rest)
-        # This error is the cause of whatever error HDF5 raised.
+        # HDF5 may have raised an error of its own by now; the one that was kept is its cause.
         self.check()
 
 

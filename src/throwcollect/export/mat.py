@@ -27,7 +27,7 @@ from throwcollect.tasks.dmp import fit_dmp, kernels, roll_out
 scipy_io = lazily("scipy.io", extra="export")
 
 BASIS_FUNCTIONS = 25
-"""Of a DMP that is fitted, to each joint."""
+"""Number of basis functions of each joint in a DMP that is fitted."""
 _FIT_POINTS = 501
 _LARGEST = 2**31 - 1
 """Size that a variable may have in a file of version 5 [bytes]."""

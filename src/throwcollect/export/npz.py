@@ -71,7 +71,7 @@ def _write_shard(source: Source, entries: tuple[Entry, ...], path: Path) -> None
         "moving_joints": np.array(source.moving),
         "digest_of_dataset": np.array(source.digest),
     }
-    # Signals are written side by side on disk before they are packed one after the other.
+    # A member of an archive has to be written in one go, so each signal first gets a file of its own.
     beside = {signal.name: path.with_name(f"{path.stem}.{signal.name}.npy") for signal in source.signals}
     with ExitStack() as stack:
         files = {name: stack.enter_context(file.open("wb")) for name, file in beside.items()}

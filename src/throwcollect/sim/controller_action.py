@@ -55,7 +55,7 @@ class ControllerAction:
         """Answer whoever waits for the result of a goal."""
         if (future := self._results.get(result.goal_id)) is not None:
             future.set_result(result)
-            # No feedback after the end, which may lie within the slice of time that has just passed.
+            # A goal that has ended gets no more feedback, also if it ended in the middle of the last slice.
             self._handles.pop(result.goal_id, None)
 
     @property
@@ -65,7 +65,7 @@ class ControllerAction:
 
     @property
     def watched(self) -> bool:
-        """Whether somebody listens to feedback that there is."""
+        """Whether a goal has been taken and somebody listens to its feedback."""
         return bool(self._results) and self.heard
 
     @property
@@ -77,7 +77,7 @@ class ControllerAction:
     def publish_feedback(self, state: ControllerState) -> None:
         """Tell how far the goals have come."""
         passed_ns = self._simulation.now_ns - self._told_ns
-        # By a clock of its own, as slices of time need not end when feedback is due.
+        # Feedback is due by a clock of its own, as slices of time need not end just then.
         self._told_ns += passed_ns - passed_ns % (self._simulation.feedback_ns or 1)
         feedback = feedback_message(state)
         for handle in self._handles.values():
@@ -114,7 +114,7 @@ class ControllerAction:
         handle.execute()
 
     def _cancel(self, handle: Any) -> CancelResponse:
-        # Its result reaches the client when the goal's execution goes on, after this answer.
+        # The client gets the result of the cancelled goal when its execution goes on, after this answer.
         key = self._keys.get(_uuid(handle))
         cancelled = key is not None and self._simulation.cancel(self._controller, key)
         return CancelResponse.ACCEPT if cancelled else CancelResponse.REJECT

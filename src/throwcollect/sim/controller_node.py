@@ -29,7 +29,7 @@ from throwcollect.sim.simulation import Simulation
 
 _SPEED = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _STATES = QoSProfile(depth=100)
-"""The states of one slice of time leave together."""
+"""Deep enough for all states of one slice of time, as they leave together."""
 _REPEATED_S = 1.0
 
 
@@ -71,7 +71,7 @@ class ControllerNode(Node):
 
     @property
     def watched(self) -> bool:
-        """Whether somebody listens to the controller's state, or to feedback that there is."""
+        """Whether somebody listens to the controller's state, or to the feedback of a goal that was taken."""
         return self.wants_states or self._action.watched
 
     @property
@@ -85,7 +85,7 @@ class ControllerNode(Node):
         if not self.watched:
             return
         if self.wants_states and not (states or self._simulation.running):
-            # Time stands still, but whoever has just come wants to know.
+            # While time stands still no state is new, but a listener that has just come has not seen the present one.
             states = [self._present_state()]
         for state in states:
             self._states.publish(state_message(state))
@@ -127,7 +127,7 @@ class ControllerNode(Node):
 
 
 class _LogHandler(logging.Handler):
-    """Passes on what a controller logs to the log of its node; what is repeated once a second at most."""
+    """Passes on what a controller logs to the log of its node: of records marked as repeated, one a second."""
 
     def __init__(self, node: Node) -> None:
         super().__init__()

@@ -23,7 +23,7 @@ _CHANGEABLE = {
     "cmd_timeout": "How long after the end of a trajectory the joints are stopped [s]; 0 never",
 }
 _LEAST = {"action_monitor_rate": 0.1}
-"""The least value of parameters for which that is not 0."""
+"""Least value of each parameter that may not go down to 0."""
 
 
 class ParameterFace:

@@ -14,7 +14,7 @@ BALL = "ball"
 WORLD_FRAME = "world"
 _LARGEST_COORDINATE_M = 1e3
 _LARGEST_SPEED = 1e3
-"""In m/s and rad/s: what is faster soon leaves the range of numbers."""
+"""Largest speed that a client may give a body [m/s, rad/s]: a faster one is soon too far away to be a number."""
 
 _NORM_TOLERANCE = 1e-3
 _MOST_SPAWNED = 200

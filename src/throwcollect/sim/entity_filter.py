@@ -96,7 +96,7 @@ class EntityFilter:
 
 
 def _compile(expression: str) -> Any:
-    """Compile an expression of a client's; whatever it is, to search takes time in proportion to the name.
+    """Compile an expression of a client; to search a name by it takes time in proportion to the name, whatever it is.
 
     Raises:
         RequestError: ``RESULT_OPERATION_FAILED`` if it is malformed.

@@ -23,7 +23,7 @@ from throwcollect.sim.simulation import Simulation
 
 _CORNERS = 2
 _MOST_WANTED = 1000
-"""Of categories or tags in one filter."""
+"""Largest number of categories, and of tags, in one filter."""
 
 
 class EntityServices:

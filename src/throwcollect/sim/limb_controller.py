@@ -86,7 +86,7 @@ class LimbController:
             posture: Angle of each joint [rad].
         """
         self._posture = np.array([posture[joint] for joint in self._joints])
-        # Put off until somebody asks for the controller, as most limbs are idle in most trials.
+        # The controller itself is reset when somebody asks for it, as most limbs are idle in most trials.
         self._start_ns = time_ns
         self._elapsed_ns, self._points, self._states = [], [], []
         if self._controller.goal_id is not None:
@@ -183,7 +183,7 @@ class LimbController:
         still = np.zeros(len(self._joints)) if self._configured.measures_velocity else None
         measured = JointState(self._posture.copy(), still)
         self._controller.reset(start_ns, measured)
-        # Begins the hold, so that an idle limb need not be driven.
+        # This update begins the hold: from then on an idle limb has the same command and need not be driven.
         self._controller.update(start_ns, 0, measured)
 
 

@@ -47,10 +47,10 @@ _EPISODE = "episode"
 _LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _SAMPLED = QoSProfile(depth=100)
 _WHOLE = QoSProfile(history=HistoryPolicy.KEEP_ALL)
-"""Every episode reaches every subscriber, however slow it is."""
+"""No episode is dropped, so each reaches every subscriber, however slow it is."""
 
 _IDLE_S = 0.2
-"""Signals are heeded between two waits: their handlers must not touch what the executor may be in the middle of."""
+"""Longest wait for messages: signals are heeded after it, as their handlers must not disturb an executor at work."""
 
 _REPEAT_S = 0.02
 """Real time between two messages on a topic of samples while time stands still; that of the robot's joint states."""
@@ -58,10 +58,10 @@ _REPEAT_S = 0.02
 _FACTOR = "sim.real_time_factor"
 _NO_LIMIT = 0.0
 _HIDDEN = (Effect.PLAN, Effect.RUN)
-"""What keys have an effect on that are no parameters, as they say nothing of a simulation."""
+"""Effects of keys that the node does not show as parameters, as they say nothing of a simulation."""
 
 _MOST_TRIALS = 10_000_000
-"""As many as a configuration may ask for; all of them start at times that fit into a stamp."""
+"""Largest number of trials that a configuration may ask for; even the last starts at a time that fits into a stamp."""
 
 
 class SimulationNode(Node):
@@ -101,7 +101,7 @@ class SimulationNode(Node):
         self._signer = Signer.of_environment()
         self._restoring = False
         self._control = SimulationControl(self, simulation)
-        # Last, as coordinators take its presence for that of the whole simulation.
+        # Episodes come last: a coordinator that sees their publisher takes the whole simulation for ready.
         self._episodes = self.create_publisher(UInt8MultiArray, _EPISODE, _WHOLE)
 
     @property
@@ -145,14 +145,14 @@ class SimulationNode(Node):
         self._control.follow_up()
 
     def _require_own_namespace(self) -> None:
-        """Refuse to live where another simulation lives: clients could not tell them apart, and each goal moved both.
+        """Refuse to live where another simulation lives: clients could not tell the two apart.
 
         Raises:
             ConfigError: If there is another one.
         """
         others = {info.node_name for info in self.get_publishers_info_by_topic(_EPISODE)} - {self.get_name()}
         if others:
-            # Before it is destroyed: rclpy tells nothing of a node afterwards.
+            # The names are read before the node is destroyed, as rclpy tells nothing of it afterwards.
             name, namespace = self.get_name(), self.get_namespace()
             self.destroy_node()
             raise ConfigError(
@@ -174,17 +174,17 @@ class SimulationNode(Node):
         self._publish_steps(samples)
 
     def _repeats(self) -> bool:
-        """Whether it is time to say again what was said last, as robots go on to tell their state while they rest."""
+        """Whether the last sample is due once more: robots go on to tell their state while they rest."""
         return self._rests and time.monotonic() - self._published_at >= _REPEAT_S
 
     @property
     def _rests(self) -> bool:
-        """Whether time stands still for want of anything to do; in a collection every sample is told once."""
+        """Whether time stands still as there is nothing to do; not in a collection, where each sample is told once."""
         simulation = self._simulation
         return simulation.state == State.PLAYING and not simulation.running and simulation.trial.setup.number < 0
 
     def _publish_steps(self, samples: Samples) -> None:
-        """Publish the time that steps have led to, as they may end between two samples."""
+        """Publish the time after steps of a paused simulation, which may end between two samples."""
         simulation = self._simulation
         self._told_ns = int(samples.stamps_ns[-1]) if len(samples) else self._told_ns
         if simulation.state != State.PAUSED or simulation.now_ns == self._told_ns:

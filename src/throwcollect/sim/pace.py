@@ -6,11 +6,11 @@ import math
 import time
 
 _SHORTEST_S = 0.004
-"""Real time of a slice, at least: what is done between two slices takes about a millisecond of it."""
+"""Shortest slice in real time: a millisecond of it goes into what is done between two slices."""
 _LONGEST_S = 0.05
-"""Real time of a slice, at most: inputs wait for its end."""
+"""Longest slice in real time: inputs wait for its end."""
 _LATE_S = 0.05
-"""Real time that is caught up with; beyond, as after a rest, pace is kept from the present on."""
+"""A delay up to this is made up for; after a longer one, such as a rest, time goes on from the present."""
 
 
 def longest_steps(factor: float, hz: int) -> int:

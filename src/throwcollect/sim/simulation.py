@@ -25,10 +25,10 @@ from throwcollect.sim.step_request import StepRequest
 from throwcollect.sim.world import World
 
 _SLICE_S = 0.5
-"""Simulated time between two looks at the inputs within a trial or many steps: about 20 ms of real time."""
+"""Simulated time between two looks at the inputs in a trial or in many steps: about 20 ms of real time."""
 
 _WATCHED_SLICE_S = 0.05
-"""The same while somebody watches, and otherwise: the period of action feedback, as upstream."""
+"""The same while somebody watches, and outside of trials: the period in which ros2_controllers give feedback."""
 
 
 class State(IntEnum):

@@ -55,7 +55,7 @@ class SimulationControl:
 
     def __init__(self, node: Node, simulation: Simulation) -> None:
         self._simulation = simulation
-        # The one service that has no result.
+        # This service stands alone, as its response is the only one that has no result code.
         node.create_service(GetSimulatorFeatures, "get_simulator_features", self._get_features)
         for service, name, fill in (
             (GetSimulationState, "get_simulation_state", self._get_state),

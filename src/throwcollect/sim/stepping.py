@@ -15,7 +15,7 @@ from throwcollect.sim.step_request import StepRequest
 
 _ACTION = "simulate_steps"
 _MOST_STEPS = 100_000
-"""In one call of the service, which cannot be cancelled: some seconds."""
+"""Most steps in one call of the service: they take some seconds, and the call cannot be cancelled."""
 
 
 class Stepping:

@@ -131,7 +131,7 @@ class World(Observer):
             start_ns: Simulated time of the present state [ns].
         """
         now = self.engine.state
-        # Without bodies that were removed since the last step.
+        # A body that was removed since the last step does not press on the ball any more.
         self._touching = now.touching
         self._begin(start_ns, now.sample)
 
@@ -254,7 +254,7 @@ class World(Observer):
             seat = tool.ball_seat(trial.ball.radius_m)
             self.engine.configure(physics_of(trial, self._moving))
             self.engine.rest(self._start, seat)
-            # At least one step, as contact forces and motor torques are those of the last one.
+            # One step is always taken, as contact forces and motor torques are those of the last step.
             steps = max(1, round(trial.sim.settle_s * trial.sim.physics_hz))
             targets, velocities = self._make_motors(trial).plan(np.tile(self._start, (steps, 1)))
             self.engine.run(Steps(targets, velocities, first_sample=steps + 1, stride=1), Observer())
@@ -273,7 +273,7 @@ class World(Observer):
         return Motors(self._start, hz=trial.sim.physics_hz, delay_s=trial.sim.command_delay_s)
 
     def _record_start(self) -> None:
-        # After a reset with the motor torques of the settled state: engines have none before the first step.
+        # The motor torques are those of the settled state, as engines have none before the first step.
         self._rows = [(*self._start_joints, *self.engine.state.sample[-BALL_NUMBERS:])]
         self._forgotten = 0
 

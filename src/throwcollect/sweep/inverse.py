@@ -13,25 +13,25 @@ from throwcollect.reproducible_math import matmul, solve
 spatial = lazily("scipy.spatial")
 
 _BASES = 8
-"""Landed throws near a goal from which a way to it is looked for."""
+"""Number of landed throws near a goal from each of which a way to it is looked for."""
 _NEIGHBOURS_PER_PARAMETER = 3
 _RIDGE = 1e-3
-"""Share of the mean square spread of the neighbours along a parameter."""
+"""Ridge of the linear models, as a share of the mean square spread of the neighbours along a parameter."""
 _LEAST = 1e-300
-"""Keeps the models solvable where all neighbours are one point."""
+"""Smallest ridge: it keeps the models solvable where all neighbours are one point."""
 _DAMPING_BINS = 0.1
-"""Error in the target that is accepted for smaller steps."""
+"""Error in the target [bins] that a step may leave in order to be smaller."""
 _LONGEST_STEP = 0.3
 _ALONG_NOISE = 0.1
 """Standard deviation of the noise that, by the model, does not change where the ball lands."""
 _NOISE = 0.02
 """Standard deviation of the noise in all directions."""
 _JUDGES = 8
-"""Ended throws near a proposal that say how likely it lands."""
+"""Number of ended throws near a proposal that say how likely it lands."""
 _PROGRESS = 0.7
 """A proposal is promising if it is predicted to land this much nearer to its goal than any throw has."""
 _CLOSE_BINS = 0.5
-"""... or as near as this."""
+"""A proposal is promising, too, if it is predicted to land as near to its goal as this."""
 _FAILURE_BINS = 2.0
 """A proposal that surely fails is as bad as one that is so many bins off."""
 

@@ -1,4 +1,4 @@
-"""Parquet files of a dataset: written so that equal tables give equal bytes, read as what may be made to do harm."""
+"""Parquet files of a dataset: equal tables are written as equal bytes; what is read may have been made to do harm."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def read_parquet(path: Path) -> Any:
             table = file.read()
         table.validate(full=True)
     except (OSError, ValueError, MemoryError, pa.ArrowException) as error:
-        # Whatever the bytes of a name or a text are not valid as ends as one of these, at the latest when validated.
+        # A name or a text whose bytes are not valid ends as one of these errors, at the latest when it is validated.
         raise DatasetError(f"is damaged: {_first_line(error)}", path=path) from error
     return table
 

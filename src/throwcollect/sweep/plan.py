@@ -26,9 +26,9 @@ _CONFIG_KEY = b"throwcollect.config_digest"
 _MOST_REASONS = 5
 
 ROUND_TRIALS = 64
-"""Trials of a round, by which a plan grows."""
+"""Number of trials in a round, by which a plan grows."""
 FIRST_TRIALS = 2 * ROUND_TRIALS
-"""Trials of the rounds that depend on no result."""
+"""Number of trials in the rounds that depend on no result."""
 
 Check = Callable[[Config], str | None]
 """Says of the configuration of a trial why it cannot be run, or None when it can."""

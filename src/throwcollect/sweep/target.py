@@ -19,7 +19,7 @@ from throwcollect.tasks.throw.outcome import ThrowOutcome, ThrowResult
 _RANDOMNESS = 0
 """First number of the spawn keys of rounds; those of trials have one number alone."""
 _GOALS = 3
-"""Places in a cell of which the one is aimed at that the ball gets to best."""
+"""Number of places that are tried in a cell; the throw aims at the one that it is predicted to come nearest to."""
 
 
 class TargetSampler:

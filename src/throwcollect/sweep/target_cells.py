@@ -12,13 +12,13 @@ from throwcollect.sweep.plan import Trial
 from throwcollect.tasks.throw.outcome import ThrowResult
 
 NOWHERE = -1
-"""In the place of a cell: none."""
+"""Stands in the place of a cell for none of them."""
 
 _TIE = 1e-6
 """Cells whose scores differ by less are equally thin."""
 _MOST_DOUBLINGS = 60
 _DOUBT = 4
-"""Misses that a doubt counts for."""
+"""Number of misses that a doubt counts for."""
 
 
 class Cells:

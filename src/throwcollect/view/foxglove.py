@@ -14,7 +14,7 @@ _BALL = "Plot!ball"
 _LIMITS = "Plot!limits"
 _FACTS = "DiagnosticStatusPanel!facts"
 _SPEED = 0.2
-"""Of the playback: a throw takes a second."""
+"""Speed of the playback [-]: at real speed a throw is over within a second or two."""
 
 
 def layout(joints: Sequence[str]) -> bytes:
@@ -84,7 +84,7 @@ def _scene() -> dict[str, Any]:
             "/view/throw": {"visible": True, "showOutlines": False},
             "/view/throws": {"visible": True, "showOutlines": False},
             "/view/path": {"visible": False},
-            # The same robot once more, by the paths of its meshes, which are not where they are on every machine.
+            # This is the same robot, but with paths of meshes, which do not lie there on every machine.
             "/robot_description": {"visible": False},
         },
         "layers": layers,

@@ -29,7 +29,7 @@ _OTHERS_ALPHA = 0.25
 _POINT_M, _TEXT_M, _LINE_M, _THIN_LINE_M, _PLANE_M = 0.035, 0.07, 0.012, 0.005, 0.002
 _MARGIN_M = 0.5
 _POINTS_PER_S = 100
-"""As many points of a path as the eye can tell apart."""
+"""Points of a path in a second of it: more could not be told apart by eye."""
 
 
 def robot_markers(robot: DrawnRobot, stamp_ns: int) -> Any:

@@ -10,7 +10,7 @@ from throwcollect.view.viewed import ViewedThrow
 
 NAME = "throw"
 HARDWARE = "throwcollect"
-"""By these two names a viewer chooses the status to show."""
+"""Hardware of the status; by it and `NAME` a viewer chooses what it shows."""
 
 
 def throw_facts(throw: ViewedThrow) -> Any:
