@@ -50,8 +50,8 @@ def render_card(source: Source, layout: Layout) -> str:
         *(_render_front_matter(config, layout.hub) if layout.hub else []),
         f"# {config.name}",
         "",
-        f"{len(source.table)} simulated {config.task.subject} by {robot_of(config).introduction}; {len(source.entries)} "
-        f"of them have time series, at {source.rate_hz} Hz. Exported by throwcollect {__version__} from the "
+        f"{len(source.table)} simulated {config.task.subject} by {robot_of(config).introduction}; {len(source.entries)}"
+        f" of them have time series, at {source.rate_hz} Hz. Exported by throwcollect {__version__} from the "
         f"dataset with the digest `{source.digest}`.",
         "",
         *outcome_lines(source.table),
