@@ -116,7 +116,7 @@ def talos(endpoint: str, session: Context, tmp_path_factory: pytest.TempPathFact
 
 
 def test_joint_states_have_velocity_and_effort_of_every_joint(talos: Robot) -> None:
-    states = PlayMotion(talos).joint_states(TALOS.joints)
+    states = PlayMotion(talos).joint_states()
     assert set(states) == set(TALOS.joints)
     # The arm holds itself against gravity.
     assert abs(states["arm_right_2_joint"][2]) > 0.1
@@ -138,7 +138,7 @@ def test_motions_of_the_real_robot_are_played(motion: Motion, goals: int, talos:
     assert client.play(motion) == [(4, 0, "Goal successfully reached!")] * goals
     joints, points = motion
     end = list(points.values())[-1]
-    states = client.joint_states(TALOS.joints)
+    states = client.joint_states()
     assert [states[joint][0] for joint in joints] == pytest.approx(end, abs=0.02)
 
 
