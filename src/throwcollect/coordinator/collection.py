@@ -19,7 +19,7 @@ from throwcollect.coordinator.growth import Growth
 from throwcollect.coordinator.leases import Leases
 from throwcollect.coordinator.progress import Progress
 from throwcollect.coordinator.replay_check import check_by_replay
-from throwcollect.dataset.directory import known_directory
+from throwcollect.dataset.directory import find_known_directory
 from throwcollect.dataset.inspect import info, loss
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.episode.message import Delivery, Episode
@@ -301,7 +301,7 @@ class TrialCollection:
             WorkerError: If trials cannot be simulated again.
             LossError: If the dataset is finished, and trials of it are lost.
         """
-        known = known_directory(directory)
+        known = find_known_directory(directory)
         if not self.complete:
             raise Interrupted(
                 f"interrupted; what is finished is in {known or 'the volume'}",

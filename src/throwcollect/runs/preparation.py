@@ -17,7 +17,7 @@ from throwcollect.coordinator.prepare import prepare as prepare_plan
 from throwcollect.coordinator.resume import begun, finished
 from throwcollect.coordinator.resume import resume as resume_plan
 from throwcollect.dataset.directory import CONFIG, PLAN, TRIALS, config_path
-from throwcollect.dataset.lock import held_together
+from throwcollect.dataset.lock import hold_together
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.ros.middleware import Middleware
 from throwcollect.runs.choice import Choice, choose
@@ -274,7 +274,7 @@ def _prepare(records: Records, request: _Request, plan: Plan | None, onlooker: O
             if (config.trials or 0) >= _MANY_TRIALS and not config.grows:
                 onlooker.say(f"plan: checking {config.trials} trials against limits and collisions, about 5 ms each")
             plan = prepare_plan(config, directory, sweep_directory=request.sweep_directory)
-        held.enter_context(held_together(directory))
+        held.enter_context(hold_together(directory))
         if not request.resumed:
             undo.callback(_remove_plan, directory, made=made)
         choice = choice or choose(config, say=onlooker.say, warn=onlooker.warn)

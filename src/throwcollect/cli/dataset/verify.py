@@ -29,7 +29,7 @@ def verify_dataset(
 ) -> None:
     """Check a dataset against itself and against physics; exit code 4 if anything is wrong."""
     from throwcollect.dataset.reader import Dataset
-    from throwcollect.dataset.verify import unchecked
+    from throwcollect.dataset.verify import find_unchecked
     from throwcollect.replay.verification import verify_dataset as verify
 
     findings = verify(directory, replay=replay)
@@ -43,7 +43,7 @@ def verify_dataset(
     dataset = Dataset.open(directory)
     if not json:
         typer.echo(f"{directory}: nothing wrong\n{_describe_unchecked(dataset, replay)}")
-    if left_out := unchecked(dataset.config):
+    if left_out := find_unchecked(dataset.config):
         typer.echo(f"not checked without the extra collect: {', '.join(left_out)}", err=json)
         typer.echo(f"  try: {install_command('collect')}", err=json)
 
