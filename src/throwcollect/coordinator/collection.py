@@ -27,7 +27,7 @@ from throwcollect.errors import Interrupted, WorkerError
 from throwcollect.sweep.plan import Trial
 from throwcollect.tasks.result import Result
 from throwcollect.tasks.task import task_of
-from throwcollect.wording import command, counted
+from throwcollect.wording import command, format_count
 
 _RATE_WINDOW_S = 10.0
 """Throws per second are averaged over this time."""
@@ -84,7 +84,7 @@ class TrialCollection:
         writer = DatasetWriter.open(directory)
         there: list[tuple[int, Result]] = []
         if found := writer.recover(lambda trial, result: there.append((trial, result))):
-            say(f"keeps {counted(found, 'episode')} of an earlier collection")
+            say(f"keeps {format_count(found, 'episode')} of an earlier collection")
         collection = cls(writer)
         for trial, result in there:
             collection.recall(trial, result)

@@ -16,7 +16,7 @@ from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.summary import Info
 from throwcollect.errors import DatasetError, LossError
 from throwcollect.tasks.result import LOST
-from throwcollect.wording import counted
+from throwcollect.wording import format_count
 
 
 def info(directory: Path) -> Info:
@@ -83,7 +83,7 @@ def loss(outcomes: Mapping[str, int], *, hint: str | None) -> LossError | None:
     if not lost:
         return None
     verb = "is" if lost == 1 else "are"
-    return LossError(f"{lost} of {counted(all_of_them, 'trial')} {verb} lost; throws.parquet says why", hint=hint)
+    return LossError(f"{lost} of {format_count(all_of_them, 'trial')} {verb} lost; throws.parquet says why", hint=hint)
 
 
 def _landing(throws: pa.Table) -> Mapping[str, tuple[float, float]] | None:

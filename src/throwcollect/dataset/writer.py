@@ -48,7 +48,7 @@ from throwcollect.sweep.point_file import encode_points
 from throwcollect.sweep.points import Points
 from throwcollect.tasks.result import Result
 from throwcollect.tasks.task import task_of
-from throwcollect.wording import command, counted
+from throwcollect.wording import command, format_count
 
 Tell = Callable[[int, Result], None]
 """Receives the number of a trial and its result."""
@@ -317,7 +317,7 @@ class DatasetWriter:
         if self._shards:
             missing = sorted(number for shard in self._shards.values() for number in shard.missing)
             example = f", such as {missing[0]}" if missing else ""
-            raise DatasetError(f"lacks {counted(len(missing), 'trial')}{example}", path=self._directory)
+            raise DatasetError(f"lacks {format_count(len(missing), 'trial')}{example}", path=self._directory)
         finished = [self._finished[shard] for shard in sorted(self._finished)]
         throws = pa.concat_tables([each.rows for each in finished])
         if self._journal is not None:

@@ -28,7 +28,7 @@ from throwcollect.runs.selection import busy, find_left_in
 from throwcollect.runtimes.ports import reserve_port
 from throwcollect.runtimes.runtime import Place
 from throwcollect.sweep.plan import Plan
-from throwcollect.wording import command, counted
+from throwcollect.wording import command, format_count
 
 _MANY_TRIALS = 1000
 """From here on the plan takes long enough to be announced."""
@@ -286,7 +286,7 @@ def _prepare(records: Records, request: _Request, plan: Plan | None, onlooker: O
         note = f", {refused} refused by calculation (see `throwcollect plan`)" if refused else ""
         _warn_of_company(config, choice.middleware, onlooker)
         where = f"volume {volume}" if volume else directory
-        onlooker.say(f"plan: {counted(len(plan.trials), 'trial')}{note}{more_trials(plan)}; dataset: {where}")
+        onlooker.say(f"plan: {format_count(len(plan.trials), 'trial')}{note}{more_trials(plan)}; dataset: {where}")
         return PreparedRun(records, run, config, directory, onlooker=onlooker, held=held.pop_all(), undo=undo.pop_all())
 
 
