@@ -60,7 +60,7 @@ test-fast: $(READY_DEV)
 
 # Continuous integration makes the image meanwhile, and names the process that does.
 test: check
-	$(BIN)/python -m pytest -n logical tests/architecture tests/unit tests/install tests/rclzenoh tests/contract tests/physics
+	$(BIN)/python -m pytest -n logical tests/unit tests/install tests/rclzenoh tests/contract tests/physics
 	@while [ -n "$(MAKES_IMAGE)" ] && kill -0 $(MAKES_IMAGE) 2> /dev/null; do sleep 1; done
 	$(MAKE) --no-print-directory ros
 	$(ROS_TESTS) || $(ROS_TESTS) --last-failed --last-failed-no-failures none
@@ -78,12 +78,13 @@ test-containers:
 test-processes:
 	$(BIN)/python -m pytest -n 2 --dist loadfile tests/e2e tests/integration
 
-# Format, lint, types and the direction of imports.
+# Format, lint, types, the direction of imports, and the rules of the house.
 check: $(READY_DEV)
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	$(BIN)/python -m pytest -q tests/architecture
 
 # Throws a second against the raw limit of the same machine, in the same run.
 bench: $(READY_DEV) ros

@@ -31,7 +31,7 @@ from tests.e2e.collection import Running, collect, fingerprints, launched, start
 from tests.unit.dataset.conftest import Collection
 from tests.unit.dataset.test_forgeries import FORGED, FORGERIES, problems
 from throwcollect.config.loader import load
-from throwcollect.dataset.manifest import promised_names
+from throwcollect.dataset.manifest import list_promised_names
 from throwcollect.dataset.verify import verify
 from throwcollect.dataset.verify_manifest import find_manifest_problems
 
@@ -61,7 +61,7 @@ def flips(directory: Path, count: int, source: random.Random) -> Count:
     """Flip single bits of a dataset, one at a time; the dataset is as it was when this returns."""
     result = Count()
     collection = load(directory / "config.yaml").name
-    names = [*promised_names(directory), MANIFEST]
+    names = [*list_promised_names(directory), MANIFEST]
     for number in range(count):
         # All files alike, however large they are.
         path = directory / source.choice(names)

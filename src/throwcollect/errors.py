@@ -158,8 +158,8 @@ class DatasetError(ThrowcollectError):
         """What is wrong with all facts but where, for reports that have columns of their own for file and place."""
         return self._with_facts(self.problem)
 
-    def located(self, path: Path | None = None, place: str = "") -> DatasetError:
-        """The same error in more detail, for a caller that knows where the bytes came from.
+    def locate(self, path: Path | None = None, place: str = "") -> DatasetError:
+        """Return the same error in more detail, for a caller that knows where the bytes came from.
 
         Args:
             path: The file that they came from; None if that is not known here either.

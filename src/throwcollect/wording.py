@@ -11,12 +11,12 @@ _MOST_NAMES = 6
 _NUMBER = re.compile(r"(?<![\w.])-?\d[\d.]*(?:e[-+]?\d+)?")
 
 
-def counted(number: int, noun: str) -> str:
+def format_count(number: int, noun: str) -> str:
     """A number and what it counts, such as ``1 trial`` and ``0 trials``."""
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
-def listed(names: Sequence[str], word: str = "and") -> str:
+def join_names(names: Sequence[str], word: str = "and") -> str:
     """Names in a sentence, such as ``a, b and c``; of more than six, the others are counted.
 
     Args:

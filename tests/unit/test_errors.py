@@ -16,8 +16,8 @@ def test_an_error_about_a_dataset_has_its_facts_as_fields_and_tells_them_in_orde
 
 def test_whoever_knows_where_it_happened_adds_that_and_loses_nothing() -> None:
     inner = ForeignPlanError("chunk: its CRC differs", place="byte 9", expected="5", evidence="6", hint="copy it again")
-    outer = inner.located(Path("x.mcap"), "trial 4")
+    outer = inner.locate(Path("x.mcap"), "trial 4")
     assert type(outer) is ForeignPlanError
     assert outer.message == "x.mcap: trial 4: byte 9: chunk: its CRC differs"
     assert (outer.expected, outer.evidence, outer.hint) == ("5", "6", "copy it again")
-    assert outer.located(place="shard 1").path == Path("x.mcap")
+    assert outer.locate(place="shard 1").path == Path("x.mcap")

@@ -3,12 +3,12 @@ from pathlib import Path
 
 import pytest
 
-from throwcollect.wording import command, counted, is_text, listed, printable
+from throwcollect.wording import command, format_count, is_text, join_names, printable
 
 
 @pytest.mark.parametrize(("number", "said"), [(0, "0 trials"), (1, "1 trial"), (2, "2 trials")])
 def test_one_alone_is_singular(number: int, said: str) -> None:
-    assert counted(number, "trial") == said
+    assert format_count(number, "trial") == said
 
 
 @pytest.mark.parametrize(
@@ -16,7 +16,7 @@ def test_one_alone_is_singular(number: int, said: str) -> None:
     [("", ""), ("a", "a"), ("ab", "a and b"), ("abc", "a, b and c"), ("abcdefgh", "a, b, c, d, e and 3 more")],
 )
 def test_names_stand_in_a_sentence_unless_they_are_many(names: str, said: str) -> None:
-    assert listed(names) == said
+    assert join_names(names) == said
 
 
 def test_a_recommended_command_can_be_typed_as_it_is() -> None:

@@ -71,10 +71,10 @@ def coordinator(
     from throwcollect.coordinator.resume import prepare_or_resume
     from throwcollect.dataset.inspect import info
     from throwcollect.errors import LossError
-    from throwcollect.wording import counted
+    from throwcollect.wording import format_count
 
     plan = prepare_or_resume(config, directory)
-    print(f"plan: {counted(len(plan.trials), 'trial')}{more_trials(plan)}; dataset: {directory}", flush=True)
+    print(f"plan: {format_count(len(plan.trials), 'trial')}{more_trials(plan)}; dataset: {directory}", flush=True)
     loss: LossError | None = None
     try:
         run(directory)

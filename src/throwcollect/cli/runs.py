@@ -15,7 +15,7 @@ import typer
 from throwcollect.cli.options import JsonOption
 from throwcollect.cli.streams import end_with_reader
 from throwcollect.errors import ConfigError, Interrupted
-from throwcollect.wording import command, counted
+from throwcollect.wording import command, format_count
 
 if TYPE_CHECKING:
     from throwcollect.runs.record import Record
@@ -131,7 +131,7 @@ def scale(
 
     found = to_change(Records(), run, command=f"scale {simulations}")
     control.scale(found, simulations)
-    typer.echo(f"{found.id}: {found.record.simulations} -> {counted(simulations, 'simulation')}")
+    typer.echo(f"{found.id}: {found.record.simulations} -> {format_count(simulations, 'simulation')}")
 
 
 def stop(run: RunOption = None) -> None:
@@ -209,7 +209,7 @@ def _node_lines(run: Run, held: tuple[str, HeldRun] | None) -> list[tuple[str, .
 
 
 def _node_line(node: NodeState, handle: str) -> tuple[str, ...]:
-    again = counted(node.restarts, "restart") if node.restarts else ""
+    again = format_count(node.restarts, "restart") if node.restarts else ""
     return (
         node.name,
         node.status,

@@ -11,7 +11,7 @@ import typer
 
 from throwcollect.cli.options import DEFAULT_CONFIG, ConfigArgument, JsonOption, SetOption, TrialsOption, overrides
 from throwcollect.cli.streams import end_with_reader
-from throwcollect.wording import counted
+from throwcollect.wording import format_count
 
 
 def config(
@@ -64,7 +64,7 @@ def plan(
         note = f"  refused: {trial.refused}" if trial.refused else ""
         typer.echo("  ".join([str(trial.number).rjust(len("trial")), *numbers]) + note)
     refused = Counter(trial.refused for trial in found.trials if trial.refused)
-    typer.echo(f"{counted(len(found.trials), 'trial')}, {refused.total()} refused{more_trials(found)}", err=True)
+    typer.echo(f"{format_count(len(found.trials), 'trial')}, {refused.total()} refused{more_trials(found)}", err=True)
 
 
 def doctor(json: JsonOption = False) -> None:

@@ -19,7 +19,7 @@ from throwcollect.coordinator.growth import Growth
 from throwcollect.coordinator.leases import Leases
 from throwcollect.coordinator.progress import Progress
 from throwcollect.coordinator.replay_check import check_by_replay
-from throwcollect.dataset.directory import known_directory
+from throwcollect.dataset.directory import find_known_directory
 from throwcollect.dataset.inspect import info, loss
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.episode.message import Delivery, Episode
@@ -27,7 +27,7 @@ from throwcollect.errors import Interrupted, WorkerError
 from throwcollect.sweep.plan import Trial
 from throwcollect.tasks.result import Result
 from throwcollect.tasks.task import task_of
-from throwcollect.wording import command, counted
+from throwcollect.wording import command, format_count
 
 _RATE_WINDOW_S = 10.0
 """Throws per second are averaged over this time."""
@@ -84,7 +84,7 @@ class TrialCollection:
         writer = DatasetWriter.open(directory)
         there: list[tuple[int, Result]] = []
         if found := writer.recover(lambda trial, result: there.append((trial, result))):
-            say(f"keeps {counted(found, 'episode')} of an earlier collection")
+            say(f"keeps {format_count(found, 'episode')} of an earlier collection")
         collection = cls(writer)
         for trial, result in there:
             collection.recall(trial, result)
@@ -301,7 +301,7 @@ class TrialCollection:
             WorkerError: If trials cannot be simulated again.
             LossError: If the dataset is finished, and trials of it are lost.
         """
-        known = known_directory(directory)
+        known = find_known_directory(directory)
         if not self.complete:
             raise Interrupted(
                 f"interrupted; what is finished is in {known or 'the volume'}",

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, field
 
 from pydantic import TypeAdapter, ValidationError
 
-from throwcollect.wording import counted
+from throwcollect.wording import format_count
 
 
 @dataclass(frozen=True)
@@ -71,14 +71,14 @@ class Progress:
     def line(self) -> str:
         """All of it that people want to see, in one line."""
         if self.wanted is None:
-            return f"{self.ended}/{counted(self.total, self.noun)}: {self.counts}"
+            return f"{self.ended}/{format_count(self.total, self.noun)}: {self.counts}"
         succeeded = f"{self.succeeded}/{self.wanted} {self.success}"
-        return f"{counted(self.ended, self.noun)}: {', '.join([succeeded, *self._others])}"
+        return f"{format_count(self.ended, self.noun)}: {', '.join([succeeded, *self._others])}"
 
     @property
     def _others(self) -> list[str]:
         lost = [f"{self.lost} lost"] if self.lost else []
-        simulations = counted(self.simulations, "simulation")
+        simulations = format_count(self.simulations, "simulation")
         return [f"{self.failed} failed", *lost, simulations, f"{self.throws_per_s:.1f} {self.noun}s/s"]
 
     def to_json(self) -> str:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from throwcollect.errors import DatasetError, WorkerError
 from throwcollect.trial.choice import choose_trials
-from throwcollect.wording import counted
+from throwcollect.wording import format_count
 
 
 def check_by_replay(
@@ -42,18 +42,18 @@ def check_by_replay(
         output, errors = process.communicate()
     if process.returncode:
         raise WorkerError(
-            f"{counted(len(trials), 'trial')} could not be simulated again (exit code {process.returncode})",
+            f"{format_count(len(trials), 'trial')} could not be simulated again (exit code {process.returncode})",
             evidence=errors.strip() or None,
         )
     again = {each["trial"]: each["digest"] for each in map(json.loads, output.splitlines())}
     wrong = [trial for trial in trials if again.get(trial) != digests[trial]]
     if wrong:
         raise DatasetError(
-            f"{directory}: {len(wrong)} of {counted(len(trials), 'trial')} came out otherwise in a fresh process: "
+            f"{directory}: {len(wrong)} of {format_count(len(trials), 'trial')} came out otherwise in a fresh process: "
             f"trial {', '.join(map(str, wrong))}",
             evidence="\n".join(
                 f"trial {trial}: {digests[trial]} in the dataset, {again.get(trial)}" for trial in wrong
             ),
             hint="this machine does not compute alike each time, or something has changed what was simulated",
         )
-    return f"{counted(len(trials), 'trial')} simulated again in a fresh process: the same bit for bit"
+    return f"{format_count(len(trials), 'trial')} simulated again in a fresh process: the same bit for bit"

@@ -108,7 +108,7 @@ class StoredThrow:
             try:
                 episode = contents.episode(self.offset).episode
             except DatasetError as error:
-                raise error.located(self.path) from error
+                raise error.locate(self.path) from error
         if (found := episode.header.trial) != self.trial:
             expected = f"trial {self.trial}"
             raise DatasetError(f"trial {found}", path=self.path, place=f"byte {self.offset}", expected=expected)
@@ -129,7 +129,7 @@ class StoredThrow:
             DatasetError: If the episode is not there, or its chunk is damaged.
         """
         try:
-            size = Chunk.announced_size(contents.slice(self.offset, self.offset + CHUNK_HEADER_BYTES))
+            size = Chunk.read_announced_size(contents.slice(self.offset, self.offset + CHUNK_HEADER_BYTES))
             chunk = Chunk.parse(contents.slice(self.offset, self.offset + size))
             if chunk.start_ns != self.start_ns:
                 raise DatasetError(
@@ -137,7 +137,7 @@ class StoredThrow:
                 )
             return trajectory_rows(chunk.decompress(), self.samples, self.joints)
         except DatasetError as error:
-            raise error.located(self.path, f"byte {self.offset}") from error
+            raise error.locate(self.path, f"byte {self.offset}") from error
 
 
 def check_columns(columns: Sequence[str]) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pyarrow as pa
 
 from throwcollect.dataset.bag import FileSummary, dataset_metadata
-from throwcollect.dataset.digest import combined_digest
+from throwcollect.dataset.digest import combine_digests
 from throwcollect.dataset.directory import CONFIG, MANIFEST, METADATA, PLAN, SOURCES, THROWS, TRIALS
 from throwcollect.dataset.manifest import FileEntry, entry_of, entry_of_file, manifest_text
 from throwcollect.episode.channels import Channels
@@ -38,7 +38,7 @@ def write_description(
     Raises:
         DatasetError: If a file cannot be read or written.
     """
-    digest = combined_digest(throws["digest"].drop_null().to_pylist())
+    digest = combine_digests(throws["digest"].drop_null().to_pylist())
     table = encode_table(throws)
     metadata = dataset_metadata([summary for summary, _ in recordings], channels.all, digest).encode()
     others = (directory / each for each in (CONFIG, PLAN, TRIALS, SOURCES))

@@ -14,7 +14,7 @@ def is_digest(value: object) -> bool:
     return isinstance(value, str) and bool(_DIGEST.fullmatch(value))
 
 
-def combined_digest(digests: Iterable[str]) -> str:
+def combine_digests(digests: Iterable[str]) -> str:
     """SHA-256 over the digests of all episodes in order of trials, each as 32 bytes, in hexadecimal.
 
     Args:

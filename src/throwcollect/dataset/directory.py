@@ -41,7 +41,7 @@ def shard_name(collection: str, number: int) -> str:
     return f"{collection}_{number:05d}{SHARD_SUFFIX}"
 
 
-def known_directory(directory: Path) -> Path | None:
+def find_known_directory(directory: Path) -> Path | None:
     """The directory of a dataset as its user knows it; None if it has none, such as in a volume.
 
     Args:

@@ -9,14 +9,14 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from throwcollect.dataset.data_card import count_outcomes
-from throwcollect.dataset.digest import combined_digest
+from throwcollect.dataset.digest import combine_digests
 from throwcollect.dataset.directory import METADATA
-from throwcollect.dataset.journal import collected_s
+from throwcollect.dataset.journal import measure_collected_s
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.summary import Info
 from throwcollect.errors import DatasetError, LossError
 from throwcollect.tasks.result import LOST
-from throwcollect.wording import counted
+from throwcollect.wording import format_count
 
 
 def info(directory: Path) -> Info:
@@ -66,7 +66,7 @@ def summary(dataset: Dataset) -> Info:
         recordings_bytes=sum(size for name, size in sizes.items() if name.endswith(".mcap")),
         topics=topics,
         digest=dataset.digest,
-        wall_s=collected_s(directory),
+        wall_s=measure_collected_s(directory),
         success=dataset.config.task.success,
         noun=dataset.config.task.noun,
     )
@@ -83,7 +83,7 @@ def loss(outcomes: Mapping[str, int], *, hint: str | None) -> LossError | None:
     if not lost:
         return None
     verb = "is" if lost == 1 else "are"
-    return LossError(f"{lost} of {counted(all_of_them, 'trial')} {verb} lost; throws.parquet says why", hint=hint)
+    return LossError(f"{lost} of {format_count(all_of_them, 'trial')} {verb} lost; throws.parquet says why", hint=hint)
 
 
 def _landing(throws: pa.Table) -> Mapping[str, tuple[float, float]] | None:
@@ -111,13 +111,13 @@ def digest(directory: Path) -> str:
         try:
             episode.check_records()
         except DatasetError as error:
-            raise error.located(directory, f"trial {trial}") from error
+            raise error.locate(directory, f"trial {trial}") from error
         if episode.digest != said[trial]:
             raise DatasetError(
                 f"digest {episode.digest}", path=directory, place=f"trial {trial}", expected=f"{said[trial]}"
             )
         digests.append(episode.digest)
-    combined = combined_digest(digests)
+    combined = combine_digests(digests)
     if combined != dataset.digest:
         raise DatasetError(f"digest {combined}", path=directory, expected=f"{dataset.digest} as metadata.yaml says")
     return combined

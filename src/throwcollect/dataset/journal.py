@@ -55,7 +55,7 @@ class Journal:
         except DatasetError:
             os.close(self._descriptor)
             raise
-        self._earlier_s = collected_s(directory) or 0.0
+        self._earlier_s = measure_collected_s(directory) or 0.0
         self._opened = time.time()
         size = os.fstat(self._descriptor).st_size
         if size and os.pread(self._descriptor, 1, size - 1) != b"\n":
@@ -71,7 +71,7 @@ class Journal:
     ) -> None:
         self.close()
 
-    def collected_s(self) -> float:
+    def measure_collected_s(self) -> float:
         """Real time that this process and earlier ones have collected for [s], to the millisecond."""
         # Clocks are set back now and then.
         return round(self._earlier_s + max(time.time() - self._opened, 0.0), 3)
@@ -124,7 +124,7 @@ def was_open(directory: Path) -> bool:
     return any(entry["event"] == "exposed" for entry in read_journal(directory / JOURNAL))
 
 
-def collected_s(directory: Path) -> float | None:
+def measure_collected_s(directory: Path) -> float | None:
     """Real time for which processes have collected into a dataset [s]; None if no journal says so.
 
     What the last one has written when it finished the dataset; before that, from first to last event of each.

@@ -31,7 +31,7 @@ _RETRY_S = 0.05
 
 
 @contextmanager
-def held_alone(directory: Path) -> Iterator[None]:
+def hold_alone(directory: Path) -> Iterator[None]:
     """Keep all others from changing a dataset while the block lasts.
 
     Args:
@@ -40,12 +40,12 @@ def held_alone(directory: Path) -> Iterator[None]:
     Raises:
         DatasetError: If another process changes it, or it cannot be locked.
     """
-    with _held(directory, alone=True):
+    with _hold(directory, alone=True):
         yield
 
 
 @contextmanager
-def held_together(directory: Path) -> Iterator[None]:
+def hold_together(directory: Path) -> Iterator[None]:
     """Keep all others but the processes of a run from changing its dataset while the block lasts.
 
     Args:
@@ -54,7 +54,7 @@ def held_together(directory: Path) -> Iterator[None]:
     Raises:
         DatasetError: If another process changes it, or it cannot be locked.
     """
-    with _held(directory, alone=False):
+    with _hold(directory, alone=False):
         yield
 
 
@@ -93,7 +93,7 @@ def lock(descriptor: int, directory: Path, *, alone: bool = True) -> None:
 
 
 @contextmanager
-def _held(directory: Path, *, alone: bool) -> Iterator[None]:
+def _hold(directory: Path, *, alone: bool) -> Iterator[None]:
     try:
         descriptor = os.open(directory, os.O_RDONLY | os.O_DIRECTORY)
     except OSError as error:

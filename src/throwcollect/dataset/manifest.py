@@ -122,7 +122,7 @@ class RunningHash:
             self._hash.update(part)
 
 
-def promised_names(directory: Path) -> list[str]:
+def list_promised_names(directory: Path) -> list[str]:
     """Names of the files in a directory that a manifest has to cover, in order; nothing is opened.
 
     The data card and the logs are not among them, as they say how, where and when a dataset was collected.
@@ -153,10 +153,10 @@ def read_manifest(directory: Path) -> tuple[FileEntry, ...]:
     Raises:
         DatasetError: If the manifest is missing, or its text is not one that `manifest_text` makes.
     """
-    return named_manifest(directory)[1]
+    return read_named_manifest(directory)[1]
 
 
-def named_manifest(directory: Path) -> tuple[str, tuple[FileEntry, ...]]:
+def read_named_manifest(directory: Path) -> tuple[str, tuple[FileEntry, ...]]:
     """Name of the collection that a manifest has, and its entries; see `read_manifest`.
 
     Raises:

@@ -77,7 +77,7 @@ class McapFile:
         self._contents = FileContents(*declarations(channels.all))
         opening = encode_records(records.Header(PROFILE, LIBRARY), *self._contents.schemas, *self._contents.channels)
         self._put(MAGIC + opening)
-        latched = latched_run(channels, start_ns)
+        latched = encode_latched_run(channels, start_ns)
         self._contents.add_run(latched, self.size)
         self._put(latched.data)
 
@@ -123,11 +123,11 @@ def bag_record(summary: FileSummary, channels: Sequence[Channel]) -> records.Met
     return records.Metadata(BAG, {"serialized_metadata": to_yaml(bag_information([summary], channels, {}))})
 
 
-def latched_run(channels: Channels, stamp_ns: int) -> Run:
+def encode_latched_run(channels: Channels, stamp_ns: int) -> Run:
     """Records with the latched messages: a chunk and its message indexes."""
     messages = [
         encode_records(records.Message(channel.id, stamp_ns, data, stamp_ns, 0))
-        for channel, data in channels.latched_messages(stamp_ns).items()
+        for channel, data in channels.encode_latched_messages(stamp_ns).items()
     ]
     starts = itertools.accumulate(map(len, messages), initial=0)
     indexes = {

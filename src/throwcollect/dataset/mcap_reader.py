@@ -186,7 +186,7 @@ class McapContents:
         mark = self.find(CHUNK_MARK, start + CHUNK_MARK_OFFSET)
         while mark >= 0:
             offset = mark - CHUNK_MARK_OFFSET
-            size = Chunk.announced_size(self._data[offset : offset + CHUNK_HEADER_BYTES])
+            size = Chunk.read_announced_size(self._data[offset : offset + CHUNK_HEADER_BYTES])
             if 0 < size <= len(self._data) - offset:
                 return offset
             mark = self.find(CHUNK_MARK, mark + 1)
@@ -241,7 +241,7 @@ class McapContents:
         try:
             return StoredEpisode.of(chunks, record)
         except DatasetError as error:
-            raise error.located(place=f"byte {offset}") from error
+            raise error.locate(place=f"byte {offset}") from error
 
 
 @contextmanager

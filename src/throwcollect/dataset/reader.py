@@ -31,7 +31,7 @@ from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.files import StrPath
 from throwcollect.robots.description import robot_of
 from throwcollect.sweep.plan import Plan
-from throwcollect.wording import counted
+from throwcollect.wording import format_count
 
 _SELECTION = "a condition, an Arrow expression, a mask, or numbers of trials"
 
@@ -101,7 +101,7 @@ class Dataset(Sequence[Throw]):
     def __repr__(self) -> str:
         outcomes = ", ".join(f"{count} {outcome}" for outcome, count in count_outcomes(self.throws).items())
         swept = ", ".join(self.parameters)
-        return f"Dataset({str(self.directory)!r}: {counted(len(self), 'throw')}: {outcomes}; swept: {swept})"
+        return f"Dataset({str(self.directory)!r}: {format_count(len(self), 'throw')}: {outcomes}; swept: {swept})"
 
     @property
     def config(self) -> Config:

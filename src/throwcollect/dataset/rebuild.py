@@ -17,7 +17,7 @@ from throwcollect.dataset.description import WRITTEN, write_description
 from throwcollect.dataset.directory import CARD, PLAN, THROWS, config_path
 from throwcollect.dataset.findings import Finding
 from throwcollect.dataset.journal import was_open
-from throwcollect.dataset.lock import held_alone
+from throwcollect.dataset.lock import hold_alone
 from throwcollect.dataset.manifest import entry_of_file
 from throwcollect.dataset.mcap_reader import StoredEpisode
 from throwcollect.dataset.provenance import Provenance, read_provenance, write_provenance
@@ -89,7 +89,7 @@ def rebuild(directory: Path) -> Rebuilt:
             collected to its end, or a file cannot be written.
         ConfigError: If the ``config.yaml`` is wrong.
     """
-    with held_alone(directory):
+    with hold_alone(directory):
         return _rebuild(directory)
 
 
@@ -167,7 +167,7 @@ def read_earlier_rows(directory: Path, plan: Plan) -> Mapping[int, Row]:
 def _row_without_episode(table: ThrowsTable, task: Task[Any], trial: Trial, earlier: Row | None) -> Row:
     """Row of a trial that has no episode; one that was lost before keeps its reason."""
     if trial.refused is not None:
-        return table.refused_row(trial)
+        return table.make_refused_row(trial)
     return table.row(trial, task.lose(reason_lost(earlier) or NO_EPISODE), None)
 
 

@@ -224,7 +224,7 @@ class _Sorting:
         except DatasetError as error:
             if error.path != path:
                 raise
-            self.remarks.append(str(error.located(Path(path.name))))
+            self.remarks.append(str(error.locate(Path(path.name))))
 
     def _take(self, name: str, found: Found) -> None:
         episode = found.stored.episode

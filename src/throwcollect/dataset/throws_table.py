@@ -110,7 +110,7 @@ class ThrowsTable:
             row.update(vars(place))
         return row
 
-    def refused_row(self, trial: Trial) -> Row:
+    def make_refused_row(self, trial: Trial) -> Row:
         """Row of a trial that the plan refused."""
         return self._start_row(trial, REFUSED, trial.refused)
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.dataset.columns import Column, StoredThrow, check_columns, empty_columns, fill, read_stored_rows
-from throwcollect.wording import counted
+from throwcollect.wording import format_count
 
 _BLOCK = 16
 """Throws that are read at once: enough to be worth an array, few enough for the caches."""
@@ -46,7 +46,7 @@ class Trajectories:
     def __repr__(self) -> str:
         size = sum(column.nbytes for column in self.columns.values()) / 1e6
         names = ", ".join(self.columns)
-        return f"Trajectories({counted(len(self), 'throw')}, {self.offsets[-1]} samples, {size:.1f} MB: {names})"
+        return f"Trajectories({format_count(len(self), 'throw')}, {self.offsets[-1]} samples, {size:.1f} MB: {names})"
 
     def __iter__(self) -> Iterator[dict[str, Column]]:
         return (self[number] for number in range(len(self)))

@@ -12,7 +12,7 @@ from typing import Any
 
 from throwcollect.config.schema import Config
 from throwcollect.dataset.bag import FileSummary, bag_information, read_bag_metadata
-from throwcollect.dataset.digest import combined_digest, is_digest
+from throwcollect.dataset.digest import combine_digests, is_digest
 from throwcollect.dataset.directory import CARD, FORMAT, METADATA, SHARD_SUFFIX, THROWS
 from throwcollect.dataset.findings import Finding
 from throwcollect.dataset.verify_episode import EpisodeCheck
@@ -37,7 +37,7 @@ def verify(directory: Path, *, check_of: CheckOf | None = None) -> list[Finding]
     plan is drawn again; the bag's metadata against the files; of each file every record, index, count and CRC, the
     latched topics and the order of trials; of each episode its digest, layout and stamps, and that the simulation can
     have recorded it; the table of throws against the episodes, which are judged again, and against the plan; and the
-    dataset's digest. What takes packages that are not installed is left out, and `unchecked` names it.
+    dataset's digest. What takes packages that are not installed is left out, and `find_unchecked` names it.
 
     Args:
         directory: Its directory.
@@ -69,7 +69,7 @@ def verify(directory: Path, *, check_of: CheckOf | None = None) -> list[Finding]
     return findings
 
 
-def unchecked(config: Config) -> tuple[str, ...]:
+def find_unchecked(config: Config) -> tuple[str, ...]:
     """What `verify` leaves out of a dataset, as packages of the extra ``collect`` are not installed; empty if nothing.
 
     Args:
@@ -158,7 +158,7 @@ def _find_digest_problems(
             return
         # The table stands in for episodes that cannot be read.
         digests = {trial: row["digest"] for trial, row in tables.rows.items() if is_digest(row["digest"])} | digests
-    written, digest = said.get("throwcollect.digest"), combined_digest(digests[trial] for trial in sorted(digests))
+    written, digest = said.get("throwcollect.digest"), combine_digests(digests[trial] for trial in sorted(digests))
     if written != digest:
         giver = THROWS if damaged else "the episodes"
         yield Finding(

@@ -25,7 +25,7 @@ from throwcollect.robots.description import robot_of, touchable_bodies
 from throwcollect.sweep.plan import Plan
 from throwcollect.tasks.task import task_of
 from throwcollect.units import NS_PER_S
-from throwcollect.wording import counted
+from throwcollect.wording import format_count
 
 _RELATIVE_TOLERANCE = 1e-9
 """Numbers that are judged again on another machine may differ in their last bits."""
@@ -125,7 +125,7 @@ class EpisodeCheck:
         if self._plan is None or episode.header.trial in self._doubtful:
             return
         if episode.header.trial >= len(self._plan.trials):
-            yield f"the plan has {counted(len(self._plan.trials), 'trial')}"
+            yield f"the plan has {format_count(len(self._plan.trials), 'trial')}"
             return
         try:
             config = self._plan.config_of(self._plan.trials[episode.header.trial])

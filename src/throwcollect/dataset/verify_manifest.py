@@ -8,7 +8,13 @@ from pathlib import Path
 
 from throwcollect.dataset.directory import MANIFEST
 from throwcollect.dataset.findings import Finding
-from throwcollect.dataset.manifest import FileEntry, entry_of_file, named_manifest, promised_names, size_of_file
+from throwcollect.dataset.manifest import (
+    FileEntry,
+    entry_of_file,
+    list_promised_names,
+    read_named_manifest,
+    size_of_file,
+)
 from throwcollect.errors import DatasetError
 from throwcollect.files import is_there
 from throwcollect.wording import command
@@ -26,7 +32,7 @@ def find_manifest_problems(directory: Path, name: str | None) -> Iterator[Findin
         yield Finding(MANIFEST, "", f"is missing, so changed bytes may go unnoticed; {rebuild} writes it")
         return
     try:
-        said_name, entries = named_manifest(directory)
+        said_name, entries = read_named_manifest(directory)
     except DatasetError as error:
         yield Finding(MANIFEST, "", error.problem)
         return
@@ -34,7 +40,9 @@ def find_manifest_problems(directory: Path, name: str | None) -> Iterator[Findin
         yield Finding(MANIFEST, "name", f"is {said_name!r}, in the configuration {name!r}")
     said = {entry.path for entry in entries}
     yield from find_changed_files(directory, entries, in_full=True)
-    yield from (Finding(path, "", f"is not in {MANIFEST}") for path in promised_names(directory) if path not in said)
+    yield from (
+        Finding(path, "", f"is not in {MANIFEST}") for path in list_promised_names(directory) if path not in said
+    )
 
 
 def find_changed_files(directory: Path, entries: Iterable[FileEntry], *, in_full: bool) -> Iterator[Finding]:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from throwcollect.config.schema import Config
 from throwcollect.dataset.recorded_trial import RecordedTrial
 from throwcollect.episode.record import Samples
-from throwcollect.robots.description import locked_joints, robot_of, start_posture
+from throwcollect.robots.description import find_locked_joints, robot_of, start_posture
 from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.quintic_curve import sample_positions
 from throwcollect.tasks.free_flight import ballistic_steps
@@ -52,7 +52,7 @@ def find_joint_problems(trial: RecordedTrial) -> Iterator[str]:
     """What the joints did that they cannot have done, a sentence each."""
     samples, config, trajectory = trial.samples, trial.config, trial.trajectory
     robot = robot_of(config)
-    for joint, angle in locked_joints(config).items():
+    for joint, angle in find_locked_joints(config).items():
         column = robot.joints.index(joint)
         if (samples.position[:, column] != angle).any():
             yield f"{joint} is locked at {angle:.6g} rad and is somewhere else"

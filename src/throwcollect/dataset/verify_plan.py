@@ -21,7 +21,7 @@ from throwcollect.sweep.plan import Check, Plan, make_trials, refusal
 from throwcollect.sweep.points import Points
 from throwcollect.sweep.rounds import Rounds
 from throwcollect.sweep.samplers import draw_points
-from throwcollect.wording import counted
+from throwcollect.wording import format_count
 
 CHECKED_AGAIN = 100
 """How many of the trials that the plan does not refuse are checked again as a sample; each takes 5 ms."""
@@ -114,7 +114,8 @@ def _draw(directory: Path, plan: Plan) -> _Drawing:
     points = _of_keys(draw_points(plan.config, directory=directory), plan)
     count, there = len(points.values), len(plan.trials)
     return _Drawing(
-        points.values, None if count == there else f"has {counted(there, 'trial')}, the configuration draws {count}"
+        points.values,
+        None if count == there else f"has {format_count(there, 'trial')}, the configuration draws {count}",
     )
 
 
@@ -139,7 +140,7 @@ def _draw_rounds(plan: Plan, rows: Mapping[int, Row] | None) -> _Drawing:
                 rounds.tell(trial.number, table.result(row))
     problem, count = None, sum(map(len, values))
     if count > there or (rounds.over and count < there):
-        problem = f"has {counted(there, 'trial')}, the configuration draws {count}"
+        problem = f"has {format_count(there, 'trial')}, the configuration draws {count}"
     elif rounds.due and not rounds.over:
         problem = f"ends with trial {there - 1}, and by the results more would follow"
     return _Drawing(np.vstack(values), problem)

@@ -147,7 +147,7 @@ class ShardCheck:
     def _read_channels(self, contents: McapContents, config: Config, latched: int) -> Channels:
         """What is recorded, for the robot that the file describes; for the installed one if that is not readable."""
         try:
-            table = _latched_table(contents.record(latched))
+            table = _read_latched_table(contents.record(latched))
             text = deserialize(table.messages(ROBOT_DESCRIPTION_ID)[0].tobytes(), get_message("std_msgs/msg/String"))
             return Channels(config, text.data)
         except (KeyError, ValueError, ThrowcollectError):
@@ -195,7 +195,7 @@ class ShardCheck:
         """Report how the chunk of the latched topics differs from the one that should be there."""
         place = f"byte {actual.offset}"
         try:
-            found, expected = _latched_table(actual), _latched_table(wanted)
+            found, expected = _read_latched_table(actual), _read_latched_table(wanted)
         except DatasetError as error:
             self._report(place, f"latched topics: {error}")
             return
@@ -311,7 +311,7 @@ def _crc(contents: McapContents, start: int, end: int) -> int:
     return crc
 
 
-def _latched_table(record: Record) -> MessageTable:
+def _read_latched_table(record: Record) -> MessageTable:
     """The messages of the chunk of the latched topics.
 
     Raises:

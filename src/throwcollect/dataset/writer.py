@@ -32,7 +32,7 @@ from throwcollect.dataset.directory import (
     shard_name,
 )
 from throwcollect.dataset.journal import Event, Journal, was_open
-from throwcollect.dataset.lock import held_alone, held_together
+from throwcollect.dataset.lock import hold_alone, hold_together
 from throwcollect.dataset.manifest import FileEntry
 from throwcollect.dataset.provenance import Provenance, write_provenance
 from throwcollect.dataset.recovery import recover_shard, remove_unfinished
@@ -48,7 +48,7 @@ from throwcollect.sweep.point_file import encode_points
 from throwcollect.sweep.points import Points
 from throwcollect.tasks.result import Result
 from throwcollect.tasks.task import task_of
-from throwcollect.wording import command, counted
+from throwcollect.wording import command, format_count
 
 Tell = Callable[[int, Result], None]
 """Receives the number of a trial and its result."""
@@ -71,7 +71,7 @@ def create(directory: Path, plan: Plan, *, listed: Points | None = None) -> None
         directory.mkdir(parents=True, exist_ok=True)
     except (OSError, RecursionError) as error:
         raise _unusable(directory, error) from error
-    with held_alone(directory):
+    with hold_alone(directory):
         _fill(directory, plan, listed, made=made)
 
 
@@ -176,7 +176,7 @@ class DatasetWriter:
             if not (directory / name).is_file():
                 raise DatasetError(f"holds no {name}", path=directory, expected="a dataset that was created")
         with ExitStack() as held:
-            held.enter_context(held_together(directory))
+            held.enter_context(hold_together(directory))
             journal = held.enter_context(Journal(directory))
             plan = Plan.read(directory / PLAN, load(config_path(directory)))
             writer = cls(directory, plan, journal=journal, growing=plan.config.grows)
@@ -317,11 +317,11 @@ class DatasetWriter:
         if self._shards:
             missing = sorted(number for shard in self._shards.values() for number in shard.missing)
             example = f", such as {missing[0]}" if missing else ""
-            raise DatasetError(f"lacks {counted(len(missing), 'trial')}{example}", path=self._directory)
+            raise DatasetError(f"lacks {format_count(len(missing), 'trial')}{example}", path=self._directory)
         finished = [self._finished[shard] for shard in sorted(self._finished)]
         throws = pa.concat_tables([each.rows for each in finished])
         if self._journal is not None:
-            wall_s = self._journal.collected_s()
+            wall_s = self._journal.measure_collected_s()
         provenance = Provenance.of_this_machine(
             simulations=simulations, wall_s=wall_s, was_open=was_open(self._directory)
         )
@@ -353,7 +353,7 @@ class DatasetWriter:
             self._shards[number].expect(trial.number for trial in added if trial.refused is None)
             for trial in added:
                 if trial.refused is not None:
-                    self._rows[number][trial.number] = self._table.refused_row(trial)
+                    self._rows[number][trial.number] = self._table.make_refused_row(trial)
             self._finish_shard_if_complete(number)
 
     def _row(self, trial: int, result: Result, place: Place | None) -> Row:

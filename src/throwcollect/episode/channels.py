@@ -154,7 +154,7 @@ class Channels:
             and all(set(found) <= set(known) for found, known in zip(numbers[1:], sensors, strict=True))
         )
 
-    def latched_messages(self, stamp_ns: int) -> dict[Channel, bytes]:
+    def encode_latched_messages(self, stamp_ns: int) -> dict[Channel, bytes]:
         """CDR messages of the latched channels.
 
         Args:

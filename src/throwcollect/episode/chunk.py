@@ -138,7 +138,7 @@ class Chunk:
         return _CHUNK_HEADER.size + len(self.data)
 
     @staticmethod
-    def announced_size(header: bytes) -> int:
+    def read_announced_size(header: bytes) -> int:
         """Size of the record that begins with these bytes; 0 if that is no chunk as `record` writes it.
 
         Args:
@@ -161,7 +161,7 @@ class Chunk:
         """
         chunks: list[Chunk] = []
         while records or not chunks:
-            size = cls.announced_size(bytes(records[:CHUNK_HEADER_BYTES])) or len(records)
+            size = cls.read_announced_size(bytes(records[:CHUNK_HEADER_BYTES])) or len(records)
             chunks.append(cls.parse(records[:size]))
             records = records[size:]
         return chunks

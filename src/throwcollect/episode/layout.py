@@ -34,7 +34,7 @@ class _Numbers(NamedTuple):
         return self.offset + np.dtype((self.dtype, self.shape)).itemsize
 
 
-def _aligned(offset: int, size: int) -> int:
+def _align(offset: int, size: int) -> int:
     return -(-offset // size) * size
 
 
@@ -42,7 +42,7 @@ def _walk(message: Message, path: str, offset: int) -> Generator[_Numbers, None,
     """Places of all numbers of a message, in order; returns where it ends."""
     for field in message.FIELDS:
         if field.sequence:
-            offset = _aligned(offset, 4) + 4
+            offset = _align(offset, 4) + 4
         offset = yield from _walk_field(field, getattr(message, field.name), f"{path}{field.name}", offset)
     return offset
 
@@ -54,7 +54,7 @@ def _walk_field(field: Field, value: Any, path: str, offset: int) -> Generator[_
         if 0 in shape:
             return offset
         dtype = DTYPES[field.type].newbyteorder("<")
-        numbers = _Numbers(path, dtype.str, shape, _aligned(offset, dtype.itemsize))
+        numbers = _Numbers(path, dtype.str, shape, _align(offset, dtype.itemsize))
         yield numbers
         return numbers.end
     for index, element in enumerate(value if is_array else [value]):
@@ -62,7 +62,7 @@ def _walk_field(field: Field, value: Any, path: str, offset: int) -> Generator[_
             prefix = f"{path}.{index}." if is_array else f"{path}."
             offset = yield from _walk(element, prefix, offset)
         else:
-            offset = _aligned(offset, 4) + 4 + len(element.encode()) + 1  # a string
+            offset = _align(offset, 4) + 4 + len(element.encode()) + 1  # a string
     return offset
 
 
@@ -86,7 +86,7 @@ class MessageLayout:
     def __init__(self, message: Message, variable: Sequence[str]) -> None:
         self.template: bytes = serialize(message)
         numbers = list(_walk(message, "", 0))
-        places = [_merged(numbers, path, message.TYPE) for path in variable]
+        places = [_merge(numbers, path, message.TYPE) for path in variable]
         self.dtype = np.dtype(
             {
                 "names": list(variable),
@@ -122,7 +122,7 @@ class MessageLayout:
         return bool(((rows == np.frombuffer(self.template, np.uint8)) | self._varies).all())
 
 
-def _merged(numbers: Sequence[_Numbers], path: str, type_name: str) -> _Numbers:
+def _merge(numbers: Sequence[_Numbers], path: str, type_name: str) -> _Numbers:
     inside = [place for place in numbers if place.path == path or place.path.startswith(f"{path}.")]
     if not inside:
         raise ValueError(f"{type_name} has no numbers at {path!r}")

@@ -18,7 +18,7 @@ from throwcollect.replay.audit import replay_throws, select_trials
 def verify_dataset(directory: StrPath, *, replay: int | None = None) -> list[Finding]:
     """Check a finished dataset: its files against each other, its episodes against physics, its plan against the robot.
 
-    Without the extra ``collect``, what takes the robot's model is left out; `dataset.verify.unchecked` names it.
+    Without the extra ``collect``, what takes the robot's model is left out; `dataset.verify.find_unchecked` names it.
 
     Args:
         directory: Its directory.

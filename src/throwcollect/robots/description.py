@@ -66,7 +66,7 @@ def start_posture(config: Config) -> Mapping[str, float]:
     return MappingProxyType({**robot_of(config).rest_posture, **config.robot.posture, **config.task.start})
 
 
-def locked_joints(config: Config) -> Mapping[str, float]:
+def find_locked_joints(config: Config) -> Mapping[str, float]:
     """Find the joints that are simulated as rigid and their angles [rad], in the order of `Robot.joints`.
 
     Args:
@@ -154,9 +154,9 @@ def physics_description(config: Config) -> Description:
         ConfigError: If the choice of locked joints is wrong, or the robot's files cannot be read.
     """
     robot, tool = robot_of(config), tool_of(config.tool)
-    locked = locked_joints(config)
+    locked = find_locked_joints(config)
     source = _read_description(robot)
-    model = _reduced(robot, source, locked)
+    model = _reduce(robot, source, locked)
     joints = {joint.get("name"): joint for joint in source.iter("joint")}
     names = [_root_link(source), *(_child(joints[name]) for name in model.names[1:])]
 
@@ -209,7 +209,7 @@ def _whole(robot: Robot, source: ElementTree.Element) -> pinocchio.Model:
     return model
 
 
-def _reduced(robot: Robot, source: ElementTree.Element, locked: Mapping[str, float]) -> pinocchio.Model:
+def _reduce(robot: Robot, source: ElementTree.Element, locked: Mapping[str, float]) -> pinocchio.Model:
     model = _whole(robot, source)
     configuration = pinocchio.neutral(model)
     numbers = [model.getJointId(joint) for joint in locked]

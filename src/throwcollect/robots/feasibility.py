@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from throwcollect.config.schema import Config
 from throwcollect.pinocchio_library import pinocchio
 from throwcollect.robots.clearance import MARGIN_M, Clearance
-from throwcollect.robots.description import joint_model, locked_joints, robot_of, start_posture
+from throwcollect.robots.description import find_locked_joints, joint_model, robot_of, start_posture
 from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.robots.trajectory import JointTrajectory
@@ -98,7 +98,7 @@ class Feasibility:
 
     def _find_violation(self, config: Config, times: NDArray[np.float64], motion: Motion) -> str | None:
         """Find the first kind of limit that a motion violates, and the worst violation of it."""
-        joints, locked = self._robot.joints, locked_joints(config)
+        joints, locked = self._robot.joints, find_locked_joints(config)
         positions, velocities, _ = motion
         limits = self._limits
         middle, half = (limits.upper + limits.lower) / 2, (limits.upper - limits.lower) / 2

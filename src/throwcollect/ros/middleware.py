@@ -14,7 +14,7 @@ from typing import Literal
 
 from throwcollect.errors import ConfigError
 from throwcollect.ros_installation import how_to_install, missing, rmws
-from throwcollect.wording import listed
+from throwcollect.wording import join_names
 
 VARIABLE = "THROWCOLLECT_ROS"
 """Name of the environment variable that chooses the backend."""
@@ -131,7 +131,7 @@ def _choose_installed(backend: str, rmw: str | None) -> Middleware:
         if backend == "auto":
             return Middleware()
         raise ConfigError(
-            f"{VARIABLE} is rclpy, but Python does not find {listed(lacking)}",
+            f"{VARIABLE} is rclpy, but Python does not find {join_names(lacking)}",
             hint=f"{how_to_install()}; or set it to embedded",
         )
     installed = rmws()
@@ -141,6 +141,6 @@ def _choose_installed(backend: str, rmw: str | None) -> Middleware:
         return Middleware()
     raise ConfigError(
         f"{RMW_VARIABLE} is {rmw}, which is not installed",
-        expected=listed(installed, "or") or "an installed RMW",
+        expected=join_names(installed, "or") or "an installed RMW",
         hint=f"unset {RMW_VARIABLE}, or set {VARIABLE}=embedded",
     )

@@ -19,7 +19,7 @@ from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.talos import TALOS
 from throwcollect.runtimes.registry import get_runtime
 from throwcollect.runtimes.runtime import Check
-from throwcollect.wording import counted, listed
+from throwcollect.wording import format_count, join_names
 
 _GIB = 1024**3
 _SIMULATION_MEMORY_GIB = 0.3
@@ -41,7 +41,7 @@ def _check_python() -> Check:
 
 def _check_cores() -> Check:
     cores = len(os.sched_getaffinity(0))
-    return Check("cores", "ok", f"{cores}; up to {counted(cores, 'simulation')} side by side (`-n {cores}`)")
+    return Check("cores", "ok", f"{cores}; up to {format_count(cores, 'simulation')} side by side (`-n {cores}`)")
 
 
 def _check_memory() -> Check:
@@ -50,7 +50,9 @@ def _check_memory() -> Check:
             available = int(line.split()[1]) * 1024 / _GIB
             room = int(available / _SIMULATION_MEMORY_GIB)
             status: Literal["ok", "problem"] = "ok" if room >= 1 else "problem"
-            return Check("memory", status, f"{available:.1f} GiB available, enough for {counted(room, 'simulation')}")
+            return Check(
+                "memory", status, f"{available:.1f} GiB available, enough for {format_count(room, 'simulation')}"
+            )
     return Check("memory", "note", "/proc/meminfo does not say what is available")
 
 
@@ -72,10 +74,10 @@ def _check_robot() -> Check:
 def _check_extras() -> Check:
     """Extras that are installed, and those of which at least a package is missing."""
     lacking = sorted({extra for package, extra in EXTRA_OF.items() if not is_installed(package)})
-    there = listed(sorted(set(EXTRA_OF.values()) - set(lacking)))
+    there = join_names(sorted(set(EXTRA_OF.values()) - set(lacking)))
     if not lacking:
         return Check("extras", "ok", there)
-    without = f"without {listed(lacking)} (try: {install_command(','.join(lacking))})"
+    without = f"without {join_names(lacking)} (try: {install_command(','.join(lacking))})"
     return Check("extras", "note", f"{there}, {without}" if there else without)
 
 
@@ -103,10 +105,12 @@ def _check_rclpy() -> Check:
     lacking = ros_installation.missing()
     if "rclpy" in lacking:
         return Check("rclpy", "note", f"not installed; to have it: {ros_installation.how_to_install()}")
-    rmws = listed(ros_installation.rmws()) or "no RMW"
+    rmws = join_names(ros_installation.rmws()) or "no RMW"
     found = f"{ros_installation.rclpy_version() or 'of unknown version'} with {rmws}"
     if lacking:
-        return Check("rclpy", "note", f"{found}, without {listed(lacking)}; try: {ros_installation.how_to_install()}")
+        return Check(
+            "rclpy", "note", f"{found}, without {join_names(lacking)}; try: {ros_installation.how_to_install()}"
+        )
     return Check("rclpy", "ok", f"{found} and all interfaces")
 
 

@@ -11,7 +11,7 @@ from typing import Literal
 
 from throwcollect.files import open_log
 from throwcollect.runtimes.runtime import NodeState, RunEvent
-from throwcollect.wording import counted
+from throwcollect.wording import format_count
 
 EVENTS = "events.jsonl"
 
@@ -52,7 +52,7 @@ class Event:
     def __str__(self) -> str:
         """The event for people."""
         details = [self.reason.partition("\n")[0] if self.reason else None]
-        details += [counted(self.simulations, "simulation") if self.simulations is not None else None]
+        details += [format_count(self.simulations, "simulation") if self.simulations is not None else None]
         details += [f"exit code {self.exit_code}" if self.exit_code else None, self.handle and self.handle[:12]]
         told = ", ".join(filter(None, details))
         return f"{self.node or self.run} {self.event}" + (f": {told}" if told else "")

@@ -16,7 +16,7 @@ from throwcollect.config.schema import Config
 from throwcollect.coordinator.progress import Progress
 from throwcollect.dataset.directory import config_path
 from throwcollect.dataset.inspect import loss
-from throwcollect.dataset.lock import held_together
+from throwcollect.dataset.lock import hold_together
 from throwcollect.errors import ConfigError, Interrupted, LossError, ThrowcollectError, WorkerError
 from throwcollect.files import open_log
 from throwcollect.runs.events import EventLog
@@ -74,7 +74,7 @@ def launch(run: OpenRun, config: Config, *, onlooker: Onlooker, interruptions: C
     try:
         run.record.middleware.joining.settle()
         host = get_runtime(run.record.runtime).host(place, config, warn=onlooker.warn)
-        with held_together(place.directory):
+        with hold_together(place.directory):
             run.update(launcher=os.getpid(), nodes=(), endpoint=None)
             summary = Summary(**vars(host.collect(session)), open=config.run.open)
         lost = loss(summary.outcomes, hint=place.way_on)

@@ -17,7 +17,7 @@ from throwcollect.coordinator.prepare import prepare as prepare_plan
 from throwcollect.coordinator.resume import begun, finished
 from throwcollect.coordinator.resume import resume as resume_plan
 from throwcollect.dataset.directory import CONFIG, PLAN, TRIALS, config_path
-from throwcollect.dataset.lock import held_together
+from throwcollect.dataset.lock import hold_together
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.ros.middleware import Middleware
 from throwcollect.runs.choice import Choice, choose
@@ -28,7 +28,7 @@ from throwcollect.runs.selection import busy, find_left_in
 from throwcollect.runtimes.ports import reserve_port
 from throwcollect.runtimes.runtime import Place
 from throwcollect.sweep.plan import Plan
-from throwcollect.wording import command, counted
+from throwcollect.wording import command, format_count
 
 _MANY_TRIALS = 1000
 """From here on the plan takes long enough to be announced."""
@@ -274,7 +274,7 @@ def _prepare(records: Records, request: _Request, plan: Plan | None, onlooker: O
             if (config.trials or 0) >= _MANY_TRIALS and not config.grows:
                 onlooker.say(f"plan: checking {config.trials} trials against limits and collisions, about 5 ms each")
             plan = prepare_plan(config, directory, sweep_directory=request.sweep_directory)
-        held.enter_context(held_together(directory))
+        held.enter_context(hold_together(directory))
         if not request.resumed:
             undo.callback(_remove_plan, directory, made=made)
         choice = choice or choose(config, say=onlooker.say, warn=onlooker.warn)
@@ -286,7 +286,7 @@ def _prepare(records: Records, request: _Request, plan: Plan | None, onlooker: O
         note = f", {refused} refused by calculation (see `throwcollect plan`)" if refused else ""
         _warn_of_company(config, choice.middleware, onlooker)
         where = f"volume {volume}" if volume else directory
-        onlooker.say(f"plan: {counted(len(plan.trials), 'trial')}{note}{more_trials(plan)}; dataset: {where}")
+        onlooker.say(f"plan: {format_count(len(plan.trials), 'trial')}{note}{more_trials(plan)}; dataset: {where}")
         return PreparedRun(records, run, config, directory, onlooker=onlooker, held=held.pop_all(), undo=undo.pop_all())
 
 

@@ -6,7 +6,7 @@ from throwcollect.errors import ConfigError, Problem
 from throwcollect.extras import explain_missing
 from throwcollect.members import load_member, names_of
 from throwcollect.runtimes.runtime import Runtime
-from throwcollect.wording import listed
+from throwcollect.wording import join_names
 
 AUTOMATIC = ("docker", "local")
 """What ``auto`` tries, in this order."""
@@ -21,7 +21,7 @@ def get_runtime(name: str) -> Runtime:
     """
     if name not in names_of("runtimes"):
         problem = Problem(f"there is no runtime {name}", key="run.runtime")
-        raise ConfigError([problem], expected=listed(names_of("runtimes"), "or"))
+        raise ConfigError([problem], expected=join_names(names_of("runtimes"), "or"))
     with explain_missing():
         runtime: Runtime = load_member("runtimes", name)()
     return runtime

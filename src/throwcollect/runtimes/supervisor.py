@@ -12,7 +12,7 @@ from throwcollect.config.run import RunConfig
 from throwcollect.errors import Interrupted, WorkerError
 from throwcollect.runtimes.nodes import NodeExit, NodeHost, NodeSpec, Role
 from throwcollect.runtimes.runtime import NodeState, Status
-from throwcollect.wording import counted
+from throwcollect.wording import format_count
 
 _FIRST_BACKOFF_S = 0.2
 _LONGEST_BACKOFF_S = 10.0
@@ -216,7 +216,7 @@ class Supervisor:
             restarts = self._restarts.get(last.name, 0)
             what = f"the {last.name}" if vital else f"no simulation can be kept alive; the last, {last.name},"
             raise WorkerError(
-                f"{what} ended again after {counted(restarts, 'restart')}: {last.reason}",
+                f"{what} ended again after {format_count(restarts, 'restart')}: {last.reason}",
                 evidence=last.log or None,
                 hint=hint,
             )

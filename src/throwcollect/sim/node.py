@@ -208,7 +208,7 @@ class SimulationNode(Node):
 
     def _publish_latched(self, channels: Channels) -> None:
         self._latched = []
-        for channel, message in channels.latched_messages(0).items():
+        for channel, message in channels.encode_latched_messages(0).items():
             publisher = self.create_publisher(get_message(channel.type_name), channel.topic.lstrip("/"), _LATCHED)
             publisher.publish(message)
             self._latched.append(publisher)

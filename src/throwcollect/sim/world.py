@@ -12,7 +12,13 @@ from throwcollect.config.schema import Config
 from throwcollect.engines.engine import BALL_NUMBERS, BodyState, Engine, Observer, Sample, State, Steps, ball_of
 from throwcollect.episode.record import Contact, EndReason, Samples
 from throwcollect.members import load_member
-from throwcollect.robots.description import Description, locked_joints, physics_description, robot_of, start_posture
+from throwcollect.robots.description import (
+    Description,
+    find_locked_joints,
+    physics_description,
+    robot_of,
+    start_posture,
+)
 from throwcollect.sim.contacts import ContactLog
 from throwcollect.sim.motors import Motors
 from throwcollect.sim.recording import BALL_HEIGHT, BALL_LINEAR_VELOCITY, to_samples
@@ -264,7 +270,7 @@ class World(Observer):
 
     def _description(self, trial: Config) -> Description:
         """The robot as the trial needs it; the one of the trial before if it is the same."""
-        key = (trial.tool, locked_joints(trial))
+        key = (trial.tool, find_locked_joints(trial))
         if self._described is None or self._described[0] != key:
             self._described = key, physics_description(trial)
         return self._described[1]

@@ -18,7 +18,7 @@ from throwcollect.sweep.digest import config_digest, trial_digests
 from throwcollect.sweep.parquet_file import encode_table, read_parquet
 from throwcollect.sweep.points import Points
 from throwcollect.sweep.samplers import draw_points
-from throwcollect.wording import blank_numbers, counted
+from throwcollect.wording import blank_numbers, format_count
 
 _FORMAT = "1"
 _FORMAT_KEY = b"throwcollect.plan_format"
@@ -195,7 +195,7 @@ def _check_some_left(reasons: list[str], trials: int) -> None:
     examples = dict(zip(reversed(kinds), reversed(reasons), strict=True))
     listed = [f"{count} × {examples[kind]}" for kind, count in Counter(kinds).most_common(_MOST_REASONS)]
     raise PlanError(
-        [Problem(f"{counted(trials, 'trial')}, all refused: {'; '.join(listed)}", key="sweep")],
+        [Problem(f"{format_count(trials, 'trial')}, all refused: {'; '.join(listed)}", key="sweep")],
         hint="sweep over smaller ranges or slower motions, or change task.start and task.end",
     )
 

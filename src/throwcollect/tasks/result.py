@@ -69,7 +69,7 @@ class ResultColumns(Generic[AnyResult]):
         self._results = results
         self._joints = tuple(joints)
         self._fields = [
-            (each.name, columns, columns.declare(each.name, joints)) for each, columns in _declared(results)
+            (each.name, columns, columns.declare(each.name, joints)) for each, columns in _list_declared(results)
         ]
         self.columns = tuple(
             Column(column.name, column.kind, column.description.replace("{tool}", tool))
@@ -101,7 +101,7 @@ class ResultColumns(Generic[AnyResult]):
         return self._results(outcome, reason, **measures)
 
 
-def _declared(results: type[Result]) -> list[tuple[Field[Any], Columns]]:
+def _list_declared(results: type[Result]) -> list[tuple[Field[Any], Columns]]:
     """The fields of a result that have columns: first those that the task adds."""
     common = {each.name for each in fields(Result)}
     found = [(each, columns) for each in fields(results) if (columns := columns_of(each)) is not None]

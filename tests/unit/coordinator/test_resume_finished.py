@@ -10,7 +10,7 @@ import pytest
 from tests.unit.dataset.conftest import Collection
 
 from throwcollect.coordinator.resume import finished, resume
-from throwcollect.dataset.manifest import entry_of_file, manifest_text, promised_names
+from throwcollect.dataset.manifest import entry_of_file, list_promised_names, manifest_text
 from throwcollect.dataset.writer import DatasetWriter, create
 from throwcollect.errors import DatasetError
 from throwcollect.tasks.throw.outcome import ThrowResult
@@ -63,7 +63,7 @@ def sound(trials: Trials, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def promised(sound: Path, tmp_path: Path) -> Path:
     """A dataset with a manifest."""
     directory = Path(shutil.copytree(sound, tmp_path / "dataset"))
-    entries = [entry_of_file(directory / name) for name in promised_names(directory)]
+    entries = [entry_of_file(directory / name) for name in list_promised_names(directory)]
     (directory / "datapackage.json").write_text(manifest_text("quick", entries))
     return directory
 
@@ -132,7 +132,7 @@ def test_a_damaged_manifest_counts_as_damage(trials: Trials, sound: Path, promis
 
 def test_what_cannot_be_made_again_is_said_and_nothing_is_changed(trials: Trials, promised: Path) -> None:
     dataset = promised
-    entries = [entry_of_file(dataset / name) for name in promised_names(dataset)]
+    entries = [entry_of_file(dataset / name) for name in list_promised_names(dataset)]
     (dataset / "sources.parquet").write_bytes(b"from there")
     entries.append(entry_of_file(dataset / "sources.parquet"))
     (dataset / "datapackage.json").write_text(manifest_text("quick", entries))

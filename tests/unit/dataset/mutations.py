@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from throwcollect.dataset.inspect import digest, info
-from throwcollect.dataset.manifest import entry_of_file, manifest_text, named_manifest, promised_names
+from throwcollect.dataset.manifest import entry_of_file, list_promised_names, manifest_text, read_named_manifest
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.rebuild import rebuild
 from throwcollect.dataset.repair import repair
@@ -73,8 +73,8 @@ def mutate(data: bytes, mutations: Sequence[Mutation]) -> bytes:
 
 def fit_manifest(directory: Path) -> None:
     """Write the manifest that the files call for, as somebody would who wants a change to go unnoticed."""
-    files = [directory / name for name in promised_names(directory) if (directory / name).is_file()]
-    name, _ = named_manifest(directory)
+    files = [directory / name for name in list_promised_names(directory) if (directory / name).is_file()]
+    name, _ = read_named_manifest(directory)
     (directory / "datapackage.json").write_text(manifest_text(name, map(entry_of_file, files)))
 
 

@@ -2,13 +2,13 @@ from pathlib import Path
 
 import pytest
 
-from throwcollect.dataset.directory import DIRECTORY_VARIABLE, known_directory
+from throwcollect.dataset.directory import DIRECTORY_VARIABLE, find_known_directory
 
 
 def test_a_directory_is_named_as_its_user_knows_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv(DIRECTORY_VARIABLE, raising=False)
-    assert known_directory(Path("/data")) == Path("/data")
+    assert find_known_directory(Path("/data")) == Path("/data")
     monkeypatch.setenv(DIRECTORY_VARIABLE, "/home/me/my data")
-    assert known_directory(Path("/data")) == Path("/home/me/my data")
+    assert find_known_directory(Path("/data")) == Path("/home/me/my data")
     monkeypatch.setenv(DIRECTORY_VARIABLE, "")
-    assert known_directory(Path("/data")) is None
+    assert find_known_directory(Path("/data")) is None

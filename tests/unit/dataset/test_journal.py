@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from throwcollect.dataset.journal import Journal, collected_s, read_journal
+from throwcollect.dataset.journal import Journal, measure_collected_s, read_journal
 
 
 def journal_of(directory: Path, *lines: str) -> None:
@@ -41,15 +41,15 @@ def test_what_is_no_event_is_left_out(tmp_path: Path, damaged: str) -> None:
 
 
 def test_pauses_between_processes_do_not_count_as_time_of_collecting(tmp_path: Path) -> None:
-    assert collected_s(tmp_path) is None
+    assert measure_collected_s(tmp_path) is None
     journal_of(tmp_path, line("opened", 10.0), line("commit", 12.5), line("opened", 1000.0), line("finished", 1004.0))
-    assert collected_s(tmp_path) == 6.5
+    assert measure_collected_s(tmp_path) == 6.5
 
 
 def test_the_time_that_the_data_card_has_is_the_one_that_is_told(tmp_path: Path) -> None:
     with Journal(tmp_path) as journal:
-        journal.note("finished", wall_s=journal.collected_s() + 20.0)
-    assert collected_s(tmp_path) == pytest.approx(20.0, abs=0.5)
+        journal.note("finished", wall_s=journal.measure_collected_s() + 20.0)
+    assert measure_collected_s(tmp_path) == pytest.approx(20.0, abs=0.5)
     # Finishing takes a moment, which nobody counts, and another process goes on.
     journal_of(
         tmp_path,
@@ -58,4 +58,4 @@ def test_the_time_that_the_data_card_has_is_the_one_that_is_told(tmp_path: Path)
         line("opened", 100.0),
         line("commit", 101.0),
     )
-    assert collected_s(tmp_path) == 5.5
+    assert measure_collected_s(tmp_path) == 5.5

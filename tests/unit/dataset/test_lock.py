@@ -13,7 +13,7 @@ from tests.unit.dataset.conftest import Collection
 from tests.unit.dataset.mutations import SETTINGS
 
 from throwcollect.coordinator.resume import resume
-from throwcollect.dataset.lock import held_alone, held_together
+from throwcollect.dataset.lock import hold_alone, hold_together
 from throwcollect.dataset.rebuild import rebuild
 from throwcollect.dataset.writer import DatasetWriter, create
 from throwcollect.errors import DatasetError
@@ -52,21 +52,21 @@ def test_nobody_changes_a_dataset_that_is_collected_into(begun: Path, change: Ca
 
 
 def test_nobody_changes_a_dataset_whose_coordinator_is_started_again(begun: Path) -> None:
-    with held_together(begun):
+    with hold_together(begun):
         DatasetWriter.open(begun).close()
         with pytest.raises(DatasetError, match=BUSY):
             go_on(begun)
 
 
 def test_nobody_begins_to_collect_into_a_dataset_that_is_prepared(begun: Path) -> None:
-    with held_alone(begun), pytest.raises(DatasetError, match=BUSY):
+    with hold_alone(begun), pytest.raises(DatasetError, match=BUSY):
         DatasetWriter.open(begun)
     DatasetWriter.open(begun).close()
 
 
 def test_two_collections_cannot_be_prepared_in_one_directory(tmp_path: Path) -> None:
     (tmp_path / "dataset").mkdir()
-    with held_alone(tmp_path / "dataset"), pytest.raises(DatasetError, match=BUSY):
+    with hold_alone(tmp_path / "dataset"), pytest.raises(DatasetError, match=BUSY):
         create(tmp_path / "dataset", Collection(SETTINGS).plan)
     assert list((tmp_path / "dataset").iterdir()) == []
 
@@ -74,9 +74,9 @@ def test_two_collections_cannot_be_prepared_in_one_directory(tmp_path: Path) -> 
 def test_another_name_of_the_directory_is_the_same_directory(begun: Path, tmp_path: Path) -> None:
     (tmp_path / "link").symlink_to(begun)
     with (
-        held_together(begun),
+        hold_together(begun),
         pytest.raises(DatasetError, match="link: another process"),
-        held_alone(tmp_path / "link"),
+        hold_alone(tmp_path / "link"),
     ):
         pass
 
@@ -88,16 +88,16 @@ def test_who_has_just_been_killed_is_waited_for(begun: Path, monkeypatch: pytest
         assert other.stdout is not None
         other.stdout.readline()
         other.kill()
-        with held_alone(begun):
+        with hold_alone(begun):
             pass
 
 
 def test_nothing_is_left_of_a_lock(tmp_path: Path) -> None:
-    with held_alone(tmp_path):
+    with hold_alone(tmp_path):
         pass
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_directory_that_is_not_there_cannot_be_locked(tmp_path: Path) -> None:
-    with pytest.raises(DatasetError, match=r"gone: cannot be read: No such file"), held_together(tmp_path / "gone"):
+    with pytest.raises(DatasetError, match=r"gone: cannot be read: No such file"), hold_together(tmp_path / "gone"):
         pass

@@ -16,7 +16,7 @@ from mcap.opcode import Opcode
 from tests.unit.dataset.conftest import Collection
 from tests.unit.dataset.mutations import SETTINGS, no_plan
 
-from throwcollect.dataset.manifest import RunningHash, entry_of_file, promised_names, read_manifest
+from throwcollect.dataset.manifest import RunningHash, entry_of_file, list_promised_names, read_manifest
 from throwcollect.dataset.mcap_reader import open_mcap
 from throwcollect.dataset.rebuild import rebuild
 from throwcollect.dataset.repair import repair
@@ -41,10 +41,10 @@ def derived(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def classes(directory: Path) -> Iterator[tuple[str, str, list[range]]]:
     """Name, file and byte ranges of each class of bytes that a flip may hit."""
-    for name in (*promised_names(directory), MANIFEST):
+    for name in (*list_promised_names(directory), MANIFEST):
         if not name.endswith(".mcap"):
             yield name, name, [range((directory / name).stat().st_size)]
-    shard = next(name for name in promised_names(directory) if name.endswith(".mcap"))
+    shard = next(name for name in list_promised_names(directory) if name.endswith(".mcap"))
     size = (directory / shard).stat().st_size
     kinds: dict[str, list[range]] = {"magic": [range(8), range(size - 8, size)]}
     with open_mcap(directory / shard) as contents:
@@ -98,8 +98,8 @@ def test_it_has_every_promised_file_and_nothing_else(dataset: Path) -> None:
 
 
 def test_whoever_makes_a_dataset_of_another_writes_it(dataset: Path, derived: Path, tmp_path: Path) -> None:
-    assert [entry.path for entry in read_manifest(derived)] == promised_names(derived)
-    assert {"sources.parquet", "trials.parquet"} < set(promised_names(derived))
+    assert [entry.path for entry in read_manifest(derived)] == list_promised_names(derived)
+    assert {"sources.parquet", "trials.parquet"} < set(list_promised_names(derived))
     repair(dataset, tmp_path / "repaired", remake=no_plan)
     assert (tmp_path / "repaired" / MANIFEST).read_bytes() == (dataset / MANIFEST).read_bytes()
 

@@ -33,7 +33,7 @@ def test_controller_states_are_those_of_the_moving_joints() -> None:
 
 
 def test_latched_messages_are_the_description_and_the_fixed_frames() -> None:
-    description, static = channels(ALL).latched_messages(3_000_000_005).values()
+    description, static = channels(ALL).encode_latched_messages(3_000_000_005).values()
     assert deserialize(description, get_message("std_msgs/msg/String")).data == URDF
     transforms = deserialize(static, get_message("tf2_msgs/msg/TFMessage")).transforms
     assert {(each.header.stamp.sec, each.header.stamp.nanosec) for each in transforms} == {(3, 5)}

@@ -9,7 +9,7 @@ import pytest
 from throwcollect.config.schema import Config, RobotConfig
 from throwcollect.errors import ConfigError
 from throwcollect.robots import description
-from throwcollect.robots.description import full_description, locked_joints, physics_description, start_posture
+from throwcollect.robots.description import find_locked_joints, full_description, physics_description, start_posture
 from throwcollect.robots.talos import TALOS
 
 JOINTS = TALOS.joints
@@ -71,7 +71,7 @@ def test_a_list_locks_just_these():
 
 def test_locking_a_joint_that_the_task_moves_is_refused():
     with pytest.raises(ConfigError, match=r"arm_right_4_joint cannot be locked, as task\.end moves it"):
-        locked_joints(with_robot(locked=["head_1_joint", "arm_right_4_joint"]))
+        find_locked_joints(with_robot(locked=["head_1_joint", "arm_right_4_joint"]))
 
 
 def test_locking_a_joint_that_talos_lacks_is_refused():

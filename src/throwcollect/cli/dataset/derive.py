@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from throwcollect.cli.options import DatasetArgument, JsonOption, OutputArgument
-from throwcollect.wording import counted
+from throwcollect.wording import format_count
 
 if TYPE_CHECKING:
     from throwcollect.derive.derivation import Derived
@@ -80,7 +80,7 @@ def split_dataset(
         return
     for name, part in found.parts.items():
         elsewhere = f", {part.uncelled} in no cell" if part.uncelled else ""
-        typer.echo(f"{output / name}: {_trials(part.dataset)} in {counted(part.cells, 'cell')}{elsewhere}")
+        typer.echo(f"{output / name}: {_trials(part.dataset)} in {format_count(part.cells, 'cell')}{elsewhere}")
         typer.echo(f"  digest  {part.dataset.digest}")
     _tell_left_out(found.without_episode)
 
@@ -103,7 +103,7 @@ def _show(output: Path, derived: Derived, *, json: bool) -> None:
 
 
 def _trials(derived: Derived) -> str:
-    return f"{derived.trials} of {counted(derived.offered, 'trial')}"
+    return f"{derived.trials} of {format_count(derived.offered, 'trial')}"
 
 
 def _tell_left_out(without_episode: Mapping[str, int]) -> None:
@@ -116,10 +116,11 @@ def _tables(found: Statistics) -> str:
     outcomes = ", ".join(f"{count} {outcome}" for outcome, count in found.outcomes.items())
     omitted = f", {found.samples_not_finite} more are not finite" if found.samples_not_finite else ""
     columns = {name: {**vars(column), **column.quantiles} for name, column in found.columns.items()}
-    text = f"{counted(found.trials, 'trial')}: {outcomes}\n\n" + _table("throws", columns, _COLUMNS)
+    text = f"{format_count(found.trials, 'trial')}: {outcomes}\n\n" + _table("throws", columns, _COLUMNS)
     for group, signals in found.signals.items():
         text += "\n" + _table(group, {name: vars(signal) for name, signal in signals.items()}, _MOMENTS)
-    return f"{text}\nsignals over {counted(found.samples, 'sample')} of {counted(found.episodes, 'episode')}{omitted}\n"
+    of_all = f"{format_count(found.samples, 'sample')} of {format_count(found.episodes, 'episode')}"
+    return f"{text}\nsignals over {of_all}{omitted}\n"
 
 
 def _table(title: str, rows: Mapping[str, Mapping[str, Any]], columns: Sequence[str]) -> str:

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from throwcollect.cli.options import DatasetArgument, JsonOption, OutputArgument
-from throwcollect.wording import counted
+from throwcollect.wording import format_count
 
 
 def export_dataset(
@@ -29,6 +29,7 @@ def export_dataset(
         typer.echo(jsonlib.dumps(asdict(exported), indent=2))
         return
     typer.echo(
-        f"{exported.directory}: {counted(exported.episodes, 'throw')} of {counted(exported.trials, 'trial')}, "
-        f"{counted(exported.samples, 'sample')} at {exported.rate_hz} Hz, {exported.size_bytes / 1e6:.1f} MB"
+        f"{exported.directory}: {format_count(exported.episodes, 'throw')} "
+        f"of {format_count(exported.trials, 'trial')}, "
+        f"{format_count(exported.samples, 'sample')} at {exported.rate_hz} Hz, {exported.size_bytes / 1e6:.1f} MB"
     )

@@ -10,7 +10,7 @@ import typer
 
 from throwcollect.cli.options import DatasetArgument, JsonOption, OutputArgument
 from throwcollect.errors import LossError
-from throwcollect.wording import command, counted
+from throwcollect.wording import command, format_count
 
 _MOST_NAMED = 10
 
@@ -23,12 +23,12 @@ def rebuild_dataset(directory: DatasetArgument, json: JsonOption = False) -> Non
     if json:
         typer.echo(jsonlib.dumps(asdict(rebuilt), indent=2))
         return
-    found = f"{counted(rebuilt.trials, 'trial')}, {counted(rebuilt.episodes, 'episode')}"
+    found = f"{format_count(rebuilt.trials, 'trial')}, {format_count(rebuilt.episodes, 'episode')}"
     typer.echo(f"{directory}: {found}; wrote {', '.join(rebuilt.written)}")
     if rejudged := rebuilt.rejudged:
         changes = [f"trial {each.trial}: {each.before} -> {each.after}" for each in rejudged]
         verb = "is" if len(rejudged) == 1 else "are"
-        typer.echo(f"{counted(len(rejudged), 'throw')} {verb} judged otherwise: {_join(changes)}")
+        typer.echo(f"{format_count(len(rejudged), 'throw')} {verb} judged otherwise: {_join(changes)}")
     if rebuilt.lost:
         typer.echo(f"lost: {_join([str(trial) for trial in rebuilt.lost])}")
 
@@ -51,7 +51,9 @@ def repair_dataset(directory: DatasetArgument, output: OutputArgument, json: Jso
             typer.echo(remark)
         for lost in repaired.lost:
             typer.echo(f"trial {lost.trial}: lost: {lost.reason}")
-        typer.echo(f"{output}: {counted(repaired.episodes, 'episode')} of {counted(repaired.trials, 'trial')}")
+        typer.echo(
+            f"{output}: {format_count(repaired.episodes, 'episode')} of {format_count(repaired.trials, 'trial')}"
+        )
     if repaired.lost:
         count = len(repaired.lost)
         raise LossError(
@@ -60,7 +62,7 @@ def repair_dataset(directory: DatasetArgument, output: OutputArgument, json: Jso
     if repaired.differing:
         first = repaired.differing[0].trial
         raise LossError(
-            f"{output}: {counted(len(repaired.differing), 'episode')} kept, such as that of trial {first}, "
+            f"{output}: {format_count(len(repaired.differing), 'episode')} kept, such as that of trial {first}, "
             f"which {THROWS} had otherwise",
             hint=f"{command('dataset', 'replay', output, '--trial', first)} simulates it again and compares",
         )

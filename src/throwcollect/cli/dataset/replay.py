@@ -10,7 +10,7 @@ import typer
 
 from throwcollect.cli.options import DatasetArgument, JsonOption
 from throwcollect.errors import ConfigError, DatasetError
-from throwcollect.wording import counted
+from throwcollect.wording import format_count
 
 
 def replay_dataset(
@@ -46,8 +46,8 @@ def replay_dataset(
     differ = sum(bool(comparison.differences) for comparison in found)
     if differ:
         raise DatasetError(
-            f"{directory}: {differ} of {counted(len(found), 'throw')} came out otherwise",
+            f"{directory}: {differ} of {format_count(len(found), 'throw')} came out otherwise",
             hint="README.md in it says with which processor and versions it was made",
         )
     if not json:
-        typer.echo(f"{directory}: {counted(len(found), 'throw')} replayed, the same bit for bit")
+        typer.echo(f"{directory}: {format_count(len(found), 'throw')} replayed, the same bit for bit")

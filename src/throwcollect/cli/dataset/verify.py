@@ -10,7 +10,7 @@ import typer
 from throwcollect.cli.options import DatasetArgument, JsonOption
 from throwcollect.errors import DatasetError
 from throwcollect.extras import install_command
-from throwcollect.wording import command, counted
+from throwcollect.wording import command, format_count
 
 if TYPE_CHECKING:
     from throwcollect.dataset.reader import Dataset
@@ -29,7 +29,7 @@ def verify_dataset(
 ) -> None:
     """Check a dataset against itself and against physics; exit code 4 if anything is wrong."""
     from throwcollect.dataset.reader import Dataset
-    from throwcollect.dataset.verify import unchecked
+    from throwcollect.dataset.verify import find_unchecked
     from throwcollect.replay.verification import verify_dataset as verify
 
     findings = verify(directory, replay=replay)
@@ -39,11 +39,11 @@ def verify_dataset(
         for finding in findings:
             typer.echo(str(finding))
     if findings:
-        raise DatasetError(f"{directory}: {counted(len(findings), 'finding')}")
+        raise DatasetError(f"{directory}: {format_count(len(findings), 'finding')}")
     dataset = Dataset.open(directory)
     if not json:
         typer.echo(f"{directory}: nothing wrong\n{_describe_unchecked(dataset, replay)}")
-    if left_out := unchecked(dataset.config):
+    if left_out := find_unchecked(dataset.config):
         typer.echo(f"not checked without the extra collect: {', '.join(left_out)}", err=json)
         typer.echo(f"  try: {install_command('collect')}", err=json)
 
@@ -54,7 +54,7 @@ def _describe_unchecked(dataset: Dataset, replay: int | None) -> str:
     from throwcollect.robots.description import is_available
 
     if replay is not None:
-        told = f"replayed: {counted(min(replay, len(dataset.recorded)), 'throw')}, the same bit for bit"
+        told = f"replayed: {format_count(min(replay, len(dataset.recorded)), 'throw')}, the same bit for bit"
     else:
         more = command("dataset", "verify", dataset.directory, "--replay", _SUGGESTED)
         told = f"not checked: whether the simulation gives the same throws again ({more})"

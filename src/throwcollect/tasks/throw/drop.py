@@ -27,7 +27,7 @@ and down to -2.1 J/kg when the ball was thrown with 1.8 m/s in a downward swing.
 """
 
 
-def lost_before_start(samples: Samples, header: EpisodeHeader, *, config: Config) -> str | None:
+def find_early_loss(samples: Samples, header: EpisodeHeader, *, config: Config) -> str | None:
     """Reason why a trial began without a ball in the tool, if it did.
 
     A ball that is not pressed on the tool at the start may be on a small bounce: it counts as in the tool if it is

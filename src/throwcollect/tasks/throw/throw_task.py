@@ -9,7 +9,7 @@ from throwcollect.episode.record import Contact, EpisodeHeader, Samples
 from throwcollect.tasks.measures import BallState
 from throwcollect.tasks.task import Failure, Task
 from throwcollect.tasks.throw.config import throw_section
-from throwcollect.tasks.throw.drop import drop, lost_before_start
+from throwcollect.tasks.throw.drop import drop, find_early_loss
 from throwcollect.tasks.throw.flight import Flight, flight_after, release_of, without_impact
 from throwcollect.tasks.throw.outcome import ThrowOutcome, ThrowResult
 from throwcollect.units import NS_PER_S
@@ -59,7 +59,7 @@ class ThrowTask(Task[ThrowResult]):
         self, result: ThrowResult, samples: Samples, header: EpisodeHeader, touched: list[Contact]
     ) -> Failure | None:
         tool = self.config.tool.name
-        if reason := lost_before_start(samples, header, config=self.config):
+        if reason := find_early_loss(samples, header, config=self.config):
             return Failure(ThrowOutcome.DROPPED, reason)
         if result.release is None:
             return Failure(ThrowOutcome.NOT_RELEASED, f"the ball stayed in the {tool}")

@@ -1,0 +1,67 @@
+"""Functions are verbs: a participle leaves open whether something is looked up, made or changed."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+SOURCE = ROOT / "src"
+IRREGULAR = """
+begun born bound bought broken brought built caught chosen done drawn driven fallen felt flown forgotten found given
+gone grown heard held hidden kept known laid led left lost made meant met paid said seen sent shown sought sold spent
+spoken stolen struck swept taken taught thought thrown told torn withdrawn won worn written
+"""
+NO_PARTICIPLES = ("embed", "exceed", "feed", "need", "proceed", "seed", "succeed")
+OTHERS_CALL_IT = {"canceled", "padded", "measured"}
+"""Names of rclpy, of the published interface, and of what declares a field of a class."""
+
+
+def is_participle(word: str) -> bool:
+    return word in IRREGULAR.split() or (word.endswith("ed") and word not in NO_PARTICIPLES)
+
+
+def participles(tree: ast.AST) -> Iterator[str]:
+    """Functions whose first word is a participle.
+
+    Properties are things, what is true or not may be told by a participle, and what makes an error is called by what is
+    wrong, as in ``raise malformed(...)``.
+    """
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.FunctionDef):
+            continue
+        is_thing = any("property" in ast.unparse(decorator) for decorator in node.decorator_list)
+        returns = ast.unparse(node.returns) if node.returns is not None else ""
+        if (
+            not is_thing
+            and returns != "bool"
+            and not returns.endswith("Error")
+            and is_participle(node.name.strip("_").split("_")[0])
+        ):
+            yield node.name
+
+
+def test_functions_are_verbs() -> None:
+    modules = {path: ast.parse(path.read_text(encoding="utf-8")) for path in sorted(SOURCE.rglob("*.py"))}
+    found = {str(path.relative_to(SOURCE)): set(participles(tree)) - OTHERS_CALL_IT for path, tree in modules.items()}
+    assert {path: names for path, names in found.items() if names} == {}
+
+
+def test_the_rule_sees_what_it_should() -> None:
+    code = """
+def checked_plan() -> Plan: ...
+def _found(): ...
+def feed(): ...
+def seed_of(): ...
+def read_plan(): ...
+class Lease:
+    @property
+    def ended(self) -> int: ...
+    @cached_property
+    def taken(self) -> int: ...
+    def finished(self) -> bool: ...
+    def malformed(self) -> RequestError: ...
+    def held_by(self) -> int: ...
+"""
+    assert list(participles(ast.parse(code))) == ["checked_plan", "_found", "held_by"]
