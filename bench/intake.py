@@ -14,7 +14,7 @@ from pathlib import Path
 import zstandard
 from isal.isal_zlib import crc32
 
-from throwcollect.coordinator.acceptance import Acceptance, Assignment
+from throwcollect.coordinator.acceptance import Acceptance, PreparedTrial
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.episode.message import pack, unpack
@@ -33,28 +33,28 @@ def measure(directory: Path) -> tuple[float, float]:
     """
     dataset = Dataset.open(directory)
     acceptance = Acceptance(dataset.config)
-    assignments = [acceptance.assign(dataset.plan, trial) for trial in dataset.plan.trials]
+    prepared = [acceptance.prepare(dataset.plan, trial) for trial in dataset.plan.trials]
     messages = [
-        pack(episode, assignments[episode.header.trial].conditions.to_json(), _SIGNER) for episode in dataset.episodes()
+        pack(episode, prepared[episode.header.trial].conditions.to_json(), _SIGNER) for episode in dataset.episodes()
     ]
     random.Random(0).shuffle(messages)
     with tempfile.TemporaryDirectory(prefix="throwcollect-bench-") as scratch:
-        taken_in = _taken_in(messages, dataset.plan, acceptance, assignments, Path(scratch) / "data")
+        taken_in = _taken_in(messages, dataset.plan, acceptance, prepared, Path(scratch) / "data")
         return taken_in, _raw(messages, Path(scratch) / "raw")
 
 
 def _taken_in(
-    messages: list[bytes], plan: Plan, acceptance: Acceptance, assignments: list[Assignment], directory: Path
+    messages: list[bytes], plan: Plan, acceptance: Acceptance, prepared: list[PreparedTrial], directory: Path
 ) -> float:
     writer = DatasetWriter.create(directory, plan)
     began = time.perf_counter()
     for message in messages:
         delivery = unpack(message, _SIGNER)
         episode = delivery.episode
-        assignment = assignments[episode.header.trial]
-        if acceptance.foreign(delivery, assignment, "") or acceptance.unsound(episode, assignment):
+        trial = prepared[episode.header.trial]
+        if acceptance.foreign(delivery, trial, "") or acceptance.unsound(episode, trial):
             raise ValueError(f"trial {episode.header.trial} is refused")
-        result = task_of(assignment.config).judge(episode.samples(), episode.header, assignment.trajectory)
+        result = task_of(trial.config).judge(episode.samples(), episode.header, trial.trajectory)
         writer.append(episode, result)
     seconds = time.perf_counter() - began
     writer.close()
