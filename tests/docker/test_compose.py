@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.e2e.collection import collect, fingerprints, write_config
+from tests.e2e.collection import FAST, collect, fingerprints, start, write_config
 from throwcollect.runtimes.docker.engine import connect
 
 pytestmark = [pytest.mark.docker, pytest.mark.usefixtures("client")]
@@ -114,9 +114,9 @@ def test_the_documented_command_runs(environment: dict[str, str], tmp_path: Path
 
 @pytest.mark.parametrize("environment", ["v2"], indirect=True)
 def test_a_node_that_dies_is_started_again(environment: dict[str, str], tmp_path: Path) -> None:
-    # So many that the collection outlives both kills on a fast machine, too.
-    config = write_config(tmp_path, trials=300)
-    collect(config, tmp_path / "undisturbed", 2)
+    # So slowly that the collection outlives both kills on a fast machine, too.
+    config = write_config(tmp_path, trials=60, sim=f"{FAST}, real_time_factor: 4")
+    undisturbed = start(config, tmp_path / "undisturbed", 2)
     command = [str(SCRIPT), str(config), "2", str(tmp_path / "data")]
     process = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     project = f"throwcollect-{process.pid}"
@@ -126,6 +126,7 @@ def test_a_node_that_dies_is_started_again(environment: dict[str, str], tmp_path
     assert process.returncode == 0, out
     assert len(re.findall(r"sim_\w+ is ready", out)) == 3, out
     assert len(re.findall(r"router listening", out)) == 2, out
+    assert undisturbed.finish()[0] == 0
     assert fingerprints(tmp_path / "data") == fingerprints(tmp_path / "undisturbed")
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import docker
 import pytest
 
-from tests.e2e.collection import Running, call, collect, fingerprints, start, write_config
+from tests.e2e.collection import FAST, Running, call, collect, fingerprints, start, write_config
 from throwcollect.runtimes.docker.options import KEY_LABEL
 
 pytestmark = [pytest.mark.docker, pytest.mark.usefixtures("client")]
@@ -56,8 +56,10 @@ def containers_of(client: docker.DockerClient, directory: Path) -> dict[str, doc
 
 def test_chaos(engine: docker.DockerClient, tmp_path: Path) -> None:
     """Simulations, router and coordinator are killed, one is paused, then the launcher dies; resuming completes it."""
-    config, directory = write_config(tmp_path, trials=200), tmp_path / "data"
-    collect(config, tmp_path / "undisturbed", 2)
+    # So slowly that the collection outlives all of them on a fast machine, too.
+    config = write_config(tmp_path, trials=120, sim=f"{FAST}, real_time_factor: 5")
+    directory = tmp_path / "data"
+    undisturbed = start(config, tmp_path / "undisturbed", 2)
     running = start(config, directory, 4, "--runtime", "docker")
     running.wait_until(lambda: running.written() > 0)
     chance = random.Random(time.time_ns())
@@ -80,6 +82,7 @@ def test_chaos(engine: docker.DockerClient, tmp_path: Path) -> None:
     time.sleep(chance.uniform(0.0, 2.0))
     resumed = call("resume", directory, "-n", "4", "--runtime", "docker")
     assert resumed.returncode == 0, resumed.stderr
+    assert undisturbed.finish()[0] == 0
     assert fingerprints(directory) == fingerprints(tmp_path / "undisturbed")
 
 
