@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import psutil
 
@@ -106,6 +107,13 @@ def collect(config: Path, directory: Path, simulations: int, *options: str, **en
     assert code == 0, err
     summary: dict[str, object] = json.loads(out)
     return summary
+
+
+def journal(directory: Path) -> list[dict[str, Any]]:
+    """Whole lines of the journal of a dataset."""
+    path = directory / "logs" / "journal.jsonl"
+    lines = path.read_bytes().split(b"\n")[:-1] if path.exists() else []
+    return [json.loads(line) for line in lines if line.endswith(b"}")]
 
 
 def fingerprints(directory: Path) -> dict[str, str]:

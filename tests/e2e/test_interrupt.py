@@ -16,8 +16,7 @@ from mcap.exceptions import McapError
 from mcap.records import Chunk, Metadata
 from mcap.stream_reader import StreamReader
 
-from tests.e2e.collection import FAST, Running, call, collect, fingerprints, start, write_config
-from throwcollect.dataset.journal import read_journal
+from tests.e2e.collection import FAST, Running, call, collect, fingerprints, journal, start, write_config
 
 pytestmark = pytest.mark.e2e
 TRIALS = 16
@@ -98,7 +97,7 @@ def assert_goes_on(directory: Path, reference: Path) -> None:
 
 
 def events(directory: Path) -> list[dict[str, Any]]:
-    return list(read_journal(directory / "logs" / "journal.jsonl"))
+    return journal(directory)
 
 
 def test_ctrl_c_before_any_simulation_is_ready(config: Path, tmp_path: Path, started: list[Running]) -> None:

@@ -20,9 +20,8 @@ from pathlib import Path
 import pytest
 
 from rclzenoh.session_config import OVERRIDE_VARIABLE, client_override
-from tests.e2e.collection import FAST, Running, call, start, write_config
+from tests.e2e.collection import FAST, Running, call, journal, start, write_config
 from throwcollect.dataset.directory import CARD
-from throwcollect.dataset.journal import read_journal
 from throwcollect.run_key import RunKey
 from throwcollect.runs.record import Record
 from throwcollect.runs.records import STATE_VARIABLE, Records
@@ -268,5 +267,5 @@ def test_what_is_collected_is_what_would_have_been(scene: Scene) -> None:
 
 def commits(running: Running) -> dict[int, str]:
     """Digest of every episode that was written, by trial."""
-    journal = read_journal(running.directory / "logs" / "journal.jsonl")
-    return {entry["trial"]: entry["digest"] for entry in journal if entry["event"] == "commit"}
+    entries = journal(running.directory)
+    return {entry["trial"]: entry["digest"] for entry in entries if entry["event"] == "commit"}

@@ -15,8 +15,7 @@ from typing import Any
 import psutil
 import pytest
 
-from tests.e2e.collection import Running, call, collect, fingerprints, start, write_config
-from throwcollect.dataset.journal import read_journal
+from tests.e2e.collection import Running, call, collect, fingerprints, journal, start, write_config
 from throwcollect.errors import WorkerError
 from throwcollect.runs.records import STATE_VARIABLE, Records
 
@@ -87,8 +86,7 @@ def going_on(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Running]:
 
 
 def entries(running: Running, event: str) -> list[dict[str, Any]]:
-    path = running.directory / "logs" / "journal.jsonl"
-    return [entry for entry in read_journal(path) if entry["event"] == event] if path.exists() else []
+    return [entry for entry in journal(running.directory) if entry["event"] == event]
 
 
 @pytest.fixture(scope="module")

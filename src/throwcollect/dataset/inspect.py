@@ -10,7 +10,6 @@ import pyarrow.compute as pc
 
 from throwcollect.dataset.data_card import count_outcomes
 from throwcollect.dataset.digest import combine_digests
-from throwcollect.dataset.directory import METADATA
 from throwcollect.dataset.journal import measure_collected_s
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.summary import Info
@@ -39,13 +38,7 @@ def summary(dataset: Dataset) -> Info:
         DatasetError: If its metadata lack a field, or its directory cannot be read.
     """
     directory = dataset.directory
-    try:
-        shards = dataset.bag["relative_file_paths"]
-        topics = {
-            each["topic_metadata"]["name"]: each["message_count"] for each in dataset.bag["topics_with_message_count"]
-        }
-    except (KeyError, TypeError) as error:
-        raise DatasetError(f"{error} is missing", path=directory / METADATA) from error
+    shards, topics = dataset.shards, dataset.topics
     try:
         sizes = {path.name: path.stat().st_size for path in directory.iterdir() if path.is_file()}
     except OSError as error:

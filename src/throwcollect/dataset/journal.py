@@ -10,6 +10,7 @@ import json
 import os
 import time
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Literal, get_args
@@ -95,7 +96,22 @@ class Journal:
             raise unwritable(self._path, error) from error
 
 
-def read_journal(path: Path) -> Iterator[dict[str, Any]]:
+@dataclass(frozen=True)
+class Entry:
+    """One line of a journal.
+
+    Attributes:
+        event: What happened.
+        time_s: When, Unix time [s].
+        wall_s: Real time that collecting took in all [s], if the line tells it.
+    """
+
+    event: Event
+    time_s: float
+    wall_s: float | None = None
+
+
+def read_journal(path: Path) -> Iterator[Entry]:
     """Events of a journal, in order; lines that were cut off or damaged are left out.
 
     Args:
@@ -116,12 +132,13 @@ def read_journal(path: Path) -> Iterator[dict[str, Any]]:
                 and entry.get("event") in get_args(Event)
                 and isinstance(entry.get("time"), int | float)
             ):
-                yield entry
+                wall_s = entry.get("wall_s")
+                yield Entry(entry["event"], entry["time"], wall_s if isinstance(wall_s, int | float) else None)
 
 
 def was_open(directory: Path) -> bool:
     """Whether anybody who reached the router could join one of the collections into a dataset."""
-    return any(entry["event"] == "exposed" for entry in read_journal(directory / JOURNAL))
+    return any(entry.event == "exposed" for entry in read_journal(directory / JOURNAL))
 
 
 def measure_collected_s(directory: Path) -> float | None:
@@ -132,10 +149,10 @@ def measure_collected_s(directory: Path) -> float | None:
     total: float | None = None
     began = last = 0.0
     for entry in read_journal(directory / JOURNAL):
-        if entry["event"] == "opened":
+        if entry.event == "opened":
             total = (total or 0.0) + max(last - began, 0.0)
-            began = entry["time"]
-        elif entry["event"] == "finished" and isinstance(entry.get("wall_s"), int | float):
-            total, began = entry["wall_s"], entry["time"]
-        last = entry["time"]
+            began = entry.time_s
+        elif entry.event == "finished" and entry.wall_s is not None:
+            total, began = entry.wall_s, entry.time_s
+        last = entry.time_s
     return None if total is None else total + max(last - began, 0.0)

@@ -49,13 +49,12 @@ class Dataset(Sequence[Throw]):
         directory: Where the dataset is.
         plan: All its trials, also of those that were not selected.
         throws: One row a throw; ``docs/dataset.md`` describes the columns.
-        bag: Fields of its rosbag2 metadata.
     """
 
     directory: Path
     plan: Plan
     throws: pa.Table
-    bag: Mapping[str, Any]
+    _bag: Mapping[str, Any]
 
     @classmethod
     def open(cls, directory: StrPath) -> Dataset:
@@ -120,11 +119,53 @@ class Dataset(Sequence[Throw]):
         Raises:
             DatasetError: If the metadata do not have it.
         """
-        custom = self.bag.get("custom_data")
-        digest = custom.get("throwcollect.digest") if isinstance(custom, dict) else None
-        if not isinstance(digest, str):
-            raise DatasetError("throwcollect.digest is missing", path=self.directory / METADATA)
-        return digest
+        return self._custom("throwcollect.digest")
+
+    @property
+    def layout(self) -> str:
+        """Number of the format of its files, as it was written.
+
+        Raises:
+            DatasetError: If the metadata do not have it.
+        """
+        return self._custom("throwcollect.format")
+
+    @property
+    def shards(self) -> tuple[str, ...]:
+        """Names of its recordings.
+
+        Raises:
+            DatasetError: If the metadata do not have them.
+        """
+        try:
+            return tuple(self._bag["relative_file_paths"])
+        except (KeyError, TypeError) as error:
+            raise DatasetError(f"{error} is missing", path=self.directory / METADATA) from error
+
+    @property
+    def topics(self) -> Mapping[str, int]:
+        """Number of messages of each topic.
+
+        Raises:
+            DatasetError: If the metadata do not have them.
+        """
+        try:
+            counts = self._bag["topics_with_message_count"]
+            return {each["topic_metadata"]["name"]: each["message_count"] for each in counts}
+        except (KeyError, TypeError) as error:
+            raise DatasetError(f"{error} is missing", path=self.directory / METADATA) from error
+
+    def _custom(self, name: str) -> str:
+        """Return what the product itself wrote into the metadata.
+
+        Raises:
+            DatasetError: If it is not there.
+        """
+        custom = self._bag.get("custom_data")
+        value = custom.get(name) if isinstance(custom, dict) else None
+        if not isinstance(value, str):
+            raise DatasetError(f"{name} is missing", path=self.directory / METADATA)
+        return value
 
     @property
     def recorded(self) -> Dataset:

@@ -10,7 +10,6 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from throwcollect.dataset.directory import METADATA
 from throwcollect.dataset.reader import Dataset
 from throwcollect.episode.record import Samples
 from throwcollect.errors import ConfigError, DatasetError
@@ -106,16 +105,12 @@ class Source:
             )
         if not len(dataset.recorded):
             raise DatasetError(f"{directory}: none of its {len(dataset.throws)} trials has an episode to export")
-        try:
-            digest = str(dataset.bag["custom_data"]["throwcollect.digest"])
-        except (KeyError, TypeError) as error:
-            raise DatasetError(f"{directory / METADATA}: {error} is missing") from error
         rate_hz = rate_hz or recorded_hz
         joints = dataset.joints
         moving = tuple(joint for joint in joints if joint in dataset.config.task.end)
         return cls(
             dataset,
-            digest,
+            dataset.digest,
             rate_hz,
             joints,
             moving,

@@ -18,7 +18,7 @@ def provenance(dataset: Dataset, info: Info) -> dict[str, str]:
     return {
         "dataset digest": info.digest,
         "configuration digest": config_digest(dataset.config),
-        "layout": str(dataset.bag["custom_data"].get("throwcollect.format", "unknown")),
+        "layout": dataset.layout,
         "sampler": f"{dataset.config.sweep.sampler}, seed {dataset.config.seed}",
         **(collected.facts() if collected else {"collected": f"unknown: it has no readable {PROVENANCE}"}),
     }

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from throwcollect.dataset.journal import Entry
 
 _BINS = 40
 
@@ -35,11 +36,11 @@ class Throughput:
     lost_s: tuple[float, ...]
 
 
-def measure_throughput(events: Iterable[Mapping[str, Any]]) -> Throughput | None:
+def measure_throughput(events: Iterable[Entry]) -> Throughput | None:
     """Measure throughput over time.
 
     Args:
-        events: Entries of a journal, in order, each with `event` and `time` [s].
+        events: Entries of a journal, in order.
 
     Returns:
         None if no episode came in, or all at one instant.
@@ -48,12 +49,12 @@ def measure_throughput(events: Iterable[Mapping[str, Any]]) -> Throughput | None
     elapsed = 0.0
     last: float | None = None
     for event in events:
-        if last is not None and event["event"] != "opened":
+        if last is not None and event.event != "opened":
             # Clocks are set back now and then.
-            elapsed += max(event["time"] - last, 0.0)
-        last = event["time"]
-        if event["event"] in times:
-            times[event["event"]].append(elapsed)
+            elapsed += max(event.time_s - last, 0.0)
+        last = event.time_s
+        if event.event in times:
+            times[event.event].append(elapsed)
     commits = times["commit"]
     if not commits or elapsed <= 0:
         return None

@@ -17,27 +17,32 @@ def line(event: str, time: float) -> str:
     return json.dumps({"event": event, "time": time}) + "\n"
 
 
+def events_of(directory: Path) -> list[str]:
+    return [entry.event for entry in read_journal(directory / "logs" / "journal.jsonl")]
+
+
 def test_events_are_read_back_in_order_with_their_times(tmp_path: Path) -> None:
     with Journal(tmp_path) as journal:
         journal.note("lease", trial=3, simulation="sim_0")
         journal.note("commit", trial=3, outcome="landed", digest="00")
     events = list(read_journal(tmp_path / "logs" / "journal.jsonl"))
-    assert [event["event"] for event in events] == ["opened", "lease", "commit"]
-    assert (events[1]["trial"], events[1]["simulation"]) == (3, "sim_0")
-    assert events[0]["time"] <= events[1]["time"] <= events[2]["time"]
+    assert [entry.event for entry in events] == ["opened", "lease", "commit"]
+    assert events[0].time_s <= events[1].time_s <= events[2].time_s
+    lease = json.loads((tmp_path / "logs" / "journal.jsonl").read_text().splitlines()[1])
+    assert (lease["trial"], lease["simulation"]) == (3, "sim_0")
 
 
 def test_a_line_that_was_cut_off_does_not_spoil_the_next(tmp_path: Path) -> None:
     journal_of(tmp_path, line("opened", 1.0), '{"event": "comm')
     with Journal(tmp_path) as journal:
         journal.note("finished")
-    assert [e["event"] for e in read_journal(tmp_path / "logs" / "journal.jsonl")] == ["opened", "opened", "finished"]
+    assert events_of(tmp_path) == ["opened", "opened", "finished"]
 
 
 @pytest.mark.parametrize("damaged", ["\x00\xff", "[1]", '{"event": "nonsense", "time": 1}', '{"event": "commit"}', "7"])
 def test_what_is_no_event_is_left_out(tmp_path: Path, damaged: str) -> None:
     journal_of(tmp_path, line("opened", 1.0), f"{damaged}\n", line("commit", 2.0))
-    assert [e["event"] for e in read_journal(tmp_path / "logs" / "journal.jsonl")] == ["opened", "commit"]
+    assert events_of(tmp_path) == ["opened", "commit"]
 
 
 def test_pauses_between_processes_do_not_count_as_time_of_collecting(tmp_path: Path) -> None:
