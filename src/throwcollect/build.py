@@ -16,7 +16,7 @@ import rclzenoh
 
 _PACKAGES = {"pybullet": "pybullet", "example-robot-data": None, "zstandard": None}
 """Packages whose versions count, and the compiled module of the one that simulates."""
-_SOURCES = (".py", ".msg", ".srv", ".action")
+_SOURCES = (".py", ".msg", ".srv", ".action", ".json")
 
 
 @cache

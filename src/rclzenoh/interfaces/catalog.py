@@ -1,8 +1,8 @@
-"""Every interface that is known: rosbags' Jazzy store, completed by the files in ``definitions``.
+"""Every interface that is known: the messages of Jazzy in ``jazzy.json``, completed by the files in ``definitions``.
 
-The store has messages only. Services and actions, messages that it lacks, and messages whose default values it does
-not keep are read from ``definitions/<package>/{msg,srv,action}/`` when they are first asked for; a file wins over the
-store.
+``packaging/jazzy_messages.py`` takes those messages from rosbags. Services and actions, messages that it lacks, and
+messages whose default values it does not keep are read from ``definitions/<package>/{msg,srv,action}/`` when they are
+first asked for; a file wins.
 
 What the generators of ROS 2 derive from a service or an action (requests, events, the services and the feedback message
 behind an action) is derived here too, because the type hash of a service covers all of it (rosidl 4.6, Jazzy).
@@ -11,6 +11,7 @@ behind an action) is derived here too, because the type hash of a service covers
 from __future__ import annotations
 
 import difflib
+import json
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -69,8 +70,9 @@ class Structure:
 
 
 _BASE, _NAME, _ARRAY, _SEQUENCE = Nodetype.BASE, Nodetype.NAME, Nodetype.ARRAY, Nodetype.SEQUENCE
-_STORE = get_typestore(Stores.ROS2_JAZZY)
+_STORE = get_typestore(Stores.EMPTY)
 _FIELDDEFS: dict[str, Any] = _STORE.fielddefs
+_JAZZY = json.loads((Path(__file__).parent / "jazzy.json").read_text(encoding="utf-8"))
 _DEFAULTS: dict[str, dict[str, Default]] = {}
 _READ: set[Path] = set()
 _COMPLETE: set[str] = set()
@@ -164,6 +166,9 @@ def _require(name: str) -> None:
         _READ.add(path)
         parts = path.read_text().split("---\n")
         {"msg": _add_message, "srv": _add_service, "action": _add_action}[kind](package, whole, parts)
+    if name not in _FIELDDEFS and name in _JAZZY:
+        constants, fields = _JAZZY[name]
+        _add(name, [(field, _read_description(description)) for field, description in fields], constants)
     if name not in _FIELDDEFS:
         raise ValueError(f"unknown interface {name!r}{_similar(name)}")
     _COMPLETE.add(name)
@@ -175,8 +180,17 @@ def _require(name: str) -> None:
 
 def _similar(name: str) -> str:
     files = (path.relative_to(DEFINITIONS).with_suffix("").as_posix() for path in DEFINITIONS.rglob("*.*"))
-    near = difflib.get_close_matches(name, {*files, *_FIELDDEFS}, n=3)
+    near = difflib.get_close_matches(name, {*files, *_FIELDDEFS, *_JAZZY}, n=3)
     return f"; did you mean {' or '.join(map(repr, near))}?" if near else ""
+
+
+def _read_description(description: list[Any]) -> tuple[Nodetype, Any]:
+    """Make a field's description, as rosbags has it, of the JSON that it became."""
+    kind, content = Nodetype(description[0]), description[1]
+    if kind in (_ARRAY, _SEQUENCE):
+        element, size = content
+        return kind, (_read_description(element), size)
+    return kind, tuple(content) if kind == _BASE else content
 
 
 def _char_to_uint8(description: Any) -> Any:
@@ -255,7 +269,3 @@ def _add_action(package: str, name: str, parts: list[str]) -> None:
             ("feedback_message", (_NAME, f"{full}_FeedbackMessage")),
         ],
     )
-
-
-for _name, (_constants, _fields) in list(_FIELDDEFS.items()):
-    _add(_name, _fields, _constants)

@@ -1,4 +1,4 @@
-"""What type checkers are told of messages is what they are."""
+"""Files that scripts have written are those that they would write now."""
 
 import importlib.util
 from pathlib import Path
@@ -7,15 +7,25 @@ import pytest
 
 from rclzenoh.interfaces import action, get_action, get_message, get_service, msg, srv, typed_names
 
-GENERATOR = Path(__file__).parents[3] / "packaging" / "interface_stubs.py"
+PACKAGING = Path(__file__).parents[3] / "packaging"
+GENERATOR = PACKAGING / "interface_stubs.py"
+
+
+def load_script(path):
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
 
 
 @pytest.fixture(scope="module")
 def generator():
-    spec = importlib.util.spec_from_file_location("interface_stubs", GENERATOR)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return load_script(GENERATOR)
+
+
+def test_the_messages_of_jazzy_are_those_of_rosbags():
+    script = load_script(PACKAGING / "jazzy_messages.py")
+    assert script.PATH.read_text(encoding="utf-8") == script.jazzy(), "python packaging/jazzy_messages.py writes it"
 
 
 def test_the_stubs_are_those_of_the_definitions(generator):
