@@ -50,7 +50,7 @@ $(READY_ROS): $(ROS_WHEELS)/made-from.sha256 | $(READY_DEV)
 	touch $@
 
 # On Fast DDS, nodes at times do not find each other on a busy machine. A run starts them again; so do its tests.
-ROS_TESTS := $(ROS_VENV)/bin/python -m pytest -n 2 --dist loadfile tests/contract tests/ros
+ROS_TESTS := $(ROS_VENV)/bin/python -m pytest -n 3 --dist loadfile tests/contract tests/ros
 
 # What a contributor runs in between, in less than a minute on two cores: the rules of the house, the API of nodes on the embedded
 # backend, and all units but those that write, read, draw or simulate whole datasets.
