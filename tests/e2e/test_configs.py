@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.e2e.collection import call
+from tests.e2e.collection import INPROCESS, call
 from throwcollect.dataset.verify import verify
 
 pytestmark = pytest.mark.e2e
@@ -22,7 +22,7 @@ def test_there_are_configurations() -> None:
 def test_a_configuration_is_collected_and_verified(config: Path, tmp_path: Path) -> None:
     trials = WHOLE.get(config.stem, 3)
     options = [] if config.stem in WHOLE else ["--trials", str(trials)]
-    collected = call("up", "-n", "2", "--runtime", "local", config, "--output", tmp_path / "data", "--json", *options)
+    collected = call("up", *INPROCESS, config, "--output", tmp_path / "data", "--json", *options)
     assert collected.returncode == 0, collected.stderr
     summary = json.loads(collected.stdout)
     assert summary["trials"] == trials
