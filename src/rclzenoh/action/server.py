@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from enum import Enum
+from functools import partial
 from typing import Any
 
 from rclzenoh.action.goals import GoalEvent, GoalTable, TrackedGoal
@@ -217,7 +218,7 @@ class ActionServer:
         """
         callback = execute_callback or self._execute_callback
         if callback is not None:
-            submit(self._node.mailbox, self._execute(handle, callback))
+            submit(self._node.mailbox, partial(self._execute, handle, callback))
 
     def set_result(self, handle: ServerGoalHandle, result: Message) -> None:
         """Set a goal's result and answer those who wait for it; the first result counts.
@@ -280,7 +281,7 @@ class ActionServer:
             self._publish_status()
             await _outcome(self._handle_accepted_callback(handle))
 
-        submit(self._node.mailbox, begin())
+        submit(self._node.mailbox, begin)
 
     async def _on_cancel(self, request: CancelGoal.Request, response: CancelGoal.Response) -> Message:
         self._forget_old()
