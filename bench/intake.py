@@ -17,9 +17,10 @@ from isal.isal_zlib import crc32
 from throwcollect.coordinator.acceptance import Acceptance, PreparedTrial
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.writer import DatasetWriter
-from throwcollect.episode.message import pack, unpack
+from throwcollect.episode.message import Episode, pack, unpack
 from throwcollect.run_key import Signer
 from throwcollect.sweep.plan import Plan
+from throwcollect.tasks.result import Result
 from throwcollect.tasks.task import task_of
 
 _SIGNER = Signer(b"key of a run")
@@ -47,6 +48,7 @@ def _taken_in(
     messages: list[bytes], plan: Plan, acceptance: Acceptance, prepared: list[PreparedTrial], directory: Path
 ) -> float:
     writer = DatasetWriter.create(directory, plan)
+    _judge(unpack(messages[0], _SIGNER).episode, prepared)  # reads the robot's description, once in a process
     began = time.perf_counter()
     for message in messages:
         delivery = unpack(message, _SIGNER)
@@ -54,11 +56,16 @@ def _taken_in(
         trial = prepared[episode.header.trial]
         if acceptance.foreign(delivery, trial, "") or acceptance.unsound(episode, trial):
             raise ValueError(f"trial {episode.header.trial} is refused")
-        result = task_of(trial.config).judge(episode.samples(), episode.header, trial.trajectory)
-        writer.append(episode, result)
+        writer.append(episode, _judge(episode, prepared))
     seconds = time.perf_counter() - began
     writer.close()
     return len(messages) / seconds
+
+
+def _judge(episode: Episode, prepared: list[PreparedTrial]) -> Result:
+    trial = prepared[episode.header.trial]
+    result: Result = task_of(trial.config).judge(episode.samples(), episode.header, trial.trajectory)
+    return result
 
 
 def _raw(messages: list[bytes], path: Path) -> float:

@@ -42,8 +42,9 @@ def names_of(family: str) -> tuple[str, ...]:
     return tuple(_table(family))
 
 
+@cache
 def load_member(family: str, name: str) -> Any:
-    """Import a member of a family.
+    """Import a member of a family, once: it is asked for with every trial.
 
     Args:
         family: ``robots``, ``tools``, ``engines``, ``tasks`` or ``runtimes``.

@@ -46,11 +46,14 @@ def test_a_member_of_another_package_is_found_and_takes_the_place_of_none_of_our
     group = "throwcollect.engines"
     points = EntryPoints([EntryPoint("free_fall", "fractions:Fraction", group), EntryPoint("bullet", "x:Other", group)])
     monkeypatch.setattr(members, "entry_points", lambda **_: points)
-    members._table.cache_clear()
+    caches = (members._table, load_member)
+    for cached in caches:
+        cached.cache_clear()
     assert names_of("engines") == ("bullet", "ballistic", "free_fall")
     assert load_member("engines", "free_fall") is Fraction
     assert load_member("engines", "bullet") is BulletEngine
-    members._table.cache_clear()
+    for cached in caches:
+        cached.cache_clear()
 
 
 def test_a_member_that_there_is_not_is_an_error() -> None:

@@ -42,10 +42,72 @@ class Column(NamedTuple):
     size: int
 
 
+class FirstRow:
+    """The first row of a state chunk, which has one message of each channel and shows how the others are laid out.
+
+    Attributes:
+        columns: Place of each channel's record in a row, by the channel's number.
+
+    Args:
+        contents: Uncompressed records of all rows.
+        samples: Number of samples.
+
+    Raises:
+        DatasetError: If the contents cannot be so many rows, or the first one is not one message per channel.
+    """
+
+    def __init__(self, contents: bytes | bytearray, samples: int) -> None:
+        if samples < 1 or len(contents) % samples or not contents:
+            raise DatasetError(f"chunk: {len(contents)} bytes are not the records of {samples} samples")
+        self._row = contents[: len(contents) // samples]
+        self.columns: dict[int, Column] = {}
+        offset = 0
+        while offset < len(self._row):
+            if len(self._row) - offset < MESSAGE_HEADER.size:
+                raise DatasetError(f"chunk: a record is cut off at byte {offset}")
+            opcode, length, channel, *_ = MESSAGE_HEADER.unpack_from(self._row, offset)
+            column = Column(offset, RECORD_PREFIX_BYTES + length)
+            offset += column.size
+            if (
+                opcode != Opcode.MESSAGE
+                or length < MESSAGE_HEADER.size - RECORD_PREFIX_BYTES
+                or offset > len(self._row)
+                or channel in self.columns
+            ):
+                raise DatasetError(f"chunk: not one message per channel and sample at byte {column.offset}")
+            self.columns[channel] = column
+
+    @cached_property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the joints in the joint state.
+
+        Raises:
+            DatasetError: If there is no readable joint state.
+        """
+        return read_joint_names(bytes(self._message(JOINT_STATES_ID, "/joint_states")))
+
+    def check_layout(self, channel: int, topic: Topic) -> None:
+        """Compare the message of a channel, which stands for the layout of all, with that of a topic.
+
+        Raises:
+            DatasetError: If there is no such channel, or its message is laid out otherwise.
+        """
+        if not topic.layout.describes_message(self._message(channel, topic.name)):
+            raise DatasetError(
+                f"chunk: the messages of {topic.name} have another layout than {topic.type_name} written here"
+            )
+
+    def _message(self, channel: int, topic: str) -> bytes | bytearray:
+        if channel not in self.columns:
+            raise DatasetError(f"chunk: no messages of {topic}")
+        column = self.columns[channel]
+        return self._row[column.offset + MESSAGE_HEADER.size : column.offset + column.size]
+
+
 class MessageTable:
     """The records of a chunk seen as a table, without a copy.
 
-    Unless it is made otherwise, holding one guarantees that every row has the same channels at the same places.
+    Holding one guarantees that every row has the same channels at the same places.
 
     Attributes:
         columns: Place of each channel's record in a row, by the channel's number.
@@ -54,35 +116,18 @@ class MessageTable:
     Args:
         contents: Uncompressed records; what is seen of a bytearray can be written to.
         samples: Number of samples.
-        first_row_only: Whether the first row stands for all; for records that only have to be read, and fast.
 
     Raises:
         DatasetError: If the records are not such a table.
     """
 
-    def __init__(self, contents: bytes | bytearray, samples: int, *, first_row_only: bool = False) -> None:
-        if samples < 1 or len(contents) % samples or not contents:
-            raise DatasetError(f"chunk: {len(contents)} bytes are not the records of {samples} samples")
+    def __init__(self, contents: bytes | bytearray, samples: int) -> None:
+        self._first = FirstRow(contents, samples)
+        self.columns = self._first.columns
         self._table: NDArray[np.uint8] = np.frombuffer(contents, np.uint8).reshape(samples, -1)
-        self.columns: dict[int, Column] = {}
-        width, offset = self._table.shape[1], 0
-        while offset < width:
-            header = contents[offset : offset + MESSAGE_HEADER.size]
-            if len(header) < MESSAGE_HEADER.size:
-                raise DatasetError(f"chunk: a record is cut off at byte {offset}")
-            opcode, length, channel, *_ = MESSAGE_HEADER.unpack(header)
-            column = Column(offset, RECORD_PREFIX_BYTES + length)
-            offset += column.size
-            if (
-                opcode != Opcode.MESSAGE
-                or length < MESSAGE_HEADER.size - RECORD_PREFIX_BYTES
-                or offset > width
-                or channel in self.columns
-            ):
-                raise DatasetError(f"chunk: not one message per channel and sample at byte {column.offset}")
-            self.columns[channel] = column
+        for channel, column in self.columns.items():
             alike = self._table[:, column.offset : column.offset + _ALIKE_BYTES]
-            if not first_row_only and alike.tobytes() != header[:_ALIKE_BYTES] * samples:
+            if alike.tobytes() != alike[0].tobytes() * samples:
                 raise DatasetError(f"chunk: the records of channel {channel} are not alike")
         self.log_times = self.headers(next(iter(self.columns)))["log_time"]
 
@@ -125,14 +170,14 @@ class MessageTable:
         offsets = np.arange(self.columns[channel].offset, self._table.size, self._table.shape[1])
         return encode_message_index(channel, self.headers(channel)["log_time"], offsets)
 
-    @cached_property
+    @property
     def joints(self) -> tuple[str, ...]:
         """Names of the joints, in the order of the columns of `samples`: those that the first joint state has.
 
         Raises:
             DatasetError: If there is no readable joint state.
         """
-        return read_joint_names(self._first_message(JOINT_STATES_ID, "/joint_states"))
+        return self._first.joints
 
     @cached_property
     def samples(self) -> Samples:
@@ -145,25 +190,8 @@ class MessageTable:
         return read_samples(*(self._read(channel, topic) for channel, topic in topics.items()))
 
     def _read(self, channel: int, topic: Topic) -> Rows:
-        self.check_layout(channel, topic)
+        self._first.check_layout(channel, topic)
         return self.messages(channel).view(topic.layout.dtype)[:, 0]
-
-    def check_layout(self, channel: int, topic: Topic) -> None:
-        """Compare the first message of a channel, which stands for the layout of all, with that of a topic.
-
-        Raises:
-            DatasetError: If the chunk has no such channel, or its messages are laid out otherwise.
-        """
-        if not topic.layout.describes_message(self._first_message(channel, topic.name)):
-            raise DatasetError(
-                f"chunk: the messages of {topic.name} have another layout than {topic.type_name} written here"
-            )
-
-    def _first_message(self, channel: int, topic: str) -> bytes:
-        if channel not in self.columns:
-            raise DatasetError(f"chunk: no messages of {topic}")
-        message: bytes = self.messages(channel)[0].tobytes()
-        return message
 
 
 class MessageList:

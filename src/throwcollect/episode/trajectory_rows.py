@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from throwcollect.episode.channels import BALL_ODOMETRY_ID, JOINT_STATES_ID
 from throwcollect.episode.chunk import MESSAGE_HEADER
-from throwcollect.episode.message_table import MessageTable
+from throwcollect.episode.message_table import FirstRow
 from throwcollect.episode.topics import ball_odometry, joint_states
 from throwcollect.units import NS_PER_S
 
@@ -96,10 +96,10 @@ def trajectory_rows(contents: bytes, samples: int, joints: tuple[str, ...]) -> N
     Raises:
         DatasetError: If they are not rows with joint states of these joints and odometry as they are written here.
     """
-    table = MessageTable(contents, samples, first_row_only=True)
+    row = FirstRow(contents, samples)
     for channel, topic in zip(_FIELDS, (joint_states(joints), ball_odometry()), strict=True):
-        table.check_layout(channel, topic)
-    starts = tuple(table.columns[channel].offset for channel in _FIELDS)
+        row.check_layout(channel, topic)
+    starts = tuple(row.columns[channel].offset for channel in _FIELDS)
     return np.frombuffer(contents, _row_type(joints, starts, len(contents) // samples))
 
 
