@@ -46,13 +46,26 @@ def up(
         Path | None,
         typer.Option("--resume", metavar="DIR", help="Go on with the dataset in DIR; without CONFIG, with its own."),
     ] = None,
+    slice: Annotated[
+        str | None,
+        typer.Option(
+            "--slice", metavar="I/N", help="Collect slice I of N, from 0, of the plan that lies in --output DIR."
+        ),
+    ] = None,
     trials: TrialsOption = None,
     detach: DetachOption = False,
     json: JsonOption = False,
 ) -> None:
     """Collect a dataset: start the simulations, run all trials, write the files."""
     changes = overrides(settings, trials=trials, run__simulations=simulations, run__runtime=runtime)
-    if resume is None:
+    if slice is not None:
+        unfit = {"CONFIG": config, "--resume": resume, "--detach": detach or None}
+        if wrong := next((name for name, value in unfit.items() if value is not None), None):
+            raise ConfigError(f"{wrong}: should be left out with --slice, which goes by the plan in --output DIR")
+        if output is None:
+            raise ConfigError(f"--slice {slice}: needs --output DIR, in which the plan lies")
+        _collect_slice(output, slice, changes, json=json)
+    elif resume is None:
         _collect(
             lambda runs, shown: runs.prepare(
                 config or DEFAULT_CONFIG, overrides=changes, output=output, onlooker=shown
@@ -93,6 +106,33 @@ def launch(run: str, lock: Annotated[int, typer.Option("--lock", help="Descripto
     only_log()
     with display(quiet=True) as shown, Interruptions() as interruptions:
         launch_inherited(run, lock, onlooker=shown, interruptions=lambda: interruptions.count)
+
+
+def _collect_slice(directory: Path, text: str, changes: list[str], *, json: bool) -> None:
+    from throwcollect.cli.interruptions import Interruptions
+    from throwcollect.cli.terminal import display
+    from throwcollect.dataset.slice_directory import slice_directory
+    from throwcollect.runs.slices import collect_slice
+    from throwcollect.sweep.slice import Slice
+
+    slice = Slice.parse(text)
+    with display(quiet=json) as shown, Interruptions() as interruptions:
+        collect_slice(directory, slice, overrides=changes, onlooker=shown, interruptions=lambda: interruptions.count)
+    place = slice_directory(directory, slice)
+    typer.echo(jsonlib.dumps({"slice": str(slice), "directory": str(place)}) if json else f"{place}: finished")
+
+
+def join(directory: DatasetArgument, json: JsonOption = False) -> None:
+    """Make one dataset of the slices that `up --slice` has collected."""
+    from throwcollect.cli.dataset.info import print_summary
+    from throwcollect.dataset.inspect import info, loss
+    from throwcollect.dataset.join import join as join_slices
+
+    join_slices(directory)
+    found = info(directory)
+    print_summary(found, directory, as_json=json)
+    if (lost := loss(found.outcomes, hint=None)) is not None:
+        raise lost
 
 
 def _go_on(

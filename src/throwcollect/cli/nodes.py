@@ -95,7 +95,7 @@ def simulate(directory: DatasetArgument, trials: list[int]) -> None:
     plan = Plan.read(directory / PLAN, load(directory / CONFIG))
     replayer = Replayer(plan.config)
     for trial in trials:
-        print(json.dumps({"trial": trial, "digest": replayer.run(plan.trials[trial]).digest}), flush=True)
+        print(json.dumps({"trial": trial, "digest": replayer.run(plan.trial(trial)).digest}), flush=True)
 
 
 def health(

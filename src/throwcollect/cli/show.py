@@ -35,15 +35,24 @@ def plan(
     path: ConfigArgument = DEFAULT_CONFIG,
     settings: SetOption = None,
     trials: TrialsOption = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output", metavar="DIR", help="Freeze the plan in DIR, for `up --slice`, instead of printing it."
+        ),
+    ] = None,
     json: JsonOption = False,
 ) -> None:
     """Print the trials without running them."""
     from throwcollect.config.loader import load_locating_errors
-    from throwcollect.coordinator.prepare import draw_plan, more_trials
+    from throwcollect.coordinator.prepare import draw_plan, more_trials, prepare
 
     end_with_reader()
     with load_locating_errors(path, overrides(settings, trials=trials)) as config:
-        found = draw_plan(config, directory=path.parent)
+        if output is None:
+            found = draw_plan(config, directory=path.parent)
+        else:
+            found = prepare(config, output, sweep_directory=path.parent)
     if json:
         rows = [
             {
@@ -58,8 +67,10 @@ def plan(
         typer.echo(jsonlib.dumps(rows, indent=2))
         return
     columns = ["trial", *found.keys]
-    typer.echo("  ".join(columns))
-    for trial in found.trials:
+    shown = found.trials if output is None else ()
+    if shown:
+        typer.echo("  ".join(columns))
+    for trial in shown:
         numbers = [f"{trial.values[key]:.6g}".rjust(len(key)) for key in found.keys]
         note = f"  refused: {trial.refused}" if trial.refused else ""
         typer.echo("  ".join([str(trial.number).rjust(len("trial")), *numbers]) + note)

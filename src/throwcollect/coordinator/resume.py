@@ -56,7 +56,7 @@ def resume(
     with hold_alone(directory):
         stored = _read_stored_config(directory)
         if stored is not None:
-            _refuse_changes(directory, stored, make_self_contained(config))
+            refuse_changes(directory, stored, make_self_contained(config))
         old = _read_stored_plan(directory, stored, make_self_contained(config))
         damaged = _find_damaged(directory, old, check=check, say=say)
         check_regular(directory / TRIALS)
@@ -176,7 +176,17 @@ def _read_stored_plan(directory: Path, stored: Config | None, config: Config) ->
         return None
 
 
-def _refuse_changes(directory: Path, stored: Config, config: Config) -> None:
+def refuse_changes(directory: Path, stored: Config, config: Config) -> None:
+    """Refuse another configuration than the one that a dataset was begun with.
+
+    Args:
+        directory: Directory of the dataset.
+        stored: The configuration that it was begun with.
+        config: The other one, which may differ in how it is run, and may let a plan grow further.
+
+    Raises:
+        ConfigError: If it differs in anything else.
+    """
     changed = differences(stored.without_run(), config.without_run())
     problems = [
         Problem(f"{directory} was begun with {quote(before)}, got {quote(after)}", key=key)

@@ -209,7 +209,7 @@ class _Recordings:
         problems = list(self._check.find_problems(stored, shard, channels))
         yield from problems
         if not problems:
-            trial = self._plan.trials[stored.episode.header.trial]
+            trial = self._plan.trial(stored.episode.header.trial)
             if trial.refused is not None or shard != shard_of(self._plan, trial.number):
                 yield "its episode does not belong into this file"
             self.rows[trial.number] = self._check.row(stored, shard)

@@ -125,7 +125,7 @@ def _find_episodes(path: Path, plan: Plan, channels: Channels, wanted: Collectio
         if not each.intact or trial not in wanted or trial in found:
             continue
         try:
-            result = judge_episode(plan.config_of(plan.trials[trial]), episode)
+            result = judge_episode(plan.config_of(plan.trial(trial)), episode)
         except DatasetError:
             continue
         if channels.fit(episode.channels()) and episode.header.start_ns == plan.config.trial_start_ns(trial):

@@ -230,7 +230,7 @@ class _Sorting:
         episode = found.stored.episode
         trial = episode.header.trial
         place = f"{name}: byte {found.stored.offset}"
-        if trial >= len(self.plan.trials) or self.plan.trials[trial].refused is not None:
+        if trial >= len(self.plan.trials) or self.plan.trial(trial).refused is not None:
             self.remarks.append(f"{place}: an episode of trial {trial}, which the plan does not run")
         elif trial in self.taken:
             where, digest = self.taken[trial]
@@ -264,7 +264,7 @@ class _Sorting:
                     self.remarks.append(f"{told}; kept, as nothing else speaks against it")
 
     def _write(self, name: str, episode: Episode) -> None:
-        self.writer.append(episode, judge_episode(self.plan.config_of(self.plan.trials[episode.header.trial]), episode))
+        self.writer.append(episode, judge_episode(self.plan.config_of(self.plan.trial(episode.header.trial)), episode))
         self.taken[episode.header.trial] = (name, episode.digest)
 
     def give_up(self, earlier: Mapping[int, Row]) -> tuple[LostTrial, ...]:

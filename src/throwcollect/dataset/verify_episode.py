@@ -95,7 +95,7 @@ class EpisodeCheck:
         if self._plan is None or self._table is None:
             raise DatasetError("no plan says which trial it is")
         episode = stored.episode
-        trial = self._plan.trials[episode.header.trial]
+        trial = self._plan.trial(episode.header.trial)
         place = Place(shard, stored.offset, episode.header.samples, episode.digest)
         return self._table.row(trial, judge_episode(self._plan.config_of(trial), episode), place)
 
@@ -128,7 +128,7 @@ class EpisodeCheck:
             yield f"the plan has {format_count(len(self._plan.trials), 'trial')}"
             return
         try:
-            config = self._plan.config_of(self._plan.trials[episode.header.trial])
+            config = self._plan.config_of(self._plan.trial(episode.header.trial))
         except ConfigError as error:
             yield f"the plan has values that cannot be: {error}"
             return
@@ -139,7 +139,7 @@ class EpisodeCheck:
         """What the simulation cannot have recorded."""
         if self._plan is None or episode.header.trial in self._doubtful:
             return
-        config = self._plan.config_of(self._plan.trials[episode.header.trial])
+        config = self._plan.config_of(self._plan.trial(episode.header.trial))
         samples = episode.samples()
         if infinite := list(find_infinite_columns(samples)):
             yield from infinite

@@ -84,7 +84,7 @@ def find_refusal_problems(plan: Plan, doubtful: Collection[int], check_of: Check
     chosen = np.random.default_rng(plan.config.seed).permutation(len(others))[:CHECKED_AGAIN]
     check = check_of(plan.config)
     for number in sorted({*refused, *(others[index] for index in chosen)} - set(doubtful)):
-        trial = plan.trials[number]
+        trial = plan.trial(number)
         again = refusal(plan.config_of(trial), check)
         if _kind(again) != _kind(trial.refused):
             yield _of_trial(number, f"is refused as {trial.refused!r}, the check says {again!r}")

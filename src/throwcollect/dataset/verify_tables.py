@@ -70,7 +70,7 @@ def check_tables(directory: Path) -> Tables:
         tables.findings += _find_list_problems(directory, tables.plan)
     if tables.plan is not None:
         for trial, digest in find_wrong_trials(tables.plan).items():
-            problem = f"has digest {tables.plan.trials[trial].digest}, its values and seed give {digest}"
+            problem = f"has digest {tables.plan.trial(trial).digest}, its values and seed give {digest}"
             tables.findings.append(Finding(PLAN, f"trial {trial}", problem))
             tables.doubtful.add(trial)
         try:

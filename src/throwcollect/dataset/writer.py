@@ -243,6 +243,19 @@ class DatasetWriter:
         for number in list(self._shards):
             self._finish_shard_if_complete(number)
 
+    def take_shard(self, number: int, summary: FileSummary | None, entry: FileEntry | None, rows: pa.Table) -> None:
+        """Take in a finished shard that lies under its name already.
+
+        Args:
+            number: Its number.
+            summary: What the bag's metadata say of its file; None if there is none, as no trial of it has an episode.
+            entry: What the manifest says of its file.
+            rows: The rows of its trials in the table of throws.
+        """
+        self._shards.pop(number)
+        self._rows.pop(number)
+        self._finished[number] = _Finished(summary, entry, rows)
+
     def append(self, episode: Episode, result: Result) -> None:
         """Write an episode.
 
@@ -357,7 +370,7 @@ class DatasetWriter:
             self._finish_shard_if_complete(number)
 
     def _row(self, trial: int, result: Result, place: Place | None) -> Row:
-        return self._table.row(self.plan.trials[trial], result, place)
+        return self._table.row(self.plan.trial(trial), result, place)
 
     def _waiting_shard(self, trial: int) -> int:
         shard = trial // self._config.record.trials_per_shard

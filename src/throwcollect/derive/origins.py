@@ -24,7 +24,7 @@ def encode_sources(sources: Sequence[Source]) -> bytes:
                     "source_directory": str(dataset.directory),
                     "source_digest": dataset.digest,
                     "source_trial": number,
-                    "source_trial_digest": dataset.plan.trials[number].digest,
+                    "source_trial_digest": dataset.plan.trial(number).digest,
                     "source_episode_digest": digest,
                 }
             )

@@ -51,7 +51,7 @@ def list_of_trials(sources: Sequence[Source]) -> tuple[Config, Points]:
     if problems:
         raise ConfigError(problems, expected="datasets that differ only in what a sweep may vary")
     rows = [
-        [source.dataset.plan.trials[number].values.get(key, values[key]) for key in keys]
+        [source.dataset.plan.trial(number).values.get(key, values[key]) for key in keys]
         for source, values in zip(sources, fixed, strict=True)
         for number in source.trials
     ]

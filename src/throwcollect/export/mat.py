@@ -146,7 +146,7 @@ def _gather_throws(
     moving = [source.joints.index(joint) for joint in source.moving]
     paths, primitives, targets, measured, balls = [], [], [], [], []
     for throw in source.throws(entries):
-        config = plan.config_of(plan.trials[throw.trial])
+        config = plan.config_of(plan.trial(throw.trial))
         paths.append(_sample_path(throw.trajectory, source.rate_hz))
         primitives.append(_describe_primitive(throw.trajectory, config, source.rate_hz))
         targets.append(_measure_target(landings[throw.trial], config))

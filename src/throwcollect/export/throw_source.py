@@ -141,7 +141,7 @@ class Source:
         except DatasetError as error:
             raise DatasetError(f"{dataset.directory}: trial {trial}: {error}") from error
         samples = resample(recorded, recorded_hz=dataset.config.record.rate_hz, rate_hz=self.rate_hz)
-        trajectory = task_of(dataset.plan.config_of(dataset.plan.trials[trial])).trajectory()
+        trajectory = task_of(dataset.plan.config_of(dataset.plan.trial(trial))).trajectory()
         return Throw(trial, succeeded, _compute_signals(samples, trajectory, episode.header.start_ns), trajectory)
 
 

@@ -83,4 +83,4 @@ def _begin(directory: Path, child: bool = False) -> None:
 
 def _replay(trial: int) -> Comparison:
     kept = _kept[0]
-    return compare(kept.dataset.episode(trial), kept.replayer.run(kept.dataset.plan.trials[trial]))
+    return compare(kept.dataset.episode(trial), kept.replayer.run(kept.dataset.plan.trial(trial)))

@@ -126,7 +126,7 @@ class PreparedRun:
 
 
 @dataclass(frozen=True)
-class _Request:
+class Request:
     """What the user asked for.
 
     Attributes:
@@ -170,8 +170,8 @@ def prepare(
         records = Records()
         if (run := _take_over(records, directory, read, onlooker)) is not None:
             return run
-        request = _Request(read, Path(config).parent, directory, started, resumed=False)
-        return _prepare(records, request, None, onlooker)
+        request = Request(read, Path(config).parent, directory, started, resumed=False)
+        return prepare_run(records, request, None, onlooker)
 
 
 def resume(
@@ -219,7 +219,7 @@ def resume(
         if finished(directory, plan):
             onlooker.say(f"{directory}: every trial has ended, nothing is left to do")
             return None
-        return _prepare(records, _Request(read, sweep_directory, directory, started, resumed=True), plan, onlooker)
+        return prepare_run(records, Request(read, sweep_directory, directory, started, resumed=True), plan, onlooker)
 
 
 def _take_over(records: Records, directory: Path, config: Config, onlooker: Onlooker) -> PreparedRun | None:
@@ -246,11 +246,19 @@ def _take_over(records: Records, directory: Path, config: Config, onlooker: Onlo
     return PreparedRun(records, run, own, directory, onlooker=onlooker)
 
 
-def _prepare(records: Records, request: _Request, plan: Plan | None, onlooker: Onlooker) -> PreparedRun:
+def prepare_run(records: Records, request: Request, plan: Plan | None, onlooker: Onlooker) -> PreparedRun:
     """A run that is ready to be launched; nothing is left behind if that fails.
+
+    Args:
+        records: All runs.
+        request: What the user asked for.
+        plan: The plan that lies in the directory; None if it is still to be made.
+        onlooker: Is told what goes on.
 
     Raises:
         ConfigError: If the dataset is in a volume, from which a collection cannot go on.
+        WorkerError: If the runtime that is asked for cannot be had.
+        DatasetError: If another process changes the dataset, or it cannot be written.
     """
     config = request.config
     with ExitStack() as held, ExitStack() as undo:
@@ -290,7 +298,7 @@ def _prepare(records: Records, request: _Request, plan: Plan | None, onlooker: O
         return PreparedRun(records, run, config, directory, onlooker=onlooker, held=held.pop_all(), undo=undo.pop_all())
 
 
-def _record(run: OpenRun, request: _Request, choice: Choice, directory: Path, volume: str | None) -> Record:
+def _record(run: OpenRun, request: Request, choice: Choice, directory: Path, volume: str | None) -> Record:
     return Record(
         run=run.run,
         name=request.config.name,

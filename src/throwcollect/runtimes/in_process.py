@@ -105,7 +105,7 @@ class InProcess:
                 collection.drain()
             if (leased := collection.lease(_SIMULATION)) is not None:
                 try:
-                    delivery = simulation.delivery(collection.writer.plan.trials[leased[0]])
+                    delivery = simulation.delivery(collection.writer.plan.trial(leased[0]))
                 except ThrowcollectError as error:
                     collection.take_back(_SIMULATION, str(error), refused=True)
                 else:

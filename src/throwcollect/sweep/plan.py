@@ -18,11 +18,13 @@ from throwcollect.sweep.digest import config_digest, trial_digests
 from throwcollect.sweep.parquet_file import encode_table, read_parquet
 from throwcollect.sweep.points import Points
 from throwcollect.sweep.samplers import draw_points
+from throwcollect.sweep.slice import Slice
 from throwcollect.wording import blank_numbers, format_count
 
 _FORMAT = "1"
 _FORMAT_KEY = b"throwcollect.plan_format"
 _CONFIG_KEY = b"throwcollect.config_digest"
+_SLICE_KEY = b"throwcollect.slice"
 _MOST_REASONS = 5
 
 ROUND_TRIALS = 64
@@ -55,33 +57,60 @@ class Trial:
 
 @dataclass(frozen=True)
 class Plan:
-    """All trials of a collection, in order: trial n is at index n.
+    """The trials of a collection, or those of one of its slices, in order and without gaps.
 
     Attributes:
         config: Configuration that the trials vary.
-        trials: At least one.
+        trials: At least one; the first one has number 0 unless they are a slice.
+        slice: Which slice they are; None if they are the whole plan.
     """
 
     config: Config
     trials: tuple[Trial, ...]
+    slice: Slice | None = None
 
     @property
     def keys(self) -> tuple[str, ...]:
         """Swept dotted keys."""
         return tuple(self.trials[0].values)
 
+    def trial(self, number: int) -> Trial:
+        """The trial of a number.
+
+        Raises:
+            IndexError: If the plan has no such trial.
+        """
+        index = number - self.trials[0].number
+        if index < 0:
+            raise IndexError(number)
+        return self.trials[index]
+
+    def slice_of(self, wanted: Slice) -> Plan:
+        """A slice of the plan.
+
+        Raises:
+            ConfigError: If the plan has fewer shards than there are slices.
+        """
+        numbers = wanted.trials_of(len(self.trials), trials_per_shard=self.config.record.trials_per_shard)
+        return Plan(self.config, self.trials[numbers.start : numbers.stop], wanted)
+
     def config_of(self, trial: Trial) -> Config:
         """Configuration of one trial."""
         return with_values(self.config, trial.values)
 
     def write(self, path: Path) -> None:
-        """Write the plan as a Parquet file, whole or not at all; equal plans give equal bytes.
-
-        Columns: ``trial`` int64, ``digest`` string, ``seed`` uint64, ``refused`` string or null, then one float64
-        column per swept key, named like it.
+        """Write the plan as a Parquet file, whole or not at all.
 
         Raises:
             DatasetError: If the file cannot be written.
+        """
+        write_file(path, self.encode())
+
+    def encode(self) -> bytes:
+        """Bytes of the plan's Parquet file; equal plans give equal bytes.
+
+        Columns: ``trial`` int64, ``digest`` string, ``seed`` uint64, ``refused`` string or null, then one float64
+        column per swept key, named like it.
         """
         import pyarrow as pa
 
@@ -92,21 +121,26 @@ class Plan:
             [trial.refused for trial in self.trials],
             *([trial.values[key] for trial in self.trials] for key in self.keys),
         ]
-        schema = _schema(self.keys).with_metadata({_FORMAT_KEY: _FORMAT, _CONFIG_KEY: config_digest(self.config)})
+        metadata = {_FORMAT_KEY: _FORMAT, _CONFIG_KEY: config_digest(self.config)}
+        if self.slice is not None:
+            metadata[_SLICE_KEY] = str(self.slice)
+        schema = _schema(self.keys).with_metadata(metadata)
         table = pa.table([pa.array(column, kind) for column, kind in zip(columns, schema.types, strict=True)], schema)
-        write_file(path, encode_table(table))
+        return encode_table(table)
 
     @classmethod
-    def read(cls, path: Path, config: Config) -> Plan:
+    def read(cls, path: Path, config: Config, *, slice: Slice | None = None) -> Plan:
         """Read a plan that was written for a configuration.
 
         Args:
             path: File that `write` wrote.
             config: The configuration; its section `run` may differ.
+            slice: Which slice of the plan that the file holds is wanted; None for all that it holds.
 
         Raises:
             DatasetError: If the file is missing, damaged, or no plan.
             ForeignPlanError: If it is the plan of another configuration.
+            ConfigError: If the plan has fewer shards than there are slices.
         """
         table = read_parquet(path)
         metadata = table.schema.metadata or {}
@@ -124,11 +158,19 @@ class Plan:
         for key in keys:
             if reason := reason_not_sweepable(config, key):
                 raise DatasetError(f"is damaged: column {key!r}: {reason}", path=path)
-        numbers, digests, seeds, refused, *values = (column.to_pylist() for column in table.columns)
-        if numbers != list(range(len(numbers))):
+        stored = metadata.get(_SLICE_KEY)
+        first, rows = 0, table
+        if stored is not None:
+            # Its first trial has any number.
+            first, slice = table["trial"][0].as_py(), Slice.parse(stored.decode())
+        elif slice is not None:
+            wanted = slice.trials_of(table.num_rows, trials_per_shard=config.record.trials_per_shard)
+            first, rows = wanted.start, table.slice(wanted.start, len(wanted))
+        numbers, digests, seeds, refused, *values = (column.to_pylist() for column in rows.columns)
+        if numbers != list(range(first, first + len(numbers))):
             raise DatasetError("the trials are not numbered from 0 without gaps", path=path)
-        rows = zip(numbers, zip(*values, strict=True), seeds, digests, refused, strict=True)
-        return cls(config, tuple(Trial(n, dict(zip(keys, row, strict=True)), *rest) for n, row, *rest in rows))
+        trials = zip(numbers, zip(*values, strict=True), seeds, digests, refused, strict=True)
+        return cls(config, tuple(Trial(n, dict(zip(keys, row, strict=True)), *rest) for n, row, *rest in trials), slice)
 
 
 def make_plan(config: Config, *, check: Check | None = None, directory: Path | None = None) -> Plan:

@@ -122,7 +122,7 @@ def _schedule(dataset: Dataset, rows: Iterable[Row]) -> list[ViewedThrow]:
     throws, start = [], _FIRST_NS
     for row in rows:
         samples = _samples(dataset, row)
-        config = dataset.plan.config_of(dataset.plan.trials[row["trial"]])
+        config = dataset.plan.config_of(dataset.plan.trial(row["trial"]))
         throws.append(ViewedThrow(row, config, start, samples.ball_position.copy()))
         start += int(samples.stamps_ns[-1] - samples.stamps_ns[0]) + _PAUSE_NS
     return throws

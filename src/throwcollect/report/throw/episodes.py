@@ -104,7 +104,7 @@ def measure_residuals(dataset: Dataset) -> Residuals:
     found = []
     for trial in chosen.tolist():
         episode = dataset.episode(trial)
-        config = dataset.plan.config_of(dataset.plan.trials[trial])
+        config = dataset.plan.config_of(dataset.plan.trial(trial))
         distance = flight_residual(episode.samples(), episode.header, config=config)
         if distance is not None:
             found.append(distance)
@@ -154,7 +154,7 @@ def read_motion(dataset: Dataset, trial: int) -> JointMotion:
     """
     episode = dataset.episode(trial)
     samples = episode.samples(dataset.joints)
-    config = dataset.plan.config_of(dataset.plan.trials[trial])
+    config = dataset.plan.config_of(dataset.plan.trial(trial))
     trajectory = task_of(config).trajectory()
     times = (samples.stamps_ns - episode.header.start_ns) / NS_PER_S
     columns = [dataset.joints.index(joint) for joint in trajectory.joints]

@@ -1,0 +1,134 @@
+"""Joins the slices of a dataset: moves their recordings beside each other, and writes the tables of the whole.
+
+No recording is opened but to read the statistics at its end. Whatever ends this, it can be done again and comes out the
+same: the mark of a finished dataset is written last, and the slices are removed after that.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Collection, Mapping
+from contextlib import closing
+from pathlib import Path
+
+from mcap.exceptions import McapError
+from mcap.reader import make_reader
+
+from throwcollect.config.loader import load
+from throwcollect.dataset.bag import FileSummary
+from throwcollect.dataset.directory import METADATA, PLAN, config_path, shard_name
+from throwcollect.dataset.lock import hold_alone
+from throwcollect.dataset.manifest import FileEntry, entry_of, read_manifest
+from throwcollect.dataset.slice_directory import SLICES, find_finished, slice_directory
+from throwcollect.dataset.throws_table import read_throws
+from throwcollect.dataset.writer import DatasetWriter
+from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.files import open_regular, unreadable, unwritable
+from throwcollect.sweep.plan import Plan
+from throwcollect.sweep.slice import Slice
+from throwcollect.wording import command, format_count
+
+_MOST_NAMED = 8
+
+
+def join(directory: Path) -> None:
+    """Make a finished dataset of its slices; one that is finished already stays as it is.
+
+    Args:
+        directory: Directory of the dataset, with its configuration and its plan.
+
+    Raises:
+        ConfigError: If the directory holds no slices, or some of another number of slices.
+        DatasetError: If a slice is missing, damaged or not of this plan, or the dataset cannot be written.
+    """
+    with hold_alone(directory):
+        if not (directory / METADATA).exists():
+            _join(directory)
+        shutil.rmtree(directory / SLICES, ignore_errors=True)
+
+
+def count_slices(directory: Path, finished: Collection[Slice]) -> int:
+    """Of how many slices a dataset is.
+
+    Args:
+        directory: Its directory.
+        finished: Its finished slices.
+
+    Raises:
+        ConfigError: If none is finished, or they are of different numbers of slices.
+    """
+    counts = sorted({each.count for each in finished})
+    if not counts:
+        hint = "throwcollect up --slice 0/8 --output DIR collects the first of eight"
+        raise ConfigError(f"{directory}: holds no finished slices", hint=hint)
+    if len(counts) > 1:
+        raise ConfigError(
+            f"{directory / SLICES}: holds slices of {' and of '.join(map(str, counts))}",
+            expected="slices of one number",
+            hint="remove the directories of those that are not meant",
+        )
+    return counts[0]
+
+
+def _join(directory: Path) -> None:
+    plan = Plan.read(directory / PLAN, load(config_path(directory)))
+    finished = find_finished(directory)
+    slices = Slice.all_of(count_slices(directory, finished))
+    if missing := [each for each in slices if each not in finished]:
+        named = ", ".join(map(str, missing[:_MOST_NAMED])) + (" and more" if missing[_MOST_NAMED:] else "")
+        raise DatasetError(
+            f"lacks {format_count(len(missing), 'slice')} of {len(slices)}: {named}",
+            path=directory,
+            hint=f"{command('up', '--slice', missing[0], '--output', directory)} collects the first of them",
+        )
+    with closing(DatasetWriter(directory, plan)) as writer:
+        for each in slices:
+            _take(directory, plan.slice_of(each), each, writer)
+        writer.finish()
+
+
+def _take(directory: Path, part: Plan, slice: Slice, writer: DatasetWriter) -> None:
+    """Move the recordings of a slice, and have the writer know them."""
+    place = slice_directory(directory, slice)
+    entries = {entry.path: entry for entry in read_manifest(place)}
+    if entries.get(PLAN) != entry_of(PLAN, part.encode()):
+        raise DatasetError(
+            "was collected with another plan", path=place, hint=f"remove it, and collect slice {slice} again"
+        )
+    throws = read_throws(place, part)
+    per_shard = part.config.record.trials_per_shard
+    for first in range(part.trials[0].number, part.trials[-1].number + 1, per_shard):
+        number = first // per_shard
+        name = shard_name(part.config.name, number)
+        entry = entries.get(name)
+        summary = None if entry is None else _move(place / name, directory / name, entry)
+        writer.take_shard(number, summary, entry, throws.slice(first - part.trials[0].number, per_shard))
+
+
+def _move(source: Path, target: Path, entry: FileEntry) -> FileSummary:
+    """Move a recording, unless that is done, and read what is in it.
+
+    Raises:
+        DatasetError: If it is not there, or not as the manifest says.
+    """
+    if source.exists():
+        try:
+            os.replace(source, target)
+        except OSError as error:
+            raise unwritable(target, error) from error
+    try:
+        with open(open_regular(target), "rb") as file:
+            size = os.fstat(file.fileno()).st_size
+            if size != entry.bytes:
+                raise DatasetError(f"has {size} bytes", path=target, expected=f"{entry.bytes}, as its slice says")
+            summary = make_reader(file).get_summary()
+    except OSError as error:
+        raise unreadable(target, error) from error
+    except (McapError, ValueError) as error:
+        raise DatasetError(f"is damaged: {error}", path=target) from error
+    if summary is None or summary.statistics is None:
+        raise DatasetError("is damaged: it says nothing of what is in it", path=target)
+    found = summary.statistics
+    counts: Mapping[int, int] = dict(sorted(found.channel_message_counts.items()))
+    return FileSummary(entry.path, found.message_start_time, found.message_end_time, counts)

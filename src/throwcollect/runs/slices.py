@@ -1,0 +1,108 @@
+"""Collects one slice of a dataset whose plan is frozen, as a task of a scheduler does on the machine it is given."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from datetime import datetime, timezone
+from pathlib import Path
+
+from throwcollect.config.loader import load, load_locating_errors
+from throwcollect.config.schema import Config
+from throwcollect.coordinator.resume import refuse_changes
+from throwcollect.dataset.directory import PLAN, config_path
+from throwcollect.dataset.inspect import loss
+from throwcollect.dataset.slice_directory import copy_recordings, find_attempts, find_finished, make_attempt, publish
+from throwcollect.dataset.writer import create
+from throwcollect.errors import ConfigError, Interrupted, Problem
+from throwcollect.runs.launcher import SILENT, Onlooker
+from throwcollect.runs.preparation import Request, prepare_run
+from throwcollect.runs.records import Records
+from throwcollect.sweep.plan import Plan
+from throwcollect.sweep.slice import Slice
+from throwcollect.wording import command
+
+
+def collect_slice(
+    directory: str | os.PathLike[str],
+    slice: Slice,
+    *,
+    overrides: Sequence[str] = (),
+    onlooker: Onlooker = SILENT,
+    interruptions: Callable[[], int] = lambda: 0,
+) -> bool:
+    """Collect one slice of a dataset, in a directory of its own until it is finished.
+
+    It begins with what earlier attempts at this slice have recorded.
+
+    Args:
+        directory: Directory of the dataset, with its configuration and its plan.
+        slice: Which slice.
+        overrides: What replaces keys that say how it is run: ``key=value`` pairs, as ``--set`` takes them.
+        onlooker: Is told what goes on.
+        interruptions: How often somebody has asked to stop: at first running trials are finished, then no more.
+
+    Returns:
+        Whether there was anything to do.
+
+    Raises:
+        ConfigError: If there is no such dataset or slice, or it cannot be collected in slices.
+        WorkerError: If nodes cannot be started or kept alive.
+        DatasetError: If something cannot be read or written.
+        LossError: If trials of it are lost; it is not finished then.
+        Interrupted: If somebody stopped it.
+    """
+    started = datetime.now(timezone.utc)
+    directory = Path(directory)
+    config = read_frozen_config(directory, overrides)
+    plan = Plan.read(directory / PLAN, config, slice=slice)
+    if slice in find_finished(directory):
+        onlooker.say(f"{directory}: slice {slice} is finished, nothing is left to do")
+        return False
+    again = command("up", "--slice", slice, "--output", directory)
+    attempt = make_attempt(directory, slice)
+    create(attempt, plan)
+    for earlier in find_attempts(directory, slice):
+        if earlier != attempt:
+            copy_recordings(earlier, attempt)
+    onlooker.say(f"slice {slice}: trials {plan.trials[0].number} to {plan.trials[-1].number}")
+    request = Request(config, directory, attempt, started, resumed=True)
+    with prepare_run(Records(), request, plan, onlooker) as run:
+        try:
+            summary = run.collect(interruptions=interruptions)
+        except Interrupted as error:
+            raise Interrupted(f"slice {slice}: {error.message}", hint=f"{again} goes on with it") from error
+    if (lost := loss(summary.outcomes, hint=f"{again} runs them again")) is not None:
+        raise lost
+    publish(attempt, directory, slice)
+    return True
+
+
+def read_frozen_config(directory: Path, overrides: Sequence[str] = ()) -> Config:
+    """Read the configuration of a dataset that is to be collected in slices.
+
+    Args:
+        directory: Its directory, with its plan.
+        overrides: What replaces keys that say how it is run.
+
+    Raises:
+        ConfigError: If there is no such dataset, its plan grows, or the overrides change what is collected.
+    """
+    if not (directory / PLAN).is_file():
+        raise ConfigError(
+            f"{directory}: holds no plan", hint=command("plan", "CONFIG", "--output", directory) + " makes one"
+        )
+    with load_locating_errors(config_path(directory), overrides) as config:
+        refuse_changes(directory, load(config_path(directory)), config)
+        if config.grows:
+            raise ConfigError(
+                [Problem("a plan that grows with its results cannot be collected in slices", key=_growing_key(config))],
+                expected="a fixed number of trials",
+            )
+        if config.run.open:
+            raise ConfigError([Problem("should be false, as a slice has its router for itself", key="run.open")])
+        return config
+
+
+def _growing_key(config: Config) -> str:
+    return "until" if config.until is not None else "sweep.target"

@@ -1,0 +1,73 @@
+"""Slices of a plan: whole shards of it, so that others can collect them, to the byte as they would be here."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from throwcollect.errors import ConfigError, Problem
+from throwcollect.wording import format_count
+
+
+@dataclass(frozen=True)
+class Slice:
+    """One of a number of slices, which together are the plan, in order; written as ``INDEX/COUNT``.
+
+    Attributes:
+        index: From 0.
+        count: Number of slices.
+    """
+
+    index: int
+    count: int
+
+    def __str__(self) -> str:
+        return f"{self.index}/{self.count}"
+
+    @classmethod
+    def parse(cls, text: str) -> Slice:
+        """Read a slice as it is written.
+
+        Raises:
+            ConfigError: If it is no such text, or the index is not below the count.
+        """
+        match = re.fullmatch(r"(\d{1,9})/(\d{1,9})", text, re.ASCII)
+        if match is None:
+            raise ConfigError(f"a slice is INDEX/COUNT, got {text!r}", expected="such as 0/8, the first of eight")
+        index, count = int(match[1]), int(match[2])
+        if index >= count:
+            last = f"0/{count} to {count - 1}/{count}" if count else "COUNT to be 1 or more"
+            raise ConfigError(f"there is no slice {text}", expected=last)
+        return cls(index, count)
+
+    @classmethod
+    def all_of(cls, count: int) -> tuple[Slice, ...]:
+        """All slices of a number of them."""
+        return tuple(cls(index, count) for index in range(count))
+
+    def trials_of(self, trials: int, *, trials_per_shard: int) -> range:
+        """Numbers of its trials.
+
+        The shards are handed out as evenly as they can be: two slices differ by at most one shard.
+
+        Args:
+            trials: Number of trials of the plan.
+            trials_per_shard: Trials in one MCAP file.
+
+        Raises:
+            ConfigError: If there are fewer shards than slices.
+        """
+        shards = -(-trials // trials_per_shard)
+        if self.count > shards:
+            raise ConfigError(
+                [
+                    Problem(
+                        f"{format_count(trials, 'trial')} are {format_count(shards, 'shard')} of {trials_per_shard}, "
+                        f"which cannot be {self.count} slices",
+                        key="record.trials_per_shard",
+                    )
+                ],
+                expected=f"at most {format_count(shards, 'slice')}, or smaller shards",
+            )
+        first, last = (shards * bound // self.count for bound in (self.index, self.index + 1))
+        return range(first * trials_per_shard, min(last * trials_per_shard, trials))

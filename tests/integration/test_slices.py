@@ -1,0 +1,185 @@
+"""Slices are collected one by one, as tasks of a scheduler do, and joined: the files are those of one collection."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from tests.e2e.collection import CONFIG, FAST, fingerprints, write_config
+from throwcollect import runs
+from throwcollect.config.loader import load
+from throwcollect.coordinator.prepare import prepare
+from throwcollect.dataset.join import join
+from throwcollect.dataset.slice_directory import SLICES, find_attempts, find_finished, make_attempt, publish
+from throwcollect.errors import ConfigError, DatasetError, Interrupted
+from throwcollect.runs.slices import collect_slice
+from throwcollect.sweep.slice import Slice
+
+INPROCESS = ["run.runtime=inprocess"]
+
+
+class Listener(runs.Onlooker):
+    """Keeps what it is told."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+
+    def say(self, line: str) -> None:
+        self.lines.append(line)
+
+
+@pytest.fixture(scope="module")
+def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    text = CONFIG + "record: {{trials_per_shard: 4}}\n"
+    return write_config(tmp_path_factory.mktemp("config"), trials=22, text=text, sim=FAST)
+
+
+@pytest.fixture(scope="module")
+def whole(config: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The dataset as one collection makes it."""
+    directory = tmp_path_factory.mktemp("whole") / "data"
+    with runs.prepare(config, overrides=INPROCESS, output=directory) as run:
+        run.collect()
+    return directory
+
+
+@pytest.fixture
+def frozen(config: Path, tmp_path: Path) -> Path:
+    """A directory that holds the plan alone."""
+    prepare(load(config), tmp_path / "data", sweep_directory=tmp_path)
+    return tmp_path / "data"
+
+
+def collect(directory: Path, *texts: str) -> None:
+    for text in texts:
+        assert collect_slice(directory, Slice.parse(text), overrides=INPROCESS)
+
+
+def interrupt_after(directory: Path, text: str, size: int) -> Path:
+    """Interrupt the collection of a slice when it has written so many bytes; returns the directory of the attempt."""
+    slice = Slice.parse(text)
+
+    def written() -> int:
+        return sum(p.stat().st_size for each in find_attempts(directory, slice) for p in each.glob("*.mcap*"))
+
+    with pytest.raises(Interrupted, match=f"slice {text}"):
+        collect_slice(directory, slice, overrides=INPROCESS, interruptions=lambda: int(written() > size))
+    (attempt,) = find_attempts(directory, slice)
+    return attempt
+
+
+def test_joined_slices_are_the_files_of_one_collection(frozen: Path, whole: Path) -> None:
+    collect(frozen, "2/3", "0/3", "1/3")
+    join(frozen)
+    assert fingerprints(frozen) == fingerprints(whole)
+    assert not (frozen / SLICES).exists()
+
+
+def test_a_finished_slice_has_few_files(frozen: Path) -> None:
+    collect(frozen, "0/6")
+    assert sorted(path.name for path in (frozen / SLICES).rglob("*")) == [
+        "0-of-6",
+        "datapackage.json",
+        "small_00000.mcap",
+        "throws.parquet",
+    ]
+
+
+def test_a_slice_that_was_interrupted_goes_on_with_what_is_there(frozen: Path, whole: Path) -> None:
+    interrupt_after(frozen, "0/2", 100_000)
+    assert not find_finished(frozen)
+    onlooker = Listener()
+    collect_slice(frozen, Slice(0, 2), overrides=INPROCESS, onlooker=onlooker)
+    assert any("of an earlier collection" in line for line in onlooker.lines)
+    collect(frozen, "1/2")
+    join(frozen)
+    assert fingerprints(frozen) == fingerprints(whole)
+
+
+def test_a_slice_takes_over_recordings_and_not_what_is_damaged_in_them(frozen: Path, whole: Path) -> None:
+    attempt = interrupt_after(frozen, "0/2", 100_000)
+    recording = max(attempt.glob("*.mcap*"), key=lambda path: path.stat().st_size)
+    data = bytearray(recording.read_bytes())
+    data[len(data) // 2 :] = bytes(len(data) - len(data) // 2)
+    recording.write_bytes(data)
+    collect(frozen, "0/2", "1/2")
+    join(frozen)
+    assert fingerprints(frozen) == fingerprints(whole)
+
+
+def test_of_two_attempts_at_a_slice_the_second_changes_nothing(frozen: Path) -> None:
+    collect(frozen, "0/6")
+    place = frozen / SLICES / "0-of-6"
+    before = fingerprints(place)
+    twin = make_attempt(frozen, Slice(0, 6))
+    for name in ("small_00000.mcap", "throws.parquet", "datapackage.json"):
+        (twin / name).write_bytes(b"late")
+    assert not publish(twin, frozen, Slice(0, 6))
+    assert fingerprints(place) == before
+    assert not find_attempts(frozen, Slice(0, 6))
+
+
+def test_a_finished_slice_is_not_collected_again(frozen: Path) -> None:
+    collect(frozen, "0/6")
+    assert not collect_slice(frozen, Slice(0, 6), overrides=INPROCESS)
+
+
+def test_joining_says_which_slices_are_missing(frozen: Path) -> None:
+    collect(frozen, "1/3")
+    with pytest.raises(DatasetError, match=r"lacks 2 slices of 3: 0/3, 2/3") as caught:
+        join(frozen)
+    assert "--slice 0/3" in str(caught.value)
+
+
+def test_joining_that_was_ended_half_way_can_be_done_again(frozen: Path, whole: Path) -> None:
+    collect(frozen, "0/2", "1/2")
+    moved = frozen / SLICES / "0-of-2" / "small_00001.mcap"
+    moved.rename(frozen / moved.name)
+    join(frozen)
+    assert fingerprints(frozen) == fingerprints(whole)
+    join(frozen)
+    assert fingerprints(frozen) == fingerprints(whole)
+
+
+def test_slices_of_different_numbers_are_not_joined(frozen: Path) -> None:
+    collect(frozen, "0/2", "1/3")
+    with pytest.raises(ConfigError, match="slices of 2 and of 3"):
+        join(frozen)
+
+
+def test_slices_of_another_plan_are_not_joined(frozen: Path, config: Path, tmp_path: Path) -> None:
+    other = tmp_path / "other"
+    prepare(load(config, ["seed=8"]), other, sweep_directory=tmp_path)
+    collect(frozen, "0/2")
+    collect(other, "1/2")
+    shutil.copytree(other / SLICES, frozen / SLICES, dirs_exist_ok=True)
+    with pytest.raises(DatasetError, match=r"1-of-2: was collected with another plan"):
+        join(frozen)
+
+
+def test_a_recording_that_was_cut_off_is_not_joined(frozen: Path) -> None:
+    collect(frozen, "0/2", "1/2")
+    recording = frozen / SLICES / "1-of-2" / "small_00005.mcap"
+    recording.write_bytes(recording.read_bytes()[:-1])
+    with pytest.raises(DatasetError, match=r"small_00005.mcap: has \d+ bytes"):
+        join(frozen)
+
+
+def test_what_would_change_the_dataset_is_refused(frozen: Path) -> None:
+    with pytest.raises(ConfigError, match="seed"):
+        collect_slice(frozen, Slice(0, 2), overrides=["seed=9"])
+    with pytest.raises(ConfigError, match=r"run.open: should be false"):
+        collect_slice(frozen, Slice(0, 2), overrides=["run.open=true"])
+
+
+def test_a_directory_without_a_plan_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"holds no plan[\s\S]*throwcollect plan CONFIG --output"):
+        collect_slice(tmp_path, Slice(0, 2))
+
+
+def test_a_plan_that_grows_is_refused(config: Path, tmp_path: Path) -> None:
+    prepare(load(config, ["until.landed=3", "trials=200"]), tmp_path / "data", sweep_directory=tmp_path)
+    with pytest.raises(ConfigError, match=r"until: a plan that grows"):
+        collect_slice(tmp_path / "data", Slice(0, 2))
