@@ -5,6 +5,7 @@ from __future__ import annotations
 import json as jsonlib
 from collections.abc import Callable
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -92,7 +93,15 @@ def resume(
     json: JsonOption = False,
 ) -> None:
     """Go on with a dataset whose collection was ended by anything, or with more trials."""
+    from throwcollect.cluster.submission import is_submitted
+
     changes = overrides(settings, trials=trials, run__simulations=simulations, run__runtime=runtime)
+    if is_submitted(directory):
+        from throwcollect.cluster.submit import submit_missing
+
+        if submit_missing(directory, overrides=changes, say=partial(typer.echo, err=True)) is None:
+            typer.echo(f"{directory}: nothing is left to submit", err=True)
+        return
     _go_on(directory, None, changes, detach=detach, json=json, check=check)
 
 

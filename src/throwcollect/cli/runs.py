@@ -18,6 +18,7 @@ from throwcollect.errors import ConfigError, Interrupted
 from throwcollect.wording import command, format_count
 
 if TYPE_CHECKING:
+    from throwcollect.cluster.following import ClusterRun
     from throwcollect.runs.record import Record
     from throwcollect.runs.records import Run
     from throwcollect.runtimes.runtime import HeldRun, NodeState
@@ -39,6 +40,7 @@ def ps(
     json: JsonOption = False,
 ) -> None:
     """List the runs of this machine, with their nodes."""
+    from throwcollect.cli import cluster_runs
     from throwcollect.runs.records import Records
     from throwcollect.runs.selection import find_held_runs
 
@@ -56,16 +58,23 @@ def ps(
     strangers = [each for run, each in held.items() if run not in ids]
     if json:
         documents = [_document(run) for run in shown] + [_strange_document(*each) for each in strangers]
+        documents += cluster_runs.documents()
         typer.echo(jsonlib.dumps(documents, indent=2, default=_in_json))
         return
     rows = [(_row(run), _node_lines(run, held.get(run.id))) for run in shown]
     rows += [(_strange_row(*each), _list_held_nodes(*each)) for each in strangers]
+    rows += [(row, []) for row in cluster_runs.rows()]
     for line in _table(rows):
         typer.echo(line)
 
 
 def wait(run: RunOption = None, json: JsonOption = False) -> None:
     """Show the progress of a run until it ends, and then its summary; Ctrl-C leaves it alone."""
+    if (submitted := _submitted(run)) is not None:
+        from throwcollect.cli.cluster_runs import follow_to_the_end
+
+        follow_to_the_end(submitted.directory, json=json)
+        return
     from throwcollect.cli.dataset.info import print_summary
     from throwcollect.cli.interruptions import Interruptions
     from throwcollect.cli.terminal import display
@@ -98,12 +107,17 @@ def logs(
     follow: Annotated[bool, typer.Option("-f", "--follow", help="Go on until the run ends.")] = False,
     run: RunOption = None,
 ) -> None:
-    """Print what the nodes of a run print."""
+    """Print what the nodes of a run print, or the tasks of one on a cluster."""
+    end_with_reader()
+    if (submitted := _submitted(run)) is not None:
+        from throwcollect.cli.cluster_runs import print_logs
+
+        print_logs(submitted, nodes or [])
+        return
     from throwcollect.runs.following import read_logs
     from throwcollect.runs.records import Records
     from throwcollect.runs.selection import to_watch
 
-    end_with_reader()
     found = to_watch(Records(), run, say=_tell)
     for name, line, width in read_logs(found, nodes or (), follow=follow):
         typer.echo(f"{name:{width}} | {line}")
@@ -111,11 +125,16 @@ def logs(
 
 def events(run: RunOption = None, json: JsonOption = False) -> None:
     """Print what happens in a run, from its start until it ends: nodes started, ready, lost and so on."""
+    end_with_reader()
+    if (submitted := _submitted(run)) is not None:
+        from throwcollect.cli.cluster_runs import print_events
+
+        print_events(submitted)
+        return
     from throwcollect.runs.following import read_events
     from throwcollect.runs.records import Records
     from throwcollect.runs.selection import to_watch
 
-    end_with_reader()
     for event, line in read_events(to_watch(Records(), run, say=_tell)):
         typer.echo(line if json else f"{event.time}  {event}")
 
@@ -136,6 +155,11 @@ def scale(
 
 def stop(run: RunOption = None) -> None:
     """Finish the running trials of a run, close its files and end it."""
+    if (submitted := _submitted(run)) is not None:
+        from throwcollect.cli.cluster_runs import end
+
+        end(submitted)
+        return
     from throwcollect.cli.interruptions import Interruptions
     from throwcollect.runs import control
     from throwcollect.runs.records import Records
@@ -162,12 +186,24 @@ def down(
     run: RunOption = None,
 ) -> None:
     """End everything of a run, by force if need be, and forget it; never removes a directory with a dataset."""
+    if (submitted := _submitted(run)) is not None:
+        from throwcollect.cli.cluster_runs import end
+
+        end(submitted)
+        return
     from throwcollect.runs import control
 
     ended, removed = control.down(run, volumes=volumes)
     for name in removed:
         typer.echo(f"removed {name}", err=True)
     typer.echo(f"{ended}: ended and forgotten")
+
+
+def _submitted(run: str | None) -> ClusterRun | None:
+    """The submitted dataset that a command means; None if it means a run of this machine."""
+    from throwcollect.cluster.following import find_cluster_run
+
+    return find_cluster_run(run)
 
 
 def _in_json(value: datetime) -> str:

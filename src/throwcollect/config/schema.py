@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, PositiveInt, Tag, model_validator
 
+from throwcollect.config.cluster import ClusterConfig
 from throwcollect.config.containers import ContainersConfig
 from throwcollect.config.controllers import ControllersConfig
 from throwcollect.config.key import Effect, Key
@@ -215,6 +216,8 @@ class Config(Section):
     """How it is run."""
     containers: Annotated[ContainersConfig, Key(Effect.RUN)] = ContainersConfig()
     """Runs in containers."""
+    cluster: Annotated[ClusterConfig, Key(Effect.RUN)] = ClusterConfig()
+    """Runs on a cluster."""
 
     @model_validator(mode="after")
     def _joints_are_those_of_the_robot(self) -> Config:
@@ -270,7 +273,9 @@ class Config(Section):
 
     def without_run(self) -> Config:
         """This configuration with all that does not change the dataset at its default."""
-        return self.model_copy(update={"run": RunConfig(), "containers": ContainersConfig()})
+        return self.model_copy(
+            update={"run": RunConfig(), "containers": ContainersConfig(), "cluster": ClusterConfig()}
+        )
 
     def trial_start_ns(self, number: int) -> int:
         """Simulated time at which a trial starts [ns]; the slots of different trials never overlap.

@@ -154,7 +154,8 @@ def _read_stored_config(directory: Path) -> Config | None:
     try:
         path = config_path(directory)
         config = load(path)
-        whole = path.read_text(encoding="utf-8") == dump_yaml(config)
+        # A finished dataset of an earlier version has fewer keys, and stays as its manifest says.
+        whole = path.read_text(encoding="utf-8") == dump_yaml(config) or is_as_written(directory, CONFIG)
     except (ConfigError, OSError):
         return None
     return config if whole else None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 from collections.abc import Callable, Sequence
 from datetime import datetime, timezone
 from pathlib import Path
@@ -10,7 +11,7 @@ from pathlib import Path
 from throwcollect.config.loader import load, load_locating_errors
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.resume import refuse_changes
-from throwcollect.dataset.directory import PLAN, config_path
+from throwcollect.dataset.directory import METADATA, PLAN, config_path
 from throwcollect.dataset.inspect import loss
 from throwcollect.dataset.slice_directory import copy_recordings, find_attempts, find_finished, make_attempt, publish
 from throwcollect.dataset.writer import create
@@ -60,7 +61,8 @@ def collect_slice(
         onlooker.say(f"{directory}: slice {slice} is finished, nothing is left to do")
         return False
     again = command("up", "--slice", slice, "--output", directory)
-    attempt = make_attempt(directory, slice)
+    scratch = _find_scratch(config)
+    attempt = make_attempt(directory, slice, scratch=scratch)
     create(attempt, plan)
     for earlier in find_attempts(directory, slice):
         if earlier != attempt:
@@ -72,6 +74,11 @@ def collect_slice(
             summary = run.collect(interruptions=interruptions)
         except Interrupted as error:
             raise Interrupted(f"slice {slice}: {error.message}", hint=f"{again} goes on with it") from error
+        finally:
+            if scratch is not None and not (attempt / METADATA).exists():
+                # The next attempt may be on another machine.
+                copy_recordings(attempt, make_attempt(directory, slice))
+                shutil.rmtree(attempt, ignore_errors=True)
     if (lost := loss(summary.outcomes, hint=f"{again} runs them again")) is not None:
         raise lost
     publish(attempt, directory, slice)
@@ -94,14 +101,38 @@ def read_frozen_config(directory: Path, overrides: Sequence[str] = ()) -> Config
         )
     with load_locating_errors(config_path(directory), overrides) as config:
         refuse_changes(directory, load(config_path(directory)), config)
-        if config.grows:
-            raise ConfigError(
-                [Problem("a plan that grows with its results cannot be collected in slices", key=_growing_key(config))],
-                expected="a fixed number of trials",
-            )
-        if config.run.open:
-            raise ConfigError([Problem("should be false, as a slice has its router for itself", key="run.open")])
+        check_sliceable(config)
         return config
+
+
+def _find_scratch(config: Config) -> Path | None:
+    """The directory on this machine's own disk that the configuration names; None if it names none.
+
+    Raises:
+        ConfigError: If a variable in it is not set, or it is no absolute path.
+    """
+    if (named := config.cluster.scratch) is None:
+        return None
+    path = Path(os.path.expandvars(named))
+    if not path.is_absolute() or "$" in str(path):
+        raise ConfigError([Problem(f"{named} is {path} here, not an absolute path", key="cluster.scratch")])
+    return path
+
+
+def check_sliceable(config: Config) -> None:
+    """Check that a configuration can be collected in slices.
+
+    Raises:
+        ConfigError: If its plan grows with its results, or its run would be open.
+    """
+    if config.grows:
+        raise ConfigError(
+            [Problem("a plan that grows with its results cannot be collected in slices", key=_growing_key(config))],
+            expected="a fixed number of trials",
+            hint="throwcollect up collects it in one run",
+        )
+    if config.run.open:
+        raise ConfigError([Problem("should be false, as a slice has its router for itself", key="run.open")])
 
 
 def _growing_key(config: Config) -> str:

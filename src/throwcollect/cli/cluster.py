@@ -1,0 +1,48 @@
+"""`throwcollect submit`: a collection as an array of tasks of Slurm."""
+
+from __future__ import annotations
+
+import json as jsonlib
+from functools import partial
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from throwcollect.cli.options import ConfigArgument, JsonOption, SetOption, TrialsOption, overrides
+from throwcollect.wording import command
+
+_tell = partial(typer.echo, err=True)
+
+
+def submit(
+    config: ConfigArgument,
+    output: Annotated[
+        Path,
+        typer.Option(
+            "--output", metavar="DIR", help="Directory of the dataset, which all nodes see: new, or with a plan alone."
+        ),
+    ],
+    tasks: Annotated[int, typer.Option("--tasks", metavar="N", min=1, help="Number of tasks; each collects a slice.")],
+    settings: SetOption = None,
+    trials: TrialsOption = None,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Print the batch script, and do nothing else.")] = False,
+    wait: Annotated[bool, typer.Option("--wait", help="Follow it until the dataset is finished.")] = False,
+    json: JsonOption = False,
+) -> None:
+    """Collect a dataset on a cluster: submit an array of tasks to Slurm, and a job that joins what they collect."""
+    from throwcollect.cluster.submit import submit as submit_dataset
+
+    done = submit_dataset(config, output, tasks, overrides=overrides(settings, trials=trials), dry=dry_run, say=_tell)
+    if done.job is None:
+        typer.echo(done.script, nl=False)
+        return
+    if wait:
+        from throwcollect.cli.cluster_runs import follow_to_the_end
+
+        follow_to_the_end(done.directory, json=json)
+    elif json:
+        document = {"directory": str(done.directory), "array": done.job.array, "join": done.job.join}
+        typer.echo(jsonlib.dumps(document, indent=2))
+    else:
+        _tell(f"follow it: {command('wait', '--run', done.directory)}   (or ps, logs, stop)")

@@ -1,0 +1,1 @@
+"""Collections as arrays of tasks that a cluster's scheduler runs."""

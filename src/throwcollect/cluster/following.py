@@ -1,0 +1,244 @@
+"""What became of a submitted dataset: seen in its files and, as far as that tells, in the scheduler's queue."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from throwcollect.cluster import slurm
+from throwcollect.cluster.slurm import Task
+from throwcollect.cluster.submission import CLUSTER, Submission, is_submitted, read_submission
+from throwcollect.config.loader import load
+from throwcollect.config.schema import Config
+from throwcollect.coordinator.progress import Progress
+from throwcollect.dataset.directory import METADATA, PLAN, THROWS, config_path
+from throwcollect.dataset.slice_directory import find_finished, slice_directory
+from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError, WorkerError
+from throwcollect.sweep.parquet_file import read_parquet
+from throwcollect.sweep.slice import Slice
+from throwcollect.wording import command, format_count, join_names
+
+_POLL_S = 2.0
+_MOST_NAMED = 5
+
+
+@dataclass(frozen=True)
+class ClusterRun:
+    """A dataset that was submitted.
+
+    Attributes:
+        directory: Its directory.
+        submission: What was submitted for it.
+    """
+
+    directory: Path
+    submission: Submission
+
+    @classmethod
+    def open(cls, directory: Path) -> ClusterRun:
+        """The run of a dataset.
+
+        Raises:
+            ConfigError: If nothing was submitted for it.
+        """
+        return cls(directory, read_submission(directory))
+
+    @cached_property
+    def config(self) -> Config:
+        """Configuration of the dataset."""
+        return load(config_path(self.directory))
+
+    @cached_property
+    def trials(self) -> int:
+        """Number of trials of the plan."""
+        return len(read_parquet(self.directory / PLAN))
+
+    @property
+    def jobs(self) -> tuple[str, ...]:
+        """Numbers of all its jobs."""
+        return tuple(job for each in self.submission.jobs for job in (each.array, each.join) if job)
+
+    def look(self) -> Look:
+        """How it is by now.
+
+        Raises:
+            ConfigError: If there is no Slurm here.
+            WorkerError: If it does not answer.
+            DatasetError: If the directory cannot be read.
+        """
+        # The queue first: a task that ends in between has put its slice into place before.
+        tasks: dict[int | None, Task] = {}
+        joining: Task | None = None
+        for job in self.submission.jobs:
+            tasks |= {task.index: task for task in (slurm.find_tasks(job.array) if job.array else ())}
+            joining = next(iter(slurm.find_tasks(job.join)), joining)
+        complete = (self.directory / METADATA).exists()
+        finished = frozenset(self.submission.slices) if complete else find_finished(self.directory)
+        return Look(finished, tuple(tasks.values()), joining, complete)
+
+    def stop(self) -> None:
+        """End all its jobs: tasks stop in order, and keep what they have.
+
+        Raises:
+            ConfigError: If there is no Slurm here.
+            WorkerError: If it does not answer.
+        """
+        slurm.cancel(self.jobs)
+
+    def explain(self, look: Look) -> ThrowcollectError | None:
+        """The error that says why a run that is over has no finished dataset; None if it has one.
+
+        Args:
+            look: How it is.
+        """
+        if look.complete:
+            return None
+        missing = [each for each in self.submission.slices if each not in look.finished]
+        again = command("resume", self.directory)
+        if not missing:
+            hint = f"{command('join', self.directory)} joins them"
+            return WorkerError("all slices are finished, but they are not joined", hint=hint)
+        ended: dict[int | None, Task] = {}
+        for job in self.submission.jobs:
+            ended |= slurm.find_ended(job.array) if job.array else {}
+        reasons = [self._reason(each, ended.get(each.index)) for each in missing[:_MOST_NAMED]]
+        more = f" and {len(missing) - _MOST_NAMED} more" if len(missing) > _MOST_NAMED else ""
+        message = f"{format_count(len(missing), 'slice')} of {self.submission.tasks} not collected: "
+        if all(each.index in ended and ended[each.index].state == "CANCELLED" for each in missing):
+            return Interrupted(f"{message}cancelled", hint=f"{again} submits what is missing")
+        return WorkerError(f"{message}{join_names(reasons)}{more}", hint=f"{again} submits what is missing")
+
+    def log(self, index: int) -> Path | None:
+        """The latest log of a task; None if it has written none."""
+        logs = self.directory / CLUSTER / "logs"
+        found = [path for job in self.submission.jobs if (path := logs / f"{job.array}_{index}.log").exists()]
+        return found[-1] if found else None
+
+    def _reason(self, slice: Slice, task: Task | None) -> str:
+        if task is None:
+            return f"{slice.index}"
+        if task.saw_no_directory:
+            return f"{slice.index} (node {task.node} does not see {self.directory})"
+        return f"{slice.index} ({task.state}, exit code {task.reason}, node {task.node or '-'})"
+
+
+@dataclass(frozen=True)
+class Look:
+    """What is seen of a submitted dataset at a time.
+
+    Attributes:
+        finished: Slices that are finished.
+        tasks: Tasks of its arrays that Slurm remembers.
+        joining: The job that joins the slices; None if Slurm has forgotten it.
+        complete: Whether the dataset is finished.
+    """
+
+    finished: frozenset[Slice]
+    tasks: tuple[Task, ...]
+    joining: Task | None
+    complete: bool
+
+    @property
+    def running(self) -> int:
+        """Number of tasks that run."""
+        return sum(task.state in ("RUNNING", "COMPLETING") for task in self.tasks)
+
+    @property
+    def waiting(self) -> int:
+        """Number of tasks that wait for a node."""
+        return sum(task.lives for task in self.tasks) - self.running
+
+    @property
+    def lives(self) -> bool:
+        """Whether anything of it still runs, or will."""
+        joins = self.joining is not None and self.joining.lives and self.joining.reason != "DependencyNeverSatisfied"
+        return any(task.lives for task in self.tasks) or joins
+
+
+class ProgressOfSlices:
+    """Counts the trials of finished slices; each is read once.
+
+    Args:
+        run: The run.
+    """
+
+    def __init__(self, run: ClusterRun) -> None:
+        self._run = run
+        self._outcomes: Counter[str] = Counter()
+        self._read: set[Slice] = set()
+
+    def at(self, look: Look) -> Progress:
+        """How far it has come.
+
+        Args:
+            look: How the run is.
+        """
+        if not look.complete:
+            for each in look.finished - self._read:
+                try:
+                    table = read_parquet(slice_directory(self._run.directory, each) / THROWS)
+                except ThrowcollectError:
+                    continue  # it is being joined just now
+                self._outcomes.update(table["outcome"].to_pylist())
+                self._read.add(each)
+        task = self._run.config.task
+        return Progress(
+            total=self._run.trials,
+            ended=self._run.trials if look.complete else self._outcomes.total(),
+            outcomes=dict(self._outcomes),
+            simulations=look.running * self._run.config.cluster.cores,
+            throws_per_s=0.0,
+            hung=[],
+            success=task.success,
+            noun=task.noun,
+        )
+
+
+def follow(run: ClusterRun, *, keep_on: Callable[[], bool] = lambda: True) -> Iterator[Look]:
+    """Look at a run until it is over, every few seconds.
+
+    Args:
+        run: The run.
+        keep_on: Asked again and again whether to go on.
+
+    Yields:
+        What is seen; at last of a run that is over, unless `keep_on` refused.
+
+    Raises:
+        ConfigError: If there is no Slurm here.
+        WorkerError: If it does not answer.
+        DatasetError: If the directory cannot be read.
+    """
+    while True:
+        look = run.look()
+        yield look
+        if look.complete or not look.lives or not keep_on():
+            return
+        time.sleep(_POLL_S)
+
+
+def find_cluster_run(named: str | None) -> ClusterRun | None:
+    """The submitted dataset that a command means; None if it means none.
+
+    Args:
+        named: Directory of the dataset, or anything else that names a run; None for the one in the queue
+            that lies below the current directory.
+    """
+    if named is not None:
+        directory = Path(named)
+        return ClusterRun.open(directory.absolute()) if is_submitted(directory) else None
+    here = [each for each in find_queued() if each.directory.is_relative_to(Path.cwd())]
+    return here[0] if len(here) == 1 else None
+
+
+def find_queued() -> list[ClusterRun]:
+    """The submitted datasets of this user that have jobs in the queue, by directory; none where there is no Slurm."""
+    try:
+        directories = sorted(set(slurm.find_directories().values()))
+    except (ConfigError, WorkerError):
+        return []
+    return [ClusterRun.open(path) for path in map(Path, directories) if is_submitted(path)]

@@ -1,0 +1,44 @@
+"""What all collections of a user have in common on a cluster: a file of its own, below the dataset's configuration."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from throwcollect.config.cluster import ClusterConfig
+from throwcollect.config.document import Document
+from throwcollect.config.problems import findings
+from throwcollect.errors import ConfigError
+
+
+def site_path() -> Path:
+    """The file, whether it is there or not."""
+    home = os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config"
+    return Path(home) / "throwcollect" / "cluster.yaml"
+
+
+def with_site(cluster: ClusterConfig) -> ClusterConfig:
+    """The section of a configuration on top of what the site's file says.
+
+    Args:
+        cluster: The section; what it sets itself wins.
+
+    Raises:
+        ConfigError: If the file is wrong.
+    """
+    path = site_path()
+    if not path.is_file():
+        return cluster
+    document = Document(path)
+    try:
+        site = ClusterConfig.model_validate(document.values)
+    except ValidationError as error:
+        raise ConfigError(
+            [document.problem(each.location, each.sentence) for each in findings(error, document.values)]
+        ) from error
+    if document.problems:
+        raise ConfigError(document.problems)
+    own = {name: getattr(cluster, name) for name in cluster.model_fields_set}
+    return site.model_copy(update=own)

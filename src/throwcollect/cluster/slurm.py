@@ -1,0 +1,209 @@
+"""Slurm by its commands: what is submitted, what became of it, and its own words where it refuses."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from throwcollect.errors import ConfigError, WorkerError
+
+MARK = "throwcollect:"
+"""Begins the comment of our jobs; the directory of the dataset follows."""
+
+_PATIENCE_S = 60.0
+_LIVING = frozenset(
+    {"PENDING", "RUNNING", "CONFIGURING", "COMPLETING", "SUSPENDED", "REQUEUED", "REQUEUE_HOLD", "STOPPED"}
+)
+_UNSEEN_OUTPUT = "0:53"
+"""Exit code of a task whose log could not be opened: its node does not see the directory."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """One task of an array, or a job that is none.
+
+    Attributes:
+        index: Its index in the array; None for a job that is no array.
+        state: State of Slurm, such as ``PENDING`` or ``RUNNING``.
+        node: Where it runs or ran; empty if nowhere.
+        reason: Why it waits, or the exit code that it ended with, as Slurm says it.
+    """
+
+    index: int | None
+    state: str
+    node: str
+    reason: str
+
+    @property
+    def lives(self) -> bool:
+        """Whether it runs, or will."""
+        return self.state in _LIVING
+
+    @property
+    def saw_no_directory(self) -> bool:
+        """Whether it ended before its first line, as its node does not see the directory of its log."""
+        return self.state == "FAILED" and self.reason == _UNSEEN_OUTPUT
+
+
+def submit(script: Path, *options: str) -> str:
+    """Submit a batch script.
+
+    Args:
+        script: The script.
+        options: Options of ``sbatch`` besides those in the script.
+
+    Returns:
+        Number of the job.
+
+    Raises:
+        ConfigError: If there is no Slurm here.
+        WorkerError: If Slurm refuses it.
+    """
+    return _run("sbatch", "--parsable", *options, str(script)).strip().partition(";")[0]
+
+
+def check(script: Path) -> None:
+    """Ask Slurm whether it would take a batch script; nothing is submitted.
+
+    Args:
+        script: The script.
+
+    Raises:
+        ConfigError: If there is no Slurm here, or it would refuse the script.
+    """
+    try:
+        _run("sbatch", "--test-only", str(script))
+    except WorkerError as error:
+        raise ConfigError(error.message, hint="the keys of the section cluster become options of the script") from error
+
+
+def find_tasks(job: str) -> tuple[Task, ...]:
+    """The tasks of a job that Slurm remembers: those that live, and those that ended some minutes ago.
+
+    Args:
+        job: Number of the job.
+
+    Raises:
+        ConfigError: If there is no Slurm here.
+        WorkerError: If it does not answer.
+    """
+    # A job that is long forgotten is an error for squeue; all jobs of this user are none.
+    format_ = "%F|%K|%T|%N|%r"
+    lines = _run("squeue", "--noheader", "--array", "--me", "--states=all", f"--format={format_}").splitlines()
+    rows = (line.strip().split("|") for line in lines)
+    found = [Task(_index(index), state, node, reason) for of, index, state, node, reason in rows if of == job]
+    return tuple(found)
+
+
+def find_ended(job: str) -> dict[int | None, Task]:
+    """The tasks of a job that ended, by index: as accounting has them, or as the controller still remembers them.
+
+    Args:
+        job: Number of the job.
+
+    Raises:
+        ConfigError: If there is no Slurm here.
+    """
+    ended: dict[int | None, Task] = {}
+    try:
+        text = _run("scontrol", "--oneliner", "show", "job", job)
+    except WorkerError:
+        text = ""
+    for line in text.splitlines():
+        facts = dict(word.split("=", 1) for word in line.split() if "=" in word)
+        task = Task(
+            _index(facts.get("ArrayTaskId", "")), facts["JobState"], facts.get("NodeList", ""), facts["ExitCode"]
+        )
+        if not task.lives:
+            ended[task.index] = task
+    return ended | _find_accounted(job)
+
+
+def _find_accounted(job: str) -> dict[int | None, Task]:
+    try:
+        text = _run(
+            "sacct", "--noheader", "--parsable2", "-X", f"--jobs={job}", "--format=JobID,State,NodeList,ExitCode"
+        )
+    except (WorkerError, ConfigError):
+        return {}  # accounting is often off
+    found = {}
+    for line in text.splitlines():
+        name, state, node, code = line.split("|")
+        task = Task(_index(name.partition("_")[2]), state.partition(" ")[0], node, code)
+        if not task.lives:
+            found[task.index] = task
+    return found
+
+
+def find_directories() -> dict[str, str]:
+    """Directories of the datasets that jobs of this user in the queue collect, by the job's number.
+
+    Raises:
+        ConfigError: If there is no Slurm here.
+        WorkerError: If it does not answer.
+    """
+    lines = _run("squeue", "--noheader", "--me", "--format=%F|%k").splitlines()
+    rows = (line.strip().partition(f"|{MARK}") for line in lines)
+    return {job: directory for job, mark, directory in rows if mark}
+
+
+def cancel(jobs: Sequence[str]) -> None:
+    """End jobs, or single tasks of arrays as ``JOB_INDEX``; those that have ended are left alone.
+
+    Raises:
+        ConfigError: If there is no Slurm here.
+        WorkerError: If it does not answer.
+    """
+    _run("scancel", "--quiet", *jobs)
+
+
+def find_largest_array() -> int | None:
+    """Largest number of tasks that an array may have; None if Slurm does not say.
+
+    Raises:
+        ConfigError: If there is no Slurm here.
+        WorkerError: If it does not answer.
+    """
+    for line in _run("scontrol", "show", "config").splitlines():
+        name, _, value = line.partition("=")
+        if name.strip() == "MaxArraySize" and value.strip().isdigit():
+            return int(value)
+    return None
+
+
+def _index(text: str) -> int | None:
+    return int(text) if text.isdigit() else None
+
+
+def _run(program: str, *arguments: str) -> str:
+    """What a command of Slurm prints.
+
+    Raises:
+        ConfigError: If there is no such command.
+        WorkerError: If it fails; its own words are the evidence.
+    """
+    try:
+        done = subprocess.run(
+            [program, *arguments],
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            timeout=_PATIENCE_S,
+            check=False,
+            # Its tables and times in one form, whatever the user has set.
+            env={**{k: v for k, v in os.environ.items() if not k.startswith(("SQUEUE_", "SACCT_"))}, "LC_ALL": "C"},
+        )
+    except FileNotFoundError as error:
+        raise ConfigError(
+            f"{program} is not there: this is no machine that submits to Slurm",
+            hint="run this on a login node, or see docs/cluster.md for other schedulers",
+        ) from error
+    except subprocess.TimeoutExpired as error:
+        raise WorkerError(f"{program} has not answered within {_PATIENCE_S:g} s") from error
+    if done.returncode:
+        said = [line for line in done.stderr.splitlines() if line.strip()]
+        raise WorkerError(f"{program} refuses: {'; '.join(said) or f'exit code {done.returncode}'}")
+    return done.stdout

@@ -1,0 +1,106 @@
+"""What was submitted for a dataset: written into its directory, so that any machine that sees it can go on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+
+from pydantic import TypeAdapter, ValidationError
+
+from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.files import read_text, write_file
+from throwcollect.sweep.slice import Slice
+
+CLUSTER = "cluster"
+"""Name of the directory of scripts and logs in that of a dataset."""
+
+_FILE = "submission.json"
+_MOST_BYTES = 10_000_000
+
+
+@dataclass(frozen=True)
+class Job:
+    """An array that was submitted, and the job that joins the slices behind it.
+
+    Attributes:
+        array: Number of the array.
+        join: Number of the joining job.
+        slices: Indexes of the slices that it collects.
+        submitted: When.
+    """
+
+    array: str
+    join: str
+    slices: tuple[int, ...]
+    submitted: datetime
+
+
+@dataclass(frozen=True)
+class Submission:
+    """All that was submitted for a dataset.
+
+    Attributes:
+        name: Name of the collection.
+        tasks: Number of slices.
+        program: Words that stand for the ``throwcollect`` command outside of an image.
+        image: Image that tasks run in; None for none.
+        jobs: In the order in which they were submitted.
+    """
+
+    name: str
+    tasks: int
+    program: tuple[str, ...]
+    image: str | None
+    jobs: tuple[Job, ...] = ()
+
+    @property
+    def slices(self) -> tuple[Slice, ...]:
+        """All slices."""
+        return Slice.all_of(self.tasks)
+
+
+_JSON = TypeAdapter(Submission)
+
+
+def is_submitted(directory: Path) -> bool:
+    """Whether something was submitted for a dataset."""
+    return (directory / CLUSTER / _FILE).is_file()
+
+
+def read_submission(directory: Path) -> Submission:
+    """Read what was submitted for a dataset.
+
+    Raises:
+        ConfigError: If nothing was, or the file is damaged.
+    """
+    path = directory / CLUSTER / _FILE
+    try:
+        return _JSON.validate_json(read_text(path, most_bytes=_MOST_BYTES))
+    except (DatasetError, ValidationError) as error:
+        reason = error.message if isinstance(error, DatasetError) else "it is damaged"
+        raise ConfigError(f"{path}: does not say what was submitted: {reason}") from error
+
+
+def write_submission(directory: Path, submission: Submission) -> None:
+    """Write it, whole or not at all.
+
+    Raises:
+        DatasetError: If it cannot be written.
+    """
+    write_file(directory / CLUSTER / _FILE, _JSON.dump_json(submission, indent=1) + b"\n")
+
+
+def format_indexes(indexes: tuple[int, ...]) -> str:
+    """Indexes as ``sbatch --array`` takes them, such as ``0-4,7``.
+
+    Args:
+        indexes: In ascending order, at least one.
+    """
+    ranges: list[list[int]] = []
+    for index in indexes:
+        if ranges and index == ranges[-1][1] + 1:
+            ranges[-1][1] = index
+        else:
+            ranges.append([index, index])
+    return ",".join(str(first) if first == last else f"{first}-{last}" for first, last in ranges)

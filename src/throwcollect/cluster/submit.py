@@ -1,0 +1,206 @@
+"""Submits a dataset to Slurm: an array of tasks that each collect a slice, and a job that joins the slices."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass, replace
+from datetime import datetime, timezone
+from pathlib import Path
+
+from throwcollect.cluster import slurm
+from throwcollect.cluster.script import BatchScripts
+from throwcollect.cluster.site import with_site
+from throwcollect.cluster.submission import (
+    CLUSTER,
+    Job,
+    Submission,
+    format_indexes,
+    is_submitted,
+    read_submission,
+    write_submission,
+)
+from throwcollect.config.loader import load_locating_errors
+from throwcollect.config.schema import Config
+from throwcollect.coordinator.prepare import prepare
+from throwcollect.coordinator.resume import refuse_changes
+from throwcollect.dataset.directory import CONFIG, METADATA, PLAN, TRIALS
+from throwcollect.dataset.slice_directory import find_finished
+from throwcollect.errors import ConfigError, Problem
+from throwcollect.files import unwritable, write_file
+from throwcollect.runs.slices import check_sliceable, read_frozen_config
+from throwcollect.sweep.plan import Plan
+from throwcollect.sweep.slice import Slice
+from throwcollect.wording import command, format_count
+
+_COLLECT, _JOIN, _LOGS = "collect.sh", "join.sh", "logs"
+Say = Callable[[str], object]
+
+
+@dataclass(frozen=True)
+class Submitted:
+    """What was submitted, or would be.
+
+    Attributes:
+        directory: Directory of the dataset, absolute.
+        script: Text of the script of a task.
+        job: The array and its joining job; None if nothing was submitted.
+    """
+
+    directory: Path
+    script: str
+    job: Job | None = None
+
+
+def submit(
+    config: Path, directory: Path, tasks: int, *, overrides: Sequence[str] = (), dry: bool = False, say: Say
+) -> Submitted:
+    """Plan a dataset and submit it as an array of tasks.
+
+    Args:
+        config: The configuration's file.
+        directory: Directory of the dataset: new or empty, or with the plan of this configuration; all nodes see it.
+        tasks: Number of slices, each of which is a task.
+        overrides: What replaces keys of the configuration, as ``--set`` takes them.
+        dry: Whether only the script is made, and nothing is written.
+        say: Is told what is done.
+
+    Raises:
+        ConfigError: If the configuration cannot be collected so, something is missing that tasks need, or Slurm would
+            refuse them; nothing is left behind then.
+        WorkerError: If Slurm refuses the jobs.
+        DatasetError: If the directory cannot be written.
+    """
+    directory = directory.absolute()
+    if not str(directory).isprintable():
+        raise ConfigError(f"{str(directory)!r}: cannot be named in a batch script", expected="printable characters")
+    with load_locating_errors(config, overrides) as read, ExitStack() as undo:
+        wanted = read.model_copy(update={"cluster": with_site(read.cluster)})
+        check_sliceable(wanted)
+        if wanted.trials is not None:
+            Slice(0, tasks).trials_of(wanted.trials, trials_per_shard=wanted.record.trials_per_shard)
+        scripts = _scripts(wanted, directory)
+        text = scripts.collect(tasks, format_indexes(tuple(range(tasks))))
+        if dry:
+            return Submitted(directory, text)
+        if is_submitted(directory):
+            raise ConfigError(
+                f"{directory}: was submitted already", hint=f"{command('resume', directory)} submits what is missing"
+            )
+        _check_size(tasks)
+        made = not directory.exists()
+        undo.callback(_remove, directory, made=made, planned=not (directory / PLAN).exists())
+        _freeze(wanted, directory, config.parent, say)
+        Plan.read(directory / PLAN, read_frozen_config(directory), slice=Slice(0, tasks))
+        submission = Submission(
+            wanted.name, tasks, tuple(scripts.program), str(scripts.image) if scripts.image else None
+        )
+        submitted = _submit(scripts, submission, tuple(range(tasks)), say)
+        undo.pop_all()
+        return submitted
+
+
+def submit_missing(directory: Path, *, overrides: Sequence[str] = (), say: Say) -> Submitted | None:
+    """Submit the slices of a dataset that are neither finished nor on their way.
+
+    Args:
+        directory: Directory of the dataset.
+        overrides: What replaces keys that say how it is run.
+        say: Is told what is done.
+
+    Returns:
+        What was submitted; None if nothing is missing.
+
+    Raises:
+        ConfigError: If nothing was ever submitted for it, or Slurm would refuse the jobs.
+        WorkerError: If Slurm refuses them.
+        DatasetError: If the directory cannot be read or written.
+    """
+    directory = directory.absolute()
+    submission = read_submission(directory)
+    if (directory / METADATA).exists():
+        return None
+    finished = find_finished(directory)
+    there = {job: slurm.find_tasks(job.array) for job in submission.jobs}
+    living = {task.index for tasks in there.values() for task in tasks if task.lives}
+    missing = tuple(each.index for each in submission.slices if each not in finished and each.index not in living)
+    if not missing and living:
+        return None
+    config = read_frozen_config(directory, overrides)
+    scripts = replace(
+        _scripts(config, directory),
+        program=submission.program,
+        image=None if submission.image is None else Path(submission.image),
+    )
+    return _submit(scripts, submission, missing, say)
+
+
+def _submit(scripts: BatchScripts, submission: Submission, slices: tuple[int, ...], say: Say) -> Submitted:
+    """Write the scripts and submit them; without slices, what is there is joined."""
+    directory = scripts.directory
+    collect, join = (directory / CLUSTER / name for name in (_COLLECT, _JOIN))
+    text = scripts.collect(submission.tasks, format_indexes(slices)) if slices else ""
+    try:
+        scripts.logs.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise unwritable(scripts.logs, error) from error
+    write_file(join, scripts.join().encode())
+    slurm.check(join)
+    array = ""
+    if slices:
+        write_file(collect, text.encode())
+        slurm.check(collect)
+        array = slurm.submit(collect)
+    # After all of them, however they end: what is missing then, it says.
+    after = (f"--dependency=afterany:{array}", "--kill-on-invalid-dep=yes") if array else ()
+    joining = slurm.submit(join, *after)
+    job = Job(array, joining, slices, datetime.now(timezone.utc))
+    write_submission(directory, replace(submission, jobs=(*submission.jobs, job)))
+    if array:
+        say(f"submitted job {array}: {format_count(len(slices), 'task')}; job {joining} joins their slices")
+    else:
+        say(f"submitted job {joining}, which joins the slices; all of them are finished")
+    return Submitted(directory, text, job)
+
+
+def _scripts(config: Config, directory: Path) -> BatchScripts:
+    image = None
+    if config.cluster.image is not None:
+        image = Path(config.cluster.image).absolute()
+        if not image.is_file():
+            raise ConfigError(
+                [Problem(f"there is no image {image}", key="cluster.image")], hint="throwcollect image sif makes one"
+            )
+    return BatchScripts(config, directory, directory / CLUSTER / _LOGS, (sys.executable, "-m", "throwcollect"), image)
+
+
+def _check_size(tasks: int) -> None:
+    largest = slurm.find_largest_array()
+    if largest is not None and tasks >= largest:
+        raise ConfigError(f"--tasks {tasks}: is more than Slurm takes here", expected=f"at most {largest - 1}")
+
+
+def _freeze(config: Config, directory: Path, sweep_directory: Path, say: Say) -> None:
+    """Have the directory hold the plan of the configuration."""
+    if (directory / PLAN).exists():
+        refuse_changes(directory, read_frozen_config(directory), config)
+        say(f"takes the plan in {directory}")
+        return
+    plan = prepare(config, directory, sweep_directory=sweep_directory)
+    refused = sum(trial.refused is not None for trial in plan.trials)
+    note = f", {refused} refused by calculation" if refused else ""
+    say(f"plan: {format_count(len(plan.trials), 'trial')}{note}; dataset: {directory}")
+
+
+def _remove(directory: Path, *, made: bool, planned: bool) -> None:
+    """Remove what a submission that failed has written."""
+    with suppress(OSError):
+        shutil.rmtree(directory / CLUSTER, ignore_errors=True)
+        if planned:
+            for name in (CONFIG, PLAN, TRIALS):
+                (directory / name).unlink(missing_ok=True)
+        if made:
+            os.rmdir(directory)
