@@ -17,29 +17,30 @@ FIGURE = ROOT / "docs" / "architecture.svg"
 
 PLACES: dict[str, tuple[float, int, str]] = {
     "cli": (2.6, 0, "commands, exit codes"),
-    "runs": (0.3, 1, "prepare, follow, stop"),
-    "simulator": (1.5, 1, "throws for Python"),
-    "runtimes": (0.3, 2, "where nodes live"),
-    "replay": (0.3, 3, "throws once more"),
-    "sim": (-0.3, 4, "a node: simulates trials"),
-    "coordinator": (1.1, 4, "a node: leases trials"),
-    "derive": (2.2, 4, "other datasets"),
-    "export": (3.2, 4, "other formats"),
-    "report": (4.2, 4, "a page"),
-    "view": (5.2, 4, "files for viewers"),
-    "engines": (-1.55, 5, "physics"),
-    "ros": (-0.55, 5, "rclpy, two backends"),
-    "trial": (1.1, 5, "leases, conditions"),
-    "dataset": (3.2, 5, "the files"),
-    "sweep": (2.9, 6, "the plan"),
-    "tasks": (2.6, 7, "motion and judging"),
-    "episode": (2.2, 8, "samples ↔ bytes"),
-    "robots": (2.5, 9, "what a robot is"),
-    "ros_installation": (-0.55, 10, "is ROS 2 here?"),
-    "tools": (2.5, 10, "what a tool is"),
-    "control": (3.5, 10, "controller arithmetic"),
-    "config": (1.6, 11, "the shape of a run"),
-    "rclzenoh": (-0.55, 11, "ROS 2 client of its own"),
+    "cluster": (0.3, 1, "Slurm: many machines"),
+    "runs": (0.3, 2, "prepare, follow, stop"),
+    "simulator": (1.5, 2, "throws for Python"),
+    "runtimes": (0.3, 3, "where nodes live"),
+    "replay": (0.3, 4, "throws once more"),
+    "sim": (-0.3, 5, "a node: simulates trials"),
+    "coordinator": (1.1, 5, "a node: leases trials"),
+    "derive": (2.2, 5, "other datasets"),
+    "export": (3.2, 5, "other formats"),
+    "report": (4.2, 5, "a page"),
+    "view": (5.2, 5, "files for viewers"),
+    "engines": (-1.55, 6, "physics"),
+    "ros": (-0.55, 6, "rclpy, two backends"),
+    "trial": (1.1, 6, "leases, conditions"),
+    "dataset": (3.2, 6, "the files"),
+    "sweep": (2.9, 7, "the plan"),
+    "tasks": (2.6, 8, "motion and judging"),
+    "episode": (2.2, 9, "samples ↔ bytes"),
+    "robots": (2.5, 10, "what a robot is"),
+    "ros_installation": (-0.55, 11, "is ROS 2 here?"),
+    "tools": (2.5, 11, "what a tool is"),
+    "control": (3.5, 11, "controller arithmetic"),
+    "config": (1.6, 12, "the shape of a run"),
+    "rclzenoh": (-0.55, 12, "ROS 2 client of its own"),
 }
 """Column, row and words of each room; rooms that are not named here lie below all others, without arrows."""
 DOORS = ("pybullet", "pinocchio", "zenoh", "rclpy", "rosbags", "mcap", "docker", "plotly", "matplotlib", "jinja2")
@@ -47,7 +48,7 @@ DOORS = ("pybullet", "pinocchio", "zenoh", "rclpy", "rosbags", "mcap", "docker",
 
 COLUMN, ROW, WIDTH, HEIGHT = 158, 82, 140, 54
 LEFT, TOP = 330, 44
-TOTAL_WIDTH, GROUND = 1240, TOP + 12 * ROW - 10
+TOTAL_WIDTH, GROUND = 1240, TOP + 13 * ROW - 10
 
 
 def read_imports() -> tuple[dict[str, set[str]], dict[str, set[str]]]:
@@ -135,7 +136,7 @@ def draw() -> str:
             for y, part in ((GROUND + 42, ground[: len(ground) // 2]), (GROUND + 60, ground[len(ground) // 2 :]))
         ),
         _note(0, "An arrow is an import. Those that follow from others are left out:"),
-        _note(1, "cli imports runs, which imports runtimes; so cli may import runtimes, too."),
+        _note(1, "runs import runtimes, which import replay; so runs may import replay, too."),
         _note(2, "In colour: libraries that come in by this room."),
         "</svg>",
     ]
@@ -159,7 +160,7 @@ def _box(x: float, y: float, room: str, words: str, libraries: str) -> list[str]
 
 def _note(line: int, words: str) -> str:
     return (
-        f'<text x="{TOTAL_WIDTH - 20}" y="{TOP + 8 * ROW + 18 * line}" text-anchor="end" fill="#52606d">{words}</text>'
+        f'<text x="{TOTAL_WIDTH - 20}" y="{TOP + 9 * ROW + 18 * line}" text-anchor="end" fill="#52606d">{words}</text>'
     )
 
 

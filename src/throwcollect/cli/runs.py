@@ -70,7 +70,7 @@ def ps(
 
 def wait(run: RunOption = None, json: JsonOption = False) -> None:
     """Show the progress of a run until it ends, and then its summary; Ctrl-C leaves it alone."""
-    if (submitted := _submitted(run)) is not None:
+    if (submitted := _find_submitted(run)) is not None:
         from throwcollect.cli.cluster_runs import follow_to_the_end
 
         follow_to_the_end(submitted.directory, json=json)
@@ -109,7 +109,7 @@ def logs(
 ) -> None:
     """Print what the nodes of a run print, or the tasks of one on a cluster."""
     end_with_reader()
-    if (submitted := _submitted(run)) is not None:
+    if (submitted := _find_submitted(run)) is not None:
         from throwcollect.cli.cluster_runs import print_logs
 
         print_logs(submitted, nodes or [])
@@ -126,7 +126,7 @@ def logs(
 def events(run: RunOption = None, json: JsonOption = False) -> None:
     """Print what happens in a run, from its start until it ends: nodes started, ready, lost and so on."""
     end_with_reader()
-    if (submitted := _submitted(run)) is not None:
+    if (submitted := _find_submitted(run)) is not None:
         from throwcollect.cli.cluster_runs import print_events
 
         print_events(submitted)
@@ -155,7 +155,7 @@ def scale(
 
 def stop(run: RunOption = None) -> None:
     """Finish the running trials of a run, close its files and end it."""
-    if (submitted := _submitted(run)) is not None:
+    if (submitted := _find_submitted(run)) is not None:
         from throwcollect.cli.cluster_runs import end
 
         end(submitted)
@@ -186,7 +186,7 @@ def down(
     run: RunOption = None,
 ) -> None:
     """End everything of a run, by force if need be, and forget it; never removes a directory with a dataset."""
-    if (submitted := _submitted(run)) is not None:
+    if (submitted := _find_submitted(run)) is not None:
         from throwcollect.cli.cluster_runs import end
 
         end(submitted)
@@ -199,7 +199,7 @@ def down(
     typer.echo(f"{ended}: ended and forgotten")
 
 
-def _submitted(run: str | None) -> ClusterRun | None:
+def _find_submitted(run: str | None) -> ClusterRun | None:
     """The submitted dataset that a command means; None if it means a run of this machine."""
     from throwcollect.cluster.following import find_cluster_run
 

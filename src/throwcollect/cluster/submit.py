@@ -139,7 +139,11 @@ def submit_missing(directory: Path, *, overrides: Sequence[str] = (), say: Say) 
 
 
 def _submit(scripts: BatchScripts, submission: Submission, slices: tuple[int, ...], say: Say) -> Submitted:
-    """Write the scripts and submit them; without slices, what is there is joined."""
+    """Write the scripts and submit them; without slices, what is there is joined.
+
+    Raises:
+        DatasetError: If a script cannot be written.
+    """
     directory = scripts.directory
     collect, join = (directory / CLUSTER / name for name in (_COLLECT, _JOIN))
     text = scripts.collect(submission.tasks, format_indexes(slices)) if slices else ""

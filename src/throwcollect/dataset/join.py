@@ -89,7 +89,11 @@ def _join(directory: Path) -> None:
 
 
 def _take(directory: Path, part: Plan, slice: Slice, writer: DatasetWriter) -> None:
-    """Move the recordings of a slice, and have the writer know them."""
+    """Move the recordings of a slice, and have the writer know them.
+
+    Raises:
+        DatasetError: If the slice is not one of this plan, or damaged.
+    """
     place = slice_directory(directory, slice)
     entries = {entry.path: entry for entry in read_manifest(place)}
     if entries.get(PLAN) != entry_of(PLAN, part.encode()):

@@ -125,7 +125,7 @@ def publish(attempt: Path, directory: Path, slice: Slice) -> bool:
     packed = directory / SLICES / f"{attempt.name}-packed"
     try:
         packed.mkdir(parents=True, exist_ok=True)
-        for name in _published_names(attempt):
+        for name in _names_to_publish(attempt):
             _move(attempt / name, packed / name)
         try:
             packed.rename(place)
@@ -141,7 +141,7 @@ def publish(attempt: Path, directory: Path, slice: Slice) -> bool:
     return first
 
 
-def _published_names(attempt: Path) -> Iterator[str]:
+def _names_to_publish(attempt: Path) -> Iterator[str]:
     yield from (name for name in _list(attempt) if name.endswith(SHARD_SUFFIX))
     yield from (THROWS, MANIFEST)
 

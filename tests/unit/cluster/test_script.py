@@ -1,0 +1,161 @@
+"""Batch scripts: what Slurm and the shell read of them is what the configuration says."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from throwcollect.cluster.script import BatchScripts
+from throwcollect.config.cluster import ClusterConfig
+from throwcollect.config.schema import Config
+
+
+def scripts(directory: Path, *, image: Path | None = None, **cluster: Any) -> BatchScripts:
+    config = Config.model_validate({"name": "many", "cluster": cluster})
+    return BatchScripts(config, directory, directory / "cluster" / "logs", ("throwcollect",), image)
+
+
+def options(script: str) -> dict[str, str]:
+    """Options of a script, as sbatch reads them: by the rules of a shell."""
+    found = {}
+    for line in script.splitlines():
+        if line.startswith("#SBATCH "):
+            (word,) = shlex.split(line.removeprefix("#SBATCH "))
+            name, _, value = word.removeprefix("--").partition("=")
+            found[name] = value
+    return found
+
+
+def run(script: str, directory: Path, **programs: str) -> subprocess.CompletedProcess[str]:
+    """Run a script in which commands are replaced by others."""
+    for name in ("srun", "scontrol", "module"):
+        path = directory / "bin" / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(f"#!/bin/bash\n{programs.get(name, 'true')}\n")
+        path.chmod(0o755)
+    environment = {"PATH": f"{directory / 'bin'}:/usr/bin:/bin", "SLURM_ARRAY_TASK_ID": "3", "SLURM_JOB_ID": "77"}
+    environment |= {name: value for name, value in programs.items() if name.isupper()}
+    path = directory / "script.sh"
+    path.write_text(script)
+    return subprocess.run(["bash", path], capture_output=True, text=True, check=False, env=environment)
+
+
+@pytest.fixture(params=["data", "with blank", "50 %", 'it\'s "quoted"', "$HOME", "a#b"])
+def directory(tmp_path: Path, request: pytest.FixtureRequest) -> Path:
+    """A directory with a plan, under a name that a shell may stumble over."""
+    path = tmp_path / str(request.param)
+    path.mkdir()
+    (path / "plan.parquet").touch()
+    return path
+
+
+def test_options_follow_from_the_configuration(tmp_path: Path) -> None:
+    script = scripts(
+        tmp_path, partition="long", account="robots", qos="low", constraint="avx2", time="4:00:00", memory="8G",
+        cores=4, at_once=20, requeue=0,
+    ).collect(100, "0-99")  # fmt: skip
+    found = options(script)
+    assert found["array"] == "0-99%20"
+    assert found["cpus-per-task"] == "4"
+    assert {found[name] for name in ("partition", "account", "qos", "constraint")} == {"long", "robots", "low", "avx2"}
+    assert (found["time"], found["mem"]) == ("4:00:00", "8G")
+    assert "no-requeue" in found
+    assert "scontrol" not in script
+
+
+def test_what_the_configuration_leaves_out_is_left_to_the_scheduler(tmp_path: Path) -> None:
+    found = options(scripts(tmp_path).collect(8, "0-7"))
+    assert not found.keys() & {"partition", "account", "qos", "constraint", "time", "mem"}
+    assert found["array"] == "0-7"
+    assert "requeue" in found
+
+
+def test_logs_and_comment_name_the_directory_whatever_it_is_called(directory: Path) -> None:
+    found = options(scripts(directory).collect(8, "0-7"))
+    assert found["output"].replace("%%", "%").replace("%A_%a", "") == f"{directory}/cluster/logs/.log"
+    assert found["comment"] == f"throwcollect:{directory}"
+
+
+def test_a_task_collects_its_slice(directory: Path, tmp_path: Path) -> None:
+    done = run(scripts(directory, cores=4).collect(8, "0-7"), tmp_path, srun='printf "%s\\n" "$@"')
+    words = done.stdout.splitlines()
+    assert done.returncode == 0, done.stderr
+    assert words[:4] == ["--ntasks=1", "--cpus-per-task=4", "throwcollect", "up"]
+    assert words[words.index("--slice") + 1] == "3/8"
+    assert words[words.index("--output") + 1] == str(directory)
+    assert words[words.index("-n") + 1] == "4"
+
+
+def test_in_an_image_it_sees_its_directories_and_no_variables_of_the_host(tmp_path: Path) -> None:
+    (tmp_path / "plan.parquet").touch()
+    made = scripts(tmp_path, image=Path("/images/t.sif"), binds=["/data:/inside:ro"], scratch="$SCRATCH/mine")
+    done = run(made.collect(8, "0-7"), tmp_path, srun='printf "%s\\n" "$@"', SCRATCH="/local")
+    words = done.stdout.splitlines()
+    assert words[2:5] == ["apptainer", "--quiet", "exec"]
+    assert "--cleanenv" in words
+    binds = [word.removeprefix("--bind=") for word in words if word.startswith("--bind=")]
+    assert binds == [str(tmp_path), "/data:/inside:ro", "/local/mine"]
+    assert words[words.index("/images/t.sif") + 1] == "throwcollect"
+    assert words[-2:] == ["--set", "cluster.scratch=/local/mine"]
+
+
+def test_lines_and_modules_of_the_site_come_before_the_task(tmp_path: Path) -> None:
+    (tmp_path / "plan.parquet").touch()
+    made = scripts(tmp_path, lines=["#SBATCH --gres=tmp:10G", "export SITE=here"], modules=["apptainer/1.4"])
+    script = made.collect(8, "0-7")
+    assert options(script)["gres"] == "tmp:10G"
+    done = run(script, tmp_path, module='echo "module $*"', srun='echo "SITE=$SITE"')
+    assert done.stdout.splitlines() == ["module load apptainer/1.4", "SITE=here"]
+
+
+def test_a_node_that_does_not_see_the_directory_says_so_and_runs_nothing(tmp_path: Path) -> None:
+    done = run(scripts(tmp_path / "nowhere").collect(8, "0-7"), tmp_path, srun="echo ran")
+    assert done.returncode == 2
+    assert re.search(r"does not see .*nowhere/plan.parquet: is it on a file system that all nodes share\?", done.stderr)
+    assert not done.stdout
+
+
+@pytest.mark.parametrize(
+    ("code", "restarts", "queued"), [(130, 0, True), (130, 10, False), (3, 0, False), (0, 0, False)]
+)
+def test_a_task_that_was_stopped_in_order_is_queued_again(
+    tmp_path: Path, code: int, restarts: int, queued: bool
+) -> None:
+    (tmp_path / "plan.parquet").touch()
+    done = run(
+        scripts(tmp_path).collect(8, "0-7"),
+        tmp_path,
+        srun=f"exit {code}",
+        scontrol='echo "$@"',
+        SLURM_RESTART_COUNT=str(restarts),
+    )
+    assert done.stdout == ("requeue 77\n" if queued else "")
+    assert done.returncode == code
+
+
+def test_the_joining_job_joins(directory: Path, tmp_path: Path) -> None:
+    done = run(scripts(directory).join(), tmp_path, srun='printf "%s\\n" "$@"')
+    assert done.stdout.splitlines()[2:] == ["throwcollect", "join", str(directory)]
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("time", "soon"),
+        ("memory", "8 GB"),
+        ("partition", "a b"),
+        ("lines", ["one\ntwo"]),
+        ("binds", ["relative:/inside"]),
+        ("scratch", "$(rm -rf /)"),
+        ("scratch", "tmp"),
+        ("cores", 0),
+    ],
+)
+def test_what_a_script_could_not_hold_is_refused(key: str, value: object) -> None:
+    with pytest.raises(ValueError, match=key):
+        ClusterConfig.model_validate({key: value})
