@@ -55,15 +55,15 @@ def test_forbidden_words_are_not_used() -> None:
 
 def test_the_rule_sees_what_it_should() -> None:
     words = read_forbidden()
-    assert {"job", "worker", "settings file"} < set(words)
+    assert {"ticket", "worker", "settings file"} < set(words)
     assert not {"goal", "frame", "session", "trial"} & set(words)
     code = """
 from queue import SimpleQueue  # a name of another package
-class JobList:
-    'Waiting jobs.'
-def run(next_job, jobbing):
-    raise ValueError(f"no agent")  # the Scheduler ended it
+class TicketList:
+    'Waiting tickets.'
+def run(next_ticket, ticketing):
+    raise ValueError(f"no agent")  # the Broker ended it
 """
     found = {offence.rpartition(": ")[2] for offence in offences(code, words)}
-    assert found == {"Job", "jobs", "job", "agent", "Scheduler"}
+    assert found == {"Ticket", "tickets", "ticket", "agent", "Broker"}
     assert list(offences("class WorkerError: ...", words)) == []
