@@ -11,7 +11,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from throwcollect.cli.options import DEFAULT_CONFIG, DatasetArgument, JsonOption, SetOption, TrialsOption, overrides
+from throwcollect.cli.options import (
+    DEFAULT_CONFIG,
+    DatasetArgument,
+    JsonOption,
+    SetOption,
+    TrialsOption,
+    count_cores,
+    overrides,
+)
 from throwcollect.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -69,7 +77,7 @@ def up(
     elif resume is None:
         _collect(
             lambda runs, shown: runs.prepare(
-                config or DEFAULT_CONFIG, overrides=changes, output=output, onlooker=shown
+                config or DEFAULT_CONFIG, overrides=changes, output=output, processes=count_cores(), onlooker=shown
             ),
             detach=detach,
             json=json,

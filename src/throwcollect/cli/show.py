@@ -9,7 +9,15 @@ from typing import Annotated
 
 import typer
 
-from throwcollect.cli.options import DEFAULT_CONFIG, ConfigArgument, JsonOption, SetOption, TrialsOption, overrides
+from throwcollect.cli.options import (
+    DEFAULT_CONFIG,
+    ConfigArgument,
+    JsonOption,
+    SetOption,
+    TrialsOption,
+    count_cores,
+    overrides,
+)
 from throwcollect.cli.streams import end_with_reader
 from throwcollect.wording import format_count
 
@@ -50,9 +58,9 @@ def plan(
     end_with_reader()
     with load_locating_errors(path, overrides(settings, trials=trials)) as config:
         if output is None:
-            found = draw_plan(config, directory=path.parent)
+            found = draw_plan(config, directory=path.parent, processes=count_cores())
         else:
-            found = prepare(config, output, sweep_directory=path.parent)
+            found = prepare(config, output, sweep_directory=path.parent, processes=count_cores())
     if json:
         rows = [
             {

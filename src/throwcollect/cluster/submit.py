@@ -193,7 +193,8 @@ def _freeze(config: Config, directory: Path, sweep_directory: Path, say: Say) ->
         refuse_changes(directory, read_frozen_config(directory), config)
         say(f"takes the plan in {directory}")
         return
-    plan = prepare(config, directory, sweep_directory=sweep_directory)
+    processes = len(os.sched_getaffinity(0))
+    plan = prepare(config, directory, sweep_directory=sweep_directory, processes=processes)
     refused = sum(trial.refused is not None for trial in plan.trials)
     note = f", {refused} refused by calculation" if refused else ""
     say(f"plan: {format_count(len(plan.trials), 'trial')}{note}; dataset: {directory}")

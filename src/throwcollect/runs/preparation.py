@@ -135,6 +135,7 @@ class Request:
         directory: Directory of the dataset.
         started: When.
         resumed: Whether the directory holds a dataset, with which the run goes on.
+        processes: How many processes may check the trials of a large plan.
     """
 
     config: Config
@@ -142,6 +143,7 @@ class Request:
     directory: Path
     started: datetime
     resumed: bool
+    processes: int = 1
 
 
 def prepare(
@@ -149,6 +151,7 @@ def prepare(
     *,
     overrides: Sequence[str] = (),
     output: str | os.PathLike[str] | None = None,
+    processes: int = 1,
     onlooker: Onlooker = SILENT,
 ) -> PreparedRun:
     """Prepare a collection into a new dataset.
@@ -157,6 +160,8 @@ def prepare(
         config: The configuration's file.
         overrides: What replaces keys of it: ``key=value`` pairs, as ``--set`` takes them.
         output: Directory of the dataset, new or empty; None for one that is named after the configuration.
+        processes: How many processes may check the trials of a large plan; more than one import the program that calls
+            this, as those of `multiprocessing` do.
         onlooker: Is told what goes on.
 
     Raises:
@@ -170,7 +175,7 @@ def prepare(
         records = Records()
         if (run := _take_over(records, directory, read, onlooker)) is not None:
             return run
-        request = Request(read, Path(config).parent, directory, started, resumed=False)
+        request = Request(read, Path(config).parent, directory, started, resumed=False, processes=processes)
         return prepare_run(records, request, None, onlooker)
 
 
@@ -280,8 +285,10 @@ def prepare_run(records: Records, request: Request, plan: Plan | None, onlooker:
         made = not directory.exists()
         if plan is None:
             if (config.trials or 0) >= _MANY_TRIALS and not config.grows:
-                onlooker.say(f"plan: checking {config.trials} trials against limits and collisions, about 5 ms each")
-            plan = prepare_plan(config, directory, sweep_directory=request.sweep_directory)
+                onlooker.say(
+                    f"plan: checking {config.trials} trials against limits and collisions, about 5 ms each and core"
+                )
+            plan = prepare_plan(config, directory, sweep_directory=request.sweep_directory, processes=request.processes)
         held.enter_context(hold_together(directory))
         if not request.resumed:
             undo.callback(_remove_plan, directory, made=made)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -98,6 +98,19 @@ class Plan:
         """Configuration of one trial."""
         return with_values(self.config, trial.values)
 
+    def refuse(self, reasons: Sequence[str | None]) -> Plan:
+        """This plan with trials refused.
+
+        Args:
+            reasons: Why each trial is not run, in order; None for those that are.
+
+        Raises:
+            PlanError: If every trial is refused.
+        """
+        _check_some_left([reason for reason in reasons if reason is not None], len(self.trials))
+        pairs = zip(self.trials, reasons, strict=True)
+        return replace(self, trials=tuple(replace(trial, refused=reason) for trial, reason in pairs))
+
     def write(self, path: Path) -> None:
         """Write the plan as a Parquet file, whole or not at all.
 
@@ -190,9 +203,7 @@ def make_plan(config: Config, *, check: Check | None = None, directory: Path | N
     if config.grows:
         points = points.first(FIRST_TRIALS)
     trials = tuple(make_trials(config, points, check=check))
-    if reasons := [trial.refused for trial in trials if trial.refused is not None]:
-        _check_some_left(reasons, len(trials))
-    return Plan(config, trials)
+    return Plan(config, trials).refuse([trial.refused for trial in trials])
 
 
 def make_trials(config: Config, points: Points, *, check: Check | None = None, first: int = 0) -> Iterator[Trial]:
