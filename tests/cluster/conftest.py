@@ -1,0 +1,50 @@
+import os
+import pwd
+import shutil
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.cluster.slurm import Slurm
+
+UNAVAILABLE = Path(__file__).parents[2] / "build" / "cluster-unavailable"
+USER = "throwcollect-ci"
+"""Whose jobs are run: nobody who may do more than others."""
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _cluster() -> None:
+    """Nothing here is tested where there is no cluster."""
+    # Where continuous integration has tried to install one, it says why it could not.
+    if UNAVAILABLE.exists():
+        pytest.skip(UNAVAILABLE.read_text().strip())
+    path = f"{os.environ.get('PATH', '')}:/usr/sbin:/sbin"
+    missing = [name for name in ("apptainer", "slurmctld", "munged") if shutil.which(name, path=path) is None]
+    if missing:
+        pytest.skip(f"not installed: {', '.join(missing)}; .ci/cluster.sh installs it on Debian")
+    if os.getuid() != 0:
+        pytest.skip("only root can start a Slurm of several nodes")
+    if not any(each.pw_name == USER for each in pwd.getpwall()):
+        pytest.skip(f"there is no user {USER}; .ci/cluster.sh makes one")
+
+
+@pytest.fixture
+def shared() -> Iterator[Path]:
+    """A directory that all nodes see, and that belongs to the user of the jobs."""
+    with tempfile.TemporaryDirectory(prefix="throwcollect-shared-") as path:
+        shutil.chown(path, USER, USER)
+        yield Path(path)
+
+
+@pytest.fixture(scope="session")
+def slurm() -> Iterator[Slurm]:
+    """A Slurm of three nodes."""
+    with tempfile.TemporaryDirectory(prefix="throwcollect-slurm-") as path:
+        started = Slurm(Path(path))
+        try:
+            started.up()
+            yield started
+        finally:
+            started.down()
