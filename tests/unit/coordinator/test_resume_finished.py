@@ -106,6 +106,17 @@ def test_a_finished_dataset_stays_as_it_is(trials: Trials, dataset: Path) -> Non
     ("damage", "check", "kept"),
     [(deleted, False, {0, 1}), (cut, False, {0, 1, 2, 3}), (flipped, True, {0, 1, 2})],
 )
+def test_the_configuration_of_an_earlier_version_stays_as_it_is(trials: Trials, promised: Path) -> None:
+    """It has fewer keys than it would have now; what says its size and hash is the manifest."""
+    path = promised / "config.yaml"
+    earlier = path.read_text()[: path.read_text().index("cluster:")]
+    path.write_text(earlier)
+    entries = [entry_of_file(promised / name) for name in list_promised_names(promised)]
+    (promised / "datapackage.json").write_text(manifest_text("quick", entries))
+    assert trials.go_on(promised) == (None, [])
+    assert path.read_text() == earlier
+
+
 def test_a_damaged_recording_is_gone_on_with_to_the_same_bytes(
     trials: Trials, sound: Path, dataset: Path, damage: Callable[[Path], None], check: bool, kept: set[int]
 ) -> None:
