@@ -108,7 +108,7 @@ class ClusterRun:
         reasons = [self._reason(each, ended.get(each.index)) for each in missing[:_MOST_NAMED]]
         more = f" and {len(missing) - _MOST_NAMED} more" if len(missing) > _MOST_NAMED else ""
         message = f"{format_count(len(missing), 'slice')} of {self.submission.tasks} not collected: "
-        if all(each.index in ended and ended[each.index].state == "CANCELLED" for each in missing):
+        if all(self._is_cancelled(each, ended.get(each.index)) for each in missing):
             return Interrupted(f"{message}cancelled", hint=f"{again} submits what is missing")
         return WorkerError(f"{message}{join_names(reasons)}{more}", hint=f"{again} submits what is missing")
 
@@ -117,6 +117,10 @@ class ClusterRun:
         logs = self.directory / CLUSTER / "logs"
         found = [path for job in self.submission.jobs if (path := logs / f"{job.array}_{index}.log").exists()]
         return found[-1] if found else None
+
+    def _is_cancelled(self, slice: Slice, task: Task | None) -> bool:
+        # Slurm forgets tasks that were cancelled before they began.
+        return self.log(slice.index) is None if task is None else task.state == "CANCELLED"
 
     def _reason(self, slice: Slice, task: Task | None) -> str:
         if task is None:

@@ -114,11 +114,10 @@ def find_ended(job: str) -> dict[int | None, Task]:
         text = ""
     for line in text.splitlines():
         facts = dict(word.split("=", 1) for word in line.split() if "=" in word)
-        task = Task(
-            _index(facts.get("ArrayTaskId", "")), facts["JobState"], facts.get("NodeList", ""), facts["ExitCode"]
-        )
-        if not task.lives:
-            ended[task.index] = task
+        for index in _indexes(facts.get("ArrayTaskId", "")):
+            task = Task(index, facts["JobState"], facts.get("NodeList", ""), facts["ExitCode"])
+            if not task.lives:
+                ended[index] = task
     return ended | _find_accounted(job)
 
 
@@ -172,6 +171,16 @@ def find_largest_array() -> int | None:
         if name.strip() == "MaxArraySize" and value.strip().isdigit():
             return int(value)
     return None
+
+
+def _indexes(text: str) -> list[int | None]:
+    """The indexes of array tasks, which may be those of several: ``4``, ``4-7%2``, ``1,4-7``; one job has none."""
+    found: list[int | None] = []
+    for part in text.partition("%")[0].split(","):
+        first, _, last = part.partition("-")
+        if first.isdigit():
+            found += range(int(first), int(last if last.isdigit() else first) + 1)
+    return found or [None]
 
 
 def _index(text: str) -> int | None:

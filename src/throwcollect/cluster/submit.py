@@ -12,6 +12,7 @@ from datetime import datetime, timezone
 from pathlib import Path
 
 from throwcollect.cluster import slurm
+from throwcollect.cluster.following import ClusterRun
 from throwcollect.cluster.script import BatchScripts
 from throwcollect.cluster.site import with_site
 from throwcollect.cluster.submission import (
@@ -27,8 +28,7 @@ from throwcollect.config.loader import load_locating_errors
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.prepare import prepare
 from throwcollect.coordinator.resume import refuse_changes
-from throwcollect.dataset.directory import CONFIG, METADATA, PLAN, TRIALS
-from throwcollect.dataset.slice_directory import find_finished
+from throwcollect.dataset.directory import CONFIG, PLAN, TRIALS
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.files import unwritable, write_file
 from throwcollect.runs.slices import check_sliceable, read_frozen_config
@@ -121,13 +121,12 @@ def submit_missing(directory: Path, *, overrides: Sequence[str] = (), say: Say) 
     """
     directory = directory.absolute()
     submission = read_submission(directory)
-    if (directory / METADATA).exists():
+    look = ClusterRun(directory, submission).look()
+    if look.complete:
         return None
-    finished = find_finished(directory)
-    there = {job: slurm.find_tasks(job.array) for job in submission.jobs}
-    living = {task.index for tasks in there.values() for task in tasks if task.lives}
-    missing = tuple(each.index for each in submission.slices if each not in finished and each.index not in living)
-    if not missing and living:
+    living = {task.index for task in look.tasks if task.lives}
+    missing = tuple(each.index for each in submission.slices if each not in look.finished and each.index not in living)
+    if not missing and look.lives:
         return None
     config = read_frozen_config(directory, overrides)
     scripts = replace(

@@ -5,9 +5,14 @@ from __future__ import annotations
 import re
 from typing import Annotated
 
-from pydantic import AfterValidator, Field, PositiveInt, WithJsonSchema
+from pydantic import AfterValidator, BeforeValidator, Field, PositiveInt, WithJsonSchema
 
 from throwcollect.config.section import Section
+
+
+def _minutes(value: object) -> object:
+    """A number of minutes, as YAML has it, as text."""
+    return str(value) if type(value) is int else value
 
 
 def _time(text: str) -> str:
@@ -50,7 +55,7 @@ def _in_words(words: str) -> WithJsonSchema:
     return WithJsonSchema({"type": "string", "words": words})
 
 
-Time = Annotated[str, AfterValidator(_time), _in_words("a time such as 4:00:00")]
+Time = Annotated[str, BeforeValidator(_minutes), AfterValidator(_time), _in_words("a time such as 4:00:00")]
 Memory = Annotated[str, AfterValidator(_memory), _in_words("a size such as 4G")]
 Word = Annotated[str, AfterValidator(_word), _in_words("one word")]
 Line = Annotated[str, AfterValidator(_line)]

@@ -102,6 +102,17 @@ def test_a_finished_dataset_stays_as_it_is(trials: Trials, dataset: Path) -> Non
     assert {path: path.stat().st_mtime_ns for path in dataset.rglob("*")} == before
 
 
+def test_the_configuration_of_an_earlier_version_stays_as_it_is(trials: Trials, promised: Path) -> None:
+    """It has fewer keys than it would have now; what says its size and hash is the manifest."""
+    path = promised / "config.yaml"
+    earlier = path.read_text()[: path.read_text().index("cluster:")]
+    path.write_text(earlier)
+    entries = [entry_of_file(promised / name) for name in list_promised_names(promised)]
+    (promised / "datapackage.json").write_text(manifest_text("quick", entries))
+    assert trials.go_on(promised) == (None, [])
+    assert path.read_text() == earlier
+
+
 @pytest.mark.parametrize(
     ("damage", "check", "kept"),
     [(deleted, False, {0, 1}), (cut, False, {0, 1, 2, 3}), (flipped, True, {0, 1, 2})],

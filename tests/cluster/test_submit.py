@@ -1,0 +1,189 @@
+"""Datasets collected by arrays of Slurm: the same bytes as by one `up`, whatever happens to tasks and nodes."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tests.cluster.slurm import Slurm
+from tests.e2e.collection import CONFIG, FAST, fingerprints, write_config
+from throwcollect import runs
+
+pytestmark = pytest.mark.cluster
+SLICED = CONFIG + "record: {{trials_per_shard: {per_shard}}}\n"
+TASKS = 6
+
+
+def call(slurm: Slurm, *arguments: str | Path, expect: int = 0, **environment: str) -> str:
+    """Call throwcollect where Slurm is; returns what it prints on both streams."""
+    done = subprocess.run(
+        [sys.executable, "-m", "throwcollect", *map(str, arguments)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        check=False,
+        timeout=240,
+        env={**os.environ, **slurm.environment, **environment},
+    )
+    assert done.returncode == expect, done.stdout
+    return done.stdout
+
+
+def configure(directory: Path, *, trials: int, sim: str = "") -> Path:
+    text = SLICED.replace("{per_shard}", str(trials // (2 * TASKS)))
+    return write_config(directory, trials=trials, text=text, sim=sim)
+
+
+def collect_whole(config: Path, directory: Path) -> dict[str, str]:
+    """What one collection makes of a configuration."""
+    with runs.prepare(config, overrides=["run.runtime=local"], output=directory) as run:
+        run.collect()
+    return fingerprints(directory)
+
+
+def submit(slurm: Slurm, config: Path, directory: Path, *settings: str) -> str:
+    """Submit a dataset; returns the number of the array."""
+    options = [word for setting in ("cluster.memory=1G", *settings) for word in ("--set", setting)]
+    said = call(slurm, "submit", config, "--output", directory, "--tasks", str(TASKS), "--json", *options)
+    return str(json.loads(said[said.index("{") :])["array"])
+
+
+def states(slurm: Slurm, array: str) -> dict[str, tuple[str, str]]:
+    """State and node of each task of an array, by its index."""
+    lines = slurm.run("squeue", "--noheader", "--array", "--states=all", f"--jobs={array}", "--format=%K|%T|%N")
+    return {index: (state, node) for index, state, node in (line.strip().split("|") for line in lines.splitlines())}
+
+
+def wait_until(condition: Callable[[], bool], *, seconds: float = 60) -> None:
+    deadline = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.2)
+
+
+@pytest.fixture(scope="module")
+def short(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str]]:
+    """A configuration of few trials, and the files that it makes."""
+    directory = tmp_path_factory.mktemp("short")
+    config = configure(directory, trials=24, sim=FAST)
+    return config, collect_whole(config, directory / "whole")
+
+
+def test_an_array_makes_the_files_of_one_collection(
+    slurm: Slurm, short: tuple[Path, dict[str, str]], tmp_path: Path
+) -> None:
+    config, whole = short
+    data = tmp_path / "with blank" / "data"
+    said = call(slurm, "submit", config, "--output", data, "--tasks", "6", "--wait", "--set", "cluster.memory=1G")
+    assert "6 tasks" in said
+    assert fingerprints(data) == whole
+    assert "digest" in call(slurm, "wait", "--run", data)
+    assert "nothing is left to submit" in call(slurm, "resume", data)
+
+
+def test_what_was_cancelled_is_submitted_again_and_nothing_else(
+    slurm: Slurm, short: tuple[Path, dict[str, str]], tmp_path: Path
+) -> None:
+    config, whole = short
+    data = tmp_path / "data"
+    array = submit(slurm, config, data, "cluster.at_once=2")
+    slurm.run("scancel", f"{array}_4", f"{array}_5")
+    said = call(slurm, "wait", "--run", data, expect=130)
+    assert "2 slices of 6 not collected: cancelled" in said
+    assert "0 | slice 0/6: trials 0 to 3" in call(slurm, "logs", "0", "--run", data)
+    assert "2 tasks" in call(slurm, "resume", data)
+    call(slurm, "wait", "--run", data)
+    assert fingerprints(data) == whole
+
+
+def test_a_run_is_listed_and_can_be_stopped(slurm: Slurm, tmp_path: Path) -> None:
+    config = configure(tmp_path, trials=1200)
+    data = tmp_path / "data"
+    array = submit(slurm, config, data)
+    wait_until(lambda: any(state == "RUNNING" for state, _ in states(slurm, array).values()))
+    (listed,) = [run for run in json.loads(call(slurm, "ps", "--json")) if run.get("directory") == str(data)]
+    assert (listed["run"], listed["tasks"]) == (array, TASKS)
+    assert "not complete" in call(slurm, "stop", "--run", data)
+    assert not any(state in ("PENDING", "RUNNING") for state, _ in states(slurm, array).values())
+
+
+def test_nothing_is_lost_when_nodes_die_and_tasks_are_preempted(slurm: Slurm, tmp_path: Path) -> None:
+    config = configure(tmp_path, trials=600)
+    whole = collect_whole(config, tmp_path / "whole")
+    data = tmp_path / "data"
+    array = submit(slurm, config, data, "cluster.partition=low")
+    wait_until(lambda: len({node for state, node in states(slurm, array).values() if state == "RUNNING"}) == 3)
+    wait_until(lambda: any((data / "slices").glob("*/*.part")))
+    dead, silent, wanted = slurm.nodes
+    slurm.kill_node(dead)
+    slurm.kill_slurmd(silent)
+    urgent = slurm.run(
+        "sbatch", "--parsable", "--partition=main", f"--nodelist={wanted}", "--cpus-per-task=2", "--wrap=sleep 5"
+    ).strip()
+    wait_until(lambda: slurm.state(silent).startswith("down"), seconds=90)
+    slurm.revive(silent)
+    slurm.revive(dead)
+    wait_until(lambda: not slurm.run("squeue", "--noheader", f"--jobs={urgent}").strip())
+    for index, (state, _) in states(slurm, array).items():
+        if state == "PENDING":
+            slurm.restart_at_once(f"{array}_{index}")
+    call(slurm, "wait", "--run", data)
+    assert fingerprints(data) == whole
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        (["cluster.partition=nowhere"], "invalid partition specified"),
+        (["cluster.image=/nowhere.sif"], "cluster.image: there is no image /nowhere.sif"),
+        (["until.landed=3"], "until: a plan that grows with its results"),
+        (["record.trials_per_shard=24"], "24 trials are 1 shard of 24, which cannot be 6 slices"),
+        (["cluster.time=soon"], "cluster.time: should be minutes"),
+    ],
+)
+def test_what_cannot_be_submitted_leaves_nothing_behind(
+    slurm: Slurm, short: tuple[Path, dict[str, str]], tmp_path: Path, settings: list[str], message: str
+) -> None:
+    data = tmp_path / "data"
+    options = [word for setting in settings for word in ("--set", setting)]
+    assert message in call(slurm, "submit", short[0], "--output", data, "--tasks", "6", *options, expect=2)
+    assert not data.exists()
+    assert not slurm.run("squeue", "--noheader", "--format=%k").count(str(data))
+
+
+def test_more_tasks_than_slurm_takes_are_refused(slurm: Slurm, tmp_path: Path) -> None:
+    config = configure(tmp_path, trials=24, sim=FAST)
+    said = call(
+        slurm, "submit", config, "--output", tmp_path / "data", "--tasks", "20000", "--trials", "20000",
+        "--set", "record.trials_per_shard=1", expect=2,
+    )  # fmt: skip
+    assert "--tasks 20000: is more than Slurm takes here" in said
+
+
+def test_the_site_says_what_all_its_datasets_have_in_common(
+    slurm: Slurm, short: tuple[Path, dict[str, str]], tmp_path: Path
+) -> None:
+    site = tmp_path / "throwcollect" / "cluster.yaml"
+    site.parent.mkdir()
+    site.write_text("partition: low\ntime: 30\n")
+    arguments = ("submit", short[0], "--output", tmp_path / "data", "--tasks", "6", "--dry-run", "--set")
+    said = call(slurm, *arguments, "cluster.time=10", XDG_CONFIG_HOME=str(tmp_path))
+    assert "#SBATCH --partition=low" in said
+    assert "#SBATCH --time=10" in said
+    site.write_text("partition: low\ntiem: 30\n")
+    said = call(slurm, *arguments, "cluster.time=10", expect=2, XDG_CONFIG_HOME=str(tmp_path))
+    assert "cluster.yaml:2: tiem: unknown key" in said
+
+
+def test_where_there_is_no_slurm_it_says_so(short: tuple[Path, dict[str, str]], slurm: Slurm, tmp_path: Path) -> None:
+    data = tmp_path / "data"
+    said = call(slurm, "submit", short[0], "--output", data, "--tasks", "6", expect=2, PATH="/nowhere")
+    assert "this is no machine that submits to Slurm" in said
+    assert not data.exists()

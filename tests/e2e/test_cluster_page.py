@@ -1,0 +1,23 @@
+"""What docs/cluster.md says of other schedulers is what happens."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+from tests.e2e.collection import CONFIG, FAST, INPROCESS, collect, fingerprints, write_config
+
+PAGE = Path(__file__).parents[2] / "docs" / "cluster.md"
+
+
+def test_a_loop_is_a_scheduler(tmp_path: Path) -> None:
+    (script,) = re.findall(r"```sh\n(.*?)```", PAGE.read_text(encoding="utf-8"), flags=re.DOTALL)
+    text = CONFIG.replace("local", "inprocess") + "record: {{trials_per_shard: 2}}\n"
+    config = write_config(tmp_path, trials=10, text=text, sim=FAST).rename(tmp_path / "throws.yaml")
+    environment = {**os.environ, "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"}
+    subprocess.run(["sh", "-e", "-c", script], cwd=tmp_path, check=True, env=environment)
+    collect(config, tmp_path / "whole", 1, *INPROCESS)
+    assert fingerprints(tmp_path / "data") == fingerprints(tmp_path / "whole")
