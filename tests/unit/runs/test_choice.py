@@ -67,7 +67,9 @@ def test_without_an_engine_auto_takes_processes_and_says_why(choose, no_engine, 
     )
 
 
-def test_without_a_client_of_an_engine_auto_takes_processes_and_says_why(choose, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_a_client_of_an_engine_auto_takes_processes_and_says_why(
+    choose, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def import_client(**_: object) -> None:
         raise ModuleNotFoundError("No module named 'docker'", name="docker")
 
