@@ -9,12 +9,14 @@ import subprocess
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
+from types import MappingProxyType
 
 from throwcollect.errors import WorkerError
 
 _PROGRAMS = ("apptainer", "singularity")
 _FATAL = "FATAL:"
 _EVIDENCE_LINES = 15
+_NO_PLACES: Mapping[str, Path] = MappingProxyType({})
 _PATIENCE_S = 10.0
 """How long what it has started may take to end with it."""
 
@@ -34,29 +36,32 @@ def find_program() -> str:
     return found
 
 
-def call(what: str, *arguments: str, cwd: Path | None = None, environment: Mapping[str, str] | None = None) -> str:
+def call(what: str, *arguments: str, cwd: Path | None = None, places: Mapping[str, Path] = _NO_PLACES) -> str:
     """What Apptainer prints.
 
     Args:
         what: What cannot be done if it fails, for the message.
         arguments: Its arguments.
         cwd: Where it runs; None is here.
-        environment: Variables that it gets besides ours.
+        places: Directories that it is to use unless the user has named others, by the end of the variable that names
+            them, such as ``TMPDIR``.
 
     Raises:
         WorkerError: If it is not installed, or fails.
     """
-    command = [find_program(), *arguments]
+    program = find_program()
+    prefix = Path(program).name.upper()
+    named = {f"{prefix}_{name}": str(path) for name, path in places.items()}
     # It starts others, which have to end with it.
     process = subprocess.Popen(
-        command,
+        [program, "--nocolor", *arguments],
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
         errors="replace",
         cwd=cwd,
-        env={**os.environ, **(environment or {})},
+        env={**named, **os.environ},
         start_new_session=True,
     )
     try:
@@ -68,7 +73,7 @@ def call(what: str, *arguments: str, cwd: Path | None = None, environment: Mappi
         lines = [line.rstrip() for line in (printed + said).splitlines() if line.strip()]
         reason = next((line.removeprefix(_FATAL).strip() for line in lines if line.startswith(_FATAL)), None)
         raise WorkerError(
-            f"{what}: {reason or f'exit code {process.returncode} of {Path(command[0]).name}'}",
+            f"{what}: {reason or f'exit code {process.returncode} of {Path(program).name}'}",
             evidence="\n".join(lines[-_EVIDENCE_LINES:]) or None,
         )
     return printed

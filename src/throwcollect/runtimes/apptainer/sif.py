@@ -129,20 +129,14 @@ def _locate(base: str) -> tuple[str, str]:
 
 
 def _run(new: Path, work: Path, *arguments: str, cwd: Path | None = None) -> None:
-    # Where the user has not said otherwise, all that is kept meanwhile goes with this directory.
+    # All that is kept meanwhile goes with this directory.
     places = {"TMPDIR": work, "CACHEDIR": work / "cache", "CONFIGDIR": work / "config"}
-    environment = {
-        f"{prefix}_{name}": str(path)
-        for prefix in ("APPTAINER", "SINGULARITY")
-        for name, path in places.items()
-        if f"{prefix}_{name}" not in os.environ
-    }
     # The output is named before what it is made of.
     *options, source = arguments
     options += ["--force", "--mksquashfs-args", _FAST_COMPRESSION]
     what = f"{new.with_suffix('')}: cannot be made"
     try:
-        call(what, "build", *options, str(new), source, cwd=cwd, environment=environment)
+        call(what, "build", *options, str(new), source, cwd=cwd, places=places)
     except WorkerError as error:
         if _NO_SPACE in (error.evidence or "").lower():
             hint = f"it needs 2 GB in {work.parent} meanwhile, or in another directory that TMPDIR names"
