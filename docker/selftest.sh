@@ -28,7 +28,7 @@ throwcollect --help > help
 for backend; do
     # On Fast DDS, nodes at times do not find each other; the next start goes on with what is there.
     throwcollect up -n 1 --runtime local --trials 4 --set run.ros="$backend" --output "$backend" "$quickstart" \
-        || throwcollect up --resume -n 1 --runtime local --trials 4 --set run.ros="$backend" --output "$backend" "$quickstart"
+        || throwcollect resume -n 1 --runtime local --set run.ros="$backend" "$backend"
     throwcollect dataset info "$backend" > info
     throwcollect dataset verify "$backend"
 done

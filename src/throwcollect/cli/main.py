@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from throwcollect.cli import cluster, collect, nodes, runs, show
+from throwcollect.cli import cluster, collect, image, nodes, runs, show
 from throwcollect.cli.dataset.commands import dataset_app
 from throwcollect.cli.execution import execute
 from throwcollect.cli.ros.commands import ros_app
@@ -36,7 +36,8 @@ _add(runs.ps, runs.wait, runs.logs, runs.events, runs.scale, runs.stop, runs.dow
 _add(show.config, show.plan, show.doctor)
 _add(nodes.router, nodes.sim, nodes.coordinator, nodes.health, panel="Nodes, as `up` starts them")
 _add(collect.launch, nodes.simulate, hidden=True)
-image_app.command("build")(show.build_image)
+image_app.command("build")(image.build)
+image_app.command("sif")(image.sif)
 
 
 def _print_version(wanted: bool) -> None:

@@ -1,4 +1,4 @@
-"""`throwcollect config`, `plan`, `doctor` and `image build`: what would be done, where, and from which image."""
+"""`throwcollect config`, `plan` and `doctor`: what would be done, and where."""
 
 from __future__ import annotations
 
@@ -99,35 +99,3 @@ def doctor(json: JsonOption = False) -> None:
             typer.echo(f"{check.status:8}{check.name:{width}}  {check.finding}")
     if any(check.status == "problem" for check in checks):
         raise typer.Exit(1)
-
-
-def build_image(
-    base: Annotated[
-        str | None,
-        typer.Option("--base", metavar="IMAGE", help="Base image; an official one of Python 3.11 by default."),
-    ] = None,
-    wheelhouse: Annotated[
-        Path | None,
-        typer.Option(
-            "--wheelhouse",
-            metavar="DIR",
-            help="Take the wheels from here, not from the package index; docker/wheelhouse.py fills it.",
-            readable=False,
-        ),
-    ] = None,
-    tag: Annotated[
-        str | None, typer.Option("--tag", metavar="TAG", help="Name of the image; throwcollect:VERSION by default.")
-    ] = None,
-) -> None:
-    """Build the image from a clone of the project."""
-    from contextlib import closing
-    from functools import partial
-
-    from throwcollect.runtimes.docker.engine import connect
-    from throwcollect.runtimes.docker.image import DEFAULT_BASE, build, default_tag
-
-    tag = tag or default_tag()
-    with closing(connect()) as client:
-        say = partial(typer.echo, err=True)
-        size = build(client, tag, base=base or DEFAULT_BASE, wheelhouse=wheelhouse, say=say)
-    typer.echo(f"{tag}  {size / 1e6:.0f} MB")

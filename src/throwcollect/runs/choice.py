@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from throwcollect.config.schema import Config
 from throwcollect.errors import WorkerError
-from throwcollect.extras import MissingExtraError
+from throwcollect.extras import MissingExtraError, explain_missing
 from throwcollect.ros.middleware import Middleware, choose_middleware
 from throwcollect.runtimes.registry import AUTOMATIC, get_runtime
 from throwcollect.runtimes.runtime import Runtime
@@ -49,7 +49,9 @@ def choose(config: Config, *, say: Callable[[str], None], warn: Callable[[str], 
     for name in candidates[:-1]:
         try:
             return _choose(name, config, launcher, note, say, warn)
-        except (MissingExtraError, WorkerError) as error:
+        except MissingExtraError as error:
+            note = f" (auto, as the package {error.package} is not installed)"
+        except WorkerError as error:
             note = f" (auto, as {error.message})"
     return _choose(candidates[-1], config, launcher, note, say, warn)
 
@@ -63,7 +65,9 @@ def _choose(
     warn: Callable[[str], None],
 ) -> Choice:
     found = get_runtime(name)
-    middleware = found.prepare(config, launcher, say=say, warn=warn)
+    # A runtime imports what only it needs when it is asked for.
+    with explain_missing():
+        middleware = found.prepare(config, launcher, say=say, warn=warn)
     rclpy = f" on genuine rclpy with {middleware.rmw}" if middleware.backend == "rclpy" else ""
     say(f"runtime: {found.in_words(config)}{rclpy}{note}")
     return Choice(name, found, middleware)

@@ -8,6 +8,7 @@ from throwcollect.config.containers import ContainersConfig
 from throwcollect.config.run import RunConfig
 from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError, WorkerError
+from throwcollect.extras import MissingExtraError
 from throwcollect.ros.middleware import Middleware
 from throwcollect.runs import choice
 from throwcollect.runtimes.docker import engine as docker_engine
@@ -64,6 +65,19 @@ def test_without_an_engine_auto_takes_processes_and_says_why(choose, no_engine, 
             "No such file or directory)"
         ],
     )
+
+
+def test_without_a_client_of_an_engine_auto_takes_processes_and_says_why(
+    choose, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def import_client(**_: object) -> None:
+        raise ModuleNotFoundError("No module named 'docker'", name="docker")
+
+    monkeypatch.setattr(docker_engine, "connect", import_client)
+    assert choose("auto") == ("local", ["runtime: local processes (auto, as the package docker is not installed)"])
+    with pytest.raises(MissingExtraError) as caught:
+        choose("docker")
+    assert caught.value.extra == "docker"
 
 
 def test_containers_that_are_asked_for_and_cannot_be_had_are_an_error(choose, no_engine) -> None:

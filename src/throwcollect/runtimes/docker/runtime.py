@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from throwcollect.errors import ConfigError, Problem, WorkerError
+from throwcollect.extras import is_installed
 from throwcollect.ros.middleware import Middleware
 from throwcollect.runtimes.runtime import Check, HeldRun, Place, Runtime
 
@@ -89,8 +90,8 @@ class DockerRuntime(Runtime):
         return Check("docker", "ok", f"{found}, with the image {default_tag()}")
 
     def find_held(self) -> list[HeldRun]:
-        """Runs of which the engine holds something; none if there is no engine that answers quickly."""
-        if "DOCKER_HOST" not in os.environ and not Path(_SOCKET).exists():
+        """Runs of which the engine holds something; none if there is no engine that answers quickly, or no client."""
+        if not is_installed("docker") or ("DOCKER_HOST" not in os.environ and not Path(_SOCKET).exists()):
             return []
         from throwcollect.runtimes.docker.engine import connect
         from throwcollect.runtimes.docker.held_runs import find_held_runs

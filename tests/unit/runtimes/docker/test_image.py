@@ -17,7 +17,15 @@ from docker.errors import APIError, ImageNotFound
 import throwcollect
 from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.runtimes.docker import image
-from throwcollect.runtimes.docker.image import DEFAULT_BASE, build, default_tag, ensure, is_outdated, source_root
+from throwcollect.runtimes.docker.image import build, default_tag, ensure, is_outdated
+from throwcollect.runtimes.image_sources import (
+    DEFAULT_BASE,
+    SOURCES_LABEL,
+    digest_sources,
+    find_address,
+    find_revision,
+    source_root,
+)
 
 ROOT = Path(__file__).parents[4]
 DOCKERFILE = (ROOT / "docker" / "Dockerfile").read_text(encoding="utf-8")
@@ -159,7 +167,7 @@ def test_a_base_image_that_cannot_be_had_is_named_with_a_way_out(said: list[str]
 
 
 def test_a_package_outside_a_clone_cannot_be_built_from(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr("throwcollect.runtimes.docker.image._PACKAGE", tmp_path / "lib" / "throwcollect")
+    monkeypatch.setattr("throwcollect.runtimes.image_sources._PACKAGE", tmp_path / "lib" / "throwcollect")
     with pytest.raises(ConfigError, match="is not in a clone of the project"):
         source_root()
 
@@ -193,7 +201,7 @@ def test_an_image_that_cannot_be_pulled_is_an_error_of_the_runtime(said: list[st
 def test_without_a_clone_the_default_image_cannot_be_had(
     monkeypatch: pytest.MonkeyPatch, said: list[str], tmp_path: Path
 ) -> None:
-    monkeypatch.setattr("throwcollect.runtimes.docker.image._PACKAGE", tmp_path / "lib" / "throwcollect")
+    monkeypatch.setattr("throwcollect.runtimes.image_sources._PACKAGE", tmp_path / "lib" / "throwcollect")
     with pytest.raises(WorkerError, match=f"{default_tag()} is not here and cannot be built: .* not in a clone"):
         ensure(Engine(), default_tag(), say=said.append)
 
@@ -204,18 +212,18 @@ def git(root: Path, *arguments: str) -> str:
 
 
 def test_the_revision_is_the_commit_and_says_when_files_differ_from_it(tmp_path: Path) -> None:
-    assert image._revision(tmp_path) is None
+    assert find_revision(tmp_path) is None
     git(tmp_path, "init", "-q")
     (tmp_path / "pyproject.toml").write_text("")
     git(tmp_path, "add", ".")
     git(tmp_path, "commit", "-qm", "first")
     commit = git(tmp_path, "rev-parse", "HEAD").strip()
-    assert image._revision(tmp_path) == commit
+    assert find_revision(tmp_path) == commit
     (tmp_path / "notes").write_text("not part of the image")
-    assert image._revision(tmp_path) == commit
+    assert find_revision(tmp_path) == commit
     (tmp_path / "src").mkdir()
     (tmp_path / "src" / "new.py").write_text("")
-    assert image._revision(tmp_path) == f"{commit}-dirty"
+    assert find_revision(tmp_path) == f"{commit}-dirty"
 
 
 @pytest.mark.parametrize(
@@ -235,16 +243,16 @@ def test_the_revision_is_the_commit_and_says_when_files_differ_from_it(tmp_path:
 def test_the_source_is_an_address_for_others_without_what_is_secret_in_it(
     tmp_path: Path, origin: str | None, address: str | None
 ) -> None:
-    assert image._address(tmp_path) is None
+    assert find_address(tmp_path) is None
     git(tmp_path, "init", "-q")
     if origin is not None:
         git(tmp_path, "remote", "add", "origin", origin)
-    assert image._address(tmp_path) == address
+    assert find_address(tmp_path) == address
 
 
 def test_an_image_without_an_address_has_no_such_label(said: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
     for address, labels in (("https://example.org/x", {image.SOURCE_LABEL: "https://example.org/x"}), (None, {})):
-        monkeypatch.setattr(image, "_address", lambda _, address=address: address)
+        monkeypatch.setattr(image, "find_address", lambda _, address=address: address)
         engine = Engine("base")
         build(engine, "mine", base="base", say=said.append)
         assert engine.options["labels"] == labels
@@ -266,9 +274,9 @@ def test_an_image_is_outdated_if_its_label_names_other_sources_than_those_of_the
     build(engine, "mine", base="base", say=lambda _line: None)
     own = engine.options["buildargs"]["SOURCES"]
     for labels, outdated in (({}, False), ("unknown", False), (own, False), ("0" * 64, True)):
-        engine.labels = labels and {image.SOURCES_LABEL: labels}
+        engine.labels = labels and {SOURCES_LABEL: labels}
         assert is_outdated(engine, "mine") == outdated
-    monkeypatch.setattr("throwcollect.runtimes.docker.image._PACKAGE", tmp_path / "lib" / "throwcollect")
+    monkeypatch.setattr("throwcollect.runtimes.image_sources._PACKAGE", tmp_path / "lib" / "throwcollect")
     assert not is_outdated(engine, "mine")
 
 
@@ -277,9 +285,9 @@ def test_whatever_is_installed_changes_the_label_of_the_sources(said: list[str],
     changes = {"pyproject.toml": "a", "src/a.py": "a", "src/b.py": "a", "src/__pycache__/a.pyc": "a"}
     for name, content in changes.items():
         (tmp_path / name).write_text(content)
-    digests = [image._digest_of(tmp_path)]
+    digests = [digest_sources(tmp_path)]
     for name in changes:
         (tmp_path / name).write_text("b")
-        digests.append(image._digest_of(tmp_path))
+        digests.append(digest_sources(tmp_path))
     assert len(set(digests)) == 4
     assert digests[-1] == digests[-2]

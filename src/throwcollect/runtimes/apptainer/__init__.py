@@ -1,0 +1,1 @@
+"""The image as one file that Apptainer and Singularity run, as clusters have them."""

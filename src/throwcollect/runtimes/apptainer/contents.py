@@ -1,0 +1,124 @@
+"""What is in a SIF, the file that Apptainer runs, and in an archive that one is made from."""
+
+from __future__ import annotations
+
+import json
+import tarfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from throwcollect.errors import ConfigError
+from throwcollect.files import unreadable
+from throwcollect.runtimes.apptainer.program import call
+from throwcollect.runtimes.image_sources import SOURCES_LABEL, UNKNOWN, VERSION_LABEL, are_others
+from throwcollect.version import __version__
+from throwcollect.wording import command
+
+_MAGIC_AT = 32
+"""Before it stands the line by which a shell finds the program for such files."""
+_MAGIC = b"SIF_MAGIC\0"
+_ENTRY_POINT = "throwcollect"
+
+
+@dataclass(frozen=True)
+class SifContents:
+    """Which throwcollect a SIF holds.
+
+    Attributes:
+        version: Its version; None if the file does not say it.
+        sources: Digest of its sources, as `image_sources.digest_sources` makes it; None if the file does not say it.
+    """
+
+    version: str | None
+    sources: str | None
+
+
+def is_sif(path: Path) -> bool:
+    """Whether a file is a SIF, judged by its first bytes.
+
+    Raises:
+        OSError: If it cannot be read.
+    """
+    with path.open("rb") as file:
+        return file.read(_MAGIC_AT + len(_MAGIC))[_MAGIC_AT:] == _MAGIC
+
+
+def read_contents(sif: Path) -> SifContents:
+    """Find out which throwcollect a SIF holds.
+
+    Raises:
+        ConfigError: If there is no such file, or it is no SIF.
+        WorkerError: If neither Apptainer nor Singularity is installed, or it cannot read the file.
+        DatasetError: If it may not be read.
+    """
+    try:
+        if not is_sif(sif):
+            raise ConfigError(
+                f"{sif}: is no SIF, the image that Apptainer runs", hint="throwcollect image sif makes one"
+            )
+    except (FileNotFoundError, IsADirectoryError) as error:
+        raise ConfigError(f"{sif}: {error.strerror}", hint=f"{command('image', 'sif', '-o', sif)} makes it") from error
+    except OSError as error:
+        raise unreadable(sif, error) from error
+    printed = call(f"{sif}: what it holds cannot be read", "inspect", "--json", str(sif))
+    labels = _labels_of(json.loads(printed))
+    told = {name: label if label != UNKNOWN else None for name, label in labels.items()}
+    return SifContents(told.get(VERSION_LABEL), told.get(SOURCES_LABEL))
+
+
+def check_sif(sif: Path) -> None:
+    """Make sure that a SIF holds the throwcollect that is installed here: another may collect other bytes.
+
+    One that does not say what it holds is taken at its word.
+
+    Raises:
+        ConfigError: If there is no such file, it is no SIF, or holds another version or other sources.
+        WorkerError: If neither Apptainer nor Singularity is installed, or it cannot read the file.
+        DatasetError: If it may not be read.
+    """
+    contents = read_contents(sif)
+    hint = f"{command('image', 'sif', '-o', sif)} makes it anew"
+    if contents.version not in (None, __version__):
+        raise ConfigError(f"{sif}: holds throwcollect {contents.version}, and this is {__version__}", hint=hint)
+    if are_others(contents.sources):
+        raise ConfigError(f"{sif}: was made from other sources than these", hint=hint)
+
+
+def check_archive(archive: Path) -> None:
+    """Make sure that a file is an archive, as `docker save` writes it, with one image of throwcollect.
+
+    Raises:
+        ConfigError: If it is not.
+        DatasetError: If it may not be read.
+    """
+    hint = "docker save throwcollect:TAG -o FILE writes one"
+    try:
+        with tarfile.open(archive) as files:
+            images = _read_json(files, "manifest.json")
+            configs = [_read_json(files, image["Config"]) for image in images]
+        entry_points = [config["config"].get("Entrypoint") or [None] for config in configs]
+    except (FileNotFoundError, IsADirectoryError) as error:
+        raise ConfigError(f"{archive}: {error.strerror}", hint=hint) from error
+    except OSError as error:
+        raise unreadable(archive, error) from error
+    except (tarfile.TarError, EOFError, LookupError, TypeError, AttributeError, ValueError) as error:
+        raise ConfigError(f"{archive}: is no archive of an image", hint=hint) from error
+    if len(entry_points) != 1:
+        raise ConfigError(f"{archive}: holds {len(entry_points)} images", expected="one", hint=hint)
+    if entry_points[0][-1] != _ENTRY_POINT:
+        raise ConfigError(f"{archive}: holds another image than one of throwcollect", hint=hint)
+
+
+def _read_json(files: tarfile.TarFile, name: str) -> Any:
+    file = files.extractfile(name)
+    if file is None:
+        raise KeyError(name)
+    return json.load(file)
+
+
+def _labels_of(document: Any) -> dict[str, str]:
+    """Labels in what `inspect --json` prints; none if it has another form."""
+    for name in ("data", "attributes", "labels"):
+        document = document.get(name) if isinstance(document, dict) else None
+    return document if isinstance(document, dict) else {}

@@ -1,0 +1,88 @@
+"""Apptainer, or Singularity, as a program of this machine."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+from types import MappingProxyType
+
+from throwcollect.errors import WorkerError
+
+_PROGRAMS = ("apptainer", "singularity")
+_FATAL = "FATAL:"
+_EVIDENCE_LINES = 15
+_NO_PLACES: Mapping[str, Path] = MappingProxyType({})
+_PATIENCE_S = 10.0
+"""How long what it has started may take to end with it."""
+
+
+def find_program() -> str:
+    """Path of Apptainer, or else of Singularity.
+
+    Raises:
+        WorkerError: If neither is installed.
+    """
+    found = next(filter(None, map(shutil.which, _PROGRAMS)), None)
+    if found is None:
+        raise WorkerError(
+            "neither apptainer nor singularity is installed here",
+            hint="clusters often have it as a module: module load apptainer",
+        )
+    return found
+
+
+def call(what: str, *arguments: str, cwd: Path | None = None, places: Mapping[str, Path] = _NO_PLACES) -> str:
+    """What Apptainer prints.
+
+    Args:
+        what: What cannot be done if it fails, for the message.
+        arguments: Its arguments.
+        cwd: Where it runs; None is here.
+        places: Directories that it is to use unless the user has named others, by the end of the variable that names
+            them, such as ``TMPDIR``.
+
+    Raises:
+        WorkerError: If it is not installed, or fails.
+    """
+    program = find_program()
+    prefix = Path(program).name.upper()
+    named = {f"{prefix}_{name}": str(path) for name, path in places.items()}
+    # It starts others, which have to end with it.
+    process = subprocess.Popen(
+        [program, "--nocolor", *arguments],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        errors="replace",
+        cwd=cwd,
+        env={**named, **os.environ},
+        start_new_session=True,
+    )
+    try:
+        printed, said = process.communicate()
+    except BaseException:
+        _end(process)
+        raise
+    if process.returncode:
+        lines = [line.rstrip() for line in (printed + said).splitlines() if line.strip()]
+        reason = next((line.removeprefix(_FATAL).strip() for line in lines if line.startswith(_FATAL)), None)
+        raise WorkerError(
+            f"{what}: {reason or f'exit code {process.returncode} of {Path(program).name}'}",
+            evidence="\n".join(lines[-_EVIDENCE_LINES:]) or None,
+        )
+    return printed
+
+
+def _end(process: subprocess.Popen[str]) -> None:
+    for number in (signal.SIGTERM, signal.SIGKILL):
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, number)
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(_PATIENCE_S)
+            return

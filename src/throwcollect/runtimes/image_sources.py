@@ -1,0 +1,144 @@
+"""What an image is made from: a clone of the project, and the labels that say afterwards which one it was."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import shlex
+import subprocess
+import tarfile
+from pathlib import Path
+from typing import IO
+from urllib.parse import urlsplit
+
+from throwcollect.errors import ConfigError
+
+DEFAULT_BASE = "python:3.11-slim-bookworm"
+"""Base image, as in the Dockerfile."""
+DOCKERFILE = "docker/Dockerfile"
+SOURCES_LABEL = "throwcollect.sources"
+"""Label that tells which sources are installed in an image."""
+VERSION_LABEL = "org.opencontainers.image.version"
+"""Label that tells of which version they are."""
+UNKNOWN = "unknown"
+"""What a label says that nobody has set."""
+
+_PACKAGE = Path(__file__).parents[1]
+"""This package, as it is installed."""
+_SOURCES = ("pyproject.toml", "README.md", "configs/quickstart.yaml", "src")
+_INTERFACES = ("packaging/ros_interfaces", "packaging/ros_constraints.txt")
+"""What the wheel with interfaces of ROS 2 is made from, besides sources."""
+_LEFT_OUT = re.compile(r"__pycache__|.*\.egg-info")
+_SCHEMES = ("https", "http", "ssh", "git")
+_SSH_ADDRESS = re.compile(r"(?:[^@:/]+@)?([^@:/]{2,}):(?!//)/?(.+)")
+"""The short form of ssh: ``git@host:path``."""
+
+
+def source_root() -> Path:
+    """Directory of the clone that this package runs from.
+
+    Raises:
+        ConfigError: If it was installed in another way than from a clone, in editable mode.
+    """
+    root = _PACKAGE.parents[1]
+    if not all((root / name).exists() for name in (DOCKERFILE, *_SOURCES)):
+        raise ConfigError(
+            f"{_PACKAGE}: is not in a clone of the project, so there is nothing to build an image from",
+            hint="clone it and run: pip install -e .; or name an image that exists",
+        )
+    return root
+
+
+def digest_sources(root: Path) -> str:
+    """SHA-256 over all that is installed of a clone, in hexadecimal."""
+    digest = hashlib.sha256()
+    for path in [root / "pyproject.toml", *sorted((root / "src").rglob("*"))]:
+        inside = path.relative_to(root)
+        if path.is_file() and not any(map(_LEFT_OUT.fullmatch, inside.parts)):
+            content = path.read_bytes()
+            digest.update(f"{inside.as_posix()}\0{len(content)}\0".encode() + content)
+    return digest.hexdigest()
+
+
+def are_others(sources: str | None) -> bool:
+    """Whether an image was made from other sources than those of the clone that this package runs from.
+
+    Args:
+        sources: What its label says; None if it has none.
+
+    Returns:
+        Whether it says so for sure: without a label, or without a clone, nobody can tell.
+    """
+    try:
+        root = source_root()
+    except ConfigError:
+        return False
+    return sources not in (None, UNKNOWN, digest_sources(root))
+
+
+def check_wheelhouse(root: Path, wheelhouse: Path | None) -> None:
+    """Make sure that there are wheels where they are to be taken from.
+
+    Args:
+        root: Directory of the clone.
+        wheelhouse: Directory of wheels; None takes them from the package index.
+
+    Raises:
+        ConfigError: If it holds none.
+    """
+    if wheelhouse is not None and not any(wheelhouse.glob("*.whl")):
+        raise ConfigError(
+            f"{wheelhouse}: holds no wheels",
+            hint=shlex.join(["python", f"{root}/docker/wheelhouse.py", str(wheelhouse)]),
+        )
+
+
+def write_context(archive: IO[bytes], root: Path, wheelhouse: Path | None) -> None:
+    """Write what an image is built from, and nothing else, as a tar archive.
+
+    Args:
+        archive: The archive.
+        root: Directory of the clone.
+        wheelhouse: Directory of wheels, which are put into `docker/wheelhouse`; None if there is none.
+    """
+
+    def entry(info: tarfile.TarInfo) -> tarfile.TarInfo | None:
+        info.uid = info.gid = 0
+        info.uname = info.gname = ""
+        return None if _LEFT_OUT.fullmatch(Path(info.name).name) else info
+
+    with tarfile.open(fileobj=archive, mode="w") as context:
+        for name in (*_SOURCES, *_INTERFACES):
+            context.add(root / name, name, filter=entry)
+        for path in sorted((root / "docker").iterdir()):
+            if path.is_file():
+                context.add(path, f"docker/{path.name}", filter=entry)
+        for wheel in sorted(wheelhouse.glob("*.whl")) if wheelhouse is not None else ():
+            context.add(wheel, f"docker/wheelhouse/{wheel.name}", filter=entry)
+
+
+def find_revision(root: Path) -> str | None:
+    """Commit of a clone; None if it is not one."""
+    if not (root / ".git").exists() or not (revision := _git(root, "rev-parse", "HEAD")):
+        return None
+    return revision + ("-dirty" if _git(root, "status", "--porcelain", "--", "docker", *_SOURCES) else "")
+
+
+def find_address(root: Path) -> str | None:
+    """Where others find the sources, without the name and the password that the address of a clone may hold."""
+    origin = (_git(root, "remote", "get-url", "origin") if (root / ".git").exists() else None) or ""
+    if short := _SSH_ADDRESS.fullmatch(origin):
+        return f"ssh://{short[1]}/{short[2]}"
+    parts = urlsplit(origin)
+    if parts.scheme not in _SCHEMES or not parts.hostname:
+        return None
+    return parts._replace(netloc=parts.netloc.rpartition("@")[2], query="", fragment="").geturl()
+
+
+def _git(root: Path, *arguments: str) -> str | None:
+    """What git prints; None where it cannot say."""
+    try:
+        answer = subprocess.run(["git", "-C", root, *arguments], capture_output=True, text=True, check=True)
+    except (OSError, subprocess.CalledProcessError):
+        return None
+    return answer.stdout.strip()

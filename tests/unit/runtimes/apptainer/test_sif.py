@@ -1,0 +1,228 @@
+"""SIFs without Apptainer: what it is asked for, and what is said when something is wrong."""
+
+from __future__ import annotations
+
+import io
+import json
+import tarfile
+from pathlib import Path
+
+import pytest
+
+import throwcollect
+from throwcollect.errors import ConfigError, DatasetError, WorkerError
+from throwcollect.extras import MissingExtraError
+from throwcollect.runtimes.apptainer.contents import check_sif, read_contents
+from throwcollect.runtimes.apptainer.sif import make_sif
+from throwcollect.runtimes.image_sources import SOURCES_LABEL, VERSION_LABEL, digest_sources, source_root
+
+SIF = b"#!/usr/bin/env run-singularity\n\0SIF_MAGIC\0"
+APPTAINER = """#!/bin/sh
+case "$2" in
+inspect) /bin/cat "{directory}/inspected" ;;
+build)
+    printf '%s\\n' "$@" > "{directory}/asked"
+    printf '%s\\n' "$PWD" "$APPTAINER_TMPDIR" "$APPTAINER_CONFIGDIR" > "{directory}/where"
+    {build}
+    for last; do new="$source"; source="$last"; done
+    printf '#!/usr/bin/env run-singularity\\n\\0SIF_MAGIC\\0 new' > "$new"
+    ;;
+esac
+"""
+
+
+@pytest.fixture
+def apptainer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A directory in which stands what Apptainer was asked for; it only pretends."""
+    directory = tmp_path / "apptainer"
+    directory.mkdir()
+    write_program(directory)
+    monkeypatch.setenv("PATH", str(directory))
+    monkeypatch.setenv("DOCKER_HOST", f"unix://{tmp_path}/no-engine.sock")
+    return directory
+
+
+def write_program(directory: Path, build: str = "") -> None:
+    program = directory / "apptainer"
+    program.write_text(APPTAINER.format(directory=directory, build=build))
+    program.chmod(0o755)
+
+
+def write_archive(path: Path, *entry_points: str, manifest: bytes | None = None) -> Path:
+    files = {
+        f"{number}.json": json.dumps({"config": {"Entrypoint": [name]}}) for number, name in enumerate(entry_points)
+    }
+    contents = {name: text.encode() for name, text in files.items()}
+    contents["manifest.json"] = manifest or json.dumps([{"Config": name} for name in files]).encode()
+    with tarfile.open(path, "w") as archive:
+        for name, content in contents.items():
+            info = tarfile.TarInfo(name)
+            info.size = len(content)
+            archive.addfile(info, io.BytesIO(content))
+    return path
+
+
+def make(output: Path, **named: object) -> list[str]:
+    said: list[str] = []
+    make_sif(output, say=said.append, **named)  # type: ignore[arg-type]
+    return said
+
+
+def test_an_archive_is_converted_and_nothing_is_written_outside_of_the_directory_for_it(
+    apptainer: Path, tmp_path: Path
+) -> None:
+    archive = write_archive(tmp_path / "image.tar", "throwcollect")
+    make(tmp_path / "it.sif", archive=archive)
+    assert (apptainer / "asked").read_text().splitlines()[-2:] == [
+        f"{tmp_path}/it.sif.new",
+        f"docker-archive:{archive}",
+    ]
+    _, work, config = (apptainer / "where").read_text().splitlines()
+    assert config.startswith(work)
+    assert not Path(work).exists()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["apptainer", "image.tar", "it.sif"]
+
+
+@pytest.mark.parametrize("named", [{"archive": "image.tar"}, {}])
+def test_a_sif_that_is_there_is_replaced_whole_or_not_at_all(
+    named: dict[str, str], apptainer: Path, tmp_path: Path
+) -> None:
+    write_archive(tmp_path / "image.tar", "throwcollect")
+    output = tmp_path / "it.sif"
+    output.write_bytes(SIF)
+    write_program(apptainer, 'echo half > "$7"; echo "FATAL:   While performing build: it broke" >&2; exit 255')
+    with pytest.raises(WorkerError, match=r"it\.sif: cannot be made: While performing build: it broke"):
+        make(output, **{name: tmp_path / path for name, path in named.items()})
+    assert output.read_bytes() == SIF
+    assert not list(tmp_path.glob("*.new"))
+    write_program(apptainer)
+    make(output, **{name: tmp_path / path for name, path in named.items()})
+    assert output.read_bytes() == SIF + b" new"
+
+
+def test_without_an_engine_the_clone_itself_is_built(apptainer: Path, tmp_path: Path) -> None:
+    said = make(tmp_path / "it.sif", base="lab/python:3.11")
+    assert "no Docker engine answers" in said[0]
+    asked = (apptainer / "asked").read_text().splitlines()
+    sources = digest_sources(source_root())
+    for value in (
+        "bootstrap=docker",
+        "base=lab/python:3.11",
+        f"version={throwcollect.__version__}",
+        f"sources={sources}",
+    ):
+        assert asked[asked.index(value) - 1] == "--build-arg"
+    assert asked[-1] == "docker/throwcollect.def"
+
+
+def test_a_base_image_may_be_a_file_or_a_directory(apptainer: Path, tmp_path: Path) -> None:
+    (tmp_path / "base").mkdir()
+    (tmp_path / "base.sif").write_bytes(SIF)
+    (tmp_path / "base.tar").write_bytes(b"")
+    for name, bootstrap in (("base", "localimage"), ("base.sif", "localimage"), ("base.tar", "docker-archive")):
+        make(tmp_path / "it.sif", base=str(tmp_path / name))
+        assert f"bootstrap={bootstrap}" in (apptainer / "asked").read_text().splitlines()
+
+
+def test_without_the_client_of_engines_the_clone_is_built_but_no_image_of_an_engine_is_found(
+    apptainer: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def import_client(**_: object) -> None:
+        raise ModuleNotFoundError("No module named 'docker'", name="docker")
+
+    monkeypatch.setattr("throwcollect.runtimes.docker.engine.connect", import_client)
+    assert "the package docker is not installed" in make(tmp_path / "it.sif")[0]
+    with pytest.raises(MissingExtraError):
+        make(tmp_path / "it.sif", image="mine")
+
+
+def test_an_image_that_is_named_needs_an_engine(apptainer: Path, tmp_path: Path) -> None:
+    with pytest.raises(WorkerError, match="no Docker engine answers"):
+        make(tmp_path / "it.sif", image="mine")
+
+
+def test_a_full_disk_is_named_with_the_place_that_is_needed(apptainer: Path, tmp_path: Path) -> None:
+    write_program(apptainer, 'echo "FATAL: write /a/b: no space left on device" >&2; exit 255')
+    with pytest.raises(WorkerError, match=r"it\.sif: cannot be made: no space left on device") as caught:
+        make(tmp_path / "it.sif")
+    assert "TMPDIR" in str(caught.value.hint)
+
+
+def test_without_a_directory_for_temporary_files_nothing_is_begun(
+    apptainer: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "gone"))
+    with pytest.raises(ConfigError, match="no directory for temporary files can be written"):
+        make(tmp_path / "it.sif")
+
+
+def test_where_neither_program_is_installed_this_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(WorkerError, match="neither apptainer nor singularity is installed"):
+        make(tmp_path / "it.sif")
+
+
+def test_singularity_does_as_well(apptainer: Path, tmp_path: Path) -> None:
+    (apptainer / "apptainer").rename(apptainer / "singularity")
+    make(tmp_path / "it.sif")
+    assert (tmp_path / "it.sif").exists()
+
+
+def test_what_is_no_sif_is_not_replaced(apptainer: Path, tmp_path: Path) -> None:
+    (tmp_path / "throws.yaml").write_text("trials: 2\n")
+    for name in ("throws.yaml", "apptainer"):
+        with pytest.raises(ConfigError, match="is there and no SIF"):
+            make(tmp_path / name)
+    assert (tmp_path / "throws.yaml").read_text() == "trials: 2\n"
+    with pytest.raises(DatasetError, match="cannot be written: No such file or directory"):
+        make(tmp_path / "missing" / "it.sif")
+
+
+def test_an_archive_that_is_none_is_named(apptainer: Path, tmp_path: Path) -> None:
+    nothing = tmp_path / "nothing.tar"
+    with pytest.raises(ConfigError, match=r"nothing\.tar: No such file or directory"):
+        make(tmp_path / "it.sif", archive=nothing)
+    nothing.write_bytes(b"no archive at all" * 1000)
+    with pytest.raises(ConfigError, match=r"nothing\.tar: is no archive of an image"):
+        make(tmp_path / "it.sif", archive=nothing)
+    for manifest in (b"[", b"{}", b"[1]", b'[{"Config": "other"}]'):
+        with pytest.raises(ConfigError, match=r"is no archive of an image|holds 0 images"):
+            make(tmp_path / "it.sif", archive=write_archive(nothing, manifest=manifest))
+    with pytest.raises(ConfigError, match="holds another image than one of throwcollect"):
+        make(tmp_path / "it.sif", archive=write_archive(nothing, "bash"))
+    with pytest.raises(ConfigError, match="holds 2 images"):
+        make(tmp_path / "it.sif", archive=write_archive(nothing, "throwcollect", "throwcollect"))
+
+
+def test_a_sif_of_another_version_or_of_other_sources_is_told_from_ours(apptainer: Path, tmp_path: Path) -> None:
+    sif = tmp_path / "it.sif"
+    sif.write_bytes(SIF)
+    own = {VERSION_LABEL: throwcollect.__version__, SOURCES_LABEL: digest_sources(source_root())}
+
+    def inspected(labels: object) -> None:
+        (apptainer / "inspected").write_text(
+            json.dumps({"data": {"attributes": {"labels": labels}}, "type": "container"})
+        )
+
+    for labels in (own, {}, None, {SOURCES_LABEL: "unknown", VERSION_LABEL: "unknown"}):
+        inspected(labels)
+        check_sif(sif)
+    inspected(own | {VERSION_LABEL: "0.0.9"})
+    with pytest.raises(
+        ConfigError, match=rf"holds throwcollect 0\.0\.9, and this is {throwcollect.__version__}"
+    ) as caught:
+        check_sif(sif)
+    assert f"image sif -o {sif}" in str(caught.value.hint)
+    inspected(own | {SOURCES_LABEL: "0" * 64})
+    with pytest.raises(ConfigError, match="was made from other sources than these"):
+        check_sif(sif)
+    inspected(own)
+    assert read_contents(sif).version == throwcollect.__version__
+
+
+def test_what_is_no_sif_is_named(apptainer: Path, tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"it\.sif: No such file or directory"):
+        check_sif(tmp_path / "it.sif")
+    (tmp_path / "it.sif").write_text("trials: 2\n")
+    with pytest.raises(ConfigError, match=r"it\.sif: is no SIF"):
+        check_sif(tmp_path / "it.sif")
