@@ -13,7 +13,7 @@ READY_ROS := $(ROS_VENV)/.ready
 # starts twice as fast when its libraries are compiled once.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: up ros test test-fast test-ros-client test-containers test-processes check bench bench-full clean
+.PHONY: up ros test test-fast test-ros-client test-containers test-processes test-cluster check bench bench-full clean
 
 up: $(READY)
 	$(BIN)/throwcollect up -n 2 configs/quickstart.yaml
@@ -64,19 +64,23 @@ test: check
 	@while [ -n "$(MAKES_IMAGE)" ] && kill -0 $(MAKES_IMAGE) 2> /dev/null; do sleep 1; done
 	$(MAKE) --no-print-directory ros
 	$(ROS_TESTS) || $(ROS_TESTS) --last-failed --last-failed-no-failures none
-	$(MAKE) --no-print-directory -j 2 --output-sync=target test-containers test-processes
+	$(MAKE) --no-print-directory -j 3 --output-sync=target test-containers test-processes test-cluster
 
 # The ROS client alone, on the embedded backend: what somebody runs who changes it.
 test-ros-client: $(READY_DEV)
 	$(BIN)/python -m pytest -n logical tests/rclzenoh tests/contract tests/unit/ros tests/unit/cli/ros
 
-# Both wait most of the time, so they run side by side. Tests with an engine look at all that is on it, so one by one.
+# These three wait most of the time, so they run side by side. Tests with an engine look at all that is on it, so one by one.
 test-containers:
 	$(BIN)/python -m pytest tests/docker
 
 # Two files at a time.
 test-processes:
 	$(BIN)/python -m pytest -n 2 --dist loadfile tests/e2e tests/integration
+
+# Slurm with three nodes of this machine, and Apptainer; `.ci/cluster.sh` installs both on Debian.
+test-cluster:
+	$(BIN)/python -m pytest tests/cluster
 
 # Format, lint, types, the direction of imports, and the rules of the house.
 check: $(READY_DEV)

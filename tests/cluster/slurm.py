@@ -136,7 +136,12 @@ class Slurm:
         _end(self._process(node), signal.SIGKILL)
         # A process that is just being started shows up in the second look.
         for _ in range(2):
-            for process in _processes_of(node):
+            found = _processes_of(node)
+            for process in found:
+                # None of them shall be able to tell Slurm how the others end.
+                with suppress(ProcessLookupError):
+                    os.kill(process, signal.SIGSTOP)
+            for process in found:
                 _end(process, signal.SIGKILL)
 
     def kill_slurmd(self, node: str) -> None:

@@ -115,7 +115,7 @@ def test_a_run_is_listed_and_can_be_stopped(slurm: Slurm, tmp_path: Path) -> Non
 
 
 def test_nothing_is_lost_when_nodes_die_and_tasks_are_preempted(slurm: Slurm, tmp_path: Path) -> None:
-    config = configure(tmp_path, trials=600)
+    config = configure(tmp_path, trials=240)
     whole = collect_whole(config, tmp_path / "whole")
     data = tmp_path / "data"
     array = submit(slurm, config, data, "cluster.partition=low")
@@ -127,7 +127,7 @@ def test_nothing_is_lost_when_nodes_die_and_tasks_are_preempted(slurm: Slurm, tm
     urgent = slurm.run(
         "sbatch", "--parsable", "--partition=main", f"--nodelist={wanted}", "--cpus-per-task=2", "--wrap=sleep 5"
     ).strip()
-    wait_until(lambda: slurm.state(silent).startswith("down"), seconds=90)
+    wait_until(lambda: all(slurm.state(node).startswith("down") for node in (dead, silent)), seconds=90)
     slurm.revive(silent)
     slurm.revive(dead)
     wait_until(lambda: not slurm.run("squeue", "--noheader", f"--jobs={urgent}").strip())
