@@ -6,10 +6,16 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from docker.client import DockerClient
 
 from tests.cluster.slurm import Slurm
+from tests.docker.conftest import client
+from throwcollect.runtimes.apptainer.sif import make_sif
+from throwcollect.runtimes.docker import image
 
-UNAVAILABLE = Path(__file__).parents[2] / "build" / "cluster-unavailable"
+BUILD = Path(__file__).parents[2] / "build"
+UNAVAILABLE = BUILD / "cluster-unavailable"
+__all__ = ["client"]
 USER = "throwcollect-ci"
 """Whose jobs are run: nobody who may do more than others."""
 
@@ -48,3 +54,18 @@ def slurm() -> Iterator[Slurm]:
             yield started
         finally:
             started.down()
+
+
+@pytest.fixture(scope="session")
+def sif(client: DockerClient) -> Iterator[Path]:
+    """The image of these sources as a SIF that all users can read; made once for each image."""
+    name = image.default_tag()
+    kept = BUILD / "sif" / f"{client.images.get(name).id.removeprefix('sha256:')}.sif"
+    if not kept.exists():
+        # Nobody asks for those of earlier images any more.
+        shutil.rmtree(kept.parent, ignore_errors=True)
+        kept.parent.mkdir(parents=True)
+        make_sif(kept, image=name, say=lambda _line: None)
+    with tempfile.TemporaryDirectory(prefix="throwcollect-sif-") as path:
+        Path(path).chmod(0o755)
+        yield Path(shutil.copy(kept, path))

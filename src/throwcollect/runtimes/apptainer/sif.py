@@ -139,7 +139,7 @@ def _run(new: Path, work: Path, *arguments: str, cwd: Path | None = None) -> Non
         call(what, "build", *options, str(new), source, cwd=cwd, places=places)
     except WorkerError as error:
         if _NO_SPACE in (error.evidence or "").lower():
-            hint = f"it needs 2 GB in {work.parent} meanwhile, or in another directory that TMPDIR names"
+            hint = f"it needs 1.5 GB in {work.parent} meanwhile, or in another directory that TMPDIR names"
             raise WorkerError(f"{what}: {_NO_SPACE}", evidence=error.evidence, hint=hint) from error
         raise
 

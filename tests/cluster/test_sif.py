@@ -1,0 +1,178 @@
+"""The image as Apptainer runs it: as any user, on a root that cannot be written, beside others on the same machine."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import os
+import pwd
+import re
+import shutil
+import subprocess
+import sys
+import sysconfig
+import tarfile
+from pathlib import Path
+
+import pytest
+from docker.client import DockerClient
+
+import throwcollect
+from tests.cluster.conftest import BUILD, USER
+from tests.e2e.collection import CONFIG, FAST, fingerprints, write_config
+from throwcollect import runs
+from throwcollect.errors import ConfigError
+from throwcollect.runtimes.apptainer.contents import check_sif, read_contents
+from throwcollect.runtimes.apptainer.sif import make_sif
+from throwcollect.runtimes.docker.saved_image import save_image
+from throwcollect.runtimes.image_sources import SOURCES_LABEL
+
+pytestmark = pytest.mark.cluster
+ROOT = Path(__file__).parents[2]
+BASE = "throwcollect-base:bookworm"
+PAGE = (ROOT / "docs" / "containers.md").read_text(encoding="utf-8")
+COMMANDS = re.findall(r"^ *(apptainer .*?throwcollect\.sif up [^#\n]*)", PAGE, flags=re.MULTILINE)
+PLACES = ("/tmp", "/var/tmp", "/home", "/dev/shm", "/run", "/opt")
+"""Where whoever shares the machine could be disturbed."""
+AUTOMATIC = CONFIG.replace("runtime: local, ", "")
+
+
+@pytest.fixture(scope="module")
+def expected(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """The files that processes of this machine make."""
+    directory = tmp_path_factory.mktemp("expected")
+    config = write_config(directory, trials=6, text=AUTOMATIC, sim=FAST)
+    with runs.prepare(config, overrides=["run.runtime=inprocess"], output=directory / "dataset") as run:
+        run.collect()
+    return fingerprints(directory / "dataset")
+
+
+@pytest.fixture
+def place(shared: Path, sif: Path) -> Path:
+    """A directory of the user with a configuration, the image, and one for temporary files."""
+    write_config(shared, trials=6, text=AUTOMATIC, sim=FAST).rename(shared / "throws.yaml")
+    (shared / "throwcollect.sif").symlink_to(sif)
+    (shared / "tmp").mkdir()
+    shutil.chown(shared / "tmp", USER, USER)
+    return shared
+
+
+def start(command: str, directory: Path, user: str = USER, **environment: str) -> subprocess.Popen[str]:
+    """A shell command of a user who has no home."""
+    return subprocess.Popen(
+        ["runuser", "-u", user, "--", "env", "-u", "HOME", "sh", "-c", command],
+        cwd=directory,
+        env={**os.environ, **environment},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+
+
+def finish(process: subprocess.Popen[str]) -> str:
+    printed, _ = process.communicate(timeout=120)
+    assert process.returncode == 0, printed
+    return printed
+
+
+def files_of(user: str, apart_from: Path) -> set[Path]:
+    """All files of a user in places that users share."""
+    number = pwd.getpwnam(user).pw_uid
+    found = set()
+    for top in PLACES:
+        for directory, folders, names in os.walk(top):
+            folders[:] = [name for name in folders if Path(directory, name) != apart_from]
+            found |= {path for name in names if (path := Path(directory, name)).lstat().st_uid == number}
+    return found
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_the_commands_of_the_docs_make_the_files_of_any_collection_and_write_nowhere_else(
+    command: str, place: Path, expected: dict[str, str]
+) -> None:
+    before = files_of(USER, place)
+    printed = finish(start(command, place, TMPDIR=str(place / "tmp"), PYTHONPATH="/nowhere", PYTHONHOME="/nowhere"))
+    assert "runtime: local processes (auto, as the package docker is not installed)" in printed
+    assert fingerprints(place / "dataset") == expected
+    assert files_of(USER, place) <= before
+
+
+def test_both_ways_to_run_it_are_in_the_docs() -> None:
+    assert [("--containall" in command) for command in COMMANDS] == [False, True]
+
+
+def test_two_users_on_one_machine_do_not_meet(place: Path, expected: dict[str, str]) -> None:
+    place.chmod(0o755)
+    processes = []
+    for user in (USER, "nobody"):
+        (place / user).mkdir()
+        shutil.chown(place / user, user)
+        command = f"apptainer run throwcollect.sif up -n 2 throws.yaml --output {user}/dataset"
+        processes.append(start(command, place, user))
+    for process in processes:
+        finish(process)
+    assert fingerprints(place / USER / "dataset") == fingerprints(place / "nobody" / "dataset") == expected
+
+
+def test_arguments_are_not_evaluated_once_more(place: Path) -> None:
+    process = start("""apptainer run throwcollect.sif config throws.yaml --set 'name=a$PWD"b'""", place)
+    assert """got 'a$PWD"b'""" in process.communicate(timeout=60)[0]
+
+
+def test_a_sif_says_what_is_in_it(sif: Path) -> None:
+    check_sif(sif)
+    assert read_contents(sif).version == throwcollect.__version__
+
+
+def test_labels_of_an_archive_are_those_of_the_sif(tmp_path: Path) -> None:
+    layer = pack({"etc/hostname": b""})
+    config = {
+        "architecture": "amd64",
+        "os": "linux",
+        "config": {"Entrypoint": ["throwcollect"], "Labels": {SOURCES_LABEL: "0" * 64}},
+        "rootfs": {"type": "layers", "diff_ids": [f"sha256:{hashlib.sha256(layer).hexdigest()}"]},
+    }
+    manifest = [{"Config": "config.json", "RepoTags": ["throwcollect:old"], "Layers": ["layer.tar"]}]
+    texts = {"config.json": json.dumps(config).encode(), "manifest.json": json.dumps(manifest).encode()}
+    (tmp_path / "image.tar").write_bytes(pack({**texts, "layer.tar": layer}))
+    make_sif(tmp_path / "old.sif", archive=tmp_path / "image.tar", say=lambda _line: None)
+    with pytest.raises(ConfigError, match="was made from other sources than these"):
+        check_sif(tmp_path / "old.sif")
+
+
+def test_without_an_engine_a_user_builds_the_same_from_the_clone(
+    client: DockerClient, place: Path, expected: dict[str, str]
+) -> None:
+    wheelhouse = BUILD / "wheelhouse"
+    if not wheelhouse.exists() or not client.images.list(BASE):
+        pytest.skip(f"there is no {wheelhouse}, or no image {BASE}; .ci/engine.sh makes both")
+    # Others may not read the Python of root, but libraries of this environment are for that of the system as well.
+    python = "/usr/bin/python3"
+    version = subprocess.check_output([python, "-c", "import sys; print(*sys.version_info[:2])"], text=True)
+    if version.split() != list(map(str, sys.version_info[:2])):
+        pytest.skip(f"{python} is of another version than {sys.executable}")
+    save_image(place / "base.tar", BASE, base=BASE, wheelhouse=None, say=lambda _line: None)
+    printed = finish(
+        start(
+            f"{python} -m throwcollect image sif -o own.sif --base base.tar --wheelhouse {wheelhouse}",
+            place,
+            TMPDIR=str(place / "tmp"),
+            PYTHONPATH=f"{ROOT / 'src'}:{sysconfig.get_path('purelib')}",
+            DOCKER_HOST="unix:///no/engine.sock",
+        )
+    )
+    assert "built from docker/throwcollect.def, as no Docker engine answers" in printed
+    check_sif(place / "own.sif")
+    finish(start("apptainer run own.sif up -n 2 throws.yaml --output dataset", place, PYTHONPATH="/nowhere"))
+    assert fingerprints(place / "dataset") == expected
+
+
+def pack(files: dict[str, bytes]) -> bytes:
+    packed = io.BytesIO()
+    with tarfile.open(fileobj=packed, mode="w") as archive:
+        for name, content in files.items():
+            info = tarfile.TarInfo(name)
+            info.size = len(content)
+            archive.addfile(info, io.BytesIO(content))
+    return packed.getvalue()
