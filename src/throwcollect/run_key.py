@@ -26,6 +26,7 @@ _NAME = "throwcollect"
 _LASTS = timedelta(days=3650)
 _CLOCKS_DIFFER_BY = timedelta(days=1)
 """Machines of one run may disagree about the time."""
+_SECRET_BYTES = 32
 _PURPOSE = b"throwcollect signature 1\0"
 
 
@@ -69,13 +70,33 @@ class RunKey:
         for path in (self.private_key, self.certificate):
             _read(path)
 
-    def create(self) -> None:
-        """Make a new key; the directory is made if it is missing.
+    @property
+    def secret(self) -> bytes:
+        """What the key can be made again from on another machine, 32 bytes.
 
         Raises:
-            ConfigError: If the files cannot be written.
+            ConfigError: If the private key cannot be read.
         """
-        private_key, certificate = _new_pair()
+        from cryptography.hazmat.primitives.asymmetric import ec
+        from cryptography.hazmat.primitives.serialization import load_pem_private_key
+
+        key = load_pem_private_key(_read(self.private_key), None)
+        if not isinstance(key, ec.EllipticCurvePrivateKey):
+            raise unreadable_key(self.private_key, "it is of another kind than those that are made here")
+        return key.private_numbers().private_value.to_bytes(_SECRET_BYTES, "big")
+
+    def create(self, secret: bytes | None = None) -> None:
+        """Make a new key, or one that there is on another machine; the directory is made if it is missing.
+
+        The certificate of a key that is made again is another one, which counts as much: trusted is who signed it.
+
+        Args:
+            secret: The secret of that key; None for a new key.
+
+        Raises:
+            ConfigError: If the files cannot be written, or there is no such secret.
+        """
+        private_key, certificate = _make_pair(secret)
         try:
             self.directory.mkdir(mode=0o700, parents=True, exist_ok=True)
             # The private key comes last: whoever waits for a key waits for that file.
@@ -141,15 +162,26 @@ def _read(path: Path) -> bytes:
         raise unreadable_key(path, error.strerror or str(error)) from error
 
 
-def _new_pair() -> tuple[bytes, bytes]:
-    """Private key and self-signed certificate, both in PEM."""
+def _make_pair(secret: bytes | None) -> tuple[bytes, bytes]:
+    """Private key and self-signed certificate, both in PEM.
+
+    Raises:
+        ConfigError: If there is no key of that secret.
+    """
     # Imported here, as only the process that makes a key needs it.
     from cryptography import x509
     from cryptography.hazmat.primitives import hashes, serialization
     from cryptography.hazmat.primitives.asymmetric import ec
     from cryptography.x509.oid import NameOID
 
-    key = ec.generate_private_key(ec.SECP256R1())
+    try:
+        key = (
+            ec.generate_private_key(ec.SECP256R1())
+            if secret is None
+            else ec.derive_private_key(int.from_bytes(secret, "big"), ec.SECP256R1())
+        )
+    except ValueError as error:
+        raise ConfigError("there is no key of this secret") from error
     name = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, _NAME)])
     now = datetime.now(timezone.utc)
     certificate = (

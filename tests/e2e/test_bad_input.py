@@ -70,9 +70,12 @@ def small(tmp_path: Path) -> Path:
         (["up", "--foo"], "No such option: --foo\n  try: throwcollect up --help"),
         (["up", "--set"], "Option '--set' requires an argument.\n  try: throwcollect --help"),
         (["up", "a.yaml", "b.yaml"], "Got unexpected extra argument(s) (b.yaml)\n  try: throwcollect up --help"),
-        (["up", "-n", "0", "small.yaml"], "run.simulations: should be a whole number from 1 to 256, got 0"),
-        (["up", "-n", "300", "small.yaml"], "run.simulations: should be a whole number from 1 to 256, got 300"),
-        (["up", "-n", "two", "small.yaml"], "run.simulations: should be a whole number from 1 to 256, got 'two'"),
+        (
+            ["up", "-n", "0", "small.yaml"],
+            "run.simulations: should be 1 or more, as no other machine can join (run.listen), got 0",
+        ),
+        (["up", "-n", "300", "small.yaml"], "run.simulations: should be a whole number from 0 to 256, got 300"),
+        (["up", "-n", "two", "small.yaml"], "run.simulations: should be a whole number from 0 to 256, got 'two'"),
         (["up", "--trials", "0", "small.yaml"], "trials: should be a whole number from 1 to 10000000 or null, got 0"),
         (
             ["up", "--runtime", "dockr", "small.yaml"],

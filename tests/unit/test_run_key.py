@@ -83,3 +83,19 @@ def test_a_key_that_is_not_there_is_named(tmp_path: Path, monkeypatch: pytest.Mo
     monkeypatch.setenv(KEY_VARIABLE, str(tmp_path / "gone"))
     with pytest.raises(ConfigError, match=r"the key of the run cannot be read: .*gone/key.pem: No such file"):
         Signer.of_environment()
+
+
+def test_a_key_is_made_again_from_its_secret(tmp_path: Path) -> None:
+    one, other = RunKey(tmp_path / "one"), RunKey(tmp_path / "other")
+    one.create()
+    assert len(one.secret) == 32
+    other.create(one.secret)
+    assert other.private_key.read_bytes() == one.private_key.read_bytes()
+    assert other.certificate.read_bytes() != one.certificate.read_bytes()
+
+
+@pytest.mark.parametrize("secret", [bytes(32), b"\xff" * 32])
+def test_what_is_no_secret_makes_no_key(tmp_path: Path, secret: bytes) -> None:
+    with pytest.raises(ConfigError, match="no key of this secret"):
+        RunKey(tmp_path / "key").create(secret)
+    assert not (tmp_path / "key").exists()

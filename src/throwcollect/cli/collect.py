@@ -21,6 +21,7 @@ from throwcollect.cli.options import (
     overrides,
 )
 from throwcollect.errors import ConfigError
+from throwcollect.wording import command
 
 if TYPE_CHECKING:
     from throwcollect.cli.terminal import Display
@@ -61,12 +62,16 @@ def up(
             "--slice", metavar="I/N", help="Collect slice I of N, from 0, of the plan that lies in --output DIR."
         ),
     ] = None,
+    listen: Annotated[
+        str | None,
+        typer.Option("--listen", metavar="ENDPOINT", help="Let other machines join, at tcp/ADDRESS:PORT: run.listen."),
+    ] = None,
     trials: TrialsOption = None,
     detach: DetachOption = False,
     json: JsonOption = False,
 ) -> None:
     """Collect a dataset: start the simulations, run all trials, write the files."""
-    changes = overrides(settings, trials=trials, run__simulations=simulations, run__runtime=runtime)
+    changes = overrides(settings, trials=trials, run__simulations=simulations, run__runtime=runtime, run__listen=listen)
     if slice is not None:
         unfit = {"CONFIG": config, "--resume": resume, "--detach": detach or None}
         if wrong := next((name for name, value in unfit.items() if value is not None), None):
@@ -139,6 +144,22 @@ def _collect_slice(directory: Path, text: str, changes: list[str], *, json: bool
     typer.echo(jsonlib.dumps({"slice": str(slice), "directory": str(place)}) if json else f"{place}: finished")
 
 
+def join_run(
+    token: Annotated[str, typer.Argument(metavar="TOKEN", help="The word that `up --listen` prints.")],
+    simulations: Annotated[
+        int | None,
+        typer.Option("-n", metavar="N", min=1, max=256, help="Number of simulations; one a core by default."),
+    ] = None,
+) -> None:
+    """Add simulations of this machine to a run of another one, until it is over; Ctrl-C takes them away."""
+    from throwcollect.cli.interruptions import Interruptions
+    from throwcollect.cli.terminal import display
+    from throwcollect.runs.joining import join_run as join
+
+    with display(quiet=False) as shown, Interruptions() as interruptions:
+        join(token, simulations or count_cores(), onlooker=shown, interruptions=lambda: interruptions.count)
+
+
 def join(directory: DatasetArgument, json: JsonOption = False) -> None:
     """Make one dataset of the slices that `up --slice` has collected."""
     from throwcollect.cli.dataset.info import print_summary
@@ -189,6 +210,9 @@ def _collect(prepare: Callable[[Any, Display], PreparedRun | None], *, detach: b
             if (run := prepare(preparation, shown)) is None:
                 return False
             held.enter_context(run)
+            if run.config.run.listen is not None:
+                # A secret, so it is not among what is said, which may be written down.
+                typer.echo(f"other machines join by: {command('join-run', run.token, '-n', 4)}", err=True)
             if not detach:
                 with Interruptions() as interruptions:
                     summary = run.collect(interruptions=lambda: interruptions.count)
@@ -205,7 +229,6 @@ def _start(run: PreparedRun, *, json: bool) -> None:
     """Hand the run over to a process of its own, and say how to follow it."""
     from throwcollect.cli.interruptions import Interruptions
     from throwcollect.cli.streams import ensure_written
-    from throwcollect.wording import command
 
     with Interruptions() as interruptions:
         record = run.start(interruptions=lambda: interruptions.count).record

@@ -31,7 +31,7 @@ def _add(*commands: Callable[..., None], panel: str | None = None, hidden: bool 
         app.command(rich_help_panel=panel, hidden=hidden)(command)
 
 
-_add(collect.up, collect.resume, cluster.submit, collect.join)
+_add(collect.up, collect.resume, collect.join_run, cluster.submit, collect.join)
 _add(runs.ps, runs.wait, runs.logs, runs.events, runs.scale, runs.stop, runs.down, panel="Runs")
 _add(show.config, show.plan, show.doctor)
 _add(nodes.router, nodes.sim, nodes.coordinator, nodes.health, panel="Nodes, as `up` starts them")

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import Field, PositiveFloat
+from pydantic import AfterValidator, Field, PositiveFloat, WithJsonSchema, model_validator
 
+from throwcollect.config.kinds import ContradictionError
 from throwcollect.config.section import Section
 from throwcollect.members import names_of
 
@@ -16,11 +18,23 @@ else:
     RuntimeName = Literal[("auto", *names_of("runtimes"))]
 
 
+def _listen_address(text: str) -> str:
+    match = re.fullmatch(r"tcp/(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9.-]+):([1-9]\d{0,4})", text)
+    if match is None or int(match[2]) > 65535:
+        raise ValueError(f"should be tcp/ADDRESS:PORT, such as tcp/0.0.0.0:7447, got '{text}'")
+    return text
+
+
+ListenAddress = Annotated[
+    str, AfterValidator(_listen_address), WithJsonSchema({"type": "string", "words": "tcp/ADDRESS:PORT"})
+]
+
+
 class RunConfig(Section):
     """How a collection is run; nothing in this section changes the dataset."""
 
-    simulations: Annotated[int, Field(ge=1, le=256)] = 2
-    """Number of simulations, unless `-n` says otherwise."""
+    simulations: Annotated[int, Field(ge=0, le=256)] = 2
+    """Number of simulations, unless `-n` says otherwise; 0 only with `listen`, for those of other machines."""
     runtime: RuntimeName = "auto"
     """Where the nodes run: in processes (`local`) or in containers; `auto` takes containers if an engine answers.
 
@@ -29,6 +43,9 @@ class RunConfig(Section):
     """TCP port of the router on the loopback interface; 7447 is the one ROS nodes look for.
 
     0 takes a free one, and publishes none of a container."""
+    listen: ListenAddress | None = None
+    """Where simulations of other machines can join (`throwcollect join-run`), such as `tcp/0.0.0.0:7447`; nobody can
+    without the token of the run. Null: this machine alone."""
     open: bool = False
     """Anybody who reaches the router may join, read and disturb the run; episodes are still signed."""
     ros: Literal["auto", "rclpy", "embedded"] = "auto"
@@ -50,3 +67,16 @@ class RunConfig(Section):
     """How many trials, chosen by the seed, a fresh process simulates again at the end, to be compared bit for bit."""
     restarts: Annotated[int, Field(ge=0, le=1000)] = 10
     """How often one simulation is restarted before it is given up."""
+
+    @model_validator(mode="after")
+    def _fits_machines_that_join(self) -> RunConfig:
+        wrong = {}
+        if self.listen is None and self.simulations == 0:
+            wrong["simulations"] = "should be 1 or more, as no other machine can join (run.listen), got 0"
+        if self.listen is not None and self.open:
+            wrong["open"] = "should be false, as other machines can reach the run (run.listen)"
+        if self.listen is not None and self.runtime not in ("auto", "local"):
+            wrong["runtime"] = f"should be local, as other machines are to join (run.listen), got {self.runtime}"
+        if wrong:
+            raise ContradictionError(wrong)
+        return self

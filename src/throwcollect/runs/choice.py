@@ -41,7 +41,8 @@ def choose(config: Config, *, say: Callable[[str], None], warn: Callable[[str], 
         MissingExtraError: If what the runtime needs is not installed.
         WorkerError: If the runtime that is asked for cannot be had.
     """
-    wanted = config.run.runtime
+    # Processes of other machines join processes.
+    wanted = config.run.runtime if config.run.listen is None else "local"
     launcher = choose_middleware(config.run.ros)
     candidates = AUTOMATIC if wanted == "auto" else (wanted,)
     note = " (auto)" if wanted == "auto" else ""

@@ -10,6 +10,7 @@ from datetime import datetime, timezone
 from pathlib import Path
 from types import TracebackType
 
+from throwcollect.build import build_digest
 from throwcollect.config.loader import load, load_locating_errors
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.prepare import make_self_contained, more_trials
@@ -25,7 +26,8 @@ from throwcollect.runs.launcher import SILENT, Onlooker, launch, start_launcher,
 from throwcollect.runs.record import Record, Summary
 from throwcollect.runs.records import OpenRun, Records, Run
 from throwcollect.runs.selection import busy, find_left_in
-from throwcollect.runtimes.ports import reserve_port
+from throwcollect.runs.token import JoinToken
+from throwcollect.runtimes.ports import format_endpoint, reach_from_elsewhere, reserve_port, split_address
 from throwcollect.runtimes.runtime import Place
 from throwcollect.sweep.plan import Plan
 from throwcollect.wording import command, format_count
@@ -92,6 +94,21 @@ class PreparedRun:
     def place(self) -> Place:
         """Where it lies."""
         return self._run.record.place(self._run.key)
+
+    @property
+    def token(self) -> str:
+        """The word by which other machines join it; a secret, as whoever has it may do so.
+
+        Raises:
+            ConfigError: If it listens to this machine alone, or its key cannot be read.
+        """
+        if self.config.run.listen is None:
+            raise ConfigError("other machines cannot join the run", hint="run.listen says where they can")
+        host, port = split_address(self.config.run.listen)
+        endpoint = format_endpoint("tls", reach_from_elsewhere(host), port)
+        return JoinToken(
+            self.record.run, endpoint, self._run.key.secret.hex(), self.config.run.domain_id, build_digest()
+        ).encode()
 
     def collect(self, *, interruptions: Callable[[], int] = lambda: 0) -> Summary:
         """Launch it in this process, and come back when it has ended; see `launcher.launch`.
@@ -269,7 +286,7 @@ def prepare_run(records: Records, request: Request, plan: Plan | None, onlooker:
     with ExitStack() as held, ExitStack() as undo:
         run = records.new(config.name)
         undo.callback(run.forget)
-        reserve_port(config.run.router_port).close()
+        reserve_port(config.run).close()
         # Getting an image may take minutes, so all that may be wrong is found before; but where there is a volume, it
         # is the runtime that decides where the dataset is.
         volume = config.containers.volume

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -17,7 +18,7 @@ from throwcollect.files import open_log
 from throwcollect.interruption import die_with_parent
 from throwcollect.runtimes.node_logs import NodeLogs
 from throwcollect.runtimes.nodes import ROUTER, NodeExit, NodeHost, NodeSpec, node_environment, protocol_of
-from throwcollect.runtimes.ports import reserve_port
+from throwcollect.runtimes.ports import format_endpoint, reach_from_here, reserve_port, split_address
 from throwcollect.runtimes.runtime import Place, Runtime, Session
 
 if TYPE_CHECKING:
@@ -58,6 +59,7 @@ class LocalNodes(NodeHost):
     Args:
         place: The run.
         config: Its configuration.
+        elsewhere: Endpoint of the router, if that is another machine's; None if the router is one of the nodes.
 
     Raises:
         ConfigError: If the router's port is taken.
@@ -65,15 +67,22 @@ class LocalNodes(NodeHost):
 
     cleared = True
 
-    def __init__(self, place: Place, config: Config) -> None:
+    def __init__(self, place: Place, config: Config, *, elsewhere: str | None = None) -> None:
         self.place = place
         self.config = config
         self.data = str(place.directory)
         self.logs = NodeLogs(place.logs)
-        self._reserved = reserve_port(config.run.router_port)
-        self._address: tuple[str, int] = self._reserved.getsockname()
-        self.listen = "{}/{}:{}".format(protocol_of(config.run, place.middleware), *self._address)
-        self._environment = {**os.environ, **node_environment(self.connection_at(self.listen))}
+        self._reserved: socket.socket | None = None
+        if elsewhere is not None:
+            self.listen = endpoint = elsewhere
+        else:
+            self._reserved = reserve_port(config.run)
+            host, port = self._reserved.getsockname()[:2]
+            protocol = protocol_of(config.run, place.middleware)
+            self.listen = format_endpoint(protocol, host, port)
+            endpoint = format_endpoint(protocol, reach_from_here(host), port)
+        self._address = split_address(endpoint)
+        self._environment = {**os.environ, **node_environment(self.connection_at(endpoint))}
         self._processes: dict[str, subprocess.Popen[bytes]] = {}
 
     def collect(self, session: Session) -> Info:
@@ -93,7 +102,7 @@ class LocalNodes(NodeHost):
         Raises:
             WorkerError: If the process cannot be started or its log cannot be written.
         """
-        if node.name == ROUTER:
+        if node.name == ROUTER and self._reserved is not None:
             self._reserved.close()
         try:
             with open(open_log(self.logs.path(node.name)), "ab") as log:
@@ -151,7 +160,8 @@ class LocalNodes(NodeHost):
 
     def close(self) -> None:
         """End all nodes, the router last, and free its port."""
-        self._reserved.close()
+        if self._reserved is not None:
+            self._reserved.close()
         self.stop([name for name in self._processes if name != ROUTER])
         self.stop([ROUTER])
 

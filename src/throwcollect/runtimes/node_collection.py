@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable
 
 from throwcollect import ros
+from throwcollect.config.loader import dump_yaml
 from throwcollect.coordinator.progress import Progress
 from throwcollect.dataset.summary import Info
 from throwcollect.errors import DatasetError, Interrupted, LossError, WorkerError
@@ -32,6 +33,8 @@ from throwcollect.runtimes.supervisor import Supervisor
 
 SIMULATIONS = "simulations"
 """Name of the launcher's parameter."""
+CONFIGURATION = "configuration"
+"""Name of its parameter that holds the text of the configuration, for machines that join."""
 MOST_SIMULATIONS = 256
 
 _POLL_S = 0.05
@@ -104,7 +107,7 @@ class NodeCollection:
         self._apart_since = math.inf
         self._started_again = False
         self._supervisor = Supervisor(host, host.config.run, roster(host, self._simulations))
-        self._listener = RunListener(self._report, name=LAUNCHER, on_connect=self._offer_scaling)
+        self._listener = RunListener(self._report, name=LAUNCHER, on_connect=self._offer)
 
     def run_to_the_end(self) -> Info:
         """See `runtime.Host.collect`."""
@@ -192,7 +195,9 @@ class NodeCollection:
                 hint="a firewall may keep nodes apart; throwcollect doctor shows what is installed",
             )
 
-    def _offer_scaling(self, node: ros.Node) -> None:
+    def _offer(self, node: ros.Node) -> None:
+        """Declare what others ask the launcher for: the number of simulations, and the configuration to join with."""
+        node.declare_parameter(CONFIGURATION, dump_yaml(self._host.config), ros.ParameterDescriptor(read_only=True))
         most = 1 if self._host.config.run.root_namespace else MOST_SIMULATIONS
         offer_scaling(node, self._simulations, self._want, most=most)
 

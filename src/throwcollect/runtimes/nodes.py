@@ -14,6 +14,7 @@ from throwcollect.config.run import RunConfig
 from throwcollect.ros.connection import Connection
 from throwcollect.ros.middleware import Middleware
 from throwcollect.runtimes.node_logs import NodeLogs
+from throwcollect.runtimes.ports import format_endpoint
 from throwcollect.runtimes.runtime import Place
 
 if TYPE_CHECKING:
@@ -107,7 +108,7 @@ class NodeHost(ABC):
         """How this process joins the run; None while there is no way to its router."""
         if (address := self.router_address()) is None:
             return None
-        return self.connection_at("{}/{}:{}".format(self.listen.partition("/")[0], *address))
+        return self.connection_at(format_endpoint(self.listen.partition("/")[0], *address))
 
     def connection_at(self, endpoint: str) -> Connection:
         """The way into the run over an endpoint of its router."""

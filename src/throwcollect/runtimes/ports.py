@@ -1,31 +1,79 @@
-"""Ports of the loopback interface."""
+"""Ports that a router listens at."""
 
 from __future__ import annotations
 
 import socket
+from ipaddress import ip_address
 
+from throwcollect.config.run import RunConfig
 from throwcollect.errors import ConfigError, Problem
 
 LOOPBACK = "127.0.0.1"
+_ELSEWHERE = ("192.0.2.1", 9)
+"""An address for documentation (RFC 5737), which is nobody's."""
 
 
-def reserve_port(wanted: int) -> socket.socket:
-    """A socket that keeps a port for the router until it is closed.
+def reserve_port(run: RunConfig) -> socket.socket:
+    """A socket that keeps the port of a run's router until it is closed.
 
     Args:
-        wanted: The port; 0 takes a free one.
+        run: Says which: a port of the loopback interface, of which 0 takes a free one, or that at which other machines
+            join.
 
     Raises:
-        ConfigError: If the port is taken.
+        ConfigError: If the port is taken, or the address is none of this machine.
     """
-    probe = socket.socket()
+    if run.listen is None:
+        return _bind(LOOPBACK, run.router_port, "run.router_port", hint="--set run.router_port=0 takes a free one")
+    host, port = split_address(run.listen)
+    return _bind(host, port, "run.listen", hint="tcp/0.0.0.0:PORT listens at all addresses of this machine")
+
+
+def split_address(endpoint: str) -> tuple[str, int]:
+    """Host and port of an endpoint, such as ``tcp/0.0.0.0:7447``."""
+    host, _, port = endpoint.partition("/")[2].rpartition(":")
+    return host.strip("[]"), int(port)
+
+
+def format_endpoint(protocol: str, host: str, port: int) -> str:
+    """An endpoint as Zenoh takes it, such as ``tls/127.0.0.1:7447``."""
+    return f"{protocol}/[{host}]:{port}" if ":" in host else f"{protocol}/{host}:{port}"
+
+
+def _bind(host: str, port: int, key: str, *, hint: str) -> socket.socket:
+    probe = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET)
     probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
-        probe.bind((LOOPBACK, wanted))
+        probe.bind((host, port))
     except OSError as error:
         probe.close()
-        raise ConfigError(
-            [Problem(f"port {wanted} of {LOOPBACK} cannot be used: {error.strerror}", "run.router_port")],
-            hint="--set run.router_port=0 takes a free one",
-        ) from error
+        problem = Problem(f"port {port} of {host} cannot be used: {error.strerror}", key)
+        raise ConfigError([problem], hint=hint) from error
     return probe
+
+
+def reach_from_here(host: str) -> str:
+    """The address at which processes of this machine reach one that listens at `host`, which may be all addresses."""
+    if not _is_unspecified(host):
+        return host
+    return "::1" if ":" in host else LOOPBACK
+
+
+def reach_from_elsewhere(host: str) -> str:
+    """The address at which other machines most likely reach one that listens at `host`, which may be all addresses."""
+    if not _is_unspecified(host):
+        return host
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            # Nothing is sent; the system only says from which address it would be.
+            probe.connect(_ELSEWHERE)
+        except OSError:
+            return socket.gethostname()
+        return str(probe.getsockname()[0])
+
+
+def _is_unspecified(host: str) -> bool:
+    try:
+        return ip_address(host).is_unspecified
+    except ValueError:
+        return False

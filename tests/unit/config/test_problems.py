@@ -8,8 +8,8 @@ from throwcollect.config.loader import load, load_locating_errors
 from throwcollect.errors import ConfigError, PlanError, Problem
 
 KNOWN_IN_RUN = (
-    "simulations, runtime, router_port, open, ros, root_namespace, domain_id, trial_timeout_s, start_timeout_s, "
-    "grace_s, retries, replay, restarts"
+    "simulations, runtime, router_port, listen, open, ros, root_namespace, domain_id, trial_timeout_s, "
+    "start_timeout_s, grace_s, retries, replay, restarts"
 )
 
 

@@ -47,7 +47,7 @@ def check(client: DockerClient, place: RunPlace, config: Config) -> None:
     if problems := list(_problems(config, networks, root)):
         raise ConfigError(problems)
     if config.run.router_port and not begun:
-        reserve_port(config.run.router_port).close()
+        reserve_port(config.run).close()
 
 
 def _problems(config: Config, networks: set[str], root: str) -> Iterator[Problem]:

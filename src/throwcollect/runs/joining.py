@@ -1,0 +1,162 @@
+"""Adds simulations of this machine to a run of another one, and takes them away again at any time."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import socket
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from throwcollect.config.loader import load
+from throwcollect.config.schema import Config
+from throwcollect.coordinator.progress import Progress
+from throwcollect.errors import WorkerError
+from throwcollect.files import write_file
+from throwcollect.ros.connection import Connection
+from throwcollect.ros.endpoint import answers
+from throwcollect.ros.middleware import Middleware
+from throwcollect.run_key import RunKey
+from throwcollect.runs.launcher import SILENT, Onlooker
+from throwcollect.runs.token import JoinToken
+from throwcollect.runtimes.local import LocalNodes
+from throwcollect.runtimes.nodes import LAUNCHER, NodeSpec, Role, simulation_name_of
+from throwcollect.runtimes.runtime import Place
+from throwcollect.runtimes.supervisor import Supervisor
+from throwcollect.wording import format_count
+
+_ANSWER_S = 15.0
+"""Time in which a router, and then a launcher, answers."""
+_POLL_S = 0.1
+_SILENT_S = 120.0
+"""A run of which nothing is heard for this long is over: a link that is cut may come back before that."""
+_OVER_S = 5.0
+"""The same for a run whose last trial has ended."""
+
+
+def join_run(
+    word: str,
+    simulations: int,
+    *,
+    onlooker: Onlooker = SILENT,
+    interruptions: Callable[[], int] = lambda: 0,
+) -> None:
+    """Simulate trials of a run that another machine has begun, until it is over.
+
+    Args:
+        word: The token of the run.
+        simulations: Number of simulations that are started here.
+        onlooker: Is told what goes on.
+        interruptions: How often somebody has asked to stop; what is simulated just then, others do again.
+
+    Raises:
+        ConfigError: If the token is none, or other throws would be computed here.
+        WorkerError: If the run cannot be reached, or the simulations cannot be kept alive.
+    """
+    token = JoinToken.decode(word)
+    token.check_build()
+    scratch = Path(tempfile.mkdtemp(prefix="throwcollect-join-"))
+    try:
+        key = RunKey(scratch / "key")
+        key.create(bytes.fromhex(token.secret))
+        connection = Connection(token.endpoint, key, token.domain_id)
+        write_file(scratch / "config.yaml", _read_configuration(connection, token).encode())
+        config = load(scratch / "config.yaml")
+        onlooker.say(f"run {token.run}: {format_count(simulations, 'simulation')} of this machine join it")
+        place = Place(token.run, scratch, None, scratch / "logs", simulations, Middleware(), key)
+        _simulate(LocalNodes(place, config, elsewhere=token.endpoint), connection, config, onlooker, interruptions)
+    finally:
+        shutil.rmtree(scratch, ignore_errors=True)
+
+
+def _simulate(
+    host: LocalNodes, connection: Connection, config: Config, onlooker: Onlooker, interruptions: Callable[[], int]
+) -> None:
+    """Keep the simulations alive until the run is over.
+
+    Raises:
+        WorkerError: If that is impossible.
+    """
+    from throwcollect.runtimes.run_listener import RunListener
+
+    heard = _Heard(onlooker)
+    # The name is this machine's, and the number this process's: several may join from one machine.
+    name = simulation_name_of(f"{socket.gethostname()}_{os.getpid()}")
+    cores = sorted(os.sched_getaffinity(0))
+    bound = host.place.simulations >= len(cores)
+    roster = [
+        NodeSpec(
+            f"{name}_{index}",
+            ("sim", f"{host.data}/config.yaml", "--name", f"{name}_{index}"),
+            Role.EXPENDABLE,
+            core=cores[index % len(cores)] if bound else None,
+        )
+        for index in range(host.place.simulations)
+    ]
+    with Supervisor(host, config.run, roster) as supervisor, RunListener(heard.update) as listener:
+        supervisor.start()
+        while not heard.over and not interruptions():
+            listener.spin(connection, _POLL_S)
+            _, news = supervisor.poll()
+            for line in news:
+                onlooker.warn(line)
+    if interruptions():
+        onlooker.say("left; the run goes on without the simulations of this machine")
+    elif heard.finished:
+        onlooker.say("the run is over")
+    else:
+        raise WorkerError(f"nothing was heard of the run for {_SILENT_S:g} s", hint="join it again if it still goes on")
+
+
+class _Heard:
+    """What was heard of the run, and when."""
+
+    def __init__(self, onlooker: Onlooker) -> None:
+        self._onlooker = onlooker
+        self._at = time.monotonic()
+        self.finished = False
+
+    def update(self, progress: Progress) -> None:
+        self._at = time.monotonic()
+        self.finished = progress.steps[0] >= progress.steps[1]
+        self._onlooker.update(progress)
+
+    @property
+    def over(self) -> bool:
+        return time.monotonic() > self._at + (_OVER_S if self.finished else _SILENT_S)
+
+
+def _read_configuration(connection: Connection, token: JoinToken) -> str:
+    """Ask the launcher of the run for its configuration.
+
+    Raises:
+        WorkerError: If it does not answer.
+    """
+    if not answers(connection.endpoint, patience_s=_ANSWER_S):
+        raise WorkerError(
+            f"run {token.run}: no router answers at {connection.endpoint}",
+            hint="is the run over, or does a firewall keep its port closed?",
+        )
+    connection.middleware.joining.settle()
+    from throwcollect import ros
+    from throwcollect.ros.srv import GetParameters
+    from throwcollect.runtimes.node_collection import CONFIGURATION
+
+    context = ros.Context()
+    ros.init(context=context, connection=connection)
+    try:
+        node = ros.Node(f"_throwcollect_{os.getpid()}", context=context)
+        executor = ros.SingleThreadedExecutor(context=context)
+        executor.add_node(node)
+        client = node.create_client(GetParameters, f"/{LAUNCHER}/get_parameters")
+        future = client.call_async(GetParameters.Request(names=[CONFIGURATION]))
+        if client.wait_for_service(_ANSWER_S):
+            executor.spin_until_future_complete(future, timeout_sec=_ANSWER_S)
+        if not future.done():
+            raise WorkerError(f"run {token.run}: its launcher does not answer at {connection.endpoint}")
+        text: str = future.result().values[0].string_value
+        return text
+    finally:
+        ros.shutdown(context=context)

@@ -1,0 +1,255 @@
+"""Simulations of other machines join a run and leave it as they like: network namespaces stand for the machines."""
+
+from __future__ import annotations
+
+import os
+import re
+import secrets
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, suppress
+from pathlib import Path
+
+import pytest
+
+from rclzenoh.session_config import OVERRIDE_VARIABLE, Key, client_override
+from tests.e2e.collection import CONFIG, FAST, INPROCESS, Running, call, collect, command, fingerprints, launched
+from throwcollect.run_key import RunKey
+
+pytestmark = pytest.mark.e2e
+TRIALS = 30
+SLOW = "sim.real_time_factor=1"
+"""Longer than all that happens to the run; the samples stay the same."""
+CUT_S = 15.0
+"""Longer than Zenoh waits for a word of the other side, so that all has to be found again."""
+DELAY_S = 0.05
+
+
+class Machine:
+    """A machine with an address of its own, on one wire with this one."""
+
+    def __init__(self, number: int) -> None:
+        self.name = f"tc{secrets.token_hex(4)}"
+        self.gateway, self.address = f"10.213.{number}.1", f"10.213.{number}.2"
+        self.wire = f"{self.name}w"
+
+    def __enter__(self) -> Machine:
+        ip("netns", "add", self.name)
+        ip("link", "add", self.wire, "type", "veth", "peer", "name", "eth0", "netns", self.name)
+        ip("address", "add", f"{self.gateway}/24", "dev", self.wire)
+        ip("link", "set", self.wire, "up")
+        for words in (f"address add {self.address}/24 dev eth0", "link set eth0 up", "link set lo up"):
+            ip("-n", self.name, *words.split())
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        # The wire goes with the namespace, but only when the last process in there has ended.
+        ip("link", "del", self.wire)
+        ip("netns", "del", self.name)
+
+    def run(self, *words: str | Path) -> list[str]:
+        """A command as it is run on this machine."""
+        return ["ip", "netns", "exec", self.name, *map(str, words)]
+
+    def cut(self) -> None:
+        """Pull out the wire."""
+        ip("link", "set", self.wire, "down")
+
+    def mend(self) -> None:
+        """Put it in again."""
+        ip("link", "set", self.wire, "up")
+
+
+def ip(*words: str) -> None:
+    subprocess.run(["ip", *words], check=True, capture_output=True)
+
+
+def can_make_machines() -> bool:
+    if os.getuid() or shutil.which("ip") is None:
+        return False
+    try:
+        with Machine(9):
+            return True
+    except subprocess.CalledProcessError:
+        return False
+
+
+needs_machines = pytest.mark.skipif(not can_make_machines(), reason="network namespaces need root and iproute2")
+
+
+class SlowWire:
+    """Listens on one address and passes everything on to another one, a while later: this kernel has no netem."""
+
+    def __init__(self, address: str, port: int) -> None:
+        self._target = (address, port)
+        self._server = socket.create_server((address, 0))
+        self.port = self._server.getsockname()[1]
+        threading.Thread(target=self._serve, daemon=True).start()
+
+    def _serve(self) -> None:
+        with suppress(OSError):
+            while True:
+                one, _ = self._server.accept()
+                other = socket.create_connection(self._target)
+                for ends in ((one, other), (other, one)):
+                    threading.Thread(target=self._pass_on, args=ends, daemon=True).start()
+
+    @staticmethod
+    def _pass_on(one: socket.socket, other: socket.socket) -> None:
+        with suppress(OSError):
+            while data := one.recv(1 << 16):
+                time.sleep(DELAY_S)
+                other.sendall(data)
+        with suppress(OSError):
+            other.shutdown(socket.SHUT_WR)
+
+
+def listen(directory: Path, *options: str) -> tuple[Running, str, int]:
+    """A run that others can join, which has no simulations of its own; its token and its port."""
+    path = directory / "small.yaml"
+    path.write_text(CONFIG.format(trials=TRIALS) + f"sim: {{{FAST}}}\n")
+    with socket.create_server(("", 0)) as free:
+        port = free.getsockname()[1]
+    running = launched(
+        directory / "data", "up", path, "--output", directory / "data", "-n", "0", "--runtime", "local",
+        "--listen", f"tcp/0.0.0.0:{port}", *options,
+    )  # fmt: skip
+    assert running.process.stderr is not None
+    for line in running.process.stderr:
+        if found := re.search(r"join-run (tc1\.\S+)", line):
+            return running, found[1], port
+    raise AssertionError("no token was printed")
+
+
+def moved(token: str, address: str, port: int) -> str:
+    """The token with another way to the router."""
+    from dataclasses import replace
+
+    from throwcollect.runs.token import JoinToken
+
+    return replace(JoinToken.decode(token), endpoint=f"tls/{address}:{port}").encode()
+
+
+def join(machine: Machine, token: str) -> subprocess.Popen[str]:
+    words = machine.run(*command("join-run", token, "-n", "1"))
+    return subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, start_new_session=True)
+
+
+@pytest.fixture
+def machines() -> Iterator[list[Machine]]:
+    with ExitStack() as stack:
+        yield [stack.enter_context(Machine(number)) for number in (1, 2, 3)]
+
+
+@pytest.fixture
+def processes() -> Iterator[list[subprocess.Popen[str]]]:
+    started: list[subprocess.Popen[str]] = []
+    yield started
+    for process in started:
+        with suppress(ProcessLookupError):
+            process.send_signal(signal.SIGKILL)
+        process.wait()
+
+
+@needs_machines
+def test_machines_come_and_go_and_the_files_are_the_same(
+    tmp_path: Path, machines: list[Machine], processes: list[subprocess.Popen[str]]
+) -> None:
+    running, token, port = listen(tmp_path, "--set", SLOW)
+    steady, late, gone = machines
+    processes += [join(steady, moved(token, steady.gateway, port)), join(gone, moved(token, gone.gateway, port))]
+    running.wait_until(lambda: running.written() > 100_000)
+    gone.cut()  # so that nothing can be said any more
+    processes[1].kill()
+    wire = SlowWire(late.gateway, port)
+    processes.append(join(late, moved(token, late.gateway, wire.port)))
+    written = running.written()
+    running.wait_until(lambda: running.written() > written + 100_000)
+    steady.cut()
+    time.sleep(CUT_S)
+    steady.mend()
+    code, _, said = running.finish()
+    assert code == 0, said
+    for process in (processes[0], processes[2]):
+        assert process.wait(30) == 0
+        assert process.stderr is not None
+        assert "the run is over" in process.stderr.read()
+    collect(tmp_path / "small.yaml", tmp_path / "whole", 1, *INPROCESS)
+    whole, joined = fingerprints(tmp_path / "whole"), fingerprints(tmp_path / "data")
+    same = [name for name in whole if name.endswith(".mcap") or name == "throws.parquet"]
+    assert len(same) == 2
+    # What the configuration says of the speed stands in the other files.
+    assert {name: joined[name] for name in same} == {name: whole[name] for name in same}
+
+
+STRANGER = """
+import os, sys, zenoh
+from rclzenoh.session_config import environment_config
+try:
+    session = zenoh.open(environment_config())
+except zenoh.ZError as error:
+    sys.exit(f"refused: {error}")
+session.put("0/sim_0/episode", b"an episode")
+print("HAS A SESSION")
+"""
+
+
+@needs_machines
+def test_nobody_gets_in_without_the_token(tmp_path: Path, machines: list[Machine]) -> None:
+    running, _, port = listen(tmp_path)
+    machine = machines[0]
+    own = RunKey(tmp_path / "own")
+    own.create()
+    ways = {
+        "without a key": client_override(f"tls/{machine.gateway}:{port}", None),
+        "with a key of its own": client_override(
+            f"tls/{machine.gateway}:{port}", Key(own.private_key, own.certificate)
+        ),
+        "without TLS": client_override(f"tcp/{machine.gateway}:{port}", None),
+    }
+    for name, way in ways.items():
+        done = subprocess.run(
+            machine.run(sys.executable, "-c", STRANGER),
+            env={**os.environ, OVERRIDE_VARIABLE: way},
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=60,
+        )
+        assert done.returncode == 1, name
+        assert "refused" in done.stderr, name
+    running.process.send_signal(signal.SIGINT)
+    running.finish()
+
+
+def test_other_sources_are_refused_with_a_clear_word(tmp_path: Path) -> None:
+    from throwcollect.runs.token import JoinToken
+
+    token = JoinToken("many-1234", "tls/127.0.0.1:1", "11" * 32, 0, build="another").encode()
+    done = call("join-run", token)
+    assert done.returncode == 2
+    assert "run many-1234: other sources, or another pybullet or robot model" in done.stderr
+
+
+@pytest.mark.parametrize("word", ["", "tc1.", "tc1.e30", "x" * 50, "tc1.!!!"])
+def test_what_is_no_token_is_refused(word: str) -> None:
+    done = call("join-run", word)
+    assert done.returncode == 2
+    assert "this is no token of a run, or not a whole one" in done.stderr
+
+
+def test_a_run_that_is_over_cannot_be_joined() -> None:
+    from throwcollect.build import build_digest
+    from throwcollect.runs.token import JoinToken
+
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    done = call("join-run", JoinToken("many-1234", f"tls/127.0.0.1:{port}", "11" * 32, 0, build_digest()).encode())
+    assert done.returncode == 3
+    assert f"no router answers at tls/127.0.0.1:{port}" in done.stderr

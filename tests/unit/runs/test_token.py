@@ -1,0 +1,39 @@
+"""Tokens are one word, are read as they were made, and are refused where other throws would be computed."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from throwcollect.build import build_digest
+from throwcollect.errors import ConfigError
+from throwcollect.runs.token import JoinToken
+
+
+def make(build: str = "") -> JoinToken:
+    return JoinToken("many-1234", "tls/10.0.0.1:7447", "0f" * 32, 7, build or build_digest())
+
+
+def test_a_token_is_one_word_and_is_read_as_it_was_made() -> None:
+    word = make().encode()
+    assert re.fullmatch(r"tc1\.[A-Za-z0-9_-]+", word)
+    assert len(word) < 400
+    assert JoinToken.decode(f" {word}\n") == make()
+
+
+@pytest.mark.parametrize("cut", [0, 3, 10, 100, -1])
+def test_a_token_that_is_not_whole_is_refused(cut: int) -> None:
+    with pytest.raises(ConfigError, match="not a whole one"):
+        JoinToken.decode(make().encode()[:cut])
+
+
+def test_a_secret_is_not_what_it_should_be() -> None:
+    with pytest.raises(ConfigError, match="no token"):
+        JoinToken.decode(JoinToken("many", "tls/x:1", "secret", 0, "").encode())
+
+
+def test_what_computes_there_has_to_compute_here() -> None:
+    make().check_build()
+    with pytest.raises(ConfigError, match="run many-1234: other sources"):
+        make("f" * 64).check_build()
