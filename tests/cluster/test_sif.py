@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import io
 import json
 import os
@@ -9,22 +10,28 @@ import pwd
 import re
 import shutil
 import subprocess
+import sys
+import sysconfig
 import tarfile
 from pathlib import Path
 
 import pytest
+from docker.client import DockerClient
 
 import throwcollect
-from tests.cluster.conftest import USER
+from tests.cluster.conftest import BUILD, USER
 from tests.e2e.collection import CONFIG, FAST, fingerprints, write_config
 from throwcollect import runs
 from throwcollect.errors import ConfigError
 from throwcollect.runtimes.apptainer.contents import check_sif, read_contents
 from throwcollect.runtimes.apptainer.sif import make_sif
+from throwcollect.runtimes.docker.saved_image import save_image
 from throwcollect.runtimes.image_sources import SOURCES_LABEL
 
 pytestmark = pytest.mark.cluster
-PAGE = (Path(__file__).parents[2] / "docs" / "containers.md").read_text(encoding="utf-8")
+ROOT = Path(__file__).parents[2]
+BASE = "throwcollect-base:bookworm"
+PAGE = (ROOT / "docs" / "containers.md").read_text(encoding="utf-8")
 COMMANDS = re.findall(r"^ *(apptainer .*?throwcollect\.sif up [^#\n]*)", PAGE, flags=re.MULTILINE)
 PLACES = ("/tmp", "/var/tmp", "/home", "/dev/shm", "/run", "/opt")
 """Where whoever shares the machine could be disturbed."""
@@ -96,6 +103,7 @@ def test_both_ways_to_run_it_are_in_the_docs() -> None:
 
 
 def test_two_users_on_one_machine_do_not_meet(place: Path, expected: dict[str, str]) -> None:
+    place.chmod(0o755)
     processes = []
     for user in (USER, "nobody"):
         (place / user).mkdir()
@@ -118,23 +126,53 @@ def test_a_sif_says_what_is_in_it(sif: Path) -> None:
 
 
 def test_labels_of_an_archive_are_those_of_the_sif(tmp_path: Path) -> None:
+    layer = pack({"etc/hostname": b""})
     config = {
         "architecture": "amd64",
         "os": "linux",
         "config": {"Entrypoint": ["throwcollect"], "Labels": {SOURCES_LABEL: "0" * 64}},
-        "rootfs": {"type": "layers", "diff_ids": []},
+        "rootfs": {"type": "layers", "diff_ids": [f"sha256:{hashlib.sha256(layer).hexdigest()}"]},
     }
-    files = {
-        "config.json": json.dumps(config).encode(),
-        "manifest.json": json.dumps(
-            [{"Config": "config.json", "RepoTags": ["throwcollect:old"], "Layers": []}]
-        ).encode(),
-    }
-    with tarfile.open(tmp_path / "image.tar", "w") as archive:
+    manifest = [{"Config": "config.json", "RepoTags": ["throwcollect:old"], "Layers": ["layer.tar"]}]
+    texts = {"config.json": json.dumps(config).encode(), "manifest.json": json.dumps(manifest).encode()}
+    (tmp_path / "image.tar").write_bytes(pack({**texts, "layer.tar": layer}))
+    make_sif(tmp_path / "old.sif", archive=tmp_path / "image.tar", say=lambda _line: None)
+    with pytest.raises(ConfigError, match="was made from other sources than these"):
+        check_sif(tmp_path / "old.sif")
+
+
+def test_without_an_engine_a_user_builds_the_same_from_the_clone(
+    client: DockerClient, place: Path, expected: dict[str, str]
+) -> None:
+    wheelhouse = BUILD / "wheelhouse"
+    if not wheelhouse.exists() or not client.images.list(BASE):
+        pytest.skip(f"there is no {wheelhouse}, or no image {BASE}; .ci/engine.sh makes both")
+    # Others may not read the Python of root, but libraries of this environment are for that of the system as well.
+    python = "/usr/bin/python3"
+    version = subprocess.check_output([python, "-c", "import sys; print(*sys.version_info[:2])"], text=True)
+    if version.split() != list(map(str, sys.version_info[:2])):
+        pytest.skip(f"{python} is of another version than {sys.executable}")
+    save_image(place / "base.tar", BASE, base=BASE, wheelhouse=None, say=lambda _line: None)
+    printed = finish(
+        start(
+            f"{python} -m throwcollect image sif -o own.sif --base base.tar --wheelhouse {wheelhouse}",
+            place,
+            TMPDIR=str(place / "tmp"),
+            PYTHONPATH=f"{ROOT / 'src'}:{sysconfig.get_path('purelib')}",
+            DOCKER_HOST="unix:///no/engine.sock",
+        )
+    )
+    assert "built from docker/throwcollect.def, as no Docker engine answers" in printed
+    check_sif(place / "own.sif")
+    finish(start("apptainer run own.sif up -n 2 throws.yaml --output dataset", place, PYTHONPATH="/nowhere"))
+    assert fingerprints(place / "dataset") == expected
+
+
+def pack(files: dict[str, bytes]) -> bytes:
+    packed = io.BytesIO()
+    with tarfile.open(fileobj=packed, mode="w") as archive:
         for name, content in files.items():
             info = tarfile.TarInfo(name)
             info.size = len(content)
             archive.addfile(info, io.BytesIO(content))
-    make_sif(tmp_path / "old.sif", archive=tmp_path / "image.tar", say=lambda _line: None)
-    with pytest.raises(ConfigError, match="was made from other sources than these"):
-        check_sif(tmp_path / "old.sif")
+    return packed.getvalue()

@@ -297,6 +297,16 @@ def test_the_way_on_after_the_death_of_a_launcher_depends_on_where_the_dataset_i
     assert "resume" not in told(make("c", "died", runtime="docker", volume="v"))
 
 
+def test_without_a_client_of_engines_none_is_asked(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    def import_client(**_: object) -> None:
+        raise ModuleNotFoundError("No module named 'docker'", name="docker")
+
+    monkeypatch.setenv("DOCKER_HOST", f"unix://{tmp_path}/engine.sock")
+    monkeypatch.setattr("throwcollect.runtimes.docker.engine.connect", import_client)
+    monkeypatch.setattr("throwcollect.runtimes.docker.runtime.is_installed", lambda _: False)
+    assert find_held_runs() == {}
+
+
 def test_an_engine_that_is_not_there_is_not_waited_for(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("DOCKER_HOST", f"unix://{tmp_path}/none.sock")
     assert find_held_runs() == {}

@@ -27,6 +27,11 @@ _DEFINITION = "docker/throwcollect.def"
 _FAST_COMPRESSION = "-comp zstd -Xcompression-level 3"
 """A quarter of the time that gzip takes, for the same size."""
 _NO_SPACE = "no space left on device"
+_HINTS = {
+    _NO_SPACE: "free 1.5 GB for temporary files, or let TMPDIR name another directory, and 200 MB for the file itself",
+    "conveyor failed to get": "--base takes another base image: one of a registry, a SIF, a directory, or an archive",
+}
+"""What helps, by what Apptainer says in small letters."""
 
 
 def make_sif(
@@ -138,10 +143,11 @@ def _run(new: Path, work: Path, *arguments: str, cwd: Path | None = None) -> Non
     try:
         call(what, "build", *options, str(new), source, cwd=cwd, places=places)
     except WorkerError as error:
-        if _NO_SPACE in (error.evidence or "").lower():
-            hint = f"it needs 2 GB in {work.parent} meanwhile, or in another directory that TMPDIR names"
-            raise WorkerError(f"{what}: {_NO_SPACE}", evidence=error.evidence, hint=hint) from error
-        raise
+        found = next((reason for reason in _HINTS if reason in str(error).lower()), None)
+        if found is None:
+            raise
+        message = f"{what}: {found}" if found == _NO_SPACE else error.message
+        raise WorkerError(message, evidence=error.evidence, hint=_HINTS[found]) from error
 
 
 @contextmanager

@@ -148,6 +148,15 @@ def test_a_full_disk_is_named_with_the_place_that_is_needed(apptainer: Path, tmp
     assert "TMPDIR" in str(caught.value.hint)
 
 
+def test_a_base_image_that_cannot_be_had_is_told_with_a_way_out(apptainer: Path, tmp_path: Path) -> None:
+    write_program(
+        apptainer, 'echo "FATAL:   While performing build: conveyor failed to get: no such host" >&2; exit 255'
+    )
+    with pytest.raises(WorkerError, match="conveyor failed to get: no such host") as caught:
+        make(tmp_path / "it.sif")
+    assert "--base" in str(caught.value.hint)
+
+
 def test_without_a_directory_for_temporary_files_nothing_is_begun(
     apptainer: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
