@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 import time
@@ -12,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.cluster.conftest import USER
 from tests.cluster.slurm import Slurm
 from tests.e2e.collection import CONFIG, FAST, fingerprints, write_config
 from throwcollect import runs
@@ -135,6 +137,25 @@ def test_nothing_is_lost_when_nodes_die_and_tasks_are_preempted(slurm: Slurm, tm
         if state == "PENDING":
             slurm.restart_at_once(f"{array}_{index}")
     call(slurm, "wait", "--run", data)
+    assert fingerprints(data) == whole
+
+
+def test_a_script_collects_in_an_image_for_whoever_submits_it(
+    slurm: Slurm, short: tuple[Path, dict[str, str]], shared: Path, sif: Path
+) -> None:
+    """The user of the jobs has nothing but the image, and the script of somebody else."""
+    config, whole = short
+    data = shared / "data"
+    shutil.copy(config, shared / "throws.yaml")
+    inside = ("apptainer", "--quiet", "exec", str(sif), "throwcollect")
+    slurm.run(*inside, "plan", "throws.yaml", "--output", "data", user=USER, cwd=shared)
+    arguments = ("submit", config, "--output", data, "--tasks", str(TASKS), "--dry-run")
+    script = call(slurm, *arguments, "--set", "cluster.memory=1G", "--set", f"cluster.image={sif}")
+    (shared / "collect.sh").write_text(script)
+    # Slurm makes no directories for logs.
+    slurm.run("mkdir", "-p", "data/cluster/logs", user=USER, cwd=shared)
+    slurm.run("sbatch", "--wait", "collect.sh", user=USER, cwd=shared)
+    slurm.run(*inside, "join", "data", user=USER, cwd=shared)
     assert fingerprints(data) == whole
 
 

@@ -32,6 +32,7 @@ from throwcollect.dataset.directory import CONFIG, PLAN, TRIALS
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.files import unwritable, write_file
 from throwcollect.runs.slices import check_sliceable, read_frozen_config
+from throwcollect.runtimes.apptainer.contents import check_sif
 from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.slice import Slice
 from throwcollect.wording import command, format_count
@@ -177,6 +178,13 @@ def _scripts(config: Config, directory: Path) -> BatchScripts:
             raise ConfigError(
                 [Problem(f"there is no image {image}", key="cluster.image")], hint="throwcollect image sif makes one"
             )
+        if wrong := sorted(set(":,") & set(str(directory))):
+            raise ConfigError(
+                f"{directory}: Apptainer binds no directory with {' or '.join(wrong)} in its name",
+                expected="another directory, or cluster.image: null",
+            )
+        if shutil.which("apptainer") is not None:
+            check_sif(image)
     return BatchScripts(config, directory, directory / CLUSTER / _LOGS, (sys.executable, "-m", "throwcollect"), image)
 
 
