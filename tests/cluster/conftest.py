@@ -18,6 +18,8 @@ UNAVAILABLE = BUILD / "cluster-unavailable"
 __all__ = ["client"]
 USER = "throwcollect-ci"
 """Whose jobs are run: nobody who may do more than others."""
+SHARED = "throwcollect-shared-"
+"""Names of directories that tests share with jobs begin so."""
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -39,7 +41,7 @@ def _cluster() -> None:
 @pytest.fixture
 def shared() -> Iterator[Path]:
     """A directory that all nodes see, and that belongs to the user of the jobs."""
-    with tempfile.TemporaryDirectory(prefix="throwcollect-shared-") as path:
+    with tempfile.TemporaryDirectory(prefix=SHARED) as path:
         shutil.chown(path, USER, USER)
         yield Path(path)
 

@@ -13,13 +13,14 @@ import subprocess
 import sys
 import sysconfig
 import tarfile
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
 from docker.client import DockerClient
 
 import throwcollect
-from tests.cluster.conftest import BUILD, USER
+from tests.cluster.conftest import BUILD, SHARED, USER
 from tests.e2e.collection import CONFIG, FAST, fingerprints, write_config
 from throwcollect import runs
 from throwcollect.errors import ConfigError
@@ -76,14 +77,18 @@ def finish(process: subprocess.Popen[str]) -> str:
     return printed
 
 
-def files_of(user: str, apart_from: Path) -> set[Path]:
-    """All files of a user in places that users share."""
+def files_of(user: str) -> set[Path]:
+    """All files of a user in places that users share, apart from directories of tests, be it of others just now."""
     number = pwd.getpwnam(user).pw_uid
     found = set()
     for top in PLACES:
         for directory, folders, names in os.walk(top):
-            folders[:] = [name for name in folders if Path(directory, name) != apart_from]
-            found |= {path for name in names if (path := Path(directory, name)).lstat().st_uid == number}
+            folders[:] = [name for name in folders if not name.startswith(SHARED)]
+            for path in (Path(directory, name) for name in names):
+                # Others may remove their files meanwhile.
+                with suppress(FileNotFoundError):
+                    if path.lstat().st_uid == number:
+                        found.add(path)
     return found
 
 
@@ -91,11 +96,11 @@ def files_of(user: str, apart_from: Path) -> set[Path]:
 def test_the_commands_of_the_docs_make_the_files_of_any_collection_and_write_nowhere_else(
     command: str, place: Path, expected: dict[str, str]
 ) -> None:
-    before = files_of(USER, place)
+    before = files_of(USER)
     printed = finish(start(command, place, TMPDIR=str(place / "tmp"), PYTHONPATH="/nowhere", PYTHONHOME="/nowhere"))
     assert "runtime: local processes (auto, as the package docker is not installed)" in printed
     assert fingerprints(place / "dataset") == expected
-    assert files_of(USER, place) <= before
+    assert files_of(USER) <= before
 
 
 def test_both_ways_to_run_it_are_in_the_docs() -> None:
