@@ -244,6 +244,12 @@ def test_what_is_no_token_is_refused(word: str) -> None:
     assert "this is no token of a run, or not a whole one" in done.stderr
 
 
+def test_a_token_is_read_from_standard_input() -> None:
+    done = subprocess.run(command("join-run", "-"), input="tc1.e30\n", capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "this is no token of a run" in done.stderr
+
+
 def test_a_run_that_is_over_cannot_be_joined() -> None:
     from throwcollect.build import build_digest
     from throwcollect.runs.token import JoinToken

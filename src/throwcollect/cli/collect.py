@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json as jsonlib
+import sys
 from collections.abc import Callable
 from contextlib import ExitStack
 from functools import partial
@@ -145,7 +146,13 @@ def _collect_slice(directory: Path, text: str, changes: list[str], *, json: bool
 
 
 def join_run(
-    token: Annotated[str, typer.Argument(metavar="TOKEN", help="The word that `up --listen` prints.")],
+    token: Annotated[
+        str,
+        typer.Argument(
+            metavar="TOKEN",
+            help="The word that `up --listen` prints; - reads it from standard input, where no other user sees it.",
+        ),
+    ],
     simulations: Annotated[
         int | None,
         typer.Option("-n", metavar="N", min=1, max=256, help="Number of simulations; one a core by default."),
@@ -157,7 +164,8 @@ def join_run(
     from throwcollect.runs.joining import join_run as join
 
     with display(quiet=False) as shown, Interruptions() as interruptions:
-        join(token, simulations or count_cores(), onlooker=shown, interruptions=lambda: interruptions.count)
+        word = sys.stdin.readline() if token == "-" else token  # noqa: S105 - it is no password
+        join(word, simulations or count_cores(), onlooker=shown, interruptions=lambda: interruptions.count)
 
 
 def join(directory: DatasetArgument, json: JsonOption = False) -> None:
