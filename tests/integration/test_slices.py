@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import errno
+import fcntl
+import os
 import shutil
 from pathlib import Path
 
@@ -12,8 +15,11 @@ from throwcollect import runs
 from throwcollect.config.loader import load
 from throwcollect.coordinator.prepare import prepare
 from throwcollect.dataset.join import join
+from throwcollect.dataset.shard import OpenShard
 from throwcollect.dataset.slice_directory import SLICES, find_attempts, find_finished, make_attempt, publish
+from throwcollect.episode.message import Episode
 from throwcollect.errors import ConfigError, DatasetError, Interrupted
+from throwcollect.files import unwritable
 from throwcollect.runs.slices import collect_slice
 from throwcollect.sweep.slice import Slice
 
@@ -172,6 +178,69 @@ def test_what_would_change_the_dataset_is_refused(frozen: Path) -> None:
         collect_slice(frozen, Slice(0, 2), overrides=["seed=9"])
     with pytest.raises(ConfigError, match=r"run.open: should be false"):
         collect_slice(frozen, Slice(0, 2), overrides=["run.open=true"])
+
+
+def test_slices_need_no_locks(config: Path, whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Some file systems of clusters have none; what one run collects needs them all the same."""
+
+    def refuse(descriptor: int, _: int) -> None:
+        if str(tmp_path) in os.readlink(f"/proc/self/fd/{descriptor}"):
+            raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
+
+    monkeypatch.setattr(fcntl, "flock", refuse)
+    prepare(load(config), tmp_path / "data", sweep_directory=tmp_path)
+    collect(tmp_path / "data", "0/2", "1/2")
+    join(tmp_path / "data")
+    assert fingerprints(tmp_path / "data") == fingerprints(whole)
+    with pytest.raises(DatasetError, match=r"cannot be locked[\s\S]*has locks"):
+        runs.prepare(config, overrides=INPROCESS, output=tmp_path / "one")
+
+
+def test_a_disk_that_is_full_costs_the_attempt_and_nothing_else(
+    frozen: Path, whole: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    full = True
+
+    def append(self: OpenShard, episode: Episode) -> None:
+        if full and len(self._runs) == 2:
+            raise unwritable(self.part, OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)))
+        appended(self, episode)
+
+    appended = OpenShard.append
+    monkeypatch.setattr(OpenShard, "append", append)
+    with pytest.raises(DatasetError, match=r"No space left on device[\s\S]*free space"):
+        collect_slice(frozen, Slice(0, 2), overrides=INPROCESS)
+    assert not find_finished(frozen)
+    full = False
+    collect(frozen, "0/2", "1/2")
+    join(frozen)
+    assert fingerprints(frozen) == fingerprints(whole)
+
+
+def test_a_slice_is_collected_on_a_disk_of_the_node_and_handed_over(
+    frozen: Path, whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scratch = tmp_path / "scratch"
+    monkeypatch.setenv("DISK_OF_THE_NODE", str(scratch))
+    on_scratch = [*INPROCESS, "cluster.scratch=$DISK_OF_THE_NODE"]
+    seen: list[Path] = []
+
+    def interruptions() -> int:
+        seen.extend(scratch.glob("0-of-2.attempt-*/*.part"))
+        return int(any(path.exists() and path.stat().st_size > 100_000 for path in seen))
+
+    with pytest.raises(Interrupted):
+        collect_slice(frozen, Slice(0, 2), overrides=on_scratch, interruptions=interruptions)
+    assert seen
+    assert not list(scratch.iterdir())
+    onlooker = Listener()
+    collect_slice(frozen, Slice(0, 2), overrides=on_scratch, onlooker=onlooker)
+    assert any("of an earlier collection" in line for line in onlooker.lines)
+    collect(frozen, "1/2")
+    join(frozen)
+    assert fingerprints(frozen) == fingerprints(whole)
+    with pytest.raises(ConfigError, match=r"cluster.scratch: \$MISSING is \$MISSING here, not an absolute path"):
+        collect_slice(frozen, Slice(0, 3), overrides=[*INPROCESS, "cluster.scratch=$MISSING"])
 
 
 def test_a_directory_without_a_plan_is_refused(tmp_path: Path) -> None:

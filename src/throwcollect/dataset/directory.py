@@ -26,6 +26,8 @@ MANIFEST = "datapackage.json"
 """Sizes and hashes of all files that the dataset promises (see `manifest`)."""
 SHARD_SUFFIX = ".mcap"
 JOURNAL = "logs/journal.jsonl"
+ATTEMPT = ".attempt-"
+"""Stands in the names of directories of attempts at a slice, and of no dataset."""
 
 FORMAT = "1"
 """Version of the layout that ``docs/dataset.md`` describes."""
@@ -39,6 +41,11 @@ def shard_name(collection: str, number: int) -> str:
         number: Number of the shard, counted from 0.
     """
     return f"{collection}_{number:05d}{SHARD_SUFFIX}"
+
+
+def is_attempt(directory: Path) -> bool:
+    """Whether a directory is that of an attempt at a slice, which one process alone knows (see `slice_directory`)."""
+    return ATTEMPT in directory.name
 
 
 def find_known_directory(directory: Path) -> Path | None:

@@ -42,7 +42,7 @@ def join(directory: Path) -> None:
         ConfigError: If the directory holds no slices, or some of another number of slices.
         DatasetError: If a slice is missing, damaged or not of this plan, or the dataset cannot be written.
     """
-    with hold_alone(directory):
+    with hold_alone(directory, needed=False):
         if not (directory / METADATA).exists():
             _join(directory)
         shutil.rmtree(directory / SLICES, ignore_errors=True)

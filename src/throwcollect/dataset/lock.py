@@ -11,10 +11,14 @@ and plan when nobody can change them any more, and they fit each other.
 
 The lock is one of the kernel (flock) on the directory itself. So it leaves nothing behind, holds across containers and
 other names of the directory, and goes with the process. On NFS it is known to the processes of one machine alone.
+
+Some file systems of clusters have no locks. A dataset that is collected in slices needs none: an attempt at a slice has
+a directory that one process alone knows, and joining comes out the same however often and by whomever it is done.
 """
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import os
 import time
@@ -22,25 +26,28 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from throwcollect.dataset.directory import is_attempt
 from throwcollect.errors import DatasetError
 from throwcollect.files import unreadable
 
 PATIENCE_S = 5.0
 """How long to wait for a lock [s]: a process that was killed a moment ago may still hold it."""
 _RETRY_S = 0.05
+_NO_LOCKS = frozenset({errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP})
 
 
 @contextmanager
-def hold_alone(directory: Path) -> Iterator[None]:
+def hold_alone(directory: Path, *, needed: bool = True) -> Iterator[None]:
     """Keep all others from changing a dataset while the block lasts.
 
     Args:
         directory: Its directory.
+        needed: Whether it has to be locked; if not, a file system without locks will do.
 
     Raises:
         DatasetError: If another process changes it, or it cannot be locked.
     """
-    with _hold(directory, alone=True):
+    with _hold(directory, alone=True, needed=needed):
         yield
 
 
@@ -58,13 +65,15 @@ def hold_together(directory: Path) -> Iterator[None]:
         yield
 
 
-def lock(descriptor: int, directory: Path, *, alone: bool = True) -> None:
+def lock(descriptor: int, directory: Path, *, alone: bool = True, needed: bool = True) -> None:
     """Lock an open file or directory of a dataset until it is closed.
 
     Args:
         descriptor: Its descriptor.
         directory: Directory of the dataset, for messages.
         alone: Whether no other process may hold the lock.
+        needed: Whether it has to be locked; if not, a file system without locks will do, as it does for an attempt at a
+            slice.
 
     Raises:
         DatasetError: If another process holds it, or it cannot be locked.
@@ -83,6 +92,8 @@ def lock(descriptor: int, directory: Path, *, alone: bool = True) -> None:
                 ) from error
             time.sleep(_RETRY_S)
         except OSError as error:
+            if error.errno in _NO_LOCKS and (not needed or is_attempt(directory)):
+                return
             raise DatasetError(
                 f"cannot be locked: {error.strerror}",
                 path=directory,
@@ -93,13 +104,13 @@ def lock(descriptor: int, directory: Path, *, alone: bool = True) -> None:
 
 
 @contextmanager
-def _hold(directory: Path, *, alone: bool) -> Iterator[None]:
+def _hold(directory: Path, *, alone: bool, needed: bool = True) -> Iterator[None]:
     try:
         descriptor = os.open(directory, os.O_RDONLY | os.O_DIRECTORY)
     except OSError as error:
         raise unreadable(directory, error) from error
     try:
-        lock(descriptor, directory, alone=alone)
+        lock(descriptor, directory, alone=alone, needed=needed)
         yield
     finally:
         os.close(descriptor)

@@ -20,14 +20,13 @@ from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
-from throwcollect.dataset.directory import MANIFEST, SHARD_SUFFIX, THROWS
+from throwcollect.dataset.directory import ATTEMPT, MANIFEST, SHARD_SUFFIX, THROWS
 from throwcollect.files import unreadable, unwritable
 from throwcollect.sweep.slice import Slice
 
 SLICES = "slices"
 """Name of the directory of slices in that of a dataset."""
 
-_ATTEMPT = ".attempt-"
 _NAME = re.compile(r"(\d+)-of-(\d+)", re.ASCII)
 
 
@@ -57,7 +56,7 @@ def find_attempts(directory: Path, slice: Slice) -> list[Path]:
     Raises:
         DatasetError: If the directory of slices cannot be read.
     """
-    start = f"{slice_directory(directory, slice).name}{_ATTEMPT}"
+    start = f"{slice_directory(directory, slice).name}{ATTEMPT}"
     return sorted(directory / SLICES / name for name in _list(directory / SLICES) if name.startswith(start))
 
 
@@ -72,7 +71,7 @@ def make_attempt(directory: Path, slice: Slice, *, scratch: Path | None = None) 
     Raises:
         DatasetError: If it cannot be made.
     """
-    name = f"{slice_directory(directory, slice).name}{_ATTEMPT}{socket.gethostname()}-{secrets.token_hex(4)}"
+    name = f"{slice_directory(directory, slice).name}{ATTEMPT}{socket.gethostname()}-{secrets.token_hex(4)}"
     path = (scratch or directory / SLICES) / name
     try:
         path.mkdir(parents=True)

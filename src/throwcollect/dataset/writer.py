@@ -71,7 +71,7 @@ def create(directory: Path, plan: Plan, *, listed: Points | None = None) -> None
         directory.mkdir(parents=True, exist_ok=True)
     except (OSError, RecursionError) as error:
         raise _unusable(directory, error) from error
-    with hold_alone(directory):
+    with hold_alone(directory, needed=False):
         _fill(directory, plan, listed, made=made)
 
 
