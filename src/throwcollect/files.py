@@ -271,3 +271,16 @@ def write_file(path: Path, data: bytes) -> None:
     """
     with replacing(path) as descriptor:
         write_all(descriptor, data)
+
+
+def write_secret(path: Path, data: bytes) -> None:
+    """Write a file as `write_file` does, which its owner alone can read.
+
+    Raises:
+        DatasetError: If it cannot be written.
+    """
+    try:
+        with beside(path, mode=0o600) as descriptor:
+            write_all(descriptor, data)
+    except OSError as error:
+        raise unwritable(path, error) from error

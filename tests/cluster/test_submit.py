@@ -159,6 +159,24 @@ def test_a_script_collects_in_an_image_for_whoever_submits_it(
     assert fingerprints(data) == whole
 
 
+def test_a_plan_that_grows_is_collected_by_one_run_on_several_nodes(slurm: Slurm, tmp_path: Path) -> None:
+    config = configure(tmp_path, trials=200, sim=FAST)
+    grows = ("until.landed=20", "sweep.sampler=sobol")
+    with runs.prepare(config, overrides=["run.runtime=local", *grows], output=tmp_path / "whole") as run:
+        run.collect()
+    data = tmp_path / "with blank" / "data"
+    settings = [word for setting in ("cluster.memory=1G", *grows) for word in ("--set", setting)]
+    arguments = ("submit", config, "--output", data, "--tasks", "3", "--mode", "live", *settings)
+    said = call(slurm, *arguments, "--wait")
+    assert "one run on 3 nodes" in said
+    assert fingerprints(data) == fingerprints(tmp_path / "whole")
+    printed = call(slurm, "logs", "--run", data)
+    assert printed.count("1 simulation of this machine join it") == 2
+    # The simulations that joined end some seconds later, and the script after them.
+    wait_until(lambda: not (data / "cluster" / "token").exists())
+    assert "nothing is left to submit" in call(slurm, "resume", data)
+
+
 @pytest.mark.parametrize(
     ("settings", "message"),
     [

@@ -250,6 +250,22 @@ def test_a_token_is_read_from_standard_input() -> None:
     assert "this is no token of a run" in done.stderr
 
 
+def test_a_token_is_written_for_its_owner_alone(tmp_path: Path) -> None:
+    path = tmp_path / "small.yaml"
+    path.write_text(CONFIG.format(trials=1) + f"sim: {{{FAST}}}\n")
+    with socket.create_server(("", 0)) as free:
+        port = free.getsockname()[1]
+    arguments = ("up", path, "--output", tmp_path / "data", "-n", "1", "--listen", f"tcp/127.0.0.1:{port}")
+    done = call(*arguments, "--token-file", tmp_path / "token")
+    assert done.returncode == 0, done.stderr
+    assert "tc1." not in done.stdout + done.stderr
+    assert (tmp_path / "token").stat().st_mode & 0o777 == 0o600
+    assert (tmp_path / "token").read_text().startswith("tc1.")
+    done = call("up", path, "--output", tmp_path / "other", "--token-file", tmp_path / "token")
+    assert done.returncode == 2
+    assert "other machines cannot join the run" in done.stderr
+
+
 def test_a_run_that_is_over_cannot_be_joined() -> None:
     from throwcollect.build import build_digest
     from throwcollect.runs.token import JoinToken

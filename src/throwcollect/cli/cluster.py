@@ -5,7 +5,7 @@ from __future__ import annotations
 import json as jsonlib
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -26,6 +26,10 @@ def submit(
     tasks: Annotated[int, typer.Option("--tasks", metavar="N", min=1, help="Number of tasks; each collects a slice.")],
     settings: SetOption = None,
     trials: TrialsOption = None,
+    mode: Annotated[
+        Literal["array", "live"],
+        typer.Option("--mode", help="Slices by tasks of their own, or one run on as many nodes, for plans that grow."),
+    ] = "array",
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Print the batch script, and do nothing else.")] = False,
     wait: Annotated[bool, typer.Option("--wait", help="Follow it until the dataset is finished.")] = False,
     json: JsonOption = False,
@@ -33,7 +37,9 @@ def submit(
     """Collect a dataset on a cluster: submit an array of tasks to Slurm, and a job that joins what they collect."""
     from throwcollect.cluster.submit import submit as submit_dataset
 
-    done = submit_dataset(config, output, tasks, overrides=overrides(settings, trials=trials), dry=dry_run, say=_tell)
+    done = submit_dataset(
+        config, output, tasks, overrides=overrides(settings, trials=trials), live=mode == "live", dry=dry_run, say=_tell
+    )
     if done.job is None:
         typer.echo(done.script, nl=False)
         return

@@ -37,16 +37,14 @@ def follow_to_the_end(directory: Path, *, json: bool) -> None:
 
 def print_logs(run: ClusterRun, tasks: list[str]) -> None:
     """Print what tasks have printed; all if none is named."""
-    for text in tasks or map(str, range(run.submission.tasks)):
+    logs = run.logs
+    for text in tasks or logs:
         if not text.isdigit() or int(text) >= run.submission.tasks:
             last = run.submission.tasks - 1
             raise ConfigError(f"{run.directory}: has no task {text!r}", expected=f"0 to {last}")
-        path = run.log(int(text))
-        if path is None:
-            if tasks:
-                raise ConfigError(f"{run.directory}: task {text} has printed nothing yet")
-            continue
-        for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
+        if text not in logs:
+            raise ConfigError(f"{run.directory}: task {text} has printed nothing yet")
+        for line in logs[text].read_text(encoding="utf-8", errors="replace").splitlines():
             typer.echo(f"{text:>{len(str(run.submission.tasks))}} | {line}")
 
 
@@ -79,7 +77,7 @@ def rows() -> Iterator[tuple[str, ...]]:
         yield (
             run.submission.jobs[-1].array or run.submission.jobs[-1].join,
             "slurm",
-            str(look.running * run.config.cluster.cores),
+            str(look.running * run.simulations_per_task),
             f"{ProgressOfSlices(run).at(look).ended}/{run.trials}",
             _status(look, run),
             str(run.directory),
@@ -106,5 +104,7 @@ def documents() -> list[dict[str, Any]]:
 
 
 def _status(look: Look, run: ClusterRun) -> str:
+    if run.submission.live:
+        return f"one run on {format_count(run.submission.tasks, 'node')}, {'running' if look.running else 'waiting'}"
     tasks = format_count(run.submission.tasks, "task")
     return f"{len(look.finished)} of {tasks} finished, {look.running} running, {look.waiting} waiting"

@@ -22,6 +22,7 @@ from throwcollect.cli.options import (
     overrides,
 )
 from throwcollect.errors import ConfigError
+from throwcollect.files import write_secret
 from throwcollect.wording import command
 
 if TYPE_CHECKING:
@@ -34,6 +35,15 @@ SimulationsOption = Annotated[
 RuntimeOption = Annotated[
     str | None,
     typer.Option("--runtime", metavar="auto|local|docker|inprocess", help="Where the nodes run: run.runtime."),
+]
+TokenOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--token-file",
+        metavar="FILE",
+        help="With --listen: write the token there, for its owner alone, and do not print it.",
+        readable=False,
+    ),
 ]
 DetachOption = Annotated[
     bool, typer.Option("-d", "--detach", help="Print the id of the run as soon as its nodes are started.")
@@ -67,6 +77,7 @@ def up(
         str | None,
         typer.Option("--listen", metavar="ENDPOINT", help="Let other machines join, at tcp/ADDRESS:PORT: run.listen."),
     ] = None,
+    token_file: TokenOption = None,
     trials: TrialsOption = None,
     detach: DetachOption = False,
     json: JsonOption = False,
@@ -87,11 +98,12 @@ def up(
             ),
             detach=detach,
             json=json,
+            token_file=token_file,
         )
     elif output is not None:
         raise ConfigError(f"--output {output}: should be left out with --resume, which names the directory")
     else:
-        _go_on(resume, config, changes, detach=detach, json=json)
+        _go_on(resume, config, changes, detach=detach, json=json, token_file=token_file)
 
 
 def resume(
@@ -182,7 +194,14 @@ def join(directory: DatasetArgument, json: JsonOption = False) -> None:
 
 
 def _go_on(
-    directory: Path, config: Path | None, changes: list[str], *, detach: bool, json: bool, check: bool = False
+    directory: Path,
+    config: Path | None,
+    changes: list[str],
+    *,
+    detach: bool,
+    json: bool,
+    check: bool = False,
+    token_file: Path | None = None,
 ) -> None:
     from throwcollect.cli.dataset.info import print_summary
     from throwcollect.dataset.inspect import info
@@ -191,18 +210,22 @@ def _go_on(
         lambda runs, shown: runs.resume(directory, config=config, overrides=changes, check=check, onlooker=shown),
         detach=detach,
         json=json,
+        token_file=token_file,
     )
     if not launched:
         print_summary(info(directory), directory, as_json=json)
 
 
-def _collect(prepare: Callable[[Any, Display], PreparedRun | None], *, detach: bool, json: bool) -> bool:
+def _collect(
+    prepare: Callable[[Any, Display], PreparedRun | None], *, detach: bool, json: bool, token_file: Path | None
+) -> bool:
     """Launch a run and print its summary or, detached, its id.
 
     Args:
         prepare: Prepares the run, with the room that does such things, and a display that shows how that goes.
         detach: Whether to come back as soon as its nodes are started.
         json: Whether to print JSON.
+        token_file: Where the token goes of a run that other machines may join; None to print it.
 
     Returns:
         Whether there was anything to do.
@@ -218,7 +241,9 @@ def _collect(prepare: Callable[[Any, Display], PreparedRun | None], *, detach: b
             if (run := prepare(preparation, shown)) is None:
                 return False
             held.enter_context(run)
-            if run.config.run.listen is not None:
+            if token_file is not None:
+                write_secret(token_file, f"{run.token}\n".encode())
+            elif run.config.run.listen is not None:
                 # A secret, so it is not among what is said, which may be written down.
                 typer.echo(f"other machines join by: {command('join-run', run.token, '-n', 4)}", err=True)
             if not detach:

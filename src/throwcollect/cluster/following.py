@@ -15,7 +15,8 @@ from throwcollect.cluster.submission import CLUSTER, Submission, is_submitted, r
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.progress import Progress
-from throwcollect.dataset.directory import METADATA, PLAN, THROWS, config_path
+from throwcollect.dataset.directory import JOURNAL, METADATA, PLAN, THROWS, config_path
+from throwcollect.dataset.journal import read_journal
 from throwcollect.dataset.slice_directory import find_finished, slice_directory
 from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError, WorkerError
 from throwcollect.sweep.parquet_file import read_parquet
@@ -58,6 +59,11 @@ class ClusterRun:
         return len(read_parquet(self.directory / PLAN))
 
     @property
+    def simulations_per_task(self) -> int:
+        """Number of simulations of a task; of one run on several nodes, of all of them."""
+        return self.config.cluster.cores * (self.submission.tasks if self.submission.live else 1)
+
+    @property
     def jobs(self) -> tuple[str, ...]:
         """Numbers of all its jobs."""
         return tuple(job for each in self.submission.jobs for job in (each.array, each.join) if job)
@@ -75,7 +81,7 @@ class ClusterRun:
         joining: Task | None = None
         for job in self.submission.jobs:
             tasks |= {task.index: task for task in (slurm.find_tasks(job.array) if job.array else ())}
-            joining = next(iter(slurm.find_tasks(job.join)), joining)
+            joining = next(iter(slurm.find_tasks(job.join) if job.join else ()), joining)
         complete = (self.directory / METADATA).exists()
         finished = frozenset(self.submission.slices) if complete else find_finished(self.directory)
         return Look(finished, tuple(tasks.values()), joining, complete)
@@ -97,8 +103,10 @@ class ClusterRun:
         """
         if look.complete:
             return None
-        missing = [each for each in self.submission.slices if each not in look.finished]
         again = command("resume", self.directory)
+        if self.submission.live:
+            return self._explain_live(again)
+        missing = [each for each in self.submission.slices if each not in look.finished]
         if not missing:
             hint = f"{command('join', self.directory)} joins them"
             return WorkerError("all slices are finished, but they are not joined", hint=hint)
@@ -112,8 +120,25 @@ class ClusterRun:
             return Interrupted(f"{message}cancelled", hint=f"{again} submits what is missing")
         return WorkerError(f"{message}{join_names(reasons)}{more}", hint=f"{again} submits what is missing")
 
+    def _explain_live(self, again: str) -> ThrowcollectError:
+        job = self.submission.jobs[-1].array
+        task = slurm.find_ended(job).get(None)
+        if task is not None and task.state == "CANCELLED":
+            return Interrupted(f"job {job} was cancelled", hint=f"{again} submits it again")
+        how = "ended" if task is None else f"ended: {task.state}, exit code {task.reason}"
+        return WorkerError(f"job {job} {how}", hint=f"{again} submits it again; throwcollect logs says what it printed")
+
+    @property
+    def logs(self) -> dict[str, Path]:
+        """The latest log of each task, by its index; of one run on several nodes, its one log."""
+        if self.submission.live:
+            path = self.directory / CLUSTER / "logs" / f"{self.submission.jobs[-1].array}_live.log"
+            return {"0": path} if path.exists() else {}
+        found = {str(index): self.log(index) for index in range(self.submission.tasks)}
+        return {index: path for index, path in found.items() if path is not None}
+
     def log(self, index: int) -> Path | None:
-        """The latest log of a task; None if it has written none."""
+        """The latest log of a task of an array; None if it has written none."""
         logs = self.directory / CLUSTER / "logs"
         found = [path for job in self.submission.jobs if (path := logs / f"{job.array}_{index}.log").exists()]
         return found[-1] if found else None
@@ -189,12 +214,15 @@ class ProgressOfSlices:
                     continue  # it is being joined just now
                 self._outcomes.update(table["outcome"].to_pylist())
                 self._read.add(each)
+        if self._run.submission.live and not look.complete:
+            entries = read_journal(self._run.directory / JOURNAL)
+            self._outcomes = Counter(entry.outcome for entry in entries if entry.outcome is not None)
         task = self._run.config.task
         return Progress(
             total=self._run.trials,
             ended=self._run.trials if look.complete else self._outcomes.total(),
             outcomes=dict(self._outcomes),
-            simulations=look.running * self._run.config.cluster.cores,
+            simulations=look.running * self._run.simulations_per_task,
             throws_per_s=0.0,
             hung=[],
             success=task.success,

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from throwcollect.cluster.slurm import MARK
+from throwcollect.cluster.submission import CLUSTER
 from throwcollect.config.cluster import ClusterConfig
 from throwcollect.config.schema import Config
 from throwcollect.dataset.directory import PLAN
@@ -21,7 +22,7 @@ from throwcollect.errors import Interrupted
 _ENDING_S = 30
 """What a task needs besides `run.grace_s` to end in order: nodes end, files are closed."""
 _JOIN_MEMORY = "4G"
-_EXPANDED = re.compile(r"\$SLURM_|cluster\.scratch=|--bind=\$")
+_EXPANDED = re.compile(r"\$SLURM_|cluster\.scratch=|--bind=\$|tcp/0\.0\.0\.0:\$PORT$")
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,7 @@ class BatchScripts:
             "mem": cluster.memory,
             "time": cluster.time,
             # To the step alone, so that this script lives on and can have the task queued again.
-            "signal": f"TERM@{math.ceil(self.config.run.grace_s) + _ENDING_S}",
+            "signal": self._signal,
         }
         collected = [
             *("up", "--slice", f"$SLURM_ARRAY_TASK_ID/{tasks}", "--output", str(self.directory)),
@@ -77,6 +78,57 @@ class BatchScripts:
                 "# As a step, so that signals reach it.",
                 self._step(collected, cores=cluster.cores),
                 "code=$?",
+                *_requeue(cluster.requeue),
+                "exit $code",
+                "",
+            ]
+        )
+
+    def live(self, nodes: int) -> str:
+        """Text of the script of one run on several nodes: the first has the coordinator, and the others join it.
+
+        Args:
+            nodes: Number of nodes.
+        """
+        cluster = self.config.cluster
+        directives = {
+            "job-name": f"throwcollect-{self.config.name}",
+            "output": self._output("%j_live.log"),
+            "nodes": nodes,
+            "ntasks": nodes,
+            "ntasks-per-node": 1,
+            "cpus-per-task": cluster.cores,
+            "mem": cluster.memory,
+            "time": cluster.time,
+            "signal": self._signal,
+        }
+        token = str(self.directory / CLUSTER / "token")
+        begin = [
+            *("up", "--resume", str(self.directory), "-n", str(cluster.cores), "--runtime", "local"),
+            *("--listen", "tcp/0.0.0.0:$PORT", "--token-file", token),
+        ]
+        join = ["join-run", "-", "-n", str(cluster.cores)]
+        return "\n".join(
+            [
+                "#!/bin/bash",
+                f"# Collects a dataset of throwcollect in one run on {nodes} nodes.",
+                *self._directives(directives, cluster),
+                "#SBATCH --no-kill",
+                f"#SBATCH {'--requeue' if cluster.requeue else '--no-requeue'}",
+                *self._start(cluster),
+                "",
+                "export PORT=$((20000 + SLURM_JOB_ID % 20000))",
+                f"rm -f {shlex.quote(token)}",
+                "# The first task begins the run; the others go on without one that is lost.",
+                f"srun --no-kill --kill-on-bad-exit=0 --cpus-per-task={cluster.cores} bash -c '",
+                'if [ "$SLURM_PROCID" = 0 ]; then',
+                f"    exec {_inside_quotes(self._words(begin))}",
+                "fi",
+                f"until [ -s {_inside_quotes(shlex.quote(token))} ]; do sleep 0.5; done",
+                f"exec {_inside_quotes(self._words(join))} < {_inside_quotes(shlex.quote(token))}",
+                "'",
+                "code=$?",
+                f"rm -f {shlex.quote(token)}",
                 *_requeue(cluster.requeue),
                 "exit $code",
                 "",
@@ -106,6 +158,10 @@ class BatchScripts:
             ]
         )
 
+    @property
+    def _signal(self) -> str:
+        return f"TERM@{math.ceil(self.config.run.grace_s) + _ENDING_S}"
+
     def _output(self, name: str) -> str:
         return f"{str(self.logs).replace('%', '%%')}/{name}"
 
@@ -120,7 +176,7 @@ class BatchScripts:
             "nodes": 1,
             "ntasks": 1,
         }
-        for name, value in {**own, **shared}.items():
+        for name, value in {**shared, **own}.items():
             if value is not None:
                 text = str(value)
                 yield f"#SBATCH --{name}={text if _plain(text) else _quote(text)}"
@@ -136,14 +192,16 @@ class BatchScripts:
         yield "fi"
 
     def _step(self, words: Sequence[str], *, cores: int) -> str:
-        step = ["srun", "--ntasks=1", f"--cpus-per-task={cores}"]
+        return f"srun --ntasks=1 --cpus-per-task={cores} {self._words(words)}"
+
+    def _words(self, words: Sequence[str]) -> str:
+        """A command of throwcollect as the shell takes it, in the image if there is one."""
+        program = list(self.program)
         if self.image is not None:
             bound = [str(self.directory), *self.config.cluster.binds, *filter(None, [self.config.cluster.scratch])]
             binds = [f"--bind={bind}" for bind in bound]
-            step += ["apptainer", "--quiet", "exec", "--cleanenv", *binds, str(self.image), "throwcollect"]
-        else:
-            step += self.program
-        return " ".join(_in_shell(word) for word in (*step, *words))
+            program = ["apptainer", "--quiet", "exec", "--cleanenv", *binds, str(self.image), "throwcollect"]
+        return " ".join(_in_shell(word) for word in (*program, *words))
 
 
 def _requeue(times: int) -> Iterator[str]:
@@ -159,6 +217,11 @@ def _in_shell(word: str) -> str:
     if "$" in word and _EXPANDED.match(word):
         return f'"{word}"'
     return shlex.quote(word)
+
+
+def _inside_quotes(text: str) -> str:
+    """A part of a command within a word in single quotes."""
+    return text.replace("'", "'\\''")
 
 
 def _plain(text: str) -> bool:

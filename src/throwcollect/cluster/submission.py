@@ -24,8 +24,8 @@ class Job:
     """An array that was submitted, and the job that joins the slices behind it.
 
     Attributes:
-        array: Number of the array.
-        join: Number of the joining job.
+        array: Number of the array; empty if the slices were only to be joined.
+        join: Number of the joining job; empty if there is none, as behind one run.
         slices: Indexes of the slices that it collects.
         submitted: When.
     """
@@ -42,10 +42,11 @@ class Submission:
 
     Attributes:
         name: Name of the collection.
-        tasks: Number of slices.
+        tasks: Number of slices; of nodes, if it is one run.
         program: Words that stand for the ``throwcollect`` command outside of an image.
         image: Image that tasks run in; None for none.
         jobs: In the order in which they were submitted.
+        live: Whether it is one run on several nodes, and not an array.
     """
 
     name: str
@@ -53,11 +54,12 @@ class Submission:
     program: tuple[str, ...]
     image: str | None
     jobs: tuple[Job, ...] = ()
+    live: bool = False
 
     @property
     def slices(self) -> tuple[Slice, ...]:
-        """All slices."""
-        return Slice.all_of(self.tasks)
+        """All slices; none if it is one run."""
+        return () if self.live else Slice.all_of(self.tasks)
 
 
 _JSON = TypeAdapter(Submission)

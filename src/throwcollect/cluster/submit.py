@@ -31,7 +31,7 @@ from throwcollect.coordinator.resume import refuse_changes
 from throwcollect.dataset.directory import CONFIG, PLAN, TRIALS
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.files import unwritable, write_file
-from throwcollect.runs.slices import check_sliceable, read_frozen_config
+from throwcollect.runs.slices import check_closed, check_sliceable, read_changed_config, read_frozen_config
 from throwcollect.runtimes.apptainer.contents import check_sif
 from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.slice import Slice
@@ -57,15 +57,23 @@ class Submitted:
 
 
 def submit(
-    config: Path, directory: Path, tasks: int, *, overrides: Sequence[str] = (), dry: bool = False, say: Say
+    config: Path,
+    directory: Path,
+    tasks: int,
+    *,
+    overrides: Sequence[str] = (),
+    live: bool = False,
+    dry: bool = False,
+    say: Say,
 ) -> Submitted:
-    """Plan a dataset and submit it as an array of tasks.
+    """Plan a dataset and submit it as an array of tasks, or as one run on several nodes.
 
     Args:
         config: The configuration's file.
         directory: Directory of the dataset: new or empty, or with the plan of this configuration; all nodes see it.
-        tasks: Number of slices, each of which is a task.
+        tasks: Number of slices, each of which is a task; of nodes, if it is one run.
         overrides: What replaces keys of the configuration, as ``--set`` takes them.
+        live: Whether it is one run on several nodes, as a plan needs that grows with its results.
         dry: Whether only the script is made, and nothing is written.
         say: Is told what is done.
 
@@ -80,32 +88,36 @@ def submit(
         raise ConfigError(f"{str(directory)!r}: cannot be named in a batch script", expected="printable characters")
     with load_locating_errors(config, overrides) as read, ExitStack() as undo:
         wanted = read.model_copy(update={"cluster": with_site(read.cluster)})
-        check_sliceable(wanted)
-        if wanted.trials is not None:
-            Slice(0, tasks).trials_of(wanted.trials, trials_per_shard=wanted.record.trials_per_shard)
+        check_closed(wanted)
+        if not live:
+            check_sliceable(wanted)
+            if wanted.trials is not None:
+                Slice(0, tasks).trials_of(wanted.trials, trials_per_shard=wanted.record.trials_per_shard)
         scripts = _scripts(wanted, directory)
-        text = scripts.collect(tasks, format_indexes(tuple(range(tasks))))
+        slices = () if live else tuple(range(tasks))
+        text = scripts.live(tasks) if live else scripts.collect(tasks, format_indexes(slices))
         if dry:
             return Submitted(directory, text)
         if is_submitted(directory):
             raise ConfigError(
                 f"{directory}: was submitted already", hint=f"{command('resume', directory)} submits what is missing"
             )
-        _check_size(tasks)
+        if not live:
+            _check_size(tasks)
         made = not directory.exists()
         undo.callback(_remove, directory, made=made, planned=not (directory / PLAN).exists())
         _freeze(wanted, directory, config.parent, say)
-        Plan.read(directory / PLAN, read_frozen_config(directory), slice=Slice(0, tasks))
-        submission = Submission(
-            wanted.name, tasks, tuple(scripts.program), str(scripts.image) if scripts.image else None
-        )
-        submitted = _submit(scripts, submission, tuple(range(tasks)), say)
+        if not live:
+            Plan.read(directory / PLAN, read_frozen_config(directory), slice=Slice(0, tasks))
+        image = str(scripts.image) if scripts.image else None
+        submission = Submission(wanted.name, tasks, tuple(scripts.program), image, live=live)
+        submitted = _submit(scripts, submission, slices, say)
         undo.pop_all()
         return submitted
 
 
 def submit_missing(directory: Path, *, overrides: Sequence[str] = (), say: Say) -> Submitted | None:
-    """Submit the slices of a dataset that are neither finished nor on their way.
+    """Submit the slices of a dataset that are neither finished nor on their way; of one run, what is left of it.
 
     Args:
         directory: Directory of the dataset.
@@ -123,13 +135,13 @@ def submit_missing(directory: Path, *, overrides: Sequence[str] = (), say: Say) 
     directory = directory.absolute()
     submission = read_submission(directory)
     look = ClusterRun(directory, submission).look()
-    if look.complete:
+    if look.complete or (submission.live and look.lives):
         return None
     living = {task.index for task in look.tasks if task.lives}
     missing = tuple(each.index for each in submission.slices if each not in look.finished and each.index not in living)
     if not missing and look.lives:
         return None
-    config = read_frozen_config(directory, overrides)
+    config = read_changed_config(directory, overrides)
     scripts = replace(
         _scripts(config, directory),
         program=submission.program,
@@ -144,6 +156,8 @@ def _submit(scripts: BatchScripts, submission: Submission, slices: tuple[int, ..
     Raises:
         DatasetError: If a script cannot be written.
     """
+    if submission.live:
+        return _submit_live(scripts, submission, say)
     directory = scripts.directory
     collect, join = (directory / CLUSTER / name for name in (_COLLECT, _JOIN))
     text = scripts.collect(submission.tasks, format_indexes(slices)) if slices else ""
@@ -167,6 +181,26 @@ def _submit(scripts: BatchScripts, submission: Submission, slices: tuple[int, ..
         say(f"submitted job {array}: {format_count(len(slices), 'task')}; job {joining} joins their slices")
     else:
         say(f"submitted job {joining}, which joins the slices; all of them are finished")
+    return Submitted(directory, text, job)
+
+
+def _submit_live(scripts: BatchScripts, submission: Submission, say: Say) -> Submitted:
+    """Write the script of one run and submit it.
+
+    Raises:
+        DatasetError: If the script cannot be written.
+    """
+    directory = scripts.directory
+    path, text = directory / CLUSTER / _COLLECT, scripts.live(submission.tasks)
+    try:
+        scripts.logs.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise unwritable(scripts.logs, error) from error
+    write_file(path, text.encode())
+    slurm.check(path)
+    job = Job(slurm.submit(path), "", (), datetime.now(timezone.utc))
+    write_submission(directory, replace(submission, jobs=(*submission.jobs, job)))
+    say(f"submitted job {job.array}: one run on {format_count(submission.tasks, 'node')}")
     return Submitted(directory, text, job)
 
 
@@ -197,7 +231,7 @@ def _check_size(tasks: int) -> None:
 def _freeze(config: Config, directory: Path, sweep_directory: Path, say: Say) -> None:
     """Have the directory hold the plan of the configuration."""
     if (directory / PLAN).exists():
-        refuse_changes(directory, read_frozen_config(directory), config)
+        refuse_changes(directory, read_changed_config(directory), config)
         say(f"takes the plan in {directory}")
         return
     processes = len(os.sched_getaffinity(0))

@@ -104,11 +104,13 @@ class Entry:
         event: What happened.
         time_s: When, Unix time [s].
         wall_s: Real time that collecting took in all [s], if the line tells it.
+        outcome: What came of a trial whose episode was written, if the line tells it.
     """
 
     event: Event
     time_s: float
     wall_s: float | None = None
+    outcome: str | None = None
 
 
 def read_journal(path: Path) -> Iterator[Entry]:
@@ -132,8 +134,13 @@ def read_journal(path: Path) -> Iterator[Entry]:
                 and entry.get("event") in get_args(Event)
                 and isinstance(entry.get("time"), int | float)
             ):
-                wall_s = entry.get("wall_s")
-                yield Entry(entry["event"], entry["time"], wall_s if isinstance(wall_s, int | float) else None)
+                wall_s, outcome = entry.get("wall_s"), entry.get("outcome")
+                yield Entry(
+                    entry["event"],
+                    entry["time"],
+                    wall_s if isinstance(wall_s, int | float) else None,
+                    outcome if isinstance(outcome, str) else None,
+                )
 
 
 def was_open(directory: Path) -> bool:

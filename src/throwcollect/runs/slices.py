@@ -95,13 +95,29 @@ def read_frozen_config(directory: Path, overrides: Sequence[str] = ()) -> Config
     Raises:
         ConfigError: If there is no such dataset, its plan grows, or the overrides change what is collected.
     """
+    read_changed_config(directory, overrides)
+    with load_locating_errors(config_path(directory), overrides) as config:
+        check_sliceable(config)
+        check_closed(config)
+        return config
+
+
+def read_changed_config(directory: Path, overrides: Sequence[str] = ()) -> Config:
+    """Read the configuration of a dataset whose plan is frozen, with other keys that say how it is run.
+
+    Args:
+        directory: Its directory, with its plan.
+        overrides: What replaces such keys.
+
+    Raises:
+        ConfigError: If there is no such dataset, or the overrides change what is collected.
+    """
     if not (directory / PLAN).is_file():
         raise ConfigError(
             f"{directory}: holds no plan", hint=command("plan", "CONFIG", "--output", directory) + " makes one"
         )
     with load_locating_errors(config_path(directory), overrides) as config:
         refuse_changes(directory, load(config_path(directory)), config)
-        check_sliceable(config)
         return config
 
 
@@ -123,16 +139,24 @@ def check_sliceable(config: Config) -> None:
     """Check that a configuration can be collected in slices.
 
     Raises:
-        ConfigError: If its plan grows with its results, or its run would be open.
+        ConfigError: If its plan grows with its results.
     """
     if config.grows:
         raise ConfigError(
             [Problem("a plan that grows with its results cannot be collected in slices", key=_growing_key(config))],
             expected="a fixed number of trials",
-            hint="throwcollect up collects it in one run",
+            hint="throwcollect submit --mode live collects it in one run on several nodes",
         )
+
+
+def check_closed(config: Config) -> None:
+    """Check that nobody else may join what is run on a cluster.
+
+    Raises:
+        ConfigError: If its run would be open.
+    """
     if config.run.open:
-        raise ConfigError([Problem("should be false, as a slice has its router for itself", key="run.open")])
+        raise ConfigError([Problem("should be false, as nodes of a cluster are there for many", key="run.open")])
 
 
 def _growing_key(config: Config) -> str:

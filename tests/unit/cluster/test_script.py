@@ -138,6 +138,27 @@ def test_a_task_that_was_stopped_in_order_is_queued_again(
     assert done.returncode == code
 
 
+def test_in_one_run_the_first_task_begins_and_the_others_join(directory: Path, tmp_path: Path) -> None:
+    (directory / "cluster").mkdir()
+    script = scripts(directory, cores=2).live(3)
+    found = options(script)
+    assert (found["nodes"], found["ntasks"], found["ntasks-per-node"]) == ("3", "3", "1")
+    program = 'while [ "$1" != bash ]; do shift; done; exec "$@"'
+    (tmp_path / "bin").mkdir()
+    node = tmp_path / "bin" / "throwcollect"
+    node.write_text('#!/bin/bash\nprintf "%s\\n" "$@"\n[ "$1" = up ] || cat\n')
+    node.chmod(0o755)
+    token = str(directory / "cluster" / "token")
+    first = run(script, tmp_path, srun=program, SLURM_PROCID="0").stdout.splitlines()
+    assert first[:3] == ["up", "--resume", str(directory)]
+    assert first[first.index("--listen") + 1] == "tcp/0.0.0.0:20077"
+    assert first[first.index("--token-file") + 1] == token
+    program = f"echo the token > {shlex.quote(token)}; {program}"
+    other = run(script, tmp_path, srun=program, SLURM_PROCID="1").stdout.splitlines()
+    assert other == ["join-run", "-", "-n", "2", "the token"]
+    assert not Path(token).exists()
+
+
 def test_the_joining_job_joins(directory: Path, tmp_path: Path) -> None:
     done = run(scripts(directory).join(), tmp_path, srun='printf "%s\\n" "$@"')
     assert done.stdout.splitlines()[2:] == ["throwcollect", "join", str(directory)]

@@ -4,6 +4,7 @@ import json
 import numpy as np
 import pytest
 
+from throwcollect.config.cluster import ClusterConfig
 from throwcollect.config.containers import ContainersConfig, NodeContainerConfig
 from throwcollect.config.controllers import ControllersConfig
 from throwcollect.config.run import RunConfig
@@ -28,7 +29,10 @@ def digests(config: Config, points: Points = POINTS, seeds: tuple[int, ...] = (5
 def test_digests_are_sha_256_over_the_effective_keys_in_order():
     kept = values_by_key(with_values(Config(), {"ball.mass_kg": 0.1, "task.duration_s": 1.0})) | {"seed": 5}
     for key in list(kept):
-        if key.startswith(("sweep", "run.", "containers.", "controllers.", "sim.engine")) or key in WITHOUT_EFFECT:
+        if (
+            key.startswith(("sweep", "run.", "containers.", "cluster.", "controllers.", "sim.engine"))
+            or key in WITHOUT_EFFECT
+        ):
             del kept[key]
     text = "\n".join(["throwcollect trial 1", *(f"{key}={json.dumps(kept[key])}" for key in sorted(kept))])
     assert digests(Config())[0] == hashlib.sha256(text.encode()).hexdigest()
@@ -49,6 +53,7 @@ def test_it_does_not_matter_whether_a_value_was_swept_or_fixed():
         {"sweep": SweepConfig(parameters={"scene.gravity_mps2": Range(min=9, max=10)})},
         {"run": RunConfig(simulations=7)},
         {"containers": ContainersConfig(volume="throws", sim=NodeContainerConfig(memory="512m"))},
+        {"cluster": ClusterConfig(partition="long")},
         {"sim": Config().sim.model_copy(update={"real_time_factor": 1.0})},
         {"record": Config().record.model_copy(update={"zstd_level": 9, "trials_per_shard": 9})},
         {"controllers": ControllersConfig(names="ros1")},
