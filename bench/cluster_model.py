@@ -47,8 +47,8 @@ class Cluster:
     start_s: float = 4.0
     plan_s: float = 3.4e-3
     plan_cores: int = 16
-    join_s: float = 33e-6
-    throw_bytes: float = 77e3
+    join_s: float = 42e-6
+    throw_bytes: float = 89e3
     disk_bytes_per_s: float = 1e9
     starts_per_s: float = 20.0
     death_hours: float = 1000.0
