@@ -201,6 +201,11 @@ def down(
 
 def _find_submitted(run: str | None) -> ClusterRun | None:
     """The submitted dataset that a command means; None if it means a run of this machine."""
+    from throwcollect.runs.records import Records
+
+    # A run of this machine is meant rather, and a scheduler that is not asked costs no time.
+    if run is None and any(each.status == "running" for each in Records().all()):
+        return None
     from throwcollect.cluster.following import find_cluster_run
 
     return find_cluster_run(run)

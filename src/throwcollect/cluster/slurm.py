@@ -14,6 +14,8 @@ MARK = "throwcollect:"
 """Begins the comment of our jobs; the directory of the dataset follows."""
 
 _PATIENCE_S = 60.0
+_GLANCE_S = 5.0
+"""The same for commands that only look whether there is something."""
 _LIVING = frozenset(
     {"PENDING", "RUNNING", "CONFIGURING", "COMPLETING", "SUSPENDED", "REQUEUED", "REQUEUE_HOLD", "STOPPED"}
 )
@@ -144,7 +146,7 @@ def find_directories() -> dict[str, str]:
         ConfigError: If there is no Slurm here.
         WorkerError: If it does not answer.
     """
-    lines = _run("squeue", "--noheader", "--me", "--format=%F|%k").splitlines()
+    lines = _run("squeue", "--noheader", "--me", "--format=%F|%k", patience_s=_GLANCE_S).splitlines()
     rows = (line.strip().partition(f"|{MARK}") for line in lines)
     return {job: directory for job, mark, directory in rows if mark}
 
@@ -187,7 +189,7 @@ def _index(text: str) -> int | None:
     return int(text) if text.isdigit() else None
 
 
-def _run(program: str, *arguments: str) -> str:
+def _run(program: str, *arguments: str, patience_s: float = _PATIENCE_S) -> str:
     """What a command of Slurm prints.
 
     Raises:
@@ -200,7 +202,7 @@ def _run(program: str, *arguments: str) -> str:
             stdin=subprocess.DEVNULL,
             capture_output=True,
             text=True,
-            timeout=_PATIENCE_S,
+            timeout=patience_s,
             check=False,
             # Its tables and times in one form, whatever the user has set.
             env={**{k: v for k, v in os.environ.items() if not k.startswith(("SQUEUE_", "SACCT_"))}, "LC_ALL": "C"},
@@ -211,7 +213,7 @@ def _run(program: str, *arguments: str) -> str:
             hint="run this on a login node, or see docs/cluster.md for other schedulers",
         ) from error
     except subprocess.TimeoutExpired as error:
-        raise WorkerError(f"{program} has not answered within {_PATIENCE_S:g} s") from error
+        raise WorkerError(f"{program} has not answered within {patience_s:g} s") from error
     if done.returncode:
         said = [line for line in done.stderr.splitlines() if line.strip()]
         raise WorkerError(f"{program} refuses: {'; '.join(said) or f'exit code {done.returncode}'}")
