@@ -3,6 +3,8 @@ import signal
 import subprocess
 import sys
 import threading
+import time
+from contextlib import suppress
 
 import pytest
 import zenoh
@@ -33,6 +35,12 @@ def impatient(monkeypatch):
 def test_a_node_that_works_answers(rig, spinning, name, namespace):
     rig.node(name, namespace=namespace)
     spinning()
+    # The router may hear the question before it knows of the node: nothing orders two sessions.
+    deadline = time.monotonic() + 10
+    while time.monotonic() < deadline:
+        with suppress(ThrowcollectError):
+            check(name)
+            break
     check(name)
 
 
