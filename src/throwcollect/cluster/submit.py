@@ -174,7 +174,12 @@ def _submit(scripts: BatchScripts, submission: Submission, slices: tuple[int, ..
         array = slurm.submit(collect)
     # After all of them, however they end: what is missing then, it says.
     after = (f"--dependency=afterany:{array}", "--kill-on-invalid-dep=yes") if array else ()
-    joining = slurm.submit(join, *after)
+    with ExitStack() as undo:
+        if array:
+            # Nobody would know of it: what its tasks need is removed if this fails.
+            undo.callback(slurm.cancel, [array])
+        joining = slurm.submit(join, *after)
+        undo.pop_all()
     job = Job(array, joining, slices, datetime.now(timezone.utc))
     write_submission(directory, replace(submission, jobs=(*submission.jobs, job)))
     if array:

@@ -1,0 +1,32 @@
+"""A submission that fails half way leaves no jobs behind."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from tests.e2e.collection import CONFIG, FAST, write_config
+
+from throwcollect.cluster import slurm
+from throwcollect.cluster.submit import submit
+from throwcollect.errors import WorkerError
+
+
+def test_an_array_whose_joining_job_is_refused_is_cancelled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = CONFIG + "record: {{trials_per_shard: 2}}\n"
+    config = write_config(tmp_path, trials=4, text=text, sim=FAST)
+    cancelled: list[str] = []
+
+    def answer(script: Path, *options: str) -> str:
+        if options:
+            raise WorkerError("sbatch refuses: too many jobs")
+        return "12"
+
+    monkeypatch.setattr(slurm, "submit", answer)
+    monkeypatch.setattr(slurm, "check", lambda _: None)
+    monkeypatch.setattr(slurm, "find_largest_array", lambda: None)
+    monkeypatch.setattr(slurm, "cancel", cancelled.extend)
+    with pytest.raises(WorkerError, match="too many jobs"):
+        submit(config, tmp_path / "data", 2, say=lambda _: None)
+    assert cancelled == ["12"]
+    assert not (tmp_path / "data").exists()
