@@ -15,6 +15,8 @@ _PATIENCE_S, _RETRY_S = 5.0, 0.1
 def open_session(config: zenoh.Config) -> zenoh.Session:
     """Open a session with a router.
 
+    Zenoh itself waits for as long as ``connect/timeout_ms`` of the configuration says, which says nothing by default.
+
     Args:
         config: Configuration of the session.
 
@@ -25,11 +27,12 @@ def open_session(config: zenoh.Config) -> zenoh.Session:
         NoRouterError: If there is no router within some seconds.
     """
     zenoh.try_init_log_from_env()  # type: ignore[no-untyped-call]
-    deadline = time.monotonic() + _PATIENCE_S
+    begin = time.monotonic()
     while True:
         try:
             return zenoh.open(config)
         except zenoh.ZError as error:
-            if time.monotonic() > deadline:
-                raise NoRouterError(config.get_json("connect/endpoints"), _PATIENCE_S, in_words(error)) from error
+            waited = time.monotonic() - begin
+            if waited > _PATIENCE_S:
+                raise NoRouterError(config.get_json("connect/endpoints"), round(waited, 1), in_words(error)) from error
             time.sleep(_RETRY_S)

@@ -1,9 +1,13 @@
+import socket
+import threading
+
 import pytest
+import zenoh
 
 from rclzenoh import session
 from rclzenoh.exceptions import ConfigurationError, NoRouterError
 from rclzenoh.session import open_session
-from rclzenoh.session_config import environment_config
+from rclzenoh.session_config import environment_config, router_config
 
 
 def test_without_a_router_the_error_says_where_it_was_looked_for(environment, monkeypatch):
@@ -13,6 +17,23 @@ def test_without_a_router_the_error_says_where_it_was_looked_for(environment, mo
         open_session(environment_config())
     assert caught.value.endpoints == '["tcp/127.0.0.1:1"]'
     assert ".rs" not in caught.value.reason
+
+
+def test_a_session_waits_for_its_router_as_long_as_its_configuration_says(environment, monkeypatch):
+    monkeypatch.setattr(session, "_PATIENCE_S", 0.0)
+    with socket.create_server(("127.0.0.1", 0)) as probe:
+        unused = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    monkeypatch.setenv("ZENOH_CONFIG_OVERRIDE", f'connect/endpoints=["{unused}"];connect/timeout_ms=20000')
+    routers: list[zenoh.Session] = []
+    late = threading.Timer(0.5, lambda: routers.append(zenoh.open(router_config(unused))))
+    late.start()
+    try:
+        opened = open_session(environment_config())
+        assert len(list(opened.info.routers_zid())) == 1
+        opened.close()
+    finally:
+        late.join()
+        routers[0].close()
 
 
 @pytest.mark.parametrize(
