@@ -35,8 +35,8 @@ CheckOf = Callable[[Config], Check]
 
 
 def can_draw(config: Config) -> bool:
-    """Whether the trials of a configuration can be drawn here: SciPy, which some samplers take, may be missing."""
-    return is_installed("scipy") or not (config.grows or config.sweep.sampler in ("latin_hypercube", "sobol"))
+    """Whether the trials of a configuration can be drawn here: SciPy, which `sweep.target` needs, may be missing."""
+    return config.sweep.target is None or is_installed("scipy")
 
 
 def find_drawing_problems(directory: Path, plan: Plan, rows: Mapping[int, Row] | None) -> Iterator[Finding]:

@@ -12,13 +12,10 @@ from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config, Parameter, Range, Values
 from throwcollect.errors import PlanError, Problem
-from throwcollect.extras import lazily
 from throwcollect.reproducible_math import exp, log
 from throwcollect.sweep.point_file import read_points
 from throwcollect.sweep.points import Points
-
-# Importing it takes about a second, so only those who draw with it do.
-qmc = lazily("scipy.stats.qmc")
+from throwcollect.sweep.sobol import MOST_DIMENSIONS, draw_sobol
 
 _MOST_TRIALS = 10_000_000
 _TRIALS_PER_SUCCESS = 10
@@ -69,15 +66,23 @@ def _uniform(count: int, dimensions: int, randomness: np.random.Generator) -> ND
 
 
 def _latin_hypercube(count: int, dimensions: int, randomness: np.random.Generator) -> NDArray[np.float64]:
-    points: NDArray[np.float64] = qmc.LatinHypercube(dimensions, seed=randomness).random(count)
-    return points
+    """Points of which each of `count` equal strips along each key holds one, as those of SciPy."""
+    (own,) = randomness.spawn(1)
+    places = own.uniform(size=(count, dimensions))
+    strips = np.tile(np.arange(1, count + 1), (dimensions, 1))
+    for strip in strips:
+        own.shuffle(strip)
+    return np.asarray((strips.T - places) / count)
 
 
 def _sobol(count: int, dimensions: int, randomness: np.random.Generator) -> NDArray[np.float64]:
-    # The sequence is drawn up to a power of two, as scipy warns of other lengths; its first points stay the same.
-    engine = qmc.Sobol(dimensions, scramble=True, seed=randomness)
-    points: NDArray[np.float64] = engine.random_base2(math.ceil(math.log2(count)))[:count]
-    return points
+    if dimensions > MOST_DIMENSIONS:
+        raise PlanError(
+            [Problem(f"{dimensions} keys are swept", key="sweep.parameters")],
+            expected=f"at most {MOST_DIMENSIONS} with the sampler sobol; uniform takes any number",
+        )
+    (own,) = randomness.spawn(1)
+    return draw_sobol(count, dimensions, own)
 
 
 UNIT_SAMPLERS = MappingProxyType[str, UnitSampler](

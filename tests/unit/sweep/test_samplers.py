@@ -67,14 +67,6 @@ def test_the_root_seed_decides(sampler):
     assert (drawn(SPREAD, sampler=sampler, seed=3) != drawn(SPREAD, sampler=sampler, seed=4)).all()
 
 
-def test_sobol_points_are_scipys_scrambled_sequence():
-    from scipy.stats import qmc
-
-    generator = np.random.default_rng(np.random.SeedSequence(7))
-    expected = qmc.scale(qmc.Sobol(1, seed=generator).random_base2(3), 1, 3)
-    np.testing.assert_allclose(drawn({"task.duration_s": Range(min=1, max=3)}, trials=8, seed=7), expected, rtol=1e-15)
-
-
 @pytest.mark.parametrize("sampler", ["sobol", "latin_hypercube"])
 def test_each_of_as_many_strips_as_trials_holds_one_point(sampler):
     strips = np.floor((drawn(SPREAD, sampler=sampler, trials=32)[:, 0] - 1) / 2 * 32)
@@ -149,9 +141,26 @@ def test_drawing_needs_a_number_of_trials():
         drawn(SPREAD, sampler="uniform", trials=None)
 
 
-def test_scipy_is_imported_by_those_who_draw_with_it_alone():
+@pytest.mark.parametrize("seed", [0, 7])
+@pytest.mark.parametrize("count", [1, 2, 3, 50])
+def test_latin_hypercubes_are_those_of_scipy(count, seed):
+    from scipy.stats import qmc
+
+    expected = qmc.LatinHypercube(4, seed=np.random.default_rng(seed)).random(count)
+    drawn = UNIT_SAMPLERS["latin_hypercube"](count, 4, np.random.default_rng(seed))
+    np.testing.assert_array_equal(drawn, expected)
+
+
+def test_more_keys_than_a_sobol_sequence_has_dimensions_are_refused():
+    with pytest.raises(PlanError, match=r"^sweep.parameters: 1025 keys are swept"):
+        UNIT_SAMPLERS["sobol"](4, 1025, np.random.default_rng(0))
+
+
+def test_drawing_a_plan_imports_nothing_large():
     code = (
-        "import sys, throwcollect.sweep.plan; "
+        "import sys, numpy as np, throwcollect.sweep.plan; "
+        "from throwcollect.sweep.samplers import UNIT_SAMPLERS; "
+        "[draw(8, 3, np.random.default_rng(0)) for draw in UNIT_SAMPLERS.values()]; "
         "sys.exit(any(name in sys.modules for name in ('scipy', 'pyarrow', 'throwcollect.robots')))"
     )
     subprocess.run([sys.executable, "-c", code], check=True)

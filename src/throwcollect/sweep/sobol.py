@@ -1,0 +1,73 @@
+"""Scrambled Sobol sequences: points that fill the unit cube more evenly than random ones.
+
+They are those of `scipy.stats.qmc.Sobol`, bit for bit, which a test compares. A plan made here depends on no version of
+SciPy, whose statistics take longer to import than all else that a command needs.
+"""
+
+from __future__ import annotations
+
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+MOST_DIMENSIONS = 1024
+"""As many as the table of direction numbers has."""
+BITS = 30
+"""Bits of a coordinate; there are as many points as numbers of so many bits."""
+
+_TABLE = Path(__file__).with_name("joe_kuo_d6.txt")
+
+
+def draw_sobol(count: int, dimensions: int, randomness: np.random.Generator) -> NDArray[np.float64]:
+    """The first points of a sequence that is scrambled by a random matrix and a random shift (Matousek 1998).
+
+    Args:
+        count: Number of points, from 1 to 2 to the power of `BITS`.
+        dimensions: Number of coordinates, from 1 to `MOST_DIMENSIONS`.
+        randomness: Where the scrambling comes from.
+
+    Returns:
+        Coordinates from 0 to 1, 1 excluded, shape ``(count, dimensions)``.
+    """
+    powers = np.uint32(1) << np.arange(BITS, dtype=np.uint32)
+    shift = randomness.integers(2, size=(dimensions, BITS), dtype=np.uint32) @ powers
+    matrices = np.tril(randomness.integers(2, size=(dimensions, BITS, BITS), dtype=np.uint32), -1)
+    numbers = _scramble(_direction_numbers(dimensions), matrices + np.eye(BITS, dtype=np.uint32))
+    # In Gray code, neighbours differ in one bit: the lowest one that is set in the number of the second of them.
+    index = np.arange(1, count)
+    flipped = np.frexp(index & -index)[1] - 1
+    points = np.empty((count, dimensions))
+    column = np.empty(count, dtype=np.uint32)
+    for i in range(dimensions):
+        column[0] = shift[i]
+        column[1:] = numbers[i][flipped]
+        points[:, i] = np.bitwise_xor.accumulate(column) * 2.0**-BITS
+    return points
+
+
+def _scramble(numbers: NDArray[np.uint32], matrices: NDArray[np.uint32]) -> NDArray[np.uint32]:
+    """Multiply direction numbers, as columns of bits with the highest first, by matrices of bits."""
+    places = np.arange(BITS, dtype=np.uint32)[::-1]
+    bits = (numbers[:, None, :] >> places[None, :, None]) & 1
+    product = (matrices @ bits) & 1
+    scrambled: NDArray[np.uint32] = (product << places[None, :, None]).sum(axis=1, dtype=np.uint32)
+    return scrambled
+
+
+def _direction_numbers(dimensions: int) -> NDArray[np.uint32]:
+    """Direction numbers, shape ``(dimensions, BITS)``, by the recurrence of Bratley and Fox (1988)."""
+    numbers = np.ones((dimensions, BITS), dtype=np.int64)
+    with open(_TABLE, encoding="ascii") as lines:
+        entries = (line.split() for line in lines if not line.startswith("#"))
+        for row, (_, degree, coefficients, *first) in zip(numbers[1:], islice(entries, dimensions - 1), strict=True):
+            s, a = int(degree), int(coefficients)
+            row[:s] = [int(each) for each in first]
+            for j in range(s, BITS):
+                number = row[j - s] ^ (row[j - s] << s)
+                for k in range(1, s):
+                    if a >> (s - 1 - k) & 1:
+                        number ^= row[j - k] << k
+                row[j] = number
+    return (numbers << np.arange(BITS)[::-1]).astype(np.uint32)
