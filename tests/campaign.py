@@ -138,7 +138,7 @@ def _disturbances(running: Running, source: random.Random) -> Iterator[str]:
         if running.process.poll() is not None:
             return
         launcher = psutil.Process(running.process.pid)
-        parties = [launcher, *launcher.children()]
+        parties = [launcher, *launcher.children(), *running.nodes()]
         victim, number = source.choice(parties), source.choice(SIGNALS)
         try:
             name = " ".join(victim.cmdline()[-1:])

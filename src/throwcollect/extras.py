@@ -25,6 +25,7 @@ EXTRA_OF = MappingProxyType(
         "pybullet": "collect",
         "re2": "collect",
         "scipy": "collect",
+        "setproctitle": "collect",
         "xxhash": "collect",
         "zenoh": "collect",
         "docker": "docker",

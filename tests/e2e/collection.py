@@ -60,11 +60,15 @@ class Running:
     process: subprocess.Popen[str]
     directory: Path
 
+    def nodes(self) -> list[psutil.Process]:
+        """Its nodes: what was forked by the process that has imported their libraries."""
+        return [node for server in psutil.Process(self.process.pid).children() for node in server.children()]
+
     def node(self, *words: str) -> psutil.Process:
-        """The child whose command line ends with these words."""
-        for child in psutil.Process(self.process.pid).children():
-            if child.cmdline()[-len(words) :] == list(words):
-                return child
+        """The node whose command line ends with these words."""
+        for node in self.nodes():
+            if node.cmdline()[-len(words) :] == list(words):
+                return node
         raise LookupError(words)
 
     def written(self) -> int:

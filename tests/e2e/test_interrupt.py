@@ -54,9 +54,8 @@ def begin(started: list[Running], config: Path, directory: Path, *options: str) 
     """A collection with two simulations, and its nodes as soon as all four run."""
     running = start(config, directory, 2, *options)
     started.append(running)
-    launcher = psutil.Process(running.process.pid)
-    running.wait_until(lambda: len(launcher.children()) == 4)
-    return running, launcher.children()
+    running.wait_until(lambda: len(running.nodes()) == 4)
+    return running, running.nodes()
 
 
 def in_the_middle(running: Running, share: float = 0.3, *, whole: Path) -> None:

@@ -12,7 +12,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import psutil
 import pytest
 
 from tests.e2e.collection import Running, call, collect, fingerprints, journal, start, write_config
@@ -120,7 +119,7 @@ def test_the_trial_of_a_simulation_that_was_killed_is_given_to_another_though_th
     running.node("--name", "sim_0").kill()
     killed = time.time()
     time.sleep(1.0)
-    (router,) = [each for each in psutil.Process(running.process.pid).children() if "router" in each.cmdline()]
+    (router,) = [each for each in running.nodes() if "router" in each.cmdline()]
     router.kill()
     code, _, err = running.finish()
     assert code == 0, err

@@ -5,18 +5,15 @@ from __future__ import annotations
 import os
 import signal
 import socket
-import subprocess
-import sys
 import time
 from collections.abc import Callable, Sequence
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from throwcollect.errors import WorkerError
 from throwcollect.files import open_log
-from throwcollect.interruption import die_with_parent
 from throwcollect.runtimes.node_logs import NodeLogs
+from throwcollect.runtimes.node_server import ForkedNode, NodeServer
 from throwcollect.runtimes.nodes import ROUTER, NodeExit, NodeHost, NodeSpec, node_environment, protocol_of
 from throwcollect.runtimes.ports import format_endpoint, reach_from_here, reserve_port, split_address
 from throwcollect.runtimes.runtime import Place, Runtime, Session
@@ -26,12 +23,8 @@ if TYPE_CHECKING:
     from throwcollect.dataset.summary import Info
 
 
-def _enter(core: int | None) -> None:
-    """What a child does before it becomes the node: it asks to die with its parent, and takes its core."""
-    # By force: without router and simulations there is nothing that a coordinator could wait for.
-    die_with_parent()
-    if core is not None:
-        os.sched_setaffinity(0, {core})
+_KILLED_S = 5.0
+"""Within this time a process has ended that was ended by force."""
 
 
 class LocalRuntime(Runtime):
@@ -53,8 +46,8 @@ class LocalRuntime(Runtime):
 class LocalNodes(NodeHost):
     """Runs nodes as child processes, each with a log file of its own; see `nodes.NodeHost` for what it offers.
 
-    Children live in sessions of their own, so that Ctrl-C reaches the launcher alone, and are ended by the kernel when
-    the launcher dies.
+    They are forked by a `NodeServer`, live in sessions of their own, so that Ctrl-C reaches the launcher alone, and are
+    ended by the kernel when the launcher dies.
 
     Args:
         place: The run.
@@ -82,8 +75,8 @@ class LocalNodes(NodeHost):
             self.listen = format_endpoint(protocol, host, port)
             endpoint = format_endpoint(protocol, reach_from_here(host), port)
         self._address = split_address(endpoint)
-        self._environment = {**os.environ, **node_environment(self.connection_at(endpoint))}
-        self._processes: dict[str, subprocess.Popen[bytes]] = {}
+        self._server = NodeServer({**os.environ, **node_environment(self.connection_at(endpoint))})
+        self._processes: dict[str, ForkedNode] = {}
 
     def collect(self, session: Session) -> Info:
         """See `runtime.Host.collect`."""
@@ -106,15 +99,7 @@ class LocalNodes(NodeHost):
             self._reserved.close()
         try:
             with open(open_log(self.logs.path(node.name)), "ab") as log:
-                self._processes[node.name] = subprocess.Popen(
-                    [sys.executable, "-m", "throwcollect", *node.arguments],
-                    stdin=subprocess.DEVNULL,
-                    stdout=log,
-                    stderr=subprocess.STDOUT,
-                    env=self._environment,
-                    start_new_session=True,
-                    preexec_fn=partial(_enter, node.core),  # noqa: PLW1509 - it calls nothing that takes a lock
-                )
+                self._processes[node.name] = self._server.start(node.arguments, log=log, core=node.core)
         except OSError as error:
             raise WorkerError(f"{node.name}: cannot be started: {error}") from error
 
@@ -129,7 +114,7 @@ class LocalNodes(NodeHost):
 
     def exits(self) -> list[NodeExit]:
         """Nodes that ended since the last call."""
-        ended = [(name, process.returncode) for name, process in self._processes.items() if process.poll() is not None]
+        ended = [(name, code) for name, process in self._processes.items() if (code := process.poll()) is not None]
         for name, _ in ended:
             del self._processes[name]
         return [NodeExit(name, code, _reason(code), self.log_tail(name)) for name, code in ended]
@@ -152,11 +137,9 @@ class LocalNodes(NodeHost):
             process = self._processes.pop(name, None)
             if process is None:
                 continue
-            try:
-                process.wait(max(0.0, deadline - time.monotonic()))
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
+            if process.wait(max(0.0, deadline - time.monotonic())) is None:
+                process.send_signal(signal.SIGKILL)
+                process.wait(_KILLED_S)
 
     def close(self) -> None:
         """End all nodes, the router last, and free its port."""
@@ -164,6 +147,7 @@ class LocalNodes(NodeHost):
             self._reserved.close()
         self.stop([name for name in self._processes if name != ROUTER])
         self.stop([ROUTER])
+        self._server.close()
 
 
 def _reason(code: int) -> str:

@@ -31,10 +31,11 @@ def draw_sobol(count: int, dimensions: int, randomness: np.random.Generator) -> 
     Returns:
         Coordinates from 0 to 1, 1 excluded, shape ``(count, dimensions)``.
     """
-    powers = np.uint32(1) << np.arange(BITS, dtype=np.uint32)
-    shift = randomness.integers(2, size=(dimensions, BITS), dtype=np.uint32) @ powers
-    matrices = np.tril(randomness.integers(2, size=(dimensions, BITS, BITS), dtype=np.uint32), -1)
-    numbers = _scramble(_direction_numbers(dimensions), matrices + np.eye(BITS, dtype=np.uint32))
+    places = np.arange(BITS, dtype=np.uint32)
+    shift = _pack(randomness.integers(2, size=(dimensions, BITS), dtype=np.uint32), places)
+    below = np.tril(randomness.integers(2, size=(dimensions, BITS, BITS), dtype=np.uint32), -1)
+    matrices = _pack(below + np.eye(BITS, dtype=np.uint32), places[::-1])
+    numbers = _multiply(matrices, _direction_numbers(dimensions))
     # In Gray code, neighbours differ in one bit: the lowest one that is set in the number of the second of them.
     index = np.arange(1, count)
     flipped = np.frexp(index & -index)[1] - 1
@@ -47,13 +48,23 @@ def draw_sobol(count: int, dimensions: int, randomness: np.random.Generator) -> 
     return points
 
 
-def _scramble(numbers: NDArray[np.uint32], matrices: NDArray[np.uint32]) -> NDArray[np.uint32]:
-    """Multiply direction numbers, as columns of bits with the highest first, by matrices of bits."""
-    places = np.arange(BITS, dtype=np.uint32)[::-1]
-    bits = (numbers[:, None, :] >> places[None, :, None]) & 1
-    product = (matrices @ bits) & 1
-    scrambled: NDArray[np.uint32] = (product << places[None, :, None]).sum(axis=1, dtype=np.uint32)
-    return scrambled
+def _pack(bits: NDArray[np.uint32], places: NDArray[np.uint32]) -> NDArray[np.uint32]:
+    """Numbers of which each bit of the last axis is the one at its place."""
+    packed: NDArray[np.uint32] = (bits << places).sum(axis=-1, dtype=np.uint32)
+    return packed
+
+
+def _multiply(matrices: NDArray[np.uint32], numbers: NDArray[np.uint32]) -> NDArray[np.uint32]:
+    """Multiply numbers, as columns of bits with the highest first, by matrices of bits, whose rows are packed alike.
+
+    Args:
+        matrices: Shape ``(dimensions, BITS)``.
+        numbers: Shape ``(dimensions, count)``.
+    """
+    common = matrices[:, None, :] & numbers[:, :, None]
+    for half in (16, 8, 4, 2, 1):
+        common ^= common >> np.uint32(half)
+    return _pack(common & np.uint32(1), np.arange(BITS, dtype=np.uint32)[::-1])
 
 
 def _direction_numbers(dimensions: int) -> NDArray[np.uint32]:

@@ -28,11 +28,10 @@ def node(code: str, name: str = "node") -> NodeSpec:
 @pytest.fixture
 def runtime(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[LocalNodes]:
     """A runtime whose nodes are small scripts: the first argument is run instead of a command."""
-    package = tmp_path / "fake" / "throwcollect"
-    package.mkdir(parents=True)
-    (package / "__init__.py").write_text("")
-    (package / "__main__.py").write_text("import sys\nexec(sys.argv[1])\n")
-    monkeypatch.chdir(tmp_path / "fake")
+    (tmp_path / "sitecustomize.py").write_text(
+        "import runpy, sys\nrunpy.run_module = lambda *_, **__: exec(sys.argv[1], {'sys': sys})\n"
+    )
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     monkeypatch.setenv("ANSWER", "42")
     local = nodes(tmp_path, domain_id=7)
     yield local

@@ -1,0 +1,101 @@
+import os
+import signal
+import socket
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import psutil
+import pytest
+
+from throwcollect.runtimes.node_server import ForkedNode, NodeServer
+
+WAIT_S = 30.0
+
+
+@pytest.fixture
+def server() -> Iterator[NodeServer]:
+    server = NodeServer({**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "COLUMNS": "80"})
+    yield server
+    server.close()
+
+
+@pytest.fixture
+def start(server: NodeServer, tmp_path: Path) -> Callable[..., ForkedNode]:
+    def start(*arguments: str, core: int | None = None) -> ForkedNode:
+        with open(tmp_path / "log", "ab") as log:
+            return server.start(arguments, log=log, core=core)
+
+    return start
+
+
+def router() -> tuple[str, ...]:
+    with socket.create_server(("127.0.0.1", 0)) as probe:
+        return ("router", "--listen", f"tcp/127.0.0.1:{probe.getsockname()[1]}")
+
+
+def wait_until(condition: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + WAIT_S
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+@pytest.mark.parametrize(("argument", "code", "words"), [("--version", 0, "throwcollect "), ("dance", 2, "dance")])
+def test_a_node_does_what_the_command_does_and_its_end_is_told(start, tmp_path, argument, code, words) -> None:
+    assert start(argument).wait(WAIT_S) == code
+    assert words in (tmp_path / "log").read_text()
+
+
+def test_nodes_are_processes_like_those_that_are_started_by_themselves(start, tmp_path) -> None:
+    core = max(os.sched_getaffinity(0))
+    node = start(*(arguments := router()), core=core)
+    wait_until(lambda: "listening" in (tmp_path / "log").read_text())
+    process = psutil.Process(node.pid)
+    assert process.cmdline()[-len(arguments) :] == list(arguments)
+    assert process.cpu_affinity() == [core]
+    assert os.getsid(node.pid) == node.pid
+    assert signal.SIGCHLD not in {each for each in signal.Signals if _handles(node.pid, each)}
+    descriptors = {os.readlink(each) for each in Path(f"/proc/{node.pid}/fd").iterdir() if int(each.name) <= 2}
+    assert descriptors == {"/dev/null", str(tmp_path / "log")}
+    node.send_signal(signal.SIGTERM)
+    assert node.wait(WAIT_S) == 0
+
+
+def test_a_node_that_is_killed_is_told_apart_from_the_others(start) -> None:
+    killed, other = start(*router()), start(*router())
+    killed.send_signal(signal.SIGKILL)
+    assert killed.wait(WAIT_S) == -signal.SIGKILL
+    assert other.poll() is None
+    killed.send_signal(signal.SIGTERM)  # Its process id may be somebody else's by now.
+    assert killed.wait(0.0) == -signal.SIGKILL
+
+
+def test_where_the_server_dies_its_nodes_do_and_the_next_one_has_a_new_server(start) -> None:
+    nodes = [start(*router()) for _ in range(2)]
+    psutil.Process(nodes[0].pid).parent().kill()
+    assert [node.wait(WAIT_S) for node in nodes] == [-signal.SIGKILL] * 2
+    wait_until(lambda: not any(map(psutil.pid_exists, (node.pid for node in nodes))))
+    assert start("--version").wait(WAIT_S) == 0
+
+
+def test_a_server_that_is_stopped_goes_on(start) -> None:
+    node = start(*router())
+    psutil.Process(node.pid).parent().suspend()
+    assert start("--version").wait(WAIT_S) == 0
+    assert node.poll() is None
+
+
+def test_closing_ends_everything(server, start) -> None:
+    node = start(*router())
+    forker = psutil.Process(node.pid).parent()
+    server.close()
+    wait_until(lambda: not psutil.pid_exists(node.pid))
+    assert not forker.is_running()
+
+
+def _handles(pid: int, number: signal.Signals) -> bool:
+    """Whether a process has a handler of its own for a signal."""
+    status = Path(f"/proc/{pid}/status").read_text()
+    (mask,) = (line.split()[1] for line in status.splitlines() if line.startswith("SigCgt:"))
+    return bool(int(mask, 16) >> (number - 1) & 1)
