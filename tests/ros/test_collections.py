@@ -174,7 +174,15 @@ def test_a_coordinator_that_sees_no_simulation_is_told_of_after_a_while(
 
     On the embedded backend: to a discovery server of Fast DDS, domains make no difference.
     """
-    apart = "import os, sys\nif '--name' in sys.orig_argv:\n    os.environ['ROS_DOMAIN_ID'] = '84'\n"
+    apart = (
+        "import os, runpy, sys\n"
+        "run = runpy.run_module\n"
+        "def run_apart(*arguments, **options):\n"
+        "    if '--name' in sys.argv:\n"
+        "        os.environ['ROS_DOMAIN_ID'] = '84'\n"
+        "    run(*arguments, **options)\n"
+        "runpy.run_module = run_apart\n"
+    )
     (tmp_path / "site").mkdir()
     (tmp_path / "site" / "sitecustomize.py").write_text(apart)
     path = os.pathsep.join([str(tmp_path / "site"), os.environ.get("PYTHONPATH", "")])
