@@ -24,7 +24,7 @@ from throwcollect.dataset.provenance import Provenance, read_provenance, write_p
 from throwcollect.dataset.recovery import remove_unfinished
 from throwcollect.dataset.throws_table import Row, ThrowsTable, read_throws_table
 from throwcollect.dataset.verify_episode import EpisodeCheck
-from throwcollect.dataset.verify_shard import ShardCheck
+from throwcollect.dataset.verify_shard import check_shard
 from throwcollect.dataset.verify_tables import find_wrong_trials, shard_of
 from throwcollect.episode.channels import Channels
 from throwcollect.errors import DatasetError
@@ -199,7 +199,7 @@ class _Recordings:
 
     def read(self, path: Path) -> list[Finding]:
         """Read a file; returns what is wrong with it, and if nothing is, it counts."""
-        checked = ShardCheck(path, self._plan.config, None, self._problems)
+        checked = check_shard(path, self._plan.config, None, self._problems)
         if not checked.findings and checked.summary is not None:
             self.summaries.append(checked.summary)
             self.channels = checked.channels

@@ -6,7 +6,9 @@ A file that cannot be read is reported, and everything that does not depend on i
 from __future__ import annotations
 
 import reprlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -18,11 +20,13 @@ from throwcollect.dataset.findings import Finding
 from throwcollect.dataset.verify_episode import EpisodeCheck
 from throwcollect.dataset.verify_manifest import find_manifest_problems
 from throwcollect.dataset.verify_plan import CheckOf, can_draw, find_drawing_problems, find_refusal_problems
-from throwcollect.dataset.verify_shard import ShardCheck
+from throwcollect.dataset.verify_shard import ShardReport, check_shard
 from throwcollect.dataset.verify_tables import Tables, check_tables, shard_of
 from throwcollect.errors import DatasetError
 from throwcollect.robots.description import is_available as robot_is_available
 
+_MANY_EPISODES = 1000
+"""From here on, checking files side by side is worth the start of processes."""
 _UNFINISHED = (".part", ".new")
 _short = reprlib.Repr()
 """Values from a file may be as large and as deep as they like."""
@@ -30,7 +34,7 @@ _short.maxstring = _short.maxother = 120
 _short.maxlevel = _short.maxdict = _short.maxlist = 3
 
 
-def verify(directory: Path, *, check_of: CheckOf | None = None) -> list[Finding]:
+def verify(directory: Path, *, check_of: CheckOf | None = None, processes: int = 1) -> list[Finding]:
     """Check a dataset.
 
     Checked are: every promised file against the manifest; the configuration and the plan against each other, and the
@@ -42,6 +46,8 @@ def verify(directory: Path, *, check_of: CheckOf | None = None) -> list[Finding]
     Args:
         directory: Its directory.
         check_of: Makes the check that says which trials the plan refuses; None leaves refusals as they are.
+        processes: How many processes may check the recordings of a large dataset; more than one import the program that
+            calls this, as those of `multiprocessing` do.
 
     Returns:
         What is wrong, file by file; empty when nothing is.
@@ -60,7 +66,7 @@ def verify(directory: Path, *, check_of: CheckOf | None = None) -> list[Finding]
     findings += find_manifest_problems(directory, tables.config.name if tables.config else None)
     findings += tables.findings
     findings += _plan_findings(directory, tables, check_of)
-    checks = _check_shards(directory, tables)
+    checks = _check_shards(directory, tables, processes)
     findings += [finding for check in checks.values() for finding in check.findings]
     if bag is not None:
         findings += _find_bag_problems(bag, checks)
@@ -89,29 +95,63 @@ def _plan_findings(directory: Path, tables: Tables, check_of: CheckOf | None) ->
         yield from find_refusal_problems(tables.plan, tables.doubtful, check_of)
 
 
-def _check_shards(directory: Path, tables: Tables) -> dict[str, ShardCheck]:
+def _check_shards(directory: Path, tables: Tables, processes: int) -> dict[str, ShardReport]:
     """Check the files that rows name; all that are there if there are no rows."""
-    names = {path.name for path in directory.iterdir() if path.suffix == SHARD_SUFFIX}
-    expected: dict[str, list[int]] | None = None
-    if tables.plan is not None and tables.rows is not None:
-        expected = {}
-        refused = {trial.number for trial in tables.plan.trials if trial.refused is not None}
-        for trial in sorted({*range(len(tables.plan.trials)), *tables.rows}):
-            name, row = shard_of(tables.plan, trial), tables.rows.get(trial)
-            # A trial whose row is missing most likely has an episode.
-            if (trial not in refused and name in names) if row is None else row["shard"] == name:
-                expected.setdefault(name, []).append(trial)
+    expected = _trials_by_file(directory, tables)
+    names = sorted(_list_shards(directory) if expected is None else expected)
+    if processes == 1 or len(names) == 1 or expected is None or sum(map(len, expected.values())) < _MANY_EPISODES:
+        check = _file_check(directory, tables)
+        return {name: check(name) for name in names}
+    # New processes, as one that was forked off might hold what threads of this one had locked.
+    with ProcessPoolExecutor(min(processes, len(names)), get_context("spawn"), _prepare_to_check, (directory,)) as pool:
+        return dict(zip(names, pool.map(_check_one, names), strict=True))
+
+
+_check_file: Callable[[str], ShardReport]
+"""What a process of `_check_shards` checks files with."""
+
+
+def _prepare_to_check(directory: Path) -> None:
+    global _check_file  # noqa: PLW0603 - the only place that a process of a pool has
+    _check_file = _file_check(directory, check_tables(directory))
+
+
+def _check_one(name: str) -> ShardReport:
+    return _check_file(name)
+
+
+def _file_check(directory: Path, tables: Tables) -> Callable[[str], ShardReport]:
+    """What checks the files of a dataset, by their names."""
+    expected = _trials_by_file(directory, tables)
     robot = tables.config is not None and robot_is_available(tables.config)
     check = EpisodeCheck(tables.plan, tables.rows or {}, doubtful=tables.doubtful, robot=robot)
-    return {
-        name: ShardCheck(
-            directory / name, tables.config, None if expected is None else expected[name], check.find_problems
-        )
-        for name in sorted(names if expected is None else expected)
-    }
+
+    def check_file(name: str) -> ShardReport:
+        trials = None if expected is None else expected[name]
+        return check_shard(directory / name, tables.config, trials, check.find_problems)
+
+    return check_file
 
 
-def _find_bag_problems(bag: Mapping[str, Any], checks: Mapping[str, ShardCheck]) -> Iterator[Finding]:
+def _trials_by_file(directory: Path, tables: Tables) -> dict[str, list[int]] | None:
+    """Trials whose episodes each file should hold, in order; None if that is not known."""
+    if tables.plan is None or tables.rows is None:
+        return None
+    names, expected = _list_shards(directory), dict[str, list[int]]()
+    refused = {trial.number for trial in tables.plan.trials if trial.refused is not None}
+    for trial in sorted({*range(len(tables.plan.trials)), *tables.rows}):
+        name, row = shard_of(tables.plan, trial), tables.rows.get(trial)
+        # A trial whose row is missing most likely has an episode.
+        if (trial not in refused and name in names) if row is None else row["shard"] == name:
+            expected.setdefault(name, []).append(trial)
+    return expected
+
+
+def _list_shards(directory: Path) -> set[str]:
+    return {path.name for path in directory.iterdir() if path.suffix == SHARD_SUFFIX}
+
+
+def _find_bag_problems(bag: Mapping[str, Any], checks: Mapping[str, ShardReport]) -> Iterator[Finding]:
     summaries = [check.summary for check in checks.values() if check.summary is not None]
     channels = next((check.channels for check in checks.values() if check.channels is not None), None)
     whole = len(summaries) == len(checks)
@@ -143,7 +183,7 @@ def _find_file_problems(bag: Mapping[str, Any], summaries: list[FileSummary]) ->
 
 
 def _find_digest_problems(
-    bag: Mapping[str, Any], tables: Tables, checks: Mapping[str, ShardCheck]
+    bag: Mapping[str, Any], tables: Tables, checks: Mapping[str, ShardReport]
 ) -> Iterator[Finding]:
     custom = bag.get("custom_data")
     said = custom if isinstance(custom, dict) else {}
@@ -168,7 +208,7 @@ def _find_digest_problems(
         )
 
 
-def _find_stray_files(directory: Path, checks: Mapping[str, ShardCheck]) -> Iterator[Finding]:
+def _find_stray_files(directory: Path, checks: Mapping[str, ShardReport]) -> Iterator[Finding]:
     for path in sorted(directory.iterdir()):
         if path.suffix in _UNFINISHED:
             yield Finding(path.name, "", "a file that was not written to its end")

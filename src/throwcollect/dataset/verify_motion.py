@@ -52,11 +52,14 @@ def find_joint_problems(trial: RecordedTrial) -> Iterator[str]:
     """What the joints did that they cannot have done, a sentence each."""
     samples, config, trajectory = trial.samples, trial.config, trial.trajectory
     robot = robot_of(config)
-    for joint, angle in find_locked_joints(config).items():
-        column = robot.joints.index(joint)
-        if (samples.position[:, column] != angle).any():
-            yield f"{joint} is locked at {angle:.6g} rad and is somewhere else"
-        if samples.velocity[:, column].any() or samples.effort[:, column].any():
+    locked = find_locked_joints(config)
+    columns = [robot.joints.index(joint) for joint in locked]
+    away = (samples.position[:, columns] != list(locked.values())).any(axis=0)
+    moved = (samples.velocity[:, columns] != 0).any(axis=0) | (samples.effort[:, columns] != 0).any(axis=0)
+    for joint, is_away, has_moved in zip(locked, away, moved, strict=True):
+        if is_away:
+            yield f"{joint} is locked at {locked[joint]:.6g} rad and is somewhere else"
+        if has_moved:
             yield f"{joint} is locked, and moves or has a torque"
     shares = np.abs(samples.effort) / (joint_limits(robot).effort * config.robot.effort_scale)
     if shares.max() > 1 + 1e-6:

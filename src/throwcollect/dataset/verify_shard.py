@@ -7,7 +7,7 @@ once more, as the writer of the file does, and compared record by record.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from isal.isal_zlib import crc32
@@ -42,8 +42,9 @@ FindProblems = Callable[[StoredEpisode, str, Channels | None], Iterator[str]]
 """What is wrong with an episode of the file of this name, recorded on these channels."""
 
 
-class ShardCheck:
-    """Checks one file; afterwards it holds what was found.
+@dataclass(frozen=True)
+class ShardReport:
+    """What was found in a file.
 
     Attributes:
         findings: What is wrong.
@@ -51,6 +52,18 @@ class ShardCheck:
             what it should be.
         channels: What it records; None if that is not known.
         digests: Digest of each episode that could be read, by trial.
+    """
+
+    findings: list[Finding]
+    summary: FileSummary | None
+    channels: Channels | None
+    digests: dict[int, str]
+
+
+def check_shard(
+    path: Path, config: Config | None, trials: Sequence[int] | None, find_problems: FindProblems
+) -> ShardReport:
+    """Check one file.
 
     Args:
         path: The file.
@@ -59,6 +72,12 @@ class ShardCheck:
         trials: Trials whose episodes the file should hold, in order; None if they are not known.
         find_problems: Finds what is wrong with an episode.
     """
+    check = _ShardCheck(path, config, trials, find_problems)
+    return ShardReport(check.findings, check.summary, check.channels, check.digests)
+
+
+class _ShardCheck:
+    """Checks one file as it is made; see `check_shard`."""
 
     def __init__(
         self, path: Path, config: Config | None, trials: Sequence[int] | None, find_problems: FindProblems

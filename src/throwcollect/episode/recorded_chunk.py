@@ -39,7 +39,7 @@ class RecordedChunk:
         Raises:
             DatasetError: If it has to be worked out and the chunk is damaged.
         """
-        return self.said_sha256 or hashlib.sha256(self.contents).hexdigest()
+        return self.said_sha256 or self._contents_sha256
 
     @cached_property
     def messages(self) -> MessageList:
@@ -50,12 +50,16 @@ class RecordedChunk:
         """
         return MessageList(self.contents)
 
+    @cached_property
+    def _contents_sha256(self) -> str:
+        return hashlib.sha256(self.contents).hexdigest()
+
     def check_records(self) -> None:
-        """Hash the message records again.
+        """Hash the message records, whatever was said of them; once, as they do not change.
 
         Raises:
             DatasetError: If the chunk is damaged, or `records_sha256` is not that of its records.
         """
-        actual = hashlib.sha256(self.contents).hexdigest()
+        actual = self._contents_sha256
         if actual != self.records_sha256:
             raise DatasetError(f"chunk: SHA-256 of its records is {actual}", expected=self.records_sha256)

@@ -15,7 +15,7 @@ from throwcollect.files import StrPath
 from throwcollect.replay.audit import replay_throws, select_trials
 
 
-def verify_dataset(directory: StrPath, *, replay: int | None = None) -> list[Finding]:
+def verify_dataset(directory: StrPath, *, replay: int | None = None, processes: int = 1) -> list[Finding]:
     """Check a finished dataset: its files against each other, its episodes against physics, its plan against the robot.
 
     Without the extra ``collect``, what takes the robot's model is left out; `dataset.verify.find_unchecked` names it.
@@ -24,6 +24,8 @@ def verify_dataset(directory: StrPath, *, replay: int | None = None) -> list[Fin
         directory: Its directory.
         replay: How many throws, chosen by the seed of the dataset, to simulate again and to compare bit for bit; None
             for none.
+        processes: How many processes may check the recordings of a large dataset; more than one import the program that
+            calls this, as those of `multiprocessing` do.
 
     Returns:
         What is wrong, file by file; empty when nothing is.
@@ -35,7 +37,7 @@ def verify_dataset(directory: StrPath, *, replay: int | None = None) -> list[Fin
     """
     if replay is not None:
         require("pybullet", "pinocchio")
-    findings = verify(Path(directory), check_of=feasibility_check)
+    findings = verify(Path(directory), check_of=feasibility_check, processes=processes)
     if replay is not None:
         findings += _replay_findings(Path(directory), replay)
     return findings

@@ -29,7 +29,7 @@ from throwcollect.dataset.scan import scan_whole
 from throwcollect.dataset.throws_table import read_throws
 from throwcollect.dataset.verify import verify
 from throwcollect.dataset.verify_episode import EpisodeCheck
-from throwcollect.dataset.verify_shard import ShardCheck
+from throwcollect.dataset.verify_shard import check_shard
 from throwcollect.episode.chunk import Chunk
 from throwcollect.episode.message import header_from_json
 from throwcollect.errors import DatasetError, ThrowcollectError
@@ -76,7 +76,7 @@ def test_a_recording_with_any_damage_is_read_or_refused(small: Path, sound: Data
         data = mutate((small / RECORDING).read_bytes(), damage)
         path.write_bytes(data)
         if data != (small / RECORDING).read_bytes():
-            assert ShardCheck(path, sound.config, [0], check.find_problems).findings
+            assert check_shard(path, sound.config, [0], check.find_problems).findings
         for found in scan_whole(path):
             assert found.stored.episode.digest == sound.throws["digest"][0].as_py()
 

@@ -7,6 +7,7 @@ import re
 import struct
 import zlib
 from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -49,6 +50,23 @@ CONSEQUENCES = {**SHARD_CONSEQUENCES, **TABLE_CONSEQUENCES}
 
 def test_a_sound_dataset_has_no_findings(dataset: Path) -> None:
     assert verify(dataset) == []
+
+
+def test_several_processes_find_the_same(dataset: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    started = []
+
+    class Pool(ProcessPoolExecutor):
+        def __init__(self, processes: int, *others: Any) -> None:
+            super().__init__(processes, *others)
+            started.append(processes)
+
+    monkeypatch.setattr("throwcollect.dataset.verify.ProcessPoolExecutor", Pool)
+    zeroed_sector(dataset)
+    alone = verify(dataset, processes=2)
+    assert (len(alone), started) == (len(verify(dataset)), [])
+    monkeypatch.setattr("throwcollect.dataset.verify._MANY_EPISODES", 1)
+    assert verify(dataset, processes=2) == alone != []
+    assert started == [2]
 
 
 @pytest.mark.parametrize("plant", DEFECTS, ids=lambda plant: plant.__name__)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from throwcollect.cli.options import DatasetArgument, JsonOption
+from throwcollect.cli.options import DatasetArgument, JsonOption, count_cores
 from throwcollect.errors import DatasetError
 from throwcollect.extras import install_command
 from throwcollect.wording import command, format_count
@@ -32,7 +32,7 @@ def verify_dataset(
     from throwcollect.dataset.verify import find_unchecked
     from throwcollect.replay.verification import verify_dataset as verify
 
-    findings = verify(directory, replay=replay)
+    findings = verify(directory, replay=replay, processes=count_cores())
     if json:
         typer.echo(jsonlib.dumps([finding.as_dict() for finding in findings], indent=2))
     else:
