@@ -21,6 +21,7 @@ import socket
 import subprocess
 import sys
 import time
+import warnings
 from collections.abc import Mapping, Sequence
 from typing import BinaryIO
 
@@ -204,6 +205,8 @@ def serve(connection: socket.socket) -> list[str]:
     signal.signal(signal.SIGCHLD, lambda *_: None)
     # Pages that the garbage collector writes to could not be shared.
     gc.freeze()
+    # The one other thread is that of Arrow's allocator, which knows of forks. From 3.12 on, Python warns of any.
+    warnings.filterwarnings("ignore", "This process .* is multi-threaded", DeprecationWarning)
     while True:
         ready, _, _ = select.select([connection, awake], [], [])
         if awake in ready:
