@@ -78,7 +78,7 @@ test-containers:
 test-processes:
 	$(BIN)/python -m pytest -n 2 --dist loadfile tests/e2e tests/integration
 
-# Slurm with three nodes of this machine, and Apptainer; `.ci/cluster.sh` installs both on Debian.
+# Slurm with four nodes of this machine, and Apptainer; `.ci/cluster.sh` installs both on Debian.
 test-cluster:
 	$(BIN)/python -m pytest tests/cluster
 

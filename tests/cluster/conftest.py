@@ -48,11 +48,11 @@ def shared() -> Iterator[Path]:
 
 @pytest.fixture(scope="session")
 def slurm() -> Iterator[Slurm]:
-    """A Slurm of three nodes."""
+    """A Slurm of four nodes."""
     with tempfile.TemporaryDirectory(prefix="throwcollect-slurm-") as path:
         started = Slurm(Path(path))
         try:
-            started.up()
+            started.up(4)
             yield started
         finally:
             started.down()

@@ -34,7 +34,7 @@ SlurmctldHost={host}(127.0.0.1)
 SlurmUser=slurm
 SlurmctldPort={port}
 AuthType=auth/munge
-AuthInfo=socket={directory}/munge/socket
+AuthInfo=socket={directory}/munge/socket,cred_expire=6
 StateSaveLocation={directory}/state
 SlurmdSpoolDir={directory}/spool.%n
 SlurmctldPidFile={directory}/run/slurmctld.pid
@@ -56,7 +56,8 @@ PreemptMode=REQUEUE
 JobRequeue=1
 ReturnToService=2
 SlurmctldTimeout=30
-SlurmdTimeout=10
+SlurmdTimeout=5
+MessageTimeout=4
 InactiveLimit=0
 KillWait={kill_wait_s}
 MinJobAge=300
@@ -130,7 +131,7 @@ class Slurm:
     def kill_node(self, node: str) -> None:
         """End all processes of a node at once, as if its power was cut.
 
-        Slurm notices after 25 to 30 s, and then runs its jobs again elsewhere. If the node is back before, Slurm takes
+        Slurm notices after 10 to 20 s, and then runs its jobs again elsewhere. If the node is back before, Slurm takes
         its jobs for running, for minutes.
         """
         _end(self._process(node), signal.SIGKILL)
@@ -178,16 +179,6 @@ class Slurm:
         )
         assert done.returncode == 0, f"{' '.join(command)}: {done.stderr or done.stdout}"
         return done.stdout
-
-    def restart_at_once(self, job: str) -> None:
-        """Let a requeued job start now, and not after the two minutes that Slurm gives it."""
-        _wait(lambda: self._try_to_restart(job), self._evidence)
-
-    def _try_to_restart(self, job: str) -> bool:
-        # Slurm refuses as long as the job is being ended on its node.
-        command = ["scontrol", "update", f"JobId={job}", "StartTime=now"]
-        environment = {**os.environ, **self.environment}
-        return subprocess.run(command, check=False, capture_output=True, env=environment).returncode == 0
 
     def _make_directories(self) -> None:
         self._directory.mkdir(parents=True, exist_ok=True)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -17,6 +19,7 @@ from tests.cluster.conftest import USER
 from tests.cluster.slurm import Slurm
 from tests.e2e.collection import CONFIG, FAST, fingerprints, write_config
 from throwcollect import runs
+from throwcollect.cluster.submission import read_submission
 
 pytestmark = pytest.mark.cluster
 SLICED = CONFIG + "record: {{trials_per_shard: {per_shard}}}\n"
@@ -40,9 +43,9 @@ def call(slurm: Slurm, *arguments: str | Path, expect: int = 0, **environment: s
     return done.stdout
 
 
-def configure(directory: Path, *, trials: int, sim: str = "") -> Path:
-    text = SLICED.replace("{per_shard}", str(trials // (2 * TASKS)))
-    return write_config(directory, trials=trials, text=text, sim=sim)
+def configure(directory: Path, *, trials: int, shards: int = 2 * TASKS) -> Path:
+    text = SLICED.replace("{per_shard}", str(trials // shards))
+    return write_config(directory, trials=trials, text=text, sim=FAST)
 
 
 def collect_whole(config: Path, directory: Path) -> dict[str, str]:
@@ -57,10 +60,10 @@ def recordings(files: dict[str, str]) -> dict[str, str]:
     return {name: each for name, each in files.items() if name.endswith(".mcap") or name == "throws.parquet"}
 
 
-def submit(slurm: Slurm, config: Path, directory: Path, *settings: str) -> str:
+def submit(slurm: Slurm, config: Path, directory: Path, *settings: str, tasks: int = TASKS) -> str:
     """Submit a dataset; returns the number of the array."""
     options = [word for setting in ("cluster.memory=1G", *settings) for word in ("--set", setting)]
-    said = call(slurm, "submit", config, "--output", directory, "--tasks", str(TASKS), "--json", *options)
+    said = call(slurm, "submit", config, "--output", directory, "--tasks", str(tasks), "--json", *options)
     return str(json.loads(said[said.index("{") :])["array"])
 
 
@@ -68,6 +71,16 @@ def states(slurm: Slurm, array: str) -> dict[str, tuple[str, str]]:
     """State and node of each task of an array, by its index."""
     lines = slurm.run("squeue", "--noheader", "--array", "--states=all", f"--jobs={array}", "--format=%K|%T|%N")
     return {index: (state, node) for index, state, node in (line.strip().split("|") for line in lines.splitlines())}
+
+
+@contextmanager
+def small_disk(directory: Path) -> Iterator[None]:
+    """A disk on which a slice has no room."""
+    subprocess.run(["mount", "-t", "tmpfs", "-o", "size=256k", "throwcollect-test", directory], check=True)
+    try:
+        yield
+    finally:
+        subprocess.run(["umount", directory], check=True)
 
 
 def wait_until(condition: Callable[[], bool], *, seconds: float = 60) -> None:
@@ -81,28 +94,52 @@ def wait_until(condition: Callable[[], bool], *, seconds: float = 60) -> None:
 def short(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str]]:
     """A configuration of few trials, and the files that it makes."""
     directory = tmp_path_factory.mktemp("short")
-    config = configure(directory, trials=24, sim=FAST)
+    config = configure(directory, trials=24)
     return config, collect_whole(config, directory / "whole")
 
 
-def test_what_was_cancelled_is_submitted_again_and_nothing_else(
+@pytest.fixture(scope="module", autouse=True)
+def limited(slurm: Slurm, tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, dict[str, str]]]:
+    """A dataset that is collected beside all other tests, as its time limit is one of minutes; and its files.
+
+    Its first task ends before the limit. The last one has twice the work, and cannot.
+    """
+    directory = tmp_path_factory.mktemp("limited")
+    config = configure(directory, trials=90, shards=3)
+    apart = f'cluster.lines=["#SBATCH --nodelist={slurm.nodes[-1]}"]'
+    array = submit(slurm, config, directory / "data", apart, "cluster.time=2", "sim.real_time_factor=1", tasks=2)
+    yield directory / "data", recordings(collect_whole(config, directory / "whole"))
+    slurm.run("scancel", "--quiet", array)
+
+
+def test_what_is_missing_is_submitted_again_and_nothing_else(
     slurm: Slurm, short: tuple[Path, dict[str, str]], tmp_path: Path
 ) -> None:
+    """A task is cancelled, the disk of another one is full, and then the joining job is cancelled."""
     config, whole = short
     data = tmp_path / "with blank" / "data"
-    array = submit(slurm, config, data, "cluster.at_once=1")
-    slurm.run("scancel", f"{array}_2")
-    said = call(slurm, "wait", "--run", data, expect=130)
-    assert "1 slice of 3 not collected: cancelled" in said
+    for index in range(TASKS):
+        (tmp_path / "disk" / str(index)).mkdir(parents=True)
+    with small_disk(tmp_path / "disk" / "1"):
+        disks = f"cluster.scratch={tmp_path}/disk/$SLURM_ARRAY_TASK_ID"
+        array = submit(slurm, config, data, "cluster.at_once=2", disks)
+        slurm.run("scancel", f"{array}_2")
+        said = call(slurm, "wait", "--run", data, expect=3)
+        assert re.search(r"2 slices of 3 not collected: 1 \(FAILED, exit code 4:0, node \w+\) and 2", said)
     assert "0 | slice 0/3: trials 0 to 7" in call(slurm, "logs", "0", "--run", data)
-    assert "1 task;" in call(slurm, "resume", data)
+    printed = call(slurm, "logs", "1", "--run", data)
+    assert re.search(r"/disk/1/.* cannot be written: No space left on device\n.*free space on that disk", printed)
+    assert "2 tasks;" in call(slurm, "resume", data)
+    slurm.run("scancel", read_submission(data).jobs[-1].join)
+    assert "all slices are finished, but they are not joined" in call(slurm, "wait", "--run", data, expect=3)
+    assert "joins the slices; all of them are finished" in call(slurm, "resume", data)
     assert "digest" in call(slurm, "wait", "--run", data)
     assert fingerprints(data) == whole
     assert "nothing is left to submit" in call(slurm, "resume", data)
 
 
 def test_a_run_is_listed_and_can_be_stopped(slurm: Slurm, tmp_path: Path) -> None:
-    config = configure(tmp_path, trials=240, sim=FAST)
+    config = configure(tmp_path, trials=240)
     data = tmp_path / "data"
     array = submit(slurm, config, data, SLOW)
     wait_until(lambda: any(state == "RUNNING" for state, _ in states(slurm, array).values()))
@@ -110,28 +147,24 @@ def test_a_run_is_listed_and_can_be_stopped(slurm: Slurm, tmp_path: Path) -> Non
     assert (listed["run"], listed["tasks"]) == (array, TASKS)
     assert "not complete" in call(slurm, "stop", "--run", data)
     assert not any(state in ("PENDING", "RUNNING") for state, _ in states(slurm, array).values())
+    assert "3 slices of 3 not collected: cancelled" in call(slurm, "wait", "--run", data, expect=130)
 
 
 def test_nothing_is_lost_when_nodes_die_and_tasks_are_preempted(slurm: Slurm, tmp_path: Path) -> None:
-    config = configure(tmp_path, trials=240, sim=FAST)
+    config = configure(tmp_path, trials=240)
     whole = recordings(collect_whole(config, tmp_path / "whole"))
     data = tmp_path / "data"
     array = submit(slurm, config, data, "cluster.partition=low", "cluster.cores=2", SLOW)
-    wait_until(lambda: len({node for state, node in states(slurm, array).values() if state == "RUNNING"}) == 3)
+    wait_until(lambda: [state for state, _ in states(slurm, array).values()] == ["RUNNING"] * TASKS)
     wait_until(lambda: any((data / "slices").glob("*/*.part")))
-    dead, silent, wanted = slurm.nodes
+    dead, silent, wanted = (node for _, node in states(slurm, array).values())
     slurm.kill_node(dead)
     slurm.kill_slurmd(silent)
-    urgent = slurm.run(
-        "sbatch", "--parsable", "--partition=main", f"--nodelist={wanted}", "--cpus-per-task=2", "--wrap=sleep 5"
-    ).strip()
+    urgent = ("--partition=main", f"--nodelist={wanted}", "--cpus-per-task=2", "--output=/dev/null", "--wrap=sleep 5")
+    slurm.run("sbatch", *urgent)
     wait_until(lambda: all(slurm.state(node).startswith("down") for node in (dead, silent)), seconds=90)
     slurm.revive(silent)
     slurm.revive(dead)
-    wait_until(lambda: not slurm.run("squeue", "--noheader", f"--jobs={urgent}").strip())
-    for index, (state, _) in states(slurm, array).items():
-        if state == "PENDING":
-            slurm.restart_at_once(f"{array}_{index}")
     call(slurm, "wait", "--run", data)
     assert recordings(fingerprints(data)) == whole
 
@@ -156,7 +189,7 @@ def test_a_script_collects_in_an_image_for_whoever_submits_it(
 
 
 def test_a_plan_that_grows_is_collected_by_one_run_on_several_nodes(slurm: Slurm, tmp_path: Path) -> None:
-    config = configure(tmp_path, trials=200, sim=FAST)
+    config = configure(tmp_path, trials=200)
     grows = ("until.landed=20", "sweep.sampler=sobol")
     with runs.prepare(config, overrides=["run.runtime=inprocess", *grows], output=tmp_path / "whole") as run:
         run.collect()
@@ -194,7 +227,7 @@ def test_what_cannot_be_submitted_leaves_nothing_behind(
 
 
 def test_more_tasks_than_slurm_takes_are_refused(slurm: Slurm, tmp_path: Path) -> None:
-    config = configure(tmp_path, trials=24, sim=FAST)
+    config = configure(tmp_path, trials=24)
     said = call(
         slurm, "submit", config, "--output", tmp_path / "data", "--tasks", "20000", "--trials", "20000",
         "--set", "record.trials_per_shard=1", expect=2,
@@ -222,3 +255,16 @@ def test_where_there_is_no_slurm_it_says_so(short: tuple[Path, dict[str, str]], 
     said = call(slurm, "submit", short[0], "--output", data, "--tasks", str(TASKS), expect=2, PATH="/nowhere")
     assert "this is no machine that submits to Slurm" in said
     assert not data.exists()
+
+
+def test_a_task_that_comes_near_its_time_limit_goes_on_and_no_other_is_disturbed(
+    slurm: Slurm, limited: tuple[Path, dict[str, str]]
+) -> None:
+    data, whole = limited
+    call(slurm, "wait", "--run", data)
+    assert recordings(fingerprints(data)) == whole
+    struck = call(slurm, "logs", "1", "--run", data)
+    assert (
+        struck.count("slice 1/2: trials 30 to 89") == struck.count("interrupted: finishing the running trials") + 1 > 1
+    )
+    assert "nothing is left to do" not in call(slurm, "logs", "0", "--run", data)

@@ -6,6 +6,8 @@ import errno
 import fcntl
 import os
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -14,6 +16,7 @@ from tests.e2e.collection import CONFIG, FAST, fingerprints, write_config
 from throwcollect import runs
 from throwcollect.config.loader import load
 from throwcollect.coordinator.prepare import prepare
+from throwcollect.dataset.directory import METADATA
 from throwcollect.dataset.join import join
 from throwcollect.dataset.shard import OpenShard
 from throwcollect.dataset.slice_directory import SLICES, find_attempts, find_finished, make_attempt, publish
@@ -24,6 +27,38 @@ from throwcollect.runs.slices import collect_slice
 from throwcollect.sweep.slice import Slice
 
 INPROCESS = ["run.runtime=inprocess"]
+KILLED_ANYWHERE = """
+import os, shutil, signal, sys
+from pathlib import Path
+from throwcollect.dataset.join import join
+
+source, copies = map(Path, sys.argv[1:])
+
+def kill_at(change):
+    def look(event, arguments):
+        nonlocal change
+        if event in ("os.rename", "os.remove", "os.rmdir") or (
+            event == "open" and isinstance(arguments[2], int) and arguments[2] & os.O_ACCMODE != os.O_RDONLY
+        ):
+            change -= 1
+            if not change:
+                os.kill(os.getpid(), signal.SIGKILL)
+    sys.addaudithook(look)
+
+shutil.copytree(source, copies / "first")
+join(copies / "first")  # so that the others need not import anything
+shutil.rmtree(copies / "first")
+for change in range(1, 1000):
+    copy = copies / f"{change:03d}"
+    shutil.copytree(source, copy)
+    if not (process := os.fork()):
+        kill_at(change)
+        join(copy)
+        os._exit(0)
+    if not os.waitpid(process, 0)[1]:
+        break
+"""
+"""Joins copies of a dataset: each is killed one change of the file system later, until one is finished."""
 
 
 class Listener(runs.Onlooker):
@@ -104,6 +139,30 @@ def test_a_slice_that_was_interrupted_goes_on_with_what_is_there(frozen: Path, w
     assert fingerprints(frozen) == fingerprints(whole)
 
 
+def test_of_attempts_that_were_stopped_one_is_left_and_it_has_most(frozen: Path, whole: Path) -> None:
+    """However often a task is queued again: its files do not become more, and what is recorded does not become less."""
+    slice = Slice(0, 2)
+    sizes = []
+    for size in (100_000, 200_000, 300_000):
+        attempt = interrupt_after(frozen, "0/2", size)
+        assert find_attempts(frozen, slice) == [attempt]
+        sizes.append(sum(path.stat().st_size for path in attempt.glob("*.mcap*")))
+    assert sizes == sorted(sizes)
+    # Beside one that died with less.
+    dead = make_attempt(frozen, slice)
+    (dead / "small_00000.mcap.part").write_bytes((attempt / "small_00000.mcap").read_bytes()[:1000])
+    early = frozen / SLICES / "0-of-2.attempt-a"
+    dead.rename(early)
+    onlooker = Listener()
+    collect_slice(frozen, slice, overrides=INPROCESS, onlooker=onlooker)
+    (kept,) = [line for line in onlooker.lines if "of an earlier collection" in line]
+    assert int(kept.split()[1]) >= 4
+    assert find_attempts(frozen, slice) == [early]
+    collect(frozen, "1/2")
+    join(frozen)
+    assert fingerprints(frozen) == fingerprints(whole)
+
+
 def test_a_slice_takes_over_recordings_and_not_what_is_damaged_in_them(frozen: Path, whole: Path) -> None:
     attempt = interrupt_after(frozen, "0/2", 100_000)
     recording = max(attempt.glob("*.mcap*"), key=lambda path: path.stat().st_size)
@@ -139,14 +198,18 @@ def test_joining_says_which_slices_are_missing(frozen: Path) -> None:
     assert "--slice 0/3" in str(caught.value)
 
 
-def test_joining_that_was_ended_half_way_can_be_done_again(frozen: Path, whole: Path) -> None:
+def test_joining_that_is_killed_anywhere_can_be_done_again(frozen: Path, whole: Path, tmp_path: Path) -> None:
     collect(frozen, "0/2", "1/2")
-    moved = frozen / SLICES / "0-of-2" / "small_00001.mcap"
-    moved.rename(frozen / moved.name)
-    join(frozen)
-    assert fingerprints(frozen) == fingerprints(whole)
-    join(frozen)
-    assert fingerprints(frozen) == fingerprints(whole)
+    killed = subprocess.run([sys.executable, "-c", KILLED_ANYWHERE, frozen, tmp_path / "killed"], check=False)
+    assert killed.returncode == 0
+    states = sorted((tmp_path / "killed").iterdir())
+    # It dies with all shards in their slices, with some of them moved, and when only slices are left to be removed.
+    assert {len(list(each.glob("*.mcap"))) for each in states} == set(range(7))
+    assert any((each / METADATA).exists() and (each / SLICES).exists() for each in states)
+    for each in states:
+        join(each)
+        assert fingerprints(each) == fingerprints(whole)
+        assert not (each / SLICES).exists()
 
 
 def test_slices_of_different_numbers_are_not_joined(frozen: Path) -> None:

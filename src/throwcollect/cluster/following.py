@@ -174,7 +174,7 @@ class Look:
     @property
     def running(self) -> int:
         """Number of tasks that run."""
-        return sum(task.state in ("RUNNING", "COMPLETING") for task in self.tasks)
+        return sum(task.runs for task in self.tasks)
 
     @property
     def waiting(self) -> int:

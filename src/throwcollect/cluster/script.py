@@ -78,7 +78,8 @@ class BatchScripts:
                 "# As a step, so that signals reach it.",
                 self._step(collected, cores=cluster.cores),
                 "code=$?",
-                *_requeue(cluster.requeue),
+                # The id of its last task is that of an array, too, and would have all of them queued again.
+                *_requeue(cluster.requeue, "${SLURM_ARRAY_JOB_ID}_$SLURM_ARRAY_TASK_ID"),
                 "exit $code",
                 "",
             ]
@@ -129,7 +130,7 @@ class BatchScripts:
                 "'",
                 "code=$?",
                 f"rm -f {shlex.quote(token)}",
-                *_requeue(cluster.requeue),
+                *_requeue(cluster.requeue, "$SLURM_JOB_ID"),
                 "exit $code",
                 "",
             ]
@@ -204,11 +205,11 @@ class BatchScripts:
         return " ".join(_in_shell(word) for word in (*program, *words))
 
 
-def _requeue(times: int) -> Iterator[str]:
+def _requeue(times: int, job: str) -> Iterator[str]:
     if times:
         yield f"# {Interrupted.exit_code}: it was stopped in order, and goes on where it is started again."
         yield f'if [ $code = {Interrupted.exit_code} ] && [ "${{SLURM_RESTART_COUNT:-0}}" -lt {times} ]; then'
-        yield '    scontrol requeue "$SLURM_JOB_ID"'
+        yield f'    scontrol requeue "{job}"'
         yield "fi"
 
 

@@ -16,9 +16,22 @@ MARK = "throwcollect:"
 _PATIENCE_S = 60.0
 _GLANCE_S = 5.0
 """The same for commands that only look whether there is something."""
-_LIVING = frozenset(
-    {"PENDING", "RUNNING", "CONFIGURING", "COMPLETING", "SUSPENDED", "REQUEUED", "REQUEUE_HOLD", "STOPPED"}
+_RUNNING = frozenset({"RUNNING", "COMPLETING", "SIGNALING"})
+_ENDED = frozenset(
+    [
+        "BOOT_FAIL",
+        "CANCELLED",
+        "COMPLETED",
+        "DEADLINE",
+        "FAILED",
+        "NODE_FAIL",
+        "OUT_OF_MEMORY",
+        "PREEMPTED",
+        "REVOKED",
+        "TIMEOUT",
+    ]
 )
+"""All others, of which new versions of Slurm have more, are those of tasks that run or will."""
 _UNSEEN_OUTPUT = "0:53"
 """Exit code of a task whose log could not be opened: its node does not see the directory."""
 
@@ -42,7 +55,12 @@ class Task:
     @property
     def lives(self) -> bool:
         """Whether it runs, or will."""
-        return self.state in _LIVING
+        return self.state not in _ENDED
+
+    @property
+    def runs(self) -> bool:
+        """Whether it is on a node."""
+        return self.state in _RUNNING
 
     @property
     def saw_no_directory(self) -> bool:

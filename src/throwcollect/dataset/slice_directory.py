@@ -7,6 +7,9 @@ nothing: what it would put there is the same, byte for byte::
 
     slices/3-of-8/                      a finished slice
     slices/3-of-8.attempt-<id>/         an attempt, unfinished; its logs are in it
+
+An attempt begins with what earlier ones have recorded. Those that were stopped in order are removed then, so that a
+task that is queued again and again does not fill the disk; those that ended otherwise stay for their logs.
 """
 
 from __future__ import annotations
@@ -16,7 +19,7 @@ import re
 import secrets
 import shutil
 import socket
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
 
@@ -27,6 +30,8 @@ from throwcollect.sweep.slice import Slice
 SLICES = "slices"
 """Name of the directory of slices in that of a dataset."""
 
+_UNFINISHED = f"{SHARD_SUFFIX}.part"
+_STOPPED = "stopped"
 _NAME = re.compile(r"(\d+)-of-(\d+)", re.ASCII)
 
 
@@ -80,29 +85,60 @@ def make_attempt(directory: Path, slice: Slice, *, scratch: Path | None = None) 
     return path
 
 
-def copy_recordings(earlier: Path, attempt: Path) -> None:
-    """Give an attempt what an earlier one has recorded, which may go on writing: whole episodes are found later.
+def take_recordings(earlier: Sequence[Path], attempt: Path) -> None:
+    """Give an attempt what earlier ones have recorded: of each shard the copy with the most in it.
 
-    Copies are made, as what is unfinished will be written to.
+    Copies are made, as what is unfinished will be written to, and some of the earlier ones may go on writing: whole
+    episodes are found later.
 
     Args:
-        earlier: Directory of the earlier attempt.
-        attempt: Directory of the new one; what it has is left as it is.
+        earlier: Directories of earlier attempts.
+        attempt: Directory of the new one.
 
     Raises:
         DatasetError: If something cannot be copied.
     """
-    for name in _list(earlier):
-        target = attempt / name
-        recording = name.endswith((SHARD_SUFFIX, f"{SHARD_SUFFIX}.part"))
-        if not recording or target.exists() or (attempt / name.removesuffix(".part")).exists():
-            continue
+    most: dict[str, Path] = {}
+    for path in sorted((each / name for each in earlier for name in _list(each)), key=_how_much):
+        if path.name.endswith((SHARD_SUFFIX, _UNFINISHED)):
+            most[path.name.removesuffix(".part")] = path
+    for path in most.values():
+        target = attempt / path.name
         try:
-            shutil.copyfile(earlier / name, target, follow_symlinks=False)
+            shutil.copyfile(path, target, follow_symlinks=False)
         except FileNotFoundError:
             continue  # the earlier attempt has just renamed it
         except OSError as error:
             raise unwritable(target, error) from error
+
+
+def _how_much(path: Path) -> tuple[bool, int]:
+    """Orders the recordings of one shard: finished ones are last, and among others the longest."""
+    try:
+        return not path.name.endswith(_UNFINISHED), path.lstat().st_size
+    except FileNotFoundError:
+        return False, 0
+
+
+def mark_stopped(attempt: Path) -> None:
+    """Say that an attempt was stopped in order, so that nobody writes to it any more.
+
+    Args:
+        attempt: Its directory.
+    """
+    with suppress(OSError):  # it is kept beside the next one then
+        (attempt / _STOPPED).touch()
+
+
+def remove_stopped(attempts: Sequence[Path]) -> None:
+    """Remove those of some attempts that were stopped in order, when another one has what they recorded.
+
+    Args:
+        attempts: Their directories.
+    """
+    for each in attempts:
+        if (each / _STOPPED).exists():
+            shutil.rmtree(each, ignore_errors=True)
 
 
 def publish(attempt: Path, directory: Path, slice: Slice) -> bool:

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import os
-import shutil
 import socket
-import tempfile
 import time
 from collections.abc import Callable
-from pathlib import Path
 
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
@@ -20,6 +17,7 @@ from throwcollect.ros.endpoint import answers
 from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
 from throwcollect.runs.launcher import SILENT, Onlooker
+from throwcollect.runs.own_directory import make_own_directory
 from throwcollect.runs.token import JoinToken
 from throwcollect.runtimes.local import LocalNodes
 from throwcollect.runtimes.nodes import LAUNCHER, NodeSpec, Role, simulation_name_of
@@ -57,8 +55,7 @@ def join_run(
     """
     token = JoinToken.decode(word)
     token.check_build()
-    scratch = Path(tempfile.mkdtemp(prefix="throwcollect-join-"))
-    try:
+    with make_own_directory("throwcollect-join-") as scratch:
         key = RunKey(scratch / "key")
         key.create(bytes.fromhex(token.secret))
         connection = Connection(token.endpoint, key, token.domain_id)
@@ -67,8 +64,6 @@ def join_run(
         onlooker.say(f"run {token.run}: {format_count(simulations, 'simulation')} of this machine join it")
         place = Place(token.run, scratch, None, scratch / "logs", simulations, Middleware(), key)
         _simulate(LocalNodes(place, config, elsewhere=token.endpoint), connection, config, onlooker, interruptions)
-    finally:
-        shutil.rmtree(scratch, ignore_errors=True)
 
 
 def _simulate(

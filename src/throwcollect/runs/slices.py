@@ -13,7 +13,15 @@ from throwcollect.config.schema import Config
 from throwcollect.coordinator.resume import refuse_changes
 from throwcollect.dataset.directory import METADATA, PLAN, config_path
 from throwcollect.dataset.inspect import loss
-from throwcollect.dataset.slice_directory import copy_recordings, find_attempts, find_finished, make_attempt, publish
+from throwcollect.dataset.slice_directory import (
+    find_attempts,
+    find_finished,
+    make_attempt,
+    mark_stopped,
+    publish,
+    remove_stopped,
+    take_recordings,
+)
 from throwcollect.dataset.writer import create
 from throwcollect.errors import ConfigError, Interrupted, Problem
 from throwcollect.runs.launcher import SILENT, Onlooker
@@ -62,22 +70,27 @@ def collect_slice(
         return False
     again = command("up", "--slice", slice, "--output", directory)
     scratch = _find_scratch(config)
+    earlier = find_attempts(directory, slice)
     attempt = make_attempt(directory, slice, scratch=scratch)
     create(attempt, plan)
-    for earlier in find_attempts(directory, slice):
-        if earlier != attempt:
-            copy_recordings(earlier, attempt)
+    take_recordings(earlier, attempt)
+    if scratch is None:
+        remove_stopped(earlier)
     onlooker.say(f"slice {slice}: trials {plan.trials[0].number} to {plan.trials[-1].number}")
     request = Request(config, directory, attempt, started, resumed=True)
     with prepare_run(Records(), request, plan, onlooker) as run:
         try:
             summary = run.collect(interruptions=interruptions)
         except Interrupted as error:
+            mark_stopped(attempt)
             raise Interrupted(f"slice {slice}: {error.message}", hint=f"{again} goes on with it") from error
         finally:
             if scratch is not None and not (attempt / METADATA).exists():
                 # The next attempt may be on another machine.
-                copy_recordings(attempt, make_attempt(directory, slice))
+                kept = make_attempt(directory, slice)
+                take_recordings([attempt], kept)
+                mark_stopped(kept)
+                remove_stopped(earlier)
                 shutil.rmtree(attempt, ignore_errors=True)
     if (lost := loss(summary.outcomes, hint=f"{again} runs them again")) is not None:
         raise lost

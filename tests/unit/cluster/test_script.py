@@ -38,7 +38,8 @@ def run(script: str, directory: Path, **programs: str) -> subprocess.CompletedPr
         path.parent.mkdir(exist_ok=True)
         path.write_text(f"#!/bin/bash\n{programs.get(name, 'true')}\n")
         path.chmod(0o755)
-    environment = {"PATH": f"{directory / 'bin'}:/usr/bin:/bin", "SLURM_ARRAY_TASK_ID": "3", "SLURM_JOB_ID": "77"}
+    job = {"SLURM_ARRAY_JOB_ID": "70", "SLURM_ARRAY_TASK_ID": "3", "SLURM_JOB_ID": "77"}
+    environment = {"PATH": f"{directory / 'bin'}:/usr/bin:/bin", **job}
     environment |= {name: value for name, value in programs.items() if name.isupper()}
     path = directory / "script.sh"
     path.write_text(script)
@@ -134,7 +135,7 @@ def test_a_task_that_was_stopped_in_order_is_queued_again(
         scontrol='echo "$@"',
         SLURM_RESTART_COUNT=str(restarts),
     )
-    assert done.stdout == ("requeue 77\n" if queued else "")
+    assert done.stdout == ("requeue 70_3\n" if queued else "")
     assert done.returncode == code
 
 

@@ -1,0 +1,33 @@
+"""What Slurm's commands print is understood."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from throwcollect.cluster import slurm
+
+QUEUE = """\
+7|0|SIGNALING|a1|None
+7|1|OUT_OF_MEMORY|a1|OutOfMemory
+7|2|PENDING||BeginTime
+7|3|NEW_IN_ANOTHER_VERSION|a2|None
+8|0|RUNNING|a2|None
+"""
+
+
+def test_a_task_that_is_being_warned_of_its_time_limit_still_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whoever takes it for ended, submits it once more."""
+    (tmp_path / "squeue").write_text(f"#!/bin/sh\ncat <<END\n{QUEUE}END\n")
+    (tmp_path / "squeue").chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}:/usr/bin:/bin")
+    tasks = slurm.find_tasks("7")
+    assert [(task.index, task.lives, task.runs) for task in tasks] == [
+        (0, True, True),
+        (1, False, False),
+        (2, True, False),
+        (3, True, False),
+    ]

@@ -1,0 +1,88 @@
+"""Directories of single processes: private, and gone with their process, however that ends."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import stat
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import pytest
+
+from throwcollect.runs.own_directory import make_own_directory
+
+PREFIX = "throwcollect-test-"
+LATER_S = 120.0
+KILLED = f"""
+import os, signal
+from throwcollect.runs.own_directory import make_own_directory
+with make_own_directory({PREFIX!r}) as path:
+    (path / "key").touch()
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+@pytest.fixture(autouse=True)
+def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Where temporary files lie."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    return tmp_path
+
+
+def grow_old(directory: Path) -> None:
+    then = time.time() - LATER_S
+    os.utime(directory, (then, then))
+
+
+def test_nobody_else_can_read_it_and_it_is_gone_afterwards(place: Path) -> None:
+    with make_own_directory(PREFIX) as path:
+        assert stat.S_IMODE(path.stat().st_mode) == 0o700
+        (path / "key").touch()
+    assert not list(place.iterdir())
+
+
+def test_that_of_a_process_that_was_killed_is_removed_by_the_next_one(place: Path) -> None:
+    subprocess.run([sys.executable, "-c", KILLED], env={**os.environ, "TMPDIR": str(place)}, check=False)
+    (left,) = place.iterdir()
+    assert (left / "key").exists()
+    with make_own_directory(PREFIX):
+        assert left.exists()  # it could be one that is just being made
+    grow_old(left)
+    with make_own_directory(PREFIX):
+        assert not left.exists()
+
+
+def test_that_of_a_process_that_lives_stays(place: Path) -> None:
+    with make_own_directory(PREFIX) as first:
+        grow_old(first)
+        with make_own_directory(PREFIX):
+            assert first.exists()
+
+
+def test_what_is_no_directory_of_its_own_stays(place: Path) -> None:
+    (place / "elsewhere").mkdir()
+    (place / "elsewhere" / "file").touch()
+    (place / f"{PREFIX}link").symlink_to(place / "elsewhere")
+    (place / f"{PREFIX}file").touch()
+    for each in place.iterdir():
+        os.utime(each, (0, 0), follow_symlinks=False)
+    before = sorted(place.rglob("*"))
+    with make_own_directory(PREFIX):
+        pass
+    assert sorted(place.rglob("*")) == before
+
+
+def test_a_file_system_without_locks_will_do(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(_: int, __: int) -> None:
+        raise OSError(37, os.strerror(37))
+
+    monkeypatch.setattr(fcntl, "flock", refuse)
+    (place / f"{PREFIX}other").mkdir()
+    grow_old(place / f"{PREFIX}other")
+    with make_own_directory(PREFIX) as path:
+        assert path.is_dir()
+    assert [each.name for each in place.iterdir()] == [f"{PREFIX}other"]
