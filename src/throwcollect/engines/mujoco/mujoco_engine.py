@@ -1,0 +1,214 @@
+"""One MuJoCo world."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from itertools import compress
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from throwcollect.engines.engine import (
+    BodyState,
+    Box,
+    Engine,
+    Observer,
+    Physics,
+    Sample,
+    Scene,
+    State,
+    Steps,
+    Vector,
+    ball_of,
+)
+from throwcollect.engines.mujoco.scenery import (
+    BALL,
+    Surface,
+    boxes,
+    make_spec,
+    resize_ball,
+    set_physics,
+)
+from throwcollect.errors import ConfigError
+
+_PRESS = 3
+"""Numbers of a sensor, of which the first is the normal force."""
+
+
+class MujocoEngine(Engine):
+    """A MuJoCo world in this process."""
+
+    _physics: Physics
+    _surfaces: list[Surface]
+    _model: mujoco.MjModel
+    _data: mujoco.MjData
+
+    def __init__(self) -> None:
+        self._scene: Scene | None = None
+        self._touching: frozenset[str] = frozenset()
+
+    def close(self) -> None:
+        """Free the world."""
+        self._scene = None
+        del self._model, self._data
+
+    @property
+    def is_as_loaded(self) -> bool:
+        """Nothing can be added."""
+        return True
+
+    def load(self, scene: Scene) -> None:
+        """Make the world of a scene; if nothing but the ball differs, the ball alone is made anew."""
+        kept, self._scene = self._scene, None
+        if kept is None or dataclasses.replace(kept, ball_radius_m=scene.ball_radius_m) != scene:
+            spec, self._surfaces = make_spec(scene)
+            try:
+                self._model = spec.compile()
+            except ValueError as error:
+                raise ConfigError(f"MuJoCo cannot load the robot's description: {error}") from error
+            self._data = mujoco.MjData(self._model)
+            # Joints of the robot come first in the model, but in an order of its own.
+            names = [self._model.joint(number).name for number in range(len(scene.moving))]
+            self._columns = np.array([scene.moving.index(name) for name in names])
+            self._order = np.array([names.index(name) for name in scene.moving])
+        elif kept.ball_radius_m != scene.ball_radius_m:
+            resize_ball(self._model, scene.ball_radius_m)
+        self._scene = scene
+
+    def configure(self, physics: Physics) -> None:
+        """Set all numbers of the physics."""
+        self._physics = physics
+        set_physics(self._model, physics)
+
+    def rest(self, joints: Sequence[float], seat: Vector) -> None:
+        """Put the joints somewhere and the ball into the tool, all at rest."""
+        assert self._scene is not None
+        model, data = self._model, self._data
+        data.qpos[: len(joints)] = np.array(joints)[self._columns]
+        mujoco.mj_kinematics(model, data)
+        tool = data.body(self._scene.tool.link)
+        centre = (tool.xpos + tool.xmat.reshape(3, 3) @ np.array(seat)).tolist()
+        still = (0.0,) * len(joints)
+        self.reset(State((*joints, *still, *still, *centre, 0.0, 0.0, 0.0, 1.0, *(0.0,) * 6), frozenset()))
+
+    def reset(self, state: State) -> None:
+        """Put robot and ball into a state, leaving nothing behind of what went on before."""
+        count = len(self._columns)
+        mujoco.mj_resetData(self._model, self._data)
+        positions, velocities = np.array(state.sample[: 2 * count]).reshape(2, count)
+        self._data.qpos[:count], self._data.qvel[:count] = positions[self._columns], velocities[self._columns]
+        self.place_ball(ball_of(state.sample))
+        self._touching = state.touching
+        # Motors begin by bearing what presses on a robot that is held up.
+        for _ in range(2):
+            mujoco.mj_forward(self._model, self._data)
+            self._data.qfrc_applied[:count] = self._data.qfrc_bias[:count]
+
+    @property
+    def state(self) -> State:
+        """Robot and ball now; right after `reset` without torques, as there are none before a step."""
+        return State(self._sample(), self._touching)
+
+    def run(self, steps: Steps, observer: Observer) -> int:
+        """Take steps until the observer stops them.
+
+        A motor gives its joint the velocity in one step that Bullet's would give it, by the torque that this takes: by
+        inverse dynamics of the present state, without the ball, and within the efforts. So the robot follows as in Bullet,
+        and contacts are solved for the motion that the tool really has.
+        """
+        # Local names, numbers in place and one loop: what stands here is paid for in every step.
+        model, data, physics = self._model, self._data, self._physics
+        count, hz = len(self._columns), float(physics.hz)
+        pull, brake = hz * physics.position_gain_per_s, hz * physics.velocity_gain
+        position, velocity = data.qpos[:count], data.qvel[:count]
+        acceleration, torque = data.qacc[:count], data.qfrc_applied[:count]
+        pushed = data.qfrc_constraint[:count]
+        needed, work, other = np.zeros(model.nv), np.zeros(count), np.zeros(count)
+        load = needed[:count]
+        most = np.array(physics.efforts)[self._columns]
+        least, damping = -most, model.dof_damping[:count].copy()
+        lag = damping / hz
+        pressing, presses = data.sensordata[::_PRESS], np.zeros(len(self._surfaces), np.bool_)
+        multiply, add, subtract, maximum, minimum = np.multiply, np.add, np.subtract, np.maximum, np.minimum
+        begin_step, end_step, inverse = mujoco.mj_step1, mujoco.mj_step2, mujoco.mj_rne
+        drag, due, stride = steps.drag_kgpm, steps.first_sample, steps.stride
+        wanted = list(pull * steps.targets[:-1, self._columns] + brake * steps.velocities[:, self._columns])
+        last_presses, number = None, 0
+        for want in wanted:
+            begin_step(model, data)
+            subtract(want, multiply(position, pull, work), work)
+            subtract(work, multiply(velocity, brake, other), acceleration)
+            inverse(model, data, 1, needed)
+            # The joints are damped by what they move at after the step.
+            add(multiply(velocity, damping, work), multiply(acceleration, lag, other), work)
+            add(load, work, work)
+            subtract(work, pushed, work)
+            maximum(minimum(work, most, out=work), least, out=torque)
+            if drag:
+                self._apply_drag(drag)
+            end_step(model, data)
+            number += 1
+            np.greater(pressing, 0.0, presses)
+            if (now := presses.tobytes()) != last_presses:
+                last_presses = now
+                self._tell_touch(number, presses, observer)
+            if number == due:
+                due += stride
+                if observer.on_sample(number, self._sample()):
+                    break
+        data.qfrc_applied[count : count + 3] = 0.0
+        return number
+
+    def place_ball(self, ball: BodyState) -> None:
+        """Put the ball somewhere."""
+        first = len(self._columns)
+        x, y, z, w = ball.orientation_xyzw
+        self._data.qpos[first : first + 7] = (*ball.position, w, x, y, z)
+        # MuJoCo has angular velocities in the frame of the body.
+        spin = _turn((w, -x, -y, -z), ball.angular_velocity)
+        self._data.qvel[first : first + 6] = (*ball.linear_velocity, *spin)
+
+    def ball_boxes(self) -> list[Box]:
+        """A box along the axes of the world around the ball."""
+        return self._boxes([self._model.body(BALL).id])
+
+    def robot_boxes(self) -> list[Box]:
+        """Boxes along the axes of the world around the links of the robot."""
+        return self._boxes(range(1, self._model.body(BALL).id))
+
+    def _boxes(self, bodies: Sequence[int]) -> list[Box]:
+        mujoco.mj_kinematics(self._model, self._data)
+        return boxes(self._model, self._data, bodies)
+
+    def _tell_touch(self, step: int, presses: NDArray[np.bool_], observer: Observer) -> None:
+        """Tell of what presses now, if it is not what did before."""
+        touching = frozenset(surface.name for surface in compress(self._surfaces, presses))
+        if touching != self._touching:
+            self._touching = touching
+            observer.on_touch(step, touching)
+
+    def _sample(self) -> Sample:
+        data, order = self._data, self._order
+        first = len(order)
+        joints = (data.qpos[order], data.qvel[order], data.qfrc_applied[order])
+        x, y, z, qw, qx, qy, qz = data.qpos[first : first + 7].tolist()
+        vx, vy, vz, *spin = data.qvel[first : first + 6].tolist()
+        turning = _turn((qw, qx, qy, qz), spin)
+        return (*np.concatenate(joints).tolist(), x, y, z, qx, qy, qz, qw, vx, vy, vz, *turning)
+
+    def _apply_drag(self, drag_kgpm: float) -> None:
+        first = len(self._columns)
+        velocity = self._data.qvel[first : first + 3].tolist()
+        factor = -drag_kgpm * math.hypot(*velocity)
+        self._data.qfrc_applied[first : first + 3] = [factor * component for component in velocity]
+
+
+def _turn(orientation: Sequence[float], vector: Sequence[float]) -> Vector:
+    """Turn a vector by a unit quaternion (wxyz)."""
+    w, x, y, z = orientation
+    a, b, c = vector
+    p, q, r = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
+    return (a + w * p + y * r - z * q, b + w * q + z * p - x * r, c + w * r + x * q - y * p)
