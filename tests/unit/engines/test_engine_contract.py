@@ -95,8 +95,7 @@ def test_the_ball_rests_in_the_tool_of_the_still_robot(engine: Engine) -> None:
     assert state.sample[: len(MOVING)] == pytest.approx(START, abs=1e-4)
     assert len(state.sample) == 3 * len(MOVING) + 13
     ball = ball_of(state.sample)
-    # Soft contacts, as those of MuJoCo, take longer than that to come to rest.
-    assert ball.linear_velocity == pytest.approx((0, 0, 0), abs=3e-4)
+    assert ball.linear_velocity == pytest.approx((0, 0, 0), abs=1e-4)
     engine.run(still(engine, 100), Observer())
     assert ball_of(engine.state.sample).position == pytest.approx(ball.position, abs=1e-4)
 

@@ -24,12 +24,14 @@ from throwcollect.engines.engine import (
     Vector,
     ball_of,
 )
+from throwcollect.engines.mujoco.contacts import aim_contacts
 from throwcollect.engines.mujoco.scenery import (
     BALL,
     Surface,
     boxes,
     make_spec,
     resize_ball,
+    restitutions_of,
     set_physics,
 )
 from throwcollect.errors import ConfigError
@@ -45,6 +47,7 @@ class MujocoEngine(Engine):
     _surfaces: list[Surface]
     _model: mujoco.MjModel
     _data: mujoco.MjData
+    _restitutions: NDArray[np.float64] | None
 
     def __init__(self) -> None:
         self._scene: Scene | None = None
@@ -82,6 +85,7 @@ class MujocoEngine(Engine):
         """Set all numbers of the physics."""
         self._physics = physics
         set_physics(self._model, physics)
+        self._restitutions = restitutions_of(self._model, physics)
 
     def rest(self, joints: Sequence[float], seat: Vector) -> None:
         """Put the joints somewhere and the ball into the tool, all at rest."""
@@ -102,10 +106,7 @@ class MujocoEngine(Engine):
         self._data.qpos[:count], self._data.qvel[:count] = positions[self._columns], velocities[self._columns]
         self.place_ball(ball_of(state.sample))
         self._touching = state.touching
-        # Motors begin by bearing what presses on a robot that is held up.
-        for _ in range(2):
-            mujoco.mj_forward(self._model, self._data)
-            self._data.qfrc_applied[:count] = self._data.qfrc_bias[:count]
+        self._bear()
 
     @property
     def state(self) -> State:
@@ -136,6 +137,7 @@ class MujocoEngine(Engine):
         begin_step, end_step, inverse = mujoco.mj_step1, mujoco.mj_step2, mujoco.mj_rne
         drag, due, stride = steps.drag_kgpm, steps.first_sample, steps.stride
         wanted = list(pull * steps.targets[:-1, self._columns] + brake * steps.velocities[:, self._columns])
+        restitutions = self._restitutions
         last_presses, number = None, 0
         for want in wanted:
             begin_step(model, data)
@@ -147,6 +149,8 @@ class MujocoEngine(Engine):
             add(load, work, work)
             subtract(work, pushed, work)
             maximum(minimum(work, most, out=work), least, out=torque)
+            if data.ncon:
+                aim_contacts(data, hz, restitutions)
             if drag:
                 self._apply_drag(drag)
             end_step(model, data)
@@ -178,6 +182,16 @@ class MujocoEngine(Engine):
     def robot_boxes(self) -> list[Box]:
         """Boxes along the axes of the world around the links of the robot."""
         return self._boxes(range(1, self._model.body(BALL).id))
+
+    def _bear(self) -> None:
+        """Have motors know what presses on the robot, as if they had held it up before."""
+        model, data, count = self._model, self._data, len(self._columns)
+        mujoco.mj_step1(model, data)
+        data.qfrc_applied[:count] = data.qfrc_bias[:count]
+        if data.ncon:
+            aim_contacts(data, self._physics.hz, self._restitutions)
+        mujoco.mj_fwdAcceleration(model, data)
+        mujoco.mj_fwdConstraint(model, data)
 
     def _boxes(self, bodies: Sequence[int]) -> list[Box]:
         mujoco.mj_kinematics(self._model, self._data)

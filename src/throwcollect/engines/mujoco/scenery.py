@@ -5,7 +5,6 @@ As in Bullet, only the ball collides, with everything, as long as nothing is add
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
@@ -23,11 +22,11 @@ _GROUND_BIT, _ROBOT_BIT, _FLOOR_BIT, _ADDED_BIT = 1, 2, 4, 8
 """A pair collides if what one of both is (``contype``) is among what the other collides with (``conaffinity``)."""
 
 _EVERYTHING = _GROUND_BIT | _ROBOT_BIT | _FLOOR_BIT | _ADDED_BIT
-_CONTACT_S = 0.01
-"""Time in which a contact without restitution pushes bodies apart; MuJoCo takes at least two steps."""
+_REACH_M = 0.02
+"""Distance from which on a contact is looked at, so that a ball does not come to be inside of what it flies against."""
 
-_LEAST_DAMPING = 0.01
-"""Share of the critical damping that a contact with restitution 1 has: MuJoCo cannot do without any."""
+_HARDNESS = 0.99
+"""Share of the acceleration that a contact asks for which it gets."""
 
 _BALL_PRIORITY = 1
 """The ball's friction and restitution are those of its contacts, whatever it touches."""
@@ -171,18 +170,29 @@ def set_physics(model: mujoco.MjModel, physics: Physics) -> None:
     # Frictions are multiplied, as in Bullet. Rolling and turning on the spot are not braked.
     model.geom_friction[:] = (physics.surface_friction**2, 0.0, 0.0)
     model.geom_friction[sphere, 0] = physics.ball_friction * physics.surface_friction
-    damping = damping_for(physics.ball_restitution)
-    model.geom_solref[sphere] = (_CONTACT_S / damping, damping)
+    model.geom_margin[sphere] = _REACH_M
+    # Friction stops what slides in one step if it can. What contacts ask for along their normals, the engine says.
+    model.geom_solref[:] = (2 / physics.hz, 1.0)
+    model.geom_solimp[:, :2] = _HARDNESS
     # Numbers that the solver derives from masses, such as those by which it scales contacts.
     mujoco.mj_setConst(model, mujoco.MjData(model))
 
 
-def damping_for(restitution: float) -> float:
-    """The damping ratio of a contact after which a fraction of the speed remains: 1 for none, less for more."""
-    if restitution == 0:
-        return 1.0
-    lost = -math.log(restitution)
-    return max(lost / math.hypot(math.pi, lost), _LEAST_DAMPING)
+def restitutions_of(model: mujoco.MjModel, physics: Physics) -> NDArray[np.float64] | None:
+    """Factor of each shape by which the ball bounces off it; None if it does not bounce.
+
+    Args:
+        model: The world.
+        physics: Of it, the restitution of the ball matters.
+    """
+    if physics.ball_restitution == 0:
+        return None
+    # What moves on its own does not bounce, as in Bullet; the robot does.
+    added = model.geom_contype == _ADDED_BIT
+    moves = model.body_weldid[model.geom_bodyid] != 0
+    factors = np.where(added & moves, 0.0, 1.0)
+    factors[model.geom(BALL).id] = physics.ball_restitution
+    return factors
 
 
 def boxes(model: mujoco.MjModel, data: mujoco.MjData, bodies: Iterable[int]) -> list[Box]:
