@@ -11,6 +11,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+_ROWS = 3
+"""Rows of a contact with friction, but without friction of rolling and turning on the spot."""
+
 _CORRECTED = 0.2
 """Share of a penetration that one step removes; Bullet's share."""
 
@@ -30,11 +33,13 @@ def aim_contacts(data: mujoco.MjData, hz: float, restitutions: NDArray[np.float6
         hz: Steps per second.
         restitutions: Of each shape of the model; of a contact, it is the product of both. None if nothing bounces.
     """
-    contacts = data.contact
-    rows, away = contacts.efc_address, contacts.dist * hz
-    speeds = data.efc_vel[rows]
-    wanted = -np.maximum(away, _CORRECTED * away)
+    # Rows of contacts are the last ones, and each has three: along its normal, and two of friction.
+    first = data.nefc - _ROWS * data.ncon
+    away, speeds = data.efc_pos[first::_ROWS] * hz, data.efc_vel[first::_ROWS]
+    wanted = np.maximum(away, _CORRECTED * away)
     if restitutions is not None:
         bounces = (speeds < -_LEAST_BOUNCE_MPS) & (speeds + away < 0.0)
-        wanted[bounces] = -(restitutions[contacts.geom].prod(axis=1) * speeds)[bounces]
-    data.efc_aref[rows] = (wanted - speeds) * hz
+        wanted[bounces] = (restitutions[data.contact.geom].prod(axis=1) * speeds)[bounces]
+    wanted += speeds
+    wanted *= -hz
+    data.efc_aref[first::_ROWS] = wanted

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import compress
+from operator import itemgetter
 
 import mujoco
 import numpy as np
@@ -35,6 +36,9 @@ from throwcollect.engines.mujoco.scenery import (
     set_physics,
 )
 from throwcollect.errors import ConfigError
+
+_ORIENTATION, _SPIN = slice(-10, -6), -3
+"""Places in a sample."""
 
 _PRESS = 3
 """Numbers of a sensor, of which the first is the normal force."""
@@ -76,7 +80,7 @@ class MujocoEngine(Engine):
             # Joints of the robot come first in the model, but in an order of its own.
             names = [self._model.joint(number).name for number in range(len(scene.moving))]
             self._columns = np.array([scene.moving.index(name) for name in names])
-            self._order = np.array([names.index(name) for name in scene.moving])
+            self._pick = _find_sample(self._model, [names.index(name) for name in scene.moving])
         elif kept.ball_radius_m != scene.ball_radius_m:
             resize_ball(self._model, scene.ball_radius_m)
         self._scene = scene
@@ -123,31 +127,31 @@ class MujocoEngine(Engine):
         # Local names, numbers in place and one loop: what stands here is paid for in every step.
         model, data, physics = self._model, self._data, self._physics
         count, hz = len(self._columns), float(physics.hz)
-        pull, brake = hz * physics.position_gain_per_s, hz * physics.velocity_gain
+        pull = np.full(count, hz * physics.position_gain_per_s)
+        brake = np.full(count, hz * physics.velocity_gain)
         position, velocity = data.qpos[:count], data.qvel[:count]
         acceleration, torque = data.qacc[:count], data.qfrc_applied[:count]
-        pushed = data.qfrc_constraint[:count]
+        passive, pushed = data.qfrc_passive[:count], data.qfrc_constraint[:count]
         needed, work, other = np.zeros(model.nv), np.zeros(count), np.zeros(count)
         load = needed[:count]
         most = np.array(physics.efforts)[self._columns]
-        least, damping = -most, model.dof_damping[:count].copy()
-        lag = damping / hz
-        pressing, presses = data.sensordata[::_PRESS], np.zeros(len(self._surfaces), np.bool_)
+        least, lag = -most, model.dof_damping[:count] / hz
+        pressing, nothing = data.sensordata[::_PRESS], np.zeros(len(self._surfaces))
+        presses = np.zeros(len(self._surfaces), np.bool_)
         multiply, add, subtract, maximum, minimum = np.multiply, np.add, np.subtract, np.maximum, np.minimum
-        begin_step, end_step, inverse = mujoco.mj_step1, mujoco.mj_step2, mujoco.mj_rne
+        begin_step, end_step, inverse, greater = mujoco.mj_step1, mujoco.mj_step2, mujoco.mj_rne, np.greater
         drag, due, stride = steps.drag_kgpm, steps.first_sample, steps.stride
-        wanted = list(pull * steps.targets[:-1, self._columns] + brake * steps.velocities[:, self._columns])
         restitutions = self._restitutions
         last_presses, number = None, 0
-        for want in wanted:
+        for want in list(pull * steps.targets[:-1, self._columns] + brake * steps.velocities[:, self._columns]):
             begin_step(model, data)
             subtract(want, multiply(position, pull, work), work)
             subtract(work, multiply(velocity, brake, other), acceleration)
             inverse(model, data, 1, needed)
             # The joints are damped by what they move at after the step.
-            add(multiply(velocity, damping, work), multiply(acceleration, lag, other), work)
-            add(load, work, work)
+            subtract(multiply(acceleration, lag, work), passive, work)
             subtract(work, pushed, work)
+            add(work, load, work)
             maximum(minimum(work, most, out=work), least, out=torque)
             if data.ncon:
                 aim_contacts(data, hz, restitutions)
@@ -155,7 +159,7 @@ class MujocoEngine(Engine):
                 self._apply_drag(drag)
             end_step(model, data)
             number += 1
-            np.greater(pressing, 0.0, presses)
+            greater(pressing, nothing, presses)
             if (now := presses.tobytes()) != last_presses:
                 last_presses = now
                 self._tell_touch(number, presses, observer)
@@ -205,19 +209,30 @@ class MujocoEngine(Engine):
             observer.on_touch(step, touching)
 
     def _sample(self) -> Sample:
-        data, order = self._data, self._order
-        first = len(order)
-        joints = (data.qpos[order], data.qvel[order], data.qfrc_applied[order])
-        x, y, z, qw, qx, qy, qz = data.qpos[first : first + 7].tolist()
-        vx, vy, vz, *spin = data.qvel[first : first + 6].tolist()
-        turning = _turn((qw, qx, qy, qz), spin)
-        return (*np.concatenate(joints).tolist(), x, y, z, qx, qy, qz, qw, vx, vy, vz, *turning)
+        data = self._data
+        row = self._pick(data.qpos.tolist() + data.qvel.tolist() + data.qfrc_applied.tolist())
+        qx, qy, qz, qw = row[_ORIENTATION]
+        return row[:_SPIN] + _turn((qw, qx, qy, qz), row[_SPIN:])
 
     def _apply_drag(self, drag_kgpm: float) -> None:
         first = len(self._columns)
         velocity = self._data.qvel[first : first + 3].tolist()
         factor = -drag_kgpm * math.hypot(*velocity)
         self._data.qfrc_applied[first : first + 3] = [factor * component for component in velocity]
+
+
+def _find_sample(model: mujoco.MjModel, order: Sequence[int]) -> Callable[[list[float]], Sample]:
+    """What takes a sample out of positions, velocities and forces, but with the ball's spin in the frame of the ball.
+
+    Args:
+        model: The world.
+        order: Place of each moving joint among those of the model.
+    """
+    ball = len(order)
+    x, y, z, w, i, j, k = range(ball, ball + 7)
+    velocities, forces = model.nq, model.nq + model.nv
+    joints = [first + place for first in (0, velocities, forces) for place in order]
+    return itemgetter(*joints, x, y, z, i, j, k, w, *range(velocities + ball, velocities + ball + 6))
 
 
 def _turn(orientation: Sequence[float], vector: Sequence[float]) -> Vector:

@@ -25,7 +25,7 @@ _EVERYTHING = _GROUND_BIT | _ROBOT_BIT | _FLOOR_BIT | _ADDED_BIT
 _REACH_M = 0.02
 """Distance from which on a contact is looked at, so that a ball does not come to be inside of what it flies against."""
 
-_HARDNESS = 0.99
+_HARDNESS = 0.999
 """Share of the acceleration that a contact asks for which it gets."""
 
 _BALL_PRIORITY = 1
