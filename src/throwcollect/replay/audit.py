@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from throwcollect.dataset.reader import Dataset
+from throwcollect.engines.packages import require_engine
 from throwcollect.errors import DatasetError
 from throwcollect.extras import require
 from throwcollect.replay.comparison import Comparison, compare
@@ -50,7 +51,8 @@ def replay_throws(directory: Path, trials: Sequence[int]) -> Iterator[Comparison
         WorkerError: If the physics engine does not start.
     """
     # Processes that cannot begin would be started again for ever.
-    require("pybullet", "pinocchio")
+    require_engine(Dataset.open(directory).config.sim.engine)
+    require("pinocchio")
     processes = min(len(os.sched_getaffinity(0)), len(trials))
     if processes == 1:
         _begin(directory)

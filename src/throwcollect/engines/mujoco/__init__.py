@@ -1,1 +1,1 @@
-"""MuJoCo: rigid bodies with soft contacts, several times as fast as Bullet, and on Pythons that Bullet has no wheel for."""
+"""MuJoCo: rigid bodies with contacts, faster than Bullet, and on Pythons that Bullet has no wheel for."""

@@ -1,8 +1,8 @@
 """What contacts ask for, in the way of Bullet.
 
-MuJoCo has contacts ask for accelerations, by the velocities of the step's begin and without the turning of surfaces. A tool
-that swings turns its surfaces so fast that a ball, which is held in it by less and less force, would begin to hop on them
-long before it leaves. So each contact is told anew in each step velocity there should be after the step.
+MuJoCo has contacts ask for accelerations, by the velocities at the begin of a step, and does not see that surfaces
+turn. A tool that swings turns so fast that a ball, which is held in it by less and less force, would begin to hop long
+before it leaves. So each contact is told in each step what velocity there should be after it.
 """
 
 from __future__ import annotations

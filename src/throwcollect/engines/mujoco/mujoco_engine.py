@@ -25,11 +25,14 @@ from throwcollect.engines.engine import (
     Vector,
     ball_of,
 )
+from throwcollect.engines.mujoco.bodies import MujocoBodies
 from throwcollect.engines.mujoco.contacts import aim_contacts
+from throwcollect.engines.mujoco.frames import turn, turn_back
 from throwcollect.engines.mujoco.scenery import (
     BALL,
     Surface,
     boxes,
+    keep_motion,
     make_spec,
     resize_ball,
     restitutions_of,
@@ -47,6 +50,7 @@ _PRESS = 3
 class MujocoEngine(Engine):
     """A MuJoCo world in this process."""
 
+    _scene: Scene
     _physics: Physics
     _surfaces: list[Surface]
     _model: mujoco.MjModel
@@ -54,46 +58,72 @@ class MujocoEngine(Engine):
     _restitutions: NDArray[np.float64] | None
 
     def __init__(self) -> None:
-        self._scene: Scene | None = None
+        self.bodies: MujocoBodies = MujocoBodies(self._compile_anew, lambda: (self._model, self._data))
+        self._is_loaded = False
         self._touching: frozenset[str] = frozenset()
 
     def close(self) -> None:
         """Free the world."""
-        self._scene = None
+        self._is_loaded = False
         del self._model, self._data
 
     @property
     def is_as_loaded(self) -> bool:
-        """Nothing can be added."""
-        return True
+        """Whether nothing was added since the world was loaded."""
+        return not self.bodies.leave_traces
 
     def load(self, scene: Scene) -> None:
         """Make the world of a scene; if nothing but the ball differs, the ball alone is made anew."""
-        kept, self._scene = self._scene, None
-        if kept is None or dataclasses.replace(kept, ball_radius_m=scene.ball_radius_m) != scene:
-            spec, self._surfaces = make_spec(scene)
-            try:
-                self._model = spec.compile()
-            except ValueError as error:
-                raise ConfigError(f"MuJoCo cannot load the robot's description: {error}") from error
-            self._data = mujoco.MjData(self._model)
-            # Joints of the robot come first in the model, but in an order of its own.
-            names = [self._model.joint(number).name for number in range(len(scene.moving))]
-            self._columns = np.array([scene.moving.index(name) for name in names])
-            self._pick = _find_sample(self._model, [names.index(name) for name in scene.moving])
-        elif kept.ball_radius_m != scene.ball_radius_m:
+        can_keep = self._is_loaded and self.is_as_loaded
+        if can_keep and dataclasses.replace(self._scene, ball_radius_m=scene.ball_radius_m) == scene:
             resize_ball(self._model, scene.ball_radius_m)
-        self._scene = scene
+            self._scene = scene
+            return
+        self._scene, self._is_loaded = scene, False
+        self.bodies.forget()
+        try:
+            self._compile()
+        except ValueError as error:
+            raise ConfigError(f"MuJoCo cannot load the robot's description: {error}") from error
+        # Joints of the robot come first in the model, but in an order of its own.
+        names = [self._model.joint(number).name for number in range(len(scene.moving))]
+        self._columns = np.array([scene.moving.index(name) for name in names])
+        self._places = [names.index(name) for name in scene.moving]
+        self._is_loaded = True
+
+    def _compile(self) -> None:
+        """Compile the world of the scene with all bodies.
+
+        Raises:
+            ValueError: If MuJoCo does not take a description.
+        """
+        spec, surfaces = make_spec(self._scene)
+        surfaces += self.bodies.attach(spec)
+        self._model = spec.compile()
+        self._data = mujoco.MjData(self._model)
+        self._surfaces = surfaces
+
+    def _compile_anew(self) -> None:
+        """Compile the world with other bodies; what stays goes on as it was.
+
+        Raises:
+            ValueError: If MuJoCo does not take the description of a body.
+        """
+        model, data = self._model, self._data
+        self._compile()
+        self.configure(self._physics)
+        self.bodies.place_fixed()
+        keep_motion(model, data, self._model, self._data)
 
     def configure(self, physics: Physics) -> None:
         """Set all numbers of the physics."""
         self._physics = physics
         set_physics(self._model, physics)
         self._restitutions = restitutions_of(self._model, physics)
+        self._pick = _find_sample(self._model, self._places)
 
     def rest(self, joints: Sequence[float], seat: Vector) -> None:
         """Put the joints somewhere and the ball into the tool, all at rest."""
-        assert self._scene is not None
         model, data = self._model, self._data
         data.qpos[: len(joints)] = np.array(joints)[self._columns]
         mujoco.mj_kinematics(model, data)
@@ -104,10 +134,13 @@ class MujocoEngine(Engine):
 
     def reset(self, state: State) -> None:
         """Put robot and ball into a state, leaving nothing behind of what went on before."""
-        count = len(self._columns)
-        mujoco.mj_resetData(self._model, self._data)
+        count, data = len(self._columns), self._data
+        # Bodies that were added stay where they are.
+        added = data.qpos[count + 7 :].copy(), data.qvel[count + 6 :].copy()
+        mujoco.mj_resetData(self._model, data)
+        data.qpos[count + 7 :], data.qvel[count + 6 :] = added
         positions, velocities = np.array(state.sample[: 2 * count]).reshape(2, count)
-        self._data.qpos[:count], self._data.qvel[:count] = positions[self._columns], velocities[self._columns]
+        data.qpos[:count], data.qvel[:count] = positions[self._columns], velocities[self._columns]
         self.place_ball(ball_of(state.sample))
         self._touching = state.touching
         self._bear()
@@ -115,14 +148,16 @@ class MujocoEngine(Engine):
     @property
     def state(self) -> State:
         """Robot and ball now; right after `reset` without torques, as there are none before a step."""
-        return State(self._sample(), self._touching)
+        # Bodies that were removed since the last step have no names any more.
+        names = {surface.name for surface in self._surfaces}
+        return State(self._sample(), self._touching & names)
 
     def run(self, steps: Steps, observer: Observer) -> int:
         """Take steps until the observer stops them.
 
         A motor gives its joint the velocity in one step that Bullet's would give it, by the torque that this takes: by
-        inverse dynamics of the present state, without the ball, and within the efforts. So the robot follows as in Bullet,
-        and contacts are solved for the motion that the tool really has.
+        inverse dynamics of the present state, with what pressed on the robot in the step before, and within the
+        efforts. So contacts are solved for the motion that the tool really has.
         """
         # Local names, numbers in place and one loop: what stands here is paid for in every step.
         model, data, physics = self._model, self._data, self._physics
@@ -175,8 +210,7 @@ class MujocoEngine(Engine):
         first = len(self._columns)
         x, y, z, w = ball.orientation_xyzw
         self._data.qpos[first : first + 7] = (*ball.position, w, x, y, z)
-        # MuJoCo has angular velocities in the frame of the body.
-        spin = _turn((w, -x, -y, -z), ball.angular_velocity)
+        spin = turn_back(ball.orientation_xyzw, ball.angular_velocity)
         self._data.qvel[first : first + 6] = (*ball.linear_velocity, *spin)
 
     def ball_boxes(self) -> list[Box]:
@@ -211,8 +245,7 @@ class MujocoEngine(Engine):
     def _sample(self) -> Sample:
         data = self._data
         row = self._pick(data.qpos.tolist() + data.qvel.tolist() + data.qfrc_applied.tolist())
-        qx, qy, qz, qw = row[_ORIENTATION]
-        return row[:_SPIN] + _turn((qw, qx, qy, qz), row[_SPIN:])
+        return row[:_SPIN] + turn(row[_ORIENTATION], row[_SPIN:])
 
     def _apply_drag(self, drag_kgpm: float) -> None:
         first = len(self._columns)
@@ -232,12 +265,6 @@ def _find_sample(model: mujoco.MjModel, order: Sequence[int]) -> Callable[[list[
     x, y, z, w, i, j, k = range(ball, ball + 7)
     velocities, forces = model.nq, model.nq + model.nv
     joints = [first + place for first in (0, velocities, forces) for place in order]
-    return itemgetter(*joints, x, y, z, i, j, k, w, *range(velocities + ball, velocities + ball + 6))
-
-
-def _turn(orientation: Sequence[float], vector: Sequence[float]) -> Vector:
-    """Turn a vector by a unit quaternion (wxyz)."""
-    w, x, y, z = orientation
-    a, b, c = vector
-    p, q, r = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
-    return (a + w * p + y * r - z * q, b + w * q + z * p - x * r, c + w * r + x * q - y * p)
+    places = [*joints, x, y, z, i, j, k, w, *range(velocities + ball, velocities + ball + 6)]
+    pick: Callable[[list[float]], Sample] = itemgetter(*places)
+    return pick

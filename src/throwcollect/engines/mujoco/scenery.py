@@ -5,7 +5,7 @@ As in Bullet, only the ball collides, with everything, as long as nothing is add
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import mujoco
@@ -110,7 +110,7 @@ def make_spec(scene: Scene) -> tuple[mujoco.MjSpec, list[Surface]]:
 def _add_ball(spec: mujoco.MjSpec, radius: float) -> None:
     """Put a ball into the world; its mass and its surface are set later."""
     ball = spec.worldbody.add_body(name=BALL)
-    ball.add_freejoint()
+    ball.add_freejoint(name=BALL)
     ball.add_geom(
         name=BALL,
         type=mujoco.mjtGeom.mjGEOM_SPHERE,
@@ -136,7 +136,7 @@ def watch(spec: mujoco.MjSpec, surface: Surface) -> None:
 
 
 def collide_with_everything(spec: mujoco.MjSpec) -> None:
-    """Let all links of an added body collide with ground, robot, ball and other added bodies, but not with each other."""
+    """Let all links of an added body collide with everything but each other."""
     bodies = spec.bodies[1:]
     for body in bodies:
         for geom in body.geoms:
@@ -195,22 +195,40 @@ def restitutions_of(model: mujoco.MjModel, physics: Physics) -> NDArray[np.float
     return factors
 
 
-def boxes(model: mujoco.MjModel, data: mujoco.MjData, bodies: Iterable[int]) -> list[Box]:
-    """Boxes along the axes of the world that enclose the bodies which have a shape."""
+def keep_motion(model: mujoco.MjModel, data: mujoco.MjData, other_model: mujoco.MjModel, other: mujoco.MjData) -> None:
+    """Put all joints that another world has too where they are in this one."""
+    there = {other_model.joint(number).name for number in range(other_model.njnt)}
+    for name in (model.joint(number).name for number in range(model.njnt)):
+        if name in there:
+            joint = other.joint(name)
+            joint.qpos, joint.qvel = data.joint(name).qpos, data.joint(name).qvel
+
+
+Frame = tuple[NDArray[np.float64], NDArray[np.float64]]
+"""Origin [m], shape ``(3,)``, and orientation, shape ``(3, 3)``, in world."""
+
+WORLD: Frame = (np.zeros(3), np.eye(3))
+
+
+def boxes(model: mujoco.MjModel, data: mujoco.MjData, bodies: Iterable[int], frame: Frame = WORLD) -> list[Box]:
+    """Boxes along the axes of a frame that enclose the bodies which have a shape."""
     found = []
     for body in bodies:
         first, count = int(model.body_geomadr[body]), int(model.body_geomnum[body])
         if count:
-            corners = [_reach(model, data, geom) for geom in range(first, first + count)]
+            corners = [_reach(model, data, geom, frame) for geom in range(first, first + count)]
             lowest = np.min([low for low, _ in corners], axis=0)
             highest = np.max([high for _, high in corners], axis=0)
             found.append((tuple(lowest.tolist()), tuple(highest.tolist())))
     return found
 
 
-def _reach(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> Sequence[NDArray[np.float64]]:
-    """Lowest and highest corner of the box around a shape, which is along the axes of the shape."""
-    turn = data.geom_xmat[geom].reshape(3, 3)
-    centre = data.geom_xpos[geom] + turn @ model.geom_aabb[geom, :3]
-    half = np.abs(turn) @ model.geom_aabb[geom, 3:]
+def _reach(
+    model: mujoco.MjModel, data: mujoco.MjData, geom: int, frame: Frame
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Lowest and highest corner of the box around a shape's own box."""
+    origin, axes = frame
+    own = data.geom_xmat[geom].reshape(3, 3)
+    centre = axes.T @ (data.geom_xpos[geom] + own @ model.geom_aabb[geom, :3] - origin)
+    half = np.abs(axes.T @ own) @ model.geom_aabb[geom, 3:]
     return centre - half, centre + half
