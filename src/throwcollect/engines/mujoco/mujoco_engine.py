@@ -39,6 +39,7 @@ from throwcollect.engines.mujoco.scenery import (
     set_physics,
 )
 from throwcollect.errors import ConfigError
+from throwcollect.reproducible_math import matmul
 
 _ORIENTATION, _SPIN = slice(-10, -6), -3
 """Places in a sample."""
@@ -128,7 +129,7 @@ class MujocoEngine(Engine):
         data.qpos[: len(joints)] = np.array(joints)[self._columns]
         mujoco.mj_kinematics(model, data)
         tool = data.body(self._scene.tool.link)
-        centre = (tool.xpos + tool.xmat.reshape(3, 3) @ np.array(seat)).tolist()
+        centre = (tool.xpos + matmul(tool.xmat.reshape(3, 3), np.array(seat).reshape(3, 1)).ravel()).tolist()
         still = (0.0,) * len(joints)
         self.reset(State((*joints, *still, *still, *centre, 0.0, 0.0, 0.0, 1.0, *(0.0,) * 6), frozenset()))
 
