@@ -41,7 +41,8 @@ class MujocoBodies(Bodies):
     MuJoCo compiles a world as a whole, so whatever comes or goes has it compiled anew.
 
     Args:
-        compile_world: Compiles the world with all bodies that are here, and keeps the motion of what stays.
+        compile_world: Compiles the world with all bodies that are here, and keeps the motion of what stays; or else
+            raises a `ValueError`, and leaves the world as it is.
         world: Gives the compiled world.
     """
 
@@ -71,14 +72,13 @@ class MujocoBodies(Bodies):
                 "MuJoCo would fill in the mesh of a body that is attached to the world",
                 expected="boxes, spheres, cylinders and capsules, or sim.engine: bullet",
             )
-        self.leave_traces = True
         self._bodies[name] = _Added(model, [], start)
         try:
             self._compile_world()
         except ValueError as error:
             del self._bodies[name]
-            self._compile_world()
             raise RequestError("RESOURCE_PARSE_ERROR", f"the physics engine cannot load it: {error}") from error
+        self.leave_traces = True
         self.place(name, start)
 
     def remove(self, name: str) -> None:

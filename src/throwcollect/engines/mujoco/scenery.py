@@ -152,6 +152,8 @@ def resize_ball(model: mujoco.MjModel, radius: float) -> None:
     model.geom_size[geom, 0] = model.geom_rbound[geom] = radius
     model.geom_aabb[geom, 3:] = radius
     model.bvh_aabb[model.body_bvhadr[body], 3:] = radius
+    first = model.body_dofadr[body]
+    model.dof_length[first + 3 : first + 6] = radius
 
 
 def set_physics(model: mujoco.MjModel, physics: Physics) -> None:
@@ -196,12 +198,12 @@ def restitutions_of(model: mujoco.MjModel, physics: Physics) -> NDArray[np.float
 
 
 def keep_motion(model: mujoco.MjModel, data: mujoco.MjData, other_model: mujoco.MjModel, other: mujoco.MjData) -> None:
-    """Put all joints that another world has too where they are in this one."""
+    """Have all joints that another world has too go on there as in this one."""
     there = {other_model.joint(number).name for number in range(other_model.njnt)}
     for name in (model.joint(number).name for number in range(model.njnt)):
         if name in there:
-            joint = other.joint(name)
-            joint.qpos, joint.qvel = data.joint(name).qpos, data.joint(name).qvel
+            for what in ("qpos", "qvel", "qacc_warmstart", "qfrc_applied", "qfrc_constraint"):
+                setattr(other.joint(name), what, getattr(data.joint(name), what))
 
 
 Frame = tuple[NDArray[np.float64], NDArray[np.float64]]
