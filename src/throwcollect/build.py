@@ -13,7 +13,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import rclzenoh
-from throwcollect.engines.packages import PACKAGES
+from throwcollect.engine_packages import PACKAGES
 
 _PACKAGES = ("example-robot-data", "zstandard")
 """Packages whose versions count, whatever simulates."""

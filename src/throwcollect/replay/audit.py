@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from throwcollect.dataset.reader import Dataset
-from throwcollect.engines.packages import require_engine
+from throwcollect.engine_packages import require_engine
 from throwcollect.errors import DatasetError
 from throwcollect.extras import require
 from throwcollect.replay.comparison import Comparison, compare

@@ -10,7 +10,7 @@ from throwcollect.coordinator.prepare import feasibility_check
 from throwcollect.dataset.findings import Finding
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.verify import verify
-from throwcollect.engines.packages import require_engine
+from throwcollect.engine_packages import require_engine
 from throwcollect.errors import DatasetError
 from throwcollect.extras import require
 from throwcollect.files import StrPath

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Literal
 
 from throwcollect import ros_installation
-from throwcollect.engines.packages import PACKAGES
+from throwcollect.engine_packages import PACKAGES
 from throwcollect.errors import ConfigError
 from throwcollect.extras import EXTRA_OF, MissingExtraError, explain_missing, has_wheel, install_command, is_installed
 from throwcollect.members import names_of

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
+from throwcollect.engine_packages import require_engine
 from throwcollect.engines.engine import BALL_NUMBERS, BodyState, Engine, Observer, Sample, State, Steps, ball_of
-from throwcollect.engines.packages import require_engine
 from throwcollect.episode.record import Contact, EndReason, Samples
 from throwcollect.members import load_member
 from throwcollect.robots.description import (

@@ -65,7 +65,11 @@ class MujocoBodies(Bodies):
         self.leave_traces = False
 
     def add(self, name: str, model: BodyModel, start: BodyState) -> None:
-        """Put a body into the world; see `Bodies.add`."""
+        """Put a body into the world; see `Bodies.add`.
+
+        Raises:
+            RequestError: ``RESOURCE_PARSE_ERROR`` if MuJoCo does not take it, or would fill in its meshes.
+        """
         if model.meshes and 'concave="yes"' in model.urdf:
             raise RequestError(
                 "RESOURCE_PARSE_ERROR",

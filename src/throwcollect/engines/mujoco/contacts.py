@@ -14,6 +14,9 @@ from numpy.typing import NDArray
 _ROWS = 3
 """Rows of a contact with friction, but without friction of rolling and turning on the spot."""
 
+HARDNESS = 0.9
+"""Share of the acceleration that a contact asks for which it gets; the harder, the longer it is solved."""
+
 _CORRECTED = 0.2
 """Share of a penetration that one step removes; Bullet's share."""
 
@@ -41,5 +44,5 @@ def aim_contacts(data: mujoco.MjData, hz: float, restitutions: NDArray[np.float6
         bounces = (speeds < -_LEAST_BOUNCE_MPS) & (speeds + away < 0.0)
         wanted[bounces] = (restitutions[data.contact.geom].prod(axis=1) * speeds)[bounces]
     wanted += speeds
-    wanted *= -hz
+    wanted *= -hz / HARDNESS
     data.efc_aref[first::_ROWS] = wanted

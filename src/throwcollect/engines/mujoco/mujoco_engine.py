@@ -74,7 +74,11 @@ class MujocoEngine(Engine):
         return not self.bodies.leave_traces
 
     def load(self, scene: Scene) -> None:
-        """Make the world of a scene; if nothing but the ball differs, the ball alone is made anew."""
+        """Make the world of a scene; if nothing but the ball differs, the ball alone is made anew.
+
+        Raises:
+            ConfigError: If MuJoCo does not take the robot's description.
+        """
         can_keep = self._is_loaded and self.is_as_loaded
         if can_keep and dataclasses.replace(self._scene, ball_radius_m=scene.ball_radius_m) == scene:
             resize_ball(self._model, scene.ball_radius_m)

@@ -13,7 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.engines.engine import GROUND, Box, Physics, Scene
+from throwcollect.engines.mujoco.contacts import HARDNESS
 from throwcollect.errors import ConfigError
+from throwcollect.reproducible_math import matmul
 
 BALL = "ball"
 """Name of the ball's body and shape; those of added bodies begin with the name of the body and a slash."""
@@ -24,9 +26,6 @@ _GROUND_BIT, _ROBOT_BIT, _FLOOR_BIT, _ADDED_BIT = 1, 2, 4, 8
 _EVERYTHING = _GROUND_BIT | _ROBOT_BIT | _FLOOR_BIT | _ADDED_BIT
 _REACH_M = 0.02
 """Distance from which on a contact is looked at, so that a ball does not come to be inside of what it flies against."""
-
-_HARDNESS = 0.999
-"""Share of the acceleration that a contact asks for which it gets."""
 
 _BALL_PRIORITY = 1
 """The ball's friction and restitution are those of its contacts, whatever it touches."""
@@ -175,7 +174,7 @@ def set_physics(model: mujoco.MjModel, physics: Physics) -> None:
     model.geom_margin[sphere] = _REACH_M
     # Friction stops what slides in one step if it can. What contacts ask for along their normals, the engine says.
     model.geom_solref[:] = (2 / physics.hz, 1.0)
-    model.geom_solimp[:, :2] = _HARDNESS
+    model.geom_solimp[:, :2] = HARDNESS
     # Numbers that the solver derives from masses, such as those by which it scales contacts.
     mujoco.mj_setConst(model, mujoco.MjData(model))
 
@@ -230,7 +229,8 @@ def _reach(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Lowest and highest corner of the box around a shape's own box."""
     origin, axes = frame
-    own = data.geom_xmat[geom].reshape(3, 3)
-    centre = axes.T @ (data.geom_xpos[geom] + own @ model.geom_aabb[geom, :3] - origin)
-    half = np.abs(axes.T @ own) @ model.geom_aabb[geom, 3:]
-    return centre - half, centre + half
+    turned = matmul(axes.T, data.geom_xmat[geom].reshape(3, 3))
+    box = model.geom_aabb[geom].reshape(2, 3, 1)
+    centre = matmul(axes.T, (data.geom_xpos[geom] - origin).reshape(3, 1)) + matmul(turned, box[0])
+    half = matmul(np.abs(turned), box[1])
+    return (centre - half).ravel(), (centre + half).ravel()
