@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from importlib.metadata import version
 from pathlib import Path
 
@@ -42,5 +43,13 @@ def test_a_collection_by_mujoco_is_the_same_whoever_simulates_it(tmp_path: Path)
         assert shards
         for shard in shards:
             assert (tmp_path / other / shard).read_bytes() == (directory / shard).read_bytes()
-    bullet = collect(config, tmp_path / "bullet", 1)
-    assert bullet["digest"] != first["digest"]
+    compared = call("dataset", "replay", directory, "--all", "--engine", "bullet", "--json")
+    assert compared.returncode == 0, compared.stderr
+    answer = json.loads(compared.stdout)
+    assert [each["again"] for each in answer["throws"]] == ["landed"] * 6
+    largest = {each["column"]: each["largest"] for each in answer["columns"]}
+    assert 1e-5 < largest["landing_x_m"] < 0.02
+    assert largest["arm_right_4_joint_tracking_error_rad"] < 1e-4
+    mixed = call("dataset", "replay", directory, "--all", "--engine", "mujoco")
+    assert mixed.returncode == 2
+    assert "by mujoco themselves" in mixed.stderr
