@@ -25,6 +25,7 @@ for module in modules:
                 raise
 PYTHON
 throwcollect --help > help
+throwcollect up -n 1 --runtime inprocess --trials 2 --set sim.engine=mujoco --output mujoco "$quickstart"
 for backend; do
     # On Fast DDS, nodes at times do not find each other; the next start goes on with what is there.
     throwcollect up -n 1 --runtime local --trials 4 --set run.ros="$backend" --output "$backend" "$quickstart" \

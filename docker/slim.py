@@ -28,6 +28,16 @@ DROPPED = (
     # Robots and scenes that come with the physics, and its renderer for servers with a graphics card.
     "eglRenderer*",
     "pybullet_*/*",
+    # What draws, tells and identifies MuJoCo's worlds.
+    "mujoco/_batch*",
+    "mujoco/_render*",
+    "mujoco/_rollout*",
+    "mujoco/_simulate*",
+    "mujoco/doc/*",
+    "mujoco/introspect/*",
+    "mujoco/plugin/*",
+    "mujoco/sysid/*",
+    "mujoco/testdata/*",
     # Tables in clouds and from other machines.
     "pyarrow/_azurefs*",
     "pyarrow/_flight*",

@@ -42,9 +42,10 @@ _EPOCH = (1980, 1, 1, 0, 0, 0)
 def requirements() -> list[str]:
     """What nodes need at run time and throwcollect to be built, and pip, as it may be missing in the base image."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-    nodes = [*project["project"]["dependencies"], *project["project"]["optional-dependencies"]["collect"]]
+    extras = project["project"]["optional-dependencies"]
+    nodes = [*project["project"]["dependencies"], *extras["collect"], *extras["mujoco"]]
     # pip would compare markers with the Python that runs here, and not with the image's.
-    nodes = [requirement.partition(";")[0] for requirement in nodes]
+    nodes = list(dict.fromkeys(requirement.partition(";")[0] for requirement in nodes))
     return [*nodes, *project["build-system"]["requires"], "pip"]
 
 

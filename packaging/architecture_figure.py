@@ -43,7 +43,19 @@ PLACES: dict[str, tuple[float, int, str]] = {
     "rclzenoh": (-0.55, 12, "ROS 2 client of its own"),
 }
 """Column, row and words of each room; rooms that are not named here lie below all others, without arrows."""
-DOORS = ("pybullet", "pinocchio", "zenoh", "rclpy", "rosbags", "mcap", "docker", "plotly", "matplotlib", "jinja2")
+DOORS = (
+    "pybullet",
+    "mujoco",
+    "pinocchio",
+    "zenoh",
+    "rclpy",
+    "rosbags",
+    "mcap",
+    "docker",
+    "plotly",
+    "matplotlib",
+    "jinja2",
+)
 """Outside libraries whose rooms are shown."""
 
 COLUMN, ROW, WIDTH, HEIGHT = 158, 82, 140, 54

@@ -1,4 +1,4 @@
-"""What computes here, as one digest: sources, physics engine, robot model, compression.
+"""What computes here, as one digest: sources, a physics engine, robot model, compression.
 
 Two processes with the same digest compute the same episodes, so a coordinator takes those of such simulations alone.
 """
@@ -13,15 +13,20 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import rclzenoh
+from throwcollect.engine_packages import PACKAGES
 
-_PACKAGES = {"pybullet": "pybullet", "example-robot-data": None, "zstandard": None}
-"""Packages whose versions count, and the compiled module of the one that simulates."""
+_PACKAGES = ("example-robot-data", "zstandard")
+"""Packages whose versions count, whatever simulates."""
 _SOURCES = (".py", ".msg", ".srv", ".action", ".json")
 
 
 @cache
-def build_digest() -> str:
-    """SHA-256, in hexadecimal, over the installed sources, and over versions of engine, model and added packages."""
+def build_digest(engine: str) -> str:
+    """SHA-256, in hexadecimal, over the installed sources, and over versions of engine, model and added packages.
+
+    Args:
+        engine: Name of the engine that computes; no other one matters.
+    """
     digest = hashlib.sha256()
     root = Path(__file__).parents[1]
     # The ROS client lays out the messages of an episode.
@@ -29,24 +34,31 @@ def build_digest() -> str:
     for path in sorted(path for package in packages for path in package.rglob("*") if path.suffix in _SOURCES):
         content = path.read_bytes()
         digest.update(f"{path.relative_to(root).as_posix()}\0{len(content)}\0".encode() + content)
-    for fact in _facts():
+    for fact in _facts(engine):
         digest.update(fact.encode() + b"\n")
     return digest.hexdigest()
 
 
-def _facts() -> Iterator[str]:
-    for package, module in _PACKAGES.items():
-        try:
-            yield f"{package} {version(package)}"
-        except PackageNotFoundError:
-            yield f"{package} without version"
-        if module is not None:
-            # Two compilations of one version differ in size. Its hash would take each node a second: it has 140 MB.
-            found = find_spec(module)
-            path = Path(found.origin) if found and found.origin else None
-            yield f"{module} {path.stat().st_size if path and path.exists() else 'missing'} bytes"
+def _facts(engine: str) -> Iterator[str]:
+    for distribution in _PACKAGES:
+        yield _version_of(distribution)
+    if engine in PACKAGES:
+        package = PACKAGES[engine]
+        yield _version_of(package.distribution)
+        # Two compilations of one version differ in size. Its hash would take each node a second: Bullet has 140 MB.
+        found = find_spec(package.module)
+        beside = Path(found.origin).parent.glob(package.compiled) if found and found.origin else []
+        sizes = [path.stat().st_size for path in sorted(beside)]
+        yield f"{package.module} {sizes or 'missing'} bytes"
     # Robots, tools, engines and tasks of other packages.
     for group in sorted(group for group in entry_points().groups if group.startswith("throwcollect.")):
         for point in sorted(entry_points(group=group), key=lambda point: point.name):
-            package = f"{point.dist.name} {point.dist.version}" if point.dist else "an unknown package"
-            yield f"{group} {point.name}: {point.value} of {package}"
+            owner = f"{point.dist.name} {point.dist.version}" if point.dist else "an unknown package"
+            yield f"{group} {point.name}: {point.value} of {owner}"
+
+
+def _version_of(distribution: str) -> str:
+    try:
+        return f"{distribution} {version(distribution)}"
+    except PackageNotFoundError:
+        return f"{distribution} without version"

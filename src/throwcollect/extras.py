@@ -32,6 +32,7 @@ EXTRA_OF = MappingProxyType(
         "h5py": "export",
         "jinja2": "report",
         "matplotlib": "report",
+        "mujoco": "mujoco",
         "plotly": "report",
     }
 )
@@ -39,6 +40,9 @@ EXTRA_OF = MappingProxyType(
 
 _LAST_WITH_BULLET = (3, 11)
 """The latest Python that pybullet has a wheel for. A Bullet that is compiled anew computes other bytes."""
+
+_FIRST_WITH_MUJOCO = (3, 11)
+"""The first Python that MuJoCo has a wheel for."""
 
 
 class MissingExtraError(ThrowcollectError, ImportError):
@@ -55,10 +59,30 @@ class MissingExtraError(ThrowcollectError, ImportError):
         self.package = package
         self.extra = extra or EXTRA_OF[package]
         problem, hint = f"this needs {package}, which is not installed", install_command(self.extra)
-        if package == "pybullet" and sys.version_info[:2] > _LAST_WITH_BULLET:
+        if not has_wheel(package):
             problem += f" and has no wheel for Python {sys.version_info[0]}.{sys.version_info[1]}"
-            hint = "Python 3.11, such as that of `uv venv --python 3.11`; `up --runtime docker` needs none here"
+            hint = _INSTEAD[package]
         super().__init__(problem, hint=hint)
+
+
+_INSTEAD = {
+    "pybullet": "`sim.engine: mujoco`, which computes other throws, or Python 3.11, such as that of `uv venv --python "
+    "3.11`; `up --runtime docker` needs none here",
+    "mujoco": "Python 3.11 or later, or `sim.engine: bullet`",
+}
+"""What helps where an engine has no wheel for this Python."""
+
+
+def has_wheel(package: str) -> bool:
+    """Whether a package can be installed on this Python without being compiled.
+
+    Args:
+        package: Name under which it is imported.
+    """
+    python = sys.version_info[:2]
+    if package == "pybullet":
+        return python <= _LAST_WITH_BULLET
+    return package != "mujoco" or python >= _FIRST_WITH_MUJOCO
 
 
 def install_command(extra: str) -> str:

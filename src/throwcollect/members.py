@@ -25,6 +25,7 @@ _OWN = MappingProxyType(
         "tools": {"spoon": "throwcollect.tools.spoon.config:SpoonConfig"},
         "engines": {
             "bullet": "throwcollect.engines.bullet.bullet_engine:BulletEngine",
+            "mujoco": "throwcollect.engines.mujoco.mujoco_engine:MujocoEngine",
             "ballistic": "throwcollect.engines.ballistic.ballistic_engine:BallisticEngine",
         },
         "tasks": {"throw": "throwcollect.tasks.throw.config:ThrowConfig"},

@@ -9,7 +9,9 @@ library behind `math` has one code for all processors with fused multiply-add (I
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from functools import reduce
+from operator import add
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,6 +59,11 @@ def sin(angles: Array) -> Array:
 def cos(angles: Array) -> Array:
     """Cosine of each angle [rad]."""
     return _each(math.cos, angles)
+
+
+def add_up(values: Iterable[float]) -> float:
+    """Sum from the first value to the last, each rounded: from Python 3.12 on, `sum` makes up for what was rounded."""
+    return reduce(add, values, 0.0)
 
 
 def matmul(left: Array, right: Array) -> Array:

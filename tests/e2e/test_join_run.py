@@ -231,13 +231,13 @@ def test_nobody_gets_in_without_the_token(tmp_path: Path, machines: list[Machine
 def test_other_sources_are_refused_with_a_clear_word(tmp_path: Path) -> None:
     from throwcollect.runs.token import JoinToken
 
-    token = JoinToken("many-1234", "tls/127.0.0.1:1", "11" * 32, 0, build="another").encode()
+    token = JoinToken("many-1234", "tls/127.0.0.1:1", "11" * 32, 0, "bullet", build="another").encode()
     done = call("join-run", token)
     assert done.returncode == 2
-    assert "run many-1234: other sources, or another pybullet or robot model" in done.stderr
+    assert "run many-1234: other sources, or another engine bullet or robot model" in done.stderr
 
 
-@pytest.mark.parametrize("word", ["", "tc1.", "tc1.e30", "x" * 50, "tc1.!!!"])
+@pytest.mark.parametrize("word", ["", "tc2.", "tc2.e30", "x" * 50, "tc2.!!!"])
 def test_what_is_no_token_is_refused(word: str) -> None:
     done = call("join-run", word)
     assert done.returncode == 2
@@ -245,7 +245,7 @@ def test_what_is_no_token_is_refused(word: str) -> None:
 
 
 def test_a_token_is_read_from_standard_input() -> None:
-    done = subprocess.run(command("join-run", "-"), input="tc1.e30\n", capture_output=True, text=True, check=False)
+    done = subprocess.run(command("join-run", "-"), input="tc2.e30\n", capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert "this is no token of a run" in done.stderr
 
@@ -258,9 +258,9 @@ def test_a_token_is_written_for_its_owner_alone(tmp_path: Path) -> None:
     arguments = ("up", path, "--output", tmp_path / "data", "-n", "1", "--listen", f"tcp/127.0.0.1:{port}")
     done = call(*arguments, "--token-file", tmp_path / "token")
     assert done.returncode == 0, done.stderr
-    assert "tc1." not in done.stdout + done.stderr
+    assert "tc2." not in done.stdout + done.stderr
     assert (tmp_path / "token").stat().st_mode & 0o777 == 0o600
-    assert (tmp_path / "token").read_text().startswith("tc1.")
+    assert (tmp_path / "token").read_text().startswith("tc2.")
     done = call("up", path, "--output", tmp_path / "other", "--token-file", tmp_path / "token")
     assert done.returncode == 2
     assert "other machines cannot join the run" in done.stderr
@@ -272,6 +272,9 @@ def test_a_run_that_is_over_cannot_be_joined() -> None:
 
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]
-    done = call("join-run", JoinToken("many-1234", f"tls/127.0.0.1:{port}", "11" * 32, 0, build_digest()).encode())
+    done = call(
+        "join-run",
+        JoinToken("many-1234", f"tls/127.0.0.1:{port}", "11" * 32, 0, "bullet", build_digest("bullet")).encode(),
+    )
     assert done.returncode == 3
     assert f"no router answers at tls/127.0.0.1:{port}" in done.stderr

@@ -34,6 +34,18 @@ SETTINGS: dict[str, dict[str, Any]] = {
     "small ball that spins fast": {"ball": {"radius_m": 0.01, "mass_kg": 0.002, "friction": 2, "restitution": 0.9}},
     "without contacts": {"sim": {"engine": "ballistic"}, "ball": {"drag_coefficient": 0.5}},
     "without contacts, on solid ground": {"sim": {"engine": "ballistic"}, "scene": {"landing_height_m": 0.8}},
+    "by MuJoCo": {"sim": {"engine": "mujoco"}},
+    "by MuJoCo, with everything else": {
+        "sim": {"engine": "mujoco", "settle_s": 0, "command_delay_s": 0.05, "physics_hz": 1000},
+        "ball": {"drag_coefficient": 0.5, "radius_m": 0.02, "restitution": 0.6},
+        "robot": {"locked": "none", "velocity_gain": 0.5},
+        "scene": {"landing_height_m": 0.8},
+    },
+    "by MuJoCo, coarsely and with weak motors": {
+        "sim": {"engine": "mujoco", "physics_hz": 100, "solver_iterations": 1},
+        "record": {"rate_hz": 100},
+        "robot": {"position_gain_per_s": 10, "velocity_gain": 0.2},
+    },
     "slick": {"ball": {"friction": 0}, "scene": {"spoon_friction": 0}},
 }
 

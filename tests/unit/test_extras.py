@@ -68,5 +68,17 @@ def test_where_pybullet_has_no_wheel_the_hint_is_another_python(
     assert ("pip install" in str(error.hint)) == wheel
 
 
+@pytest.mark.parametrize(("version", "wheel"), [((3, 10, 13), False), ((3, 11, 9), True), ((3, 14, 0), True)])
+def test_where_mujoco_has_no_wheel_the_hint_is_another_python_or_engine(
+    version: tuple[int, int, int], wheel: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "version_info", version)
+    error = MissingExtraError("mujoco")
+    assert ("has no wheel for Python 3.10" in str(error)) == (not wheel)
+    assert error.hint == (
+        "pip install 'throwcollect[mujoco]'" if wheel else "Python 3.11 or later, or `sim.engine: bullet`"
+    )
+
+
 def test_every_package_of_the_table_is_there_for_the_tests() -> None:
     assert [package for package in EXTRA_OF if find_spec(package) is None] == []

@@ -49,7 +49,7 @@ def test_a_member_of_another_package_is_found_and_takes_the_place_of_none_of_our
     caches = (members._table, load_member)
     for cached in caches:
         cached.cache_clear()
-    assert names_of("engines") == ("bullet", "ballistic", "free_fall")
+    assert names_of("engines") == ("bullet", "mujoco", "ballistic", "free_fall")
     assert load_member("engines", "free_fall") is Fraction
     assert load_member("engines", "bullet") is BulletEngine
     for cached in caches:

@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 from tests import processors
 
-from throwcollect.reproducible_math import cos, exp, log, matmul, power, sin, solve
+from throwcollect.reproducible_math import add_up, cos, exp, log, matmul, power, sin, solve
 
 ROOT = Path(__file__).parents[2]
 
@@ -102,3 +102,9 @@ def test_solutions_of_symmetric_positive_definite_systems() -> None:
     np.testing.assert_array_equal(matrices, kept)
     tiny = np.full((1, 1), 1e-300)
     assert math.isclose(solve(tiny, np.ones((1, 1))).item(), 1e300)
+
+
+def test_sums_are_those_of_every_python() -> None:
+    # `sum` gives 1.0 from Python 3.12 on.
+    assert add_up([0.1] * 10) == 0.9999999999999999
+    assert add_up(iter(())) == 0.0

@@ -105,7 +105,7 @@ class RobotConfig(Section):
     locked: Literal["auto", "none"] | list[Joint] = "auto"
     """Joints simulated as rigid: `auto` locks what the task does not move, `none` simulates all, or a list."""
     position_gain_per_s: Annotated[float, Field(gt=0, le=1000), Key(swept=True)] = 100.0
-    """Velocity commanded per radian of position error; Bullet's position gain is this times the time step."""
+    """Velocity commanded per radian of position error; with Bullet, its position gain is this times the time step."""
     velocity_gain: Annotated[float, Field(gt=0, le=1), Key(swept=True)] = 1.0
     """Share of the velocity error that a motor removes in one step [-]."""
     effort_scale: Annotated[float, Field(gt=0, le=10), Key(swept=True)] = 1.0
@@ -120,7 +120,7 @@ class BallConfig(Section):
     radius_m: Annotated[float, Field(ge=0.005, le=0.1)] = 0.025
     """Radius."""
     friction: Annotated[float, Field(ge=0, le=2)] = 0.5
-    """Coulomb friction of the ball [-]; Bullet multiplies it with that of the body it touches."""
+    """Coulomb friction of the ball [-]; it is multiplied with that of the body it touches."""
     restitution: Annotated[float, Field(ge=0, le=1)] = 0.0
     """Coefficient of restitution between the ball and whatever it touches [-]."""
     drag_coefficient: Annotated[float, Field(ge=0, le=2)] = 0.0
@@ -144,12 +144,13 @@ class SimConfig(Section):
     """How the simulation computes."""
 
     engine: Annotated[EngineName, Key(later=True)] = "bullet"
-    """Physics engine: `bullet` simulates contacts; `ballistic` is for trying things out: an arm that is always where it
-    is told to be, and a ball that leaves the spoon when the spoon would have to pull it. Packages may add others."""
+    """Physics engine: `bullet` simulates contacts; so does `mujoco`, which is faster and computes throws that differ by
+    some millimetres (docs/engines.md); `ballistic` is for trying things out: an arm that is always where it is told to
+    be, and a ball that leaves the spoon when the spoon would have to pull it. Packages may add others."""
     physics_hz: Annotated[int, Field(ge=100, le=10000)] = 500
     """Physics steps per simulated second; also the controllers' update rate."""
     solver_iterations: Annotated[int, Field(ge=1, le=1000)] = 50
-    """Iterations of Bullet's constraint solver per step."""
+    """Iterations of the contact solver per step; MuJoCo takes fewer where fewer do."""
     settle_s: Annotated[float, Field(ge=0, le=2), Key(swept=True)] = 0.05
     """Simulated time for which the ball settles in the spoon before a trial."""
     command_delay_s: Annotated[float, Field(ge=0, le=0.2), Key(swept=True)] = 0.0

@@ -73,7 +73,7 @@ class Acceptance:
         goals = trial_goals(robot_of(config), trajectory, start_posture(config))
         physics = {key: value for key, value in trial.values.items() if key in self._physics}
         conditions = Conditions(
-            build=build_digest(),
+            build=build_digest(self._config.sim.engine),
             settings=self._settings.digest,
             values=self._settings.find_replaced(config),
             inputs={controller: goal.digest for controller, goal in goals.items()},

@@ -81,12 +81,16 @@ def data_card(config: Config, throws: pa.Table, provenance: Provenance) -> str:
     return "\n".join(lines)
 
 
+_RIGID_BODIES = {"bullet": "Bullet", "mujoco": "MuJoCo"}
+"""Engines that leave out the same."""
+
+
 def _limits(engine: str) -> str:
     """What a physics engine leaves out; of those of other packages nothing is known."""
-    if engine == "bullet":
+    if engine in _RIGID_BODIES:
         return (
-            "Simulated with Bullet: rigid bodies, the base of the robot fixed, ideal motors within effort limits, no "
-            "sensor noise."
+            f"Simulated with {_RIGID_BODIES[engine]}: rigid bodies, the base of the robot fixed, ideal motors within "
+            "effort limits, no sensor noise."
         )
     if engine == "ballistic":
         return (

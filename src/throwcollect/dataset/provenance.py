@@ -27,7 +27,17 @@ from throwcollect.version import __version__
 HOST_VARIABLE = "THROWCOLLECT_HOST"
 """Environment variable with the name of the machine, for containers, which cannot know it; empty if it is unknown."""
 
-_LIBRARIES = ("pybullet", "numpy", "rosbags", "mcap", "zstandard", "pyarrow", "pin", "example-robot-data")
+_LIBRARIES = (
+    "pybullet",
+    "mujoco-core",
+    "numpy",
+    "rosbags",
+    "mcap",
+    "zstandard",
+    "pyarrow",
+    "pin",
+    "example-robot-data",
+)
 _MOST_BYTES = 1_000_000
 
 

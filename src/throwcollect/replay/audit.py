@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import os
-import signal
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from throwcollect.dataset.reader import Dataset
+from throwcollect.engine_packages import require_engine
 from throwcollect.errors import DatasetError
 from throwcollect.extras import require
 from throwcollect.replay.comparison import Comparison, compare
+from throwcollect.replay.processes import simulate_side_by_side
 from throwcollect.trial.choice import choose_trials
-
-_AT_ONCE = 4
-"""Trials that a process fetches at a time."""
 
 
 def select_trials(dataset: Dataset, *, sample: int | None) -> list[int]:
@@ -50,15 +46,9 @@ def replay_throws(directory: Path, trials: Sequence[int]) -> Iterator[Comparison
         WorkerError: If the physics engine does not start.
     """
     # Processes that cannot begin would be started again for ever.
-    require("pybullet", "pinocchio")
-    processes = min(len(os.sched_getaffinity(0)), len(trials))
-    if processes == 1:
-        _begin(directory)
-        yield from map(_replay, trials)
-        return
-    # A new interpreter each: the physics engine must not be forked.
-    with multiprocessing.get_context("spawn").Pool(processes, _begin, (directory, True)) as pool:
-        yield from pool.imap(_replay, trials, chunksize=_AT_ONCE)
+    require_engine(Dataset.open(directory).config.sim.engine)
+    require("pinocchio")
+    yield from simulate_side_by_side(trials, _begin, (directory,), _replay)
 
 
 class _Kept:
@@ -74,10 +64,7 @@ class _Kept:
 _kept: list[_Kept] = []
 
 
-def _begin(directory: Path, child: bool = False) -> None:
-    if child:
-        # Ctrl-C is for the process that started this one, which ends it.
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
+def _begin(directory: Path) -> None:
     _kept[:] = [_Kept(directory)]
 
 

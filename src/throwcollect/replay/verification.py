@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 from throwcollect.coordinator.prepare import feasibility_check
 from throwcollect.dataset.findings import Finding
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.verify import verify
+from throwcollect.engine_packages import require_engine
 from throwcollect.errors import DatasetError
 from throwcollect.extras import require
 from throwcollect.files import StrPath
@@ -36,7 +38,10 @@ def verify_dataset(directory: StrPath, *, replay: int | None = None, processes: 
         WorkerError: If the physics engine does not start.
     """
     if replay is not None:
-        require("pybullet", "pinocchio")
+        # What is wrong with a dataset that cannot be opened is told below.
+        with suppress(DatasetError):
+            require_engine(Dataset.open(Path(directory)).config.sim.engine)
+        require("pinocchio")
     findings = verify(Path(directory), check_of=feasibility_check, processes=processes)
     if replay is not None:
         findings += _replay_findings(Path(directory), replay)

@@ -7,13 +7,15 @@ import shutil
 import socket
 import sys
 from collections.abc import Callable
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Literal
 
 from throwcollect import ros_installation
+from throwcollect.engine_packages import PACKAGES
 from throwcollect.errors import ConfigError
-from throwcollect.extras import EXTRA_OF, MissingExtraError, explain_missing, install_command, is_installed
+from throwcollect.extras import EXTRA_OF, MissingExtraError, explain_missing, has_wheel, install_command, is_installed
 from throwcollect.members import names_of
 from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.talos import TALOS
@@ -33,9 +35,8 @@ _LEAST_DISK_GIB = 1.0
 
 def _check_python() -> Check:
     found = ".".join(map(str, sys.version_info[:3]))
-    if not (3, 10) <= sys.version_info[:2] <= (3, 11):
-        status: Literal["note", "problem"] = "note" if is_installed("pybullet") else "problem"
-        return Check("python", status, f"{found}; pybullet has wheels for 3.10 and 3.11")
+    if not has_wheel("pybullet"):
+        return Check("python", "note", f"{found}; pybullet has wheels for 3.10 and 3.11, MuJoCo (sim.engine) for this")
     return Check("python", "ok", found)
 
 
@@ -56,10 +57,14 @@ def _check_memory() -> Check:
     return Check("memory", "note", "/proc/meminfo does not say what is available")
 
 
-def _check_pybullet() -> Check:
-    if not is_installed("pybullet"):
-        return Check("pybullet", "problem", f"not installed; try: {MissingExtraError('pybullet').hint}")
-    return Check("pybullet", "ok", version("pybullet"))
+def _check_engine(name: str) -> Check:
+    """An engine that is missing is a problem if no other one that simulates contacts is there."""
+    package = PACKAGES[name]
+    if is_installed(package.module):
+        return Check(package.module, "ok", version(package.distribution))
+    others = any(is_installed(each.module) for each in PACKAGES.values())
+    hint = f"not installed, for sim.engine: {name}; try: {MissingExtraError(package.module).hint}"
+    return Check(package.module, "note" if others else "problem", hint)
 
 
 def _check_robot() -> Check:
@@ -73,7 +78,7 @@ def _check_robot() -> Check:
 
 def _check_extras() -> Check:
     """Extras that are installed, and those of which at least a package is missing."""
-    lacking = sorted({extra for package, extra in EXTRA_OF.items() if not is_installed(package)})
+    lacking = sorted({extra for package, extra in EXTRA_OF.items() if has_wheel(package) and not is_installed(package)})
     there = join_names(sorted(set(EXTRA_OF.values()) - set(lacking)))
     if not lacking:
         return Check("extras", "ok", there)
@@ -151,7 +156,7 @@ def examine(directory: Path) -> list[Check]:
         _check_extras,
         _check_cores,
         _check_memory,
-        _check_pybullet,
+        *(partial(_check_engine, name) for name in PACKAGES),
         _check_robot,
         _check_rclpy,
         _check_embedded,

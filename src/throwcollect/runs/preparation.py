@@ -106,9 +106,9 @@ class PreparedRun:
             raise ConfigError("other machines cannot join the run", hint="run.listen says where they can")
         host, port = split_address(self.config.run.listen)
         endpoint = format_endpoint("tls", reach_from_elsewhere(host), port)
-        return JoinToken(
-            self.record.run, endpoint, self._run.key.secret.hex(), self.config.run.domain_id, build_digest()
-        ).encode()
+        run, secret, engine = self.record.run, self._run.key.secret.hex(), self.config.sim.engine
+        domain_id = self.config.run.domain_id
+        return JoinToken(run, endpoint, secret, domain_id, engine, build_digest(engine)).encode()
 
     def collect(self, *, interruptions: Callable[[], int] = lambda: 0) -> Summary:
         """Launch it in this process, and come back when it has ended; see `launcher.launch`.

@@ -12,7 +12,7 @@ from pydantic import TypeAdapter, ValidationError
 from throwcollect.build import build_digest
 from throwcollect.errors import ConfigError
 
-_START = "tc1."
+_START = "tc2."
 """What tokens begin with; the number is that of their form."""
 
 
@@ -25,6 +25,7 @@ class JoinToken:
         endpoint: Endpoint of the router, as other machines reach it.
         secret: Secret of the key of the run, in hexadecimal.
         domain_id: ROS domain.
+        engine: Name of the physics engine that computes there.
         build: Digest over what computes there; see `throwcollect.build`.
     """
 
@@ -32,6 +33,7 @@ class JoinToken:
     endpoint: str
     secret: str
     domain_id: int
+    engine: str
     build: str
 
     def encode(self) -> str:
@@ -63,10 +65,10 @@ class JoinToken:
         Raises:
             ConfigError: If something else computes there than here.
         """
-        if self.build != build_digest():
+        if self.build != build_digest(self.engine):
             raise ConfigError(
-                f"run {self.run}: other sources, or another pybullet or robot model, compute there than here; other "
-                "bytes would be collected",
+                f"run {self.run}: other sources, or another engine {self.engine} or robot model, compute there than "
+                "here; other bytes would be collected",
                 hint="install the same version of throwcollect on both machines; throwcollect doctor shows it",
             )
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, Literal, Protocol
 
-from throwcollect.extras import require
+from throwcollect.engine_packages import require_engine
 from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
 from throwcollect.wording import command
@@ -229,8 +229,7 @@ class Runtime(ABC):
             ConfigError: If the configuration asks for something that is not there.
             MissingExtraError: If simulations run on this Python, and it lacks the physics engine.
         """
-        if config.sim.engine == "bullet":
-            require("pybullet")
+        require_engine(config.sim.engine)
         return middleware
 
     def check(self) -> Check | None:

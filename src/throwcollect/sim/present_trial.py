@@ -123,4 +123,5 @@ class PresentTrial:
     def conditions(self) -> Conditions:
         """What the trial is, or was, simulated with."""
         values = self._settings.find_replaced(self._used)
-        return Conditions(build_digest(), self._settings.digest, values, dict(self._inputs), self.setup.lease)
+        build = build_digest(self._config.sim.engine)
+        return Conditions(build, self._settings.digest, values, dict(self._inputs), self.setup.lease)

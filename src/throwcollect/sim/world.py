@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
+from throwcollect.engine_packages import require_engine
 from throwcollect.engines.engine import BALL_NUMBERS, BodyState, Engine, Observer, Sample, State, Steps, ball_of
 from throwcollect.episode.record import Contact, EndReason, Samples
 from throwcollect.members import load_member
@@ -52,6 +53,7 @@ class World(Observer):
 
     Raises:
         ConfigError: If the configuration does not describe a world (see `reset`).
+        MissingExtraError: If the physics engine is not installed.
         WorkerError: If the physics engine does not start.
     """
 
@@ -68,6 +70,7 @@ class World(Observer):
     _forgotten: int
 
     def __init__(self, config: Config) -> None:
+        require_engine(config.sim.engine)
         self.engine: Engine = load_member("engines", config.sim.engine)()
         self.spawned = SpawnedBodies(self.engine)
         self._joints = robot_of(config).joints

@@ -20,6 +20,7 @@ def test_a_machine_that_runs_the_tests_has_no_problem(tmp_path: Path) -> None:
         "cores",
         "memory",
         "pybullet",
+        "mujoco",
         "robot",
         "rclpy",
         "embedded",
@@ -121,11 +122,19 @@ def test_a_docker_engine_and_its_image_are_found(tmp_path: Path, monkeypatch: py
         server.shutdown()
 
 
-@pytest.mark.parametrize(("installed", "status"), [(True, "note"), (False, "problem")])
-def test_another_python_is_a_problem_only_where_pybullet_is_missing(
-    installed: bool, status: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_python_without_a_wheel_of_bullet_is_noted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sys.version_info", (3, 12, 3))
-    monkeypatch.setattr("throwcollect.runs.doctor.is_installed", lambda _: installed)
     (python,) = [check for check in examine(tmp_path) if check.name == "python"]
-    assert (python.status, python.finding) == (status, "3.12.3; pybullet has wheels for 3.10 and 3.11")
+    said = "3.12.3; pybullet has wheels for 3.10 and 3.11, MuJoCo (sim.engine) for this"
+    assert (python.status, python.finding) == ("note", said)
+
+
+@pytest.mark.parametrize(("missing", "status"), [({"pybullet"}, "note"), ({"pybullet", "mujoco"}, "problem")])
+def test_a_missing_engine_is_a_problem_if_no_other_one_is_there(
+    missing: set[str], status: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("throwcollect.runs.doctor.is_installed", lambda package: package not in missing)
+    checks = {check.name: check for check in examine(tmp_path)}
+    assert {name: checks[name].status for name in missing} == dict.fromkeys(missing, status)
+    finding = "not installed, for sim.engine: bullet; try: pip install 'throwcollect[collect]'"
+    assert checks["pybullet"].finding == finding

@@ -12,12 +12,12 @@ from throwcollect.runs.token import JoinToken
 
 
 def make(build: str = "") -> JoinToken:
-    return JoinToken("many-1234", "tls/10.0.0.1:7447", "0f" * 32, 7, build or build_digest())
+    return JoinToken("many-1234", "tls/10.0.0.1:7447", "0f" * 32, 7, "bullet", build or build_digest("bullet"))
 
 
 def test_a_token_is_one_word_and_is_read_as_it_was_made() -> None:
     word = make().encode()
-    assert re.fullmatch(r"tc1\.[A-Za-z0-9_-]+", word)
+    assert re.fullmatch(r"tc2\.[A-Za-z0-9_-]+", word)
     assert len(word) < 400
     assert JoinToken.decode(f" {word}\n") == make()
 
@@ -30,10 +30,10 @@ def test_a_token_that_is_not_whole_is_refused(cut: int) -> None:
 
 def test_a_secret_is_not_what_it_should_be() -> None:
     with pytest.raises(ConfigError, match="no token"):
-        JoinToken.decode(JoinToken("many", "tls/x:1", "secret", 0, "").encode())
+        JoinToken.decode(JoinToken("many", "tls/x:1", "secret", 0, "bullet", "").encode())
 
 
 def test_what_computes_there_has_to_compute_here() -> None:
     make().check_build()
-    with pytest.raises(ConfigError, match="run many-1234: other sources"):
+    with pytest.raises(ConfigError, match="run many-1234: other sources, or another engine bullet"):
         make("f" * 64).check_build()

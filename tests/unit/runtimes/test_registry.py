@@ -101,13 +101,17 @@ def test_a_runtime_that_is_not_there_is_refused_with_those_that_are(tmp_path: Pa
         get_runtime("cluster")
 
 
+@pytest.mark.parametrize(("engine", "package"), [("bullet", "pybullet"), ("mujoco", "mujoco")])
 @pytest.mark.parametrize("name", ["local", "inprocess"])
 def test_simulations_on_this_python_need_its_engine_before_anything_starts(
-    name: str, monkeypatch: pytest.MonkeyPatch
+    name: str, engine: str, package: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(extras, "is_installed", lambda package: package != "pybullet")
+    monkeypatch.setattr(extras, "is_installed", lambda each: each != package)
     middleware = Middleware("embedded", "zenoh")
-    bullet, ballistic = Config(), Config.model_validate({"sim": {"engine": "ballistic"}})
-    with pytest.raises(MissingExtraError, match="pybullet"):
-        get_runtime(name).prepare(bullet, middleware, say=print, warn=print)
-    assert get_runtime(name).prepare(ballistic, middleware, say=print, warn=print) is middleware
+    for each in ("bullet", "mujoco", "ballistic"):
+        config = Config.model_validate({"sim": {"engine": each}})
+        if each == engine:
+            with pytest.raises(MissingExtraError, match=f"this needs {package}, which is not installed"):
+                get_runtime(name).prepare(config, middleware, say=print, warn=print)
+        else:
+            assert get_runtime(name).prepare(config, middleware, say=print, warn=print) is middleware

@@ -27,9 +27,10 @@ def no_mesh(filename):
     raise AssertionError(filename)
 
 
-@pytest.fixture(scope="module")
-def shared() -> Iterator[World]:
-    world = World(CONFIG)
+@pytest.fixture(scope="module", params=["bullet", "mujoco"])
+def shared(request: pytest.FixtureRequest) -> Iterator[World]:
+    # A world keeps the engine that it began with.
+    world = World(Config.model_validate({"sim": {"engine": request.param}}))
     yield world
     world.close()
 

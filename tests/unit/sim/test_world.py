@@ -36,9 +36,10 @@ def same(first, second):
     return all(np.array_equal(getattr(first, f.name), getattr(second, f.name)) for f in fields(first))
 
 
-@pytest.fixture(scope="module")
-def world():
-    made = World(CONFIG)
+@pytest.fixture(scope="module", params=["bullet", "mujoco"])
+def world(request):
+    # A world keeps the engine that it began with.
+    made = World(config(sim={"engine": request.param}))
     yield made
     made.close()
 
@@ -200,11 +201,12 @@ def test_the_ball_can_be_put_anywhere(world):
     world.reset(CONFIG)
     state = BodyState((1.0, 2.0, 3.0), (0.0, 0.6, 0.0, 0.8), (0.1, 0.2, 0.3), (1.0, 2.0, 3.0))
     world.ball = state
-    assert world.ball == state
+    for name, value in vars(state).items():
+        assert getattr(world.ball, name) == pytest.approx(value, abs=1e-15)
     assert world.recorded == 1
     start = world.samples()
     assert start.ball_position.tolist() == [[1, 2, 3]]
-    assert start.ball_angular_velocity.tolist() == [[1, 2, 3]]
+    assert start.ball_angular_velocity[0] == pytest.approx((1, 2, 3), abs=1e-15)
     world.run(still(CONFIG, world, 2))
     assert world.contacts()[0].end_ns == 2_000_000
     assert world.ball.linear_velocity == pytest.approx([0.1, 0.2, 0.3 - 9.81 * 0.004])

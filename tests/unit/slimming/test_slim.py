@@ -83,6 +83,10 @@ def test_a_stripped_library_is_shorter_and_still_loads(library: bytes, tmp_path:
         ("numpy/testing/__init__.py", True),
         ("pybullet_data/plane.urdf", False),
         ("pybullet.cpython-311-x86_64-linux-gnu.so", True),
+        ("mujoco/libmujoco.so.4.0.0", True),
+        ("mujoco/_structs.cpython-311-x86_64-linux-gnu.so", True),
+        ("mujoco/_render.cpython-311-x86_64-linux-gnu.so", False),
+        ("mujoco/testdata/msh.xml", False),
         ("pyarrow/include/arrow/api.h", False),
         ("pyarrow/_flight.cpython-311-x86_64-linux-gnu.so", False),
         ("pyarrow/_fs.cpython-311-x86_64-linux-gnu.so", True),
@@ -313,6 +317,6 @@ def test_the_wheels_are_those_of_the_dependencies_of_the_project() -> None:
     import wheelhouse
 
     wanted = wheelhouse.requirements()
-    assert "pybullet==3.2.7" in wanted
+    assert wanted.count("pybullet==3.2.7") == wanted.count("mujoco-core==4.0.0") == 1
     assert any(name.startswith("setuptools") for name in wanted)
     assert not [name for name in wanted if name.startswith(("pytest", "ruff"))]

@@ -101,5 +101,5 @@ def test_what_a_trial_replaces_is_named_key_by_key() -> None:
 
 
 def test_a_build_has_one_digest() -> None:
-    assert build_digest() == build_digest()
-    assert len(build_digest()) == 64
+    assert build_digest("bullet") == build_digest("bullet")
+    assert len(build_digest("bullet")) == 64

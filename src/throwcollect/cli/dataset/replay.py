@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import json as jsonlib
+from collections.abc import Sequence
 from dataclasses import asdict
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from throwcollect.cli.options import DatasetArgument, JsonOption
 from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.extras import require
 from throwcollect.wording import format_count
 
 
@@ -22,6 +25,12 @@ def replay_dataset(
     sample: Annotated[
         int | None, typer.Option("--sample", metavar="N", min=1, help="With --all: so many of them, chosen at random.")
     ] = None,
+    engine: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Simulate them with another engine: how much differs?")
+    ] = None,
+    plot: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="With --engine: a picture (PNG) of how far landings are apart.")
+    ] = None,
     json: JsonOption = False,
 ) -> None:
     """Simulate stored throws again and compare them bit for bit; exit code 4 if any differs."""
@@ -32,10 +41,15 @@ def replay_dataset(
         raise ConfigError("which throws?", expected="either --trial K, which may be repeated, or --all")
     if sample is not None and not everything:
         raise ConfigError("--sample: should be given with --all")
+    if plot is not None and engine is None:
+        raise ConfigError("--plot: should be given with --engine")
     dataset = Dataset.open(directory)
     for trial in trials or ():
         dataset.episode(trial)
     chosen = list(dict.fromkeys(trials or ())) or select_trials(dataset, sample=sample)
+    if engine is not None:
+        _compare_engines(directory, engine, chosen, plot, json=json)
+        return
     found = []
     for comparison in replay_throws(directory, chosen):
         found.append(comparison)
@@ -51,3 +65,37 @@ def replay_dataset(
         )
     if not json:
         typer.echo(f"{directory}: {format_count(len(found), 'throw')} replayed, the same bit for bit")
+
+
+def _compare_engines(directory: Path, engine: str, trials: Sequence[int], plot: Path | None, *, json: bool) -> None:
+    """Tell how much depends on the physics engine.
+
+    Raises:
+        ConfigError: If there is no such engine, the dataset was computed by it, or nothing can be drawn.
+    """
+    from throwcollect.replay.other_engine import LANDING, distributions, simulate_with
+
+    if plot is not None:
+        require("plotly", "matplotlib")
+        if plot.exists():
+            raise ConfigError(f"{plot}: exists", expected="a file that is new")
+    deviations = list(simulate_with(directory, engine, trials))
+    found = distributions(deviations)
+    differ = sum(each.stored != each.again for each in deviations)
+    if plot is not None:
+        from throwcollect.report.throw.deviations import write_deviations
+
+        landed = [each.values for each in deviations if all(column in each.values for column in LANDING)]
+        if not landed:
+            raise ConfigError("--plot: no throw landed with both engines")
+        write_deviations([[each[column] for each in landed] for column in LANDING], plot)
+    if json:
+        answer = {"throws": [asdict(each) for each in deviations], "columns": [asdict(each) for each in found]}
+        typer.echo(jsonlib.dumps(answer, indent=2))
+        return
+    width = max(len(each.column) for each in found)
+    typer.echo(f"{'by ' + engine + ', above stored':{width}}  throws       mean        rms     median    largest")
+    for each in found:
+        numbers = "".join(f"{value:11.3g}" for value in (each.mean, each.rms, each.median, each.largest))
+        typer.echo(f"{each.column:{width}}  {each.throws:6}{numbers}")
+    typer.echo(f"{directory}: {format_count(len(deviations), 'throw')} by {engine}; {differ} with another outcome")

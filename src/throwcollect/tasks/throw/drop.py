@@ -9,6 +9,7 @@ import numpy as np
 
 from throwcollect.config.schema import Config
 from throwcollect.episode.record import EpisodeHeader, Samples
+from throwcollect.reproducible_math import add_up
 from throwcollect.robots.tool_motion import ToolMotion
 from throwcollect.tasks.measures import BallState
 from throwcollect.tools.tool import tool_of
@@ -74,7 +75,7 @@ def drop(samples: Samples, header: EpisodeHeader, release: BallState, *, config:
     fastest = -math.inf
     for row in range(last, -1, -1):
         velocity = tool.velocity(samples.position[row], samples.velocity[row]).tolist()
-        fastest = max(fastest, sum(map(operator.mul, direction, velocity)))
+        fastest = max(fastest, add_up(map(operator.mul, direction, velocity)))
         if fastest >= least:
             return None
         if samples.stamps_ns[row] <= since_ns:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.pinocchio_library import pinocchio
+from throwcollect.reproducible_math import add_up
 from throwcollect.tools.spoon.config import SpoonConfig
 from throwcollect.tools.tool import Box, Tool
 
@@ -73,7 +74,7 @@ class Spoon(Tool):
     @property
     def inertia(self) -> pinocchio.Inertia:
         """Its inertia in ``spoon_link``, its mass spread evenly over the volume of its boxes."""
-        density = self._config.mass_kg / sum(math.prod(box.size) for box in self.boxes)
+        density = self._config.mass_kg / add_up(math.prod(box.size) for box in self.boxes)
         total = pinocchio.Inertia.Zero()
         for box in self.boxes:
             total += box.placement.act(pinocchio.Inertia.FromBox(density * math.prod(box.size), *box.size))

@@ -1,0 +1,185 @@
+"""Bodies that are added to a MuJoCo world: obstacles, tables, other robots."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from throwcollect.engines.engine import Bodies, BodyModel, BodyState, Box
+from throwcollect.engines.mujoco.frames import rotation, turn, turn_back
+from throwcollect.engines.mujoco.scenery import Surface, boxes, collide_with_everything, read_urdf, watch
+from throwcollect.errors import RequestError
+
+_STL = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+_STL_TITLE = bytes(80)
+_FREE_JOINT = "free"
+
+
+@dataclass
+class _Added:
+    """A body.
+
+    Attributes:
+        model: What it is.
+        links: Names of its links; that of the root comes first.
+        state: Where it was put last.
+    """
+
+    model: BodyModel
+    links: list[str]
+    state: BodyState
+
+
+class MujocoBodies(Bodies):
+    """The bodies of one world. Their joints are braked, with the efforts of their limits.
+
+    MuJoCo compiles a world as a whole, so whatever comes or goes has it compiled anew.
+
+    Args:
+        compile_world: Compiles the world with all bodies that are here, and keeps the motion of what stays; or else
+            raises a `ValueError`, and leaves the world as it is.
+        world: Gives the compiled world.
+    """
+
+    def __init__(
+        self,
+        compile_world: Callable[[], None],
+        world: Callable[[], tuple[mujoco.MjModel, mujoco.MjData]],
+    ) -> None:
+        self._compile_world, self._world = compile_world, world
+        self._bodies: dict[str, _Added] = {}
+        self.leave_traces = False
+        """Whether a body has been in the world since it was loaded."""
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._bodies
+
+    def forget(self) -> None:
+        """Take note that the world was emptied."""
+        self._bodies.clear()
+        self.leave_traces = False
+
+    def add(self, name: str, model: BodyModel, start: BodyState) -> None:
+        """Put a body into the world; see `Bodies.add`.
+
+        Raises:
+            RequestError: ``RESOURCE_PARSE_ERROR`` if MuJoCo does not take it, or would fill in its meshes.
+        """
+        if model.meshes and 'concave="yes"' in model.urdf:
+            raise RequestError(
+                "RESOURCE_PARSE_ERROR",
+                "MuJoCo would fill in the mesh of a body that is attached to the world",
+                expected="boxes, spheres, cylinders and capsules, or sim.engine: bullet",
+            )
+        self._bodies[name] = _Added(model, [], start)
+        try:
+            self._compile_world()
+        except ValueError as error:
+            del self._bodies[name]
+            raise RequestError("RESOURCE_PARSE_ERROR", f"the physics engine cannot load it: {error}") from error
+        self.leave_traces = True
+        self.place(name, start)
+
+    def remove(self, name: str) -> None:
+        """Take a body out of the world."""
+        del self._bodies[name]
+        self._compile_world()
+
+    def attach(self, spec: mujoco.MjSpec) -> Iterator[Surface]:
+        """Put all bodies into a world that is to be compiled.
+
+        Yields:
+            What can press on the ball.
+
+        Raises:
+            ValueError: If MuJoCo cannot read a description.
+        """
+        for name, body in self._bodies.items():
+            text, body.links = _rename_links(body.model.urdf)
+            child = read_urdf(text, {f"{number}.stl": _stl(mesh) for number, mesh in enumerate(body.model.meshes)})
+            for joint in child.joints:
+                joint.frictionloss = max(joint.actfrcrange[1], 0.0)
+                joint.actfrclimited = mujoco.mjtLimited.mjLIMITED_FALSE
+            if not body.model.is_fixed:
+                child.worldbody.first_body().add_freejoint(name=_FREE_JOINT)
+            collide_with_everything(child)
+            spec.attach(child, frame=spec.worldbody.add_frame(), prefix=f"{name}/")
+            for number, link in enumerate(body.links):
+                surface = Surface(f"{name}/{number}", f"{name}/{link}")
+                watch(spec, surface)
+                yield surface
+
+    def place_fixed(self) -> None:
+        """Put the bodies that are attached to the world where they were put last; a compiled world has forgotten it."""
+        for name, body in self._bodies.items():
+            if body.model.is_fixed:
+                self.place(name, body.state)
+
+    def state(self, name: str) -> BodyState:
+        """Where the root link of a body is and how it moves."""
+        body = self._bodies[name]
+        if body.model.is_fixed:
+            return body.state
+        joint = self._world()[1].joint(f"{name}/{_FREE_JOINT}")
+        x, y, z, w, i, j, k = joint.qpos.tolist()
+        vx, vy, vz, *spin = joint.qvel.tolist()
+        return BodyState((x, y, z), (i, j, k, w), (vx, vy, vz), turn((i, j, k, w), spin))
+
+    def place(self, name: str, state: BodyState) -> None:
+        """Put the root link of a body somewhere; its joints stay as they are."""
+        body = self._bodies[name]
+        model, data = self._world()
+        x, y, z, w = state.orientation_xyzw
+        body.state = BodyState(state.position, state.orientation_xyzw)
+        if body.model.is_fixed:
+            root = model.body(f"{name}/0")
+            root.pos, root.quat = state.position, (w, x, y, z)
+            return
+        joint = data.joint(f"{name}/{_FREE_JOINT}")
+        joint.qpos = (*state.position, w, x, y, z)
+        joint.qvel = (*state.linear_velocity, *turn_back(state.orientation_xyzw, state.angular_velocity))
+
+    def boxes(self, name: str) -> list[Box]:
+        """Boxes along the axes of the world around the links of a body."""
+        model, data = self._world()
+        mujoco.mj_kinematics(model, data)
+        return boxes(model, data, self._numbers(name))
+
+    def bounds(self, name: str) -> list[Box]:
+        """Boxes along the axes of a body's root link around its links."""
+        model, data = self._world()
+        mujoco.mj_kinematics(model, data)
+        root = model.body(f"{name}/0").id
+        frame = data.xpos[root], rotation(data.xquat[root])
+        return boxes(model, data, self._numbers(name), frame)
+
+    def _numbers(self, name: str) -> list[int]:
+        """Numbers of the bodies of a body's links."""
+        model, _ = self._world()
+        return [model.body(f"{name}/{number}").id for number in range(len(self._bodies[name].links))]
+
+
+def _rename_links(urdf: str) -> tuple[str, list[str]]:
+    """Number the links of a description, the root's being 0: MuJoCo has an opinion on names such as ``world``."""
+    # It was checked and written anew.
+    robot = ElementTree.fromstring(urdf.encode())  # noqa: S314
+    ends = [(joint.find("parent"), joint.find("child")) for joint in robot.findall("joint")]
+    children = {child.get("link") for _, child in ends if child is not None}
+    links = sorted((link.get("name", "") for link in robot.findall("link")), key=lambda name: name in children)
+    numbers = {name: str(number) for number, name in enumerate(links)}
+    for link in robot.findall("link"):
+        link.set("name", numbers[link.get("name", "")])
+    for end in (end for both in ends for end in both if end is not None):
+        end.set("link", numbers[end.get("link", "")])
+    return ElementTree.tostring(robot, encoding="unicode"), links
+
+
+def _stl(triangles: NDArray[np.float32]) -> bytes:
+    records = np.zeros(len(triangles), _STL)
+    records["corners"] = triangles
+    return _STL_TITLE + len(triangles).to_bytes(4, "little") + records.tobytes()

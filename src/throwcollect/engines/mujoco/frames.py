@@ -1,0 +1,37 @@
+"""Vectors in the frame of a body, where MuJoCo has angular velocities, and in world."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from throwcollect.engines.engine import Quaternion, Vector
+
+
+def turn(orientation_xyzw: Sequence[float], vector: Sequence[float]) -> Vector:
+    """Turn a vector from the frame of a body into world.
+
+    Args:
+        orientation_xyzw: Unit quaternion, body to world.
+        vector: In the frame of the body.
+    """
+    x, y, z, w = orientation_xyzw
+    a, b, c = vector
+    p, q, r = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
+    return (a + w * p + y * r - z * q, b + w * q + z * p - x * r, c + w * r + x * q - y * p)
+
+
+def turn_back(orientation_xyzw: Quaternion, vector: Vector) -> Vector:
+    """Turn a vector from world into the frame of a body."""
+    x, y, z, w = orientation_xyzw
+    return turn((-x, -y, -z, w), vector)
+
+
+def rotation(orientation_wxyz: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The matrix of a unit quaternion as MuJoCo has it, shape ``(3, 3)``."""
+    matrix = np.zeros(9)
+    mujoco.mju_quat2Mat(matrix, orientation_wxyz)
+    return matrix.reshape(3, 3)

@@ -1,0 +1,275 @@
+"""One MuJoCo world."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Sequence
+from itertools import compress
+from operator import itemgetter
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from throwcollect.engines.engine import (
+    BodyState,
+    Box,
+    Engine,
+    Observer,
+    Physics,
+    Sample,
+    Scene,
+    State,
+    Steps,
+    Vector,
+    ball_of,
+)
+from throwcollect.engines.mujoco.bodies import MujocoBodies
+from throwcollect.engines.mujoco.contacts import aim_contacts
+from throwcollect.engines.mujoco.frames import turn, turn_back
+from throwcollect.engines.mujoco.scenery import (
+    BALL,
+    Surface,
+    boxes,
+    keep_motion,
+    make_spec,
+    resize_ball,
+    restitutions_of,
+    set_physics,
+)
+from throwcollect.errors import ConfigError
+from throwcollect.reproducible_math import matmul
+
+_ORIENTATION, _SPIN = slice(-10, -6), -3
+"""Places in a sample."""
+
+_PRESS = 3
+"""Numbers of a sensor, of which the first is the normal force."""
+
+
+class MujocoEngine(Engine):
+    """A MuJoCo world in this process."""
+
+    _scene: Scene
+    _physics: Physics
+    _surfaces: list[Surface]
+    _model: mujoco.MjModel
+    _data: mujoco.MjData
+    _restitutions: NDArray[np.float64] | None
+
+    def __init__(self) -> None:
+        self.bodies: MujocoBodies = MujocoBodies(self._compile_anew, lambda: (self._model, self._data))
+        self._is_loaded = False
+        self._touching: frozenset[str] = frozenset()
+
+    def close(self) -> None:
+        """Free the world."""
+        self._is_loaded = False
+        del self._model, self._data
+
+    @property
+    def is_as_loaded(self) -> bool:
+        """Whether nothing was added since the world was loaded."""
+        return not self.bodies.leave_traces
+
+    def load(self, scene: Scene) -> None:
+        """Make the world of a scene; if nothing but the ball differs, the ball alone is made anew.
+
+        Raises:
+            ConfigError: If MuJoCo does not take the robot's description.
+        """
+        can_keep = self._is_loaded and self.is_as_loaded
+        if can_keep and dataclasses.replace(self._scene, ball_radius_m=scene.ball_radius_m) == scene:
+            resize_ball(self._model, scene.ball_radius_m)
+            self._scene = scene
+            return
+        self._scene, self._is_loaded = scene, False
+        self.bodies.forget()
+        try:
+            self._compile()
+        except ValueError as error:
+            raise ConfigError(f"MuJoCo cannot load the robot's description: {error}") from error
+        # Joints of the robot come first in the model, but in an order of its own.
+        names = [self._model.joint(number).name for number in range(len(scene.moving))]
+        self._columns = np.array([scene.moving.index(name) for name in names])
+        self._places = [names.index(name) for name in scene.moving]
+        self._is_loaded = True
+
+    def _compile(self) -> None:
+        """Compile the world of the scene with all bodies.
+
+        Raises:
+            ValueError: If MuJoCo does not take a description.
+        """
+        spec, surfaces = make_spec(self._scene)
+        surfaces += self.bodies.attach(spec)
+        self._model = spec.compile()
+        self._data = mujoco.MjData(self._model)
+        self._surfaces = surfaces
+
+    def _compile_anew(self) -> None:
+        """Compile the world with other bodies; what stays goes on as it was.
+
+        Raises:
+            ValueError: If MuJoCo does not take the description of a body.
+        """
+        model, data = self._model, self._data
+        self._compile()
+        self.configure(self._physics)
+        self.bodies.place_fixed()
+        keep_motion(model, data, self._model, self._data)
+
+    def configure(self, physics: Physics) -> None:
+        """Set all numbers of the physics."""
+        self._physics = physics
+        set_physics(self._model, physics)
+        self._restitutions = restitutions_of(self._model, physics)
+        self._pick = _find_sample(self._model, self._places)
+
+    def rest(self, joints: Sequence[float], seat: Vector) -> None:
+        """Put the joints somewhere and the ball into the tool, all at rest."""
+        model, data = self._model, self._data
+        data.qpos[: len(joints)] = np.array(joints)[self._columns]
+        mujoco.mj_kinematics(model, data)
+        tool = data.body(self._scene.tool.link)
+        centre = (tool.xpos + matmul(tool.xmat.reshape(3, 3), np.array(seat).reshape(3, 1)).ravel()).tolist()
+        still = (0.0,) * len(joints)
+        self.reset(State((*joints, *still, *still, *centre, 0.0, 0.0, 0.0, 1.0, *(0.0,) * 6), frozenset()))
+
+    def reset(self, state: State) -> None:
+        """Put robot and ball into a state, leaving nothing behind of what went on before."""
+        count, data = len(self._columns), self._data
+        # Bodies that were added stay where they are.
+        added = data.qpos[count + 7 :].copy(), data.qvel[count + 6 :].copy()
+        mujoco.mj_resetData(self._model, data)
+        data.qpos[count + 7 :], data.qvel[count + 6 :] = added
+        positions, velocities = np.array(state.sample[: 2 * count]).reshape(2, count)
+        data.qpos[:count], data.qvel[:count] = positions[self._columns], velocities[self._columns]
+        self.place_ball(ball_of(state.sample))
+        self._touching = state.touching
+        self._bear()
+
+    @property
+    def state(self) -> State:
+        """Robot and ball now; right after `reset` without torques, as there are none before a step."""
+        # Bodies that were removed since the last step have no names any more.
+        names = {surface.name for surface in self._surfaces}
+        return State(self._sample(), self._touching & names)
+
+    def run(self, steps: Steps, observer: Observer) -> int:
+        """Take steps until the observer stops them.
+
+        A motor gives its joint the velocity in one step that Bullet's would give it, by the torque that this takes: by
+        inverse dynamics of the present state, with what pressed on the robot in the step before, and within the
+        efforts. So contacts are solved for the motion that the tool really has.
+        """
+        # Local names, numbers in place and one loop: what stands here is paid for in every step.
+        model, data, physics = self._model, self._data, self._physics
+        count, hz = len(self._columns), float(physics.hz)
+        pull = np.full(count, hz * physics.position_gain_per_s)
+        brake = np.full(count, hz * physics.velocity_gain)
+        position, velocity = data.qpos[:count], data.qvel[:count]
+        acceleration, torque = data.qacc[:count], data.qfrc_applied[:count]
+        passive, pushed = data.qfrc_passive[:count], data.qfrc_constraint[:count]
+        needed, work, other = np.zeros(model.nv), np.zeros(count), np.zeros(count)
+        load = needed[:count]
+        most = np.array(physics.efforts)[self._columns]
+        least, lag = -most, model.dof_damping[:count] / hz
+        pressing, nothing = data.sensordata[::_PRESS], np.zeros(len(self._surfaces))
+        presses = np.zeros(len(self._surfaces), np.bool_)
+        multiply, add, subtract, maximum, minimum = np.multiply, np.add, np.subtract, np.maximum, np.minimum
+        begin_step, end_step, inverse, greater = mujoco.mj_step1, mujoco.mj_step2, mujoco.mj_rne, np.greater
+        drag, due, stride = steps.drag_kgpm, steps.first_sample, steps.stride
+        restitutions = self._restitutions
+        last_presses, number = None, 0
+        for want in list(pull * steps.targets[:-1, self._columns] + brake * steps.velocities[:, self._columns]):
+            begin_step(model, data)
+            subtract(want, multiply(position, pull, work), work)
+            subtract(work, multiply(velocity, brake, other), acceleration)
+            inverse(model, data, 1, needed)
+            # The joints are damped by what they move at after the step.
+            subtract(multiply(acceleration, lag, work), passive, work)
+            subtract(work, pushed, work)
+            add(work, load, work)
+            maximum(minimum(work, most, out=work), least, out=torque)
+            if data.ncon:
+                aim_contacts(data, hz, restitutions)
+            if drag:
+                self._apply_drag(drag)
+            end_step(model, data)
+            number += 1
+            greater(pressing, nothing, presses)
+            if (now := presses.tobytes()) != last_presses:
+                last_presses = now
+                self._tell_touch(number, presses, observer)
+            if number == due:
+                due += stride
+                if observer.on_sample(number, self._sample()):
+                    break
+        data.qfrc_applied[count : count + 3] = 0.0
+        return number
+
+    def place_ball(self, ball: BodyState) -> None:
+        """Put the ball somewhere."""
+        first = len(self._columns)
+        x, y, z, w = ball.orientation_xyzw
+        self._data.qpos[first : first + 7] = (*ball.position, w, x, y, z)
+        spin = turn_back(ball.orientation_xyzw, ball.angular_velocity)
+        self._data.qvel[first : first + 6] = (*ball.linear_velocity, *spin)
+
+    def ball_boxes(self) -> list[Box]:
+        """A box along the axes of the world around the ball."""
+        return self._boxes([self._model.body(BALL).id])
+
+    def robot_boxes(self) -> list[Box]:
+        """Boxes along the axes of the world around the links of the robot."""
+        return self._boxes(range(1, self._model.body(BALL).id))
+
+    def _bear(self) -> None:
+        """Have motors know what presses on the robot, as if they had held it up before."""
+        model, data, count = self._model, self._data, len(self._columns)
+        mujoco.mj_step1(model, data)
+        data.qfrc_applied[:count] = data.qfrc_bias[:count]
+        if data.ncon:
+            aim_contacts(data, self._physics.hz, self._restitutions)
+        mujoco.mj_fwdAcceleration(model, data)
+        mujoco.mj_fwdConstraint(model, data)
+
+    def _boxes(self, bodies: Sequence[int]) -> list[Box]:
+        mujoco.mj_kinematics(self._model, self._data)
+        return boxes(self._model, self._data, bodies)
+
+    def _tell_touch(self, step: int, presses: NDArray[np.bool_], observer: Observer) -> None:
+        """Tell of what presses now, if it is not what did before."""
+        touching = frozenset(surface.name for surface in compress(self._surfaces, presses))
+        if touching != self._touching:
+            self._touching = touching
+            observer.on_touch(step, touching)
+
+    def _sample(self) -> Sample:
+        data = self._data
+        row = self._pick(data.qpos.tolist() + data.qvel.tolist() + data.qfrc_applied.tolist())
+        return row[:_SPIN] + turn(row[_ORIENTATION], row[_SPIN:])
+
+    def _apply_drag(self, drag_kgpm: float) -> None:
+        first = len(self._columns)
+        velocity = self._data.qvel[first : first + 3].tolist()
+        factor = -drag_kgpm * math.hypot(*velocity)
+        self._data.qfrc_applied[first : first + 3] = [factor * component for component in velocity]
+
+
+def _find_sample(model: mujoco.MjModel, order: Sequence[int]) -> Callable[[list[float]], Sample]:
+    """What takes a sample out of positions, velocities and forces, but with the ball's spin in the frame of the ball.
+
+    Args:
+        model: The world.
+        order: Place of each moving joint among those of the model.
+    """
+    ball = len(order)
+    x, y, z, w, i, j, k = range(ball, ball + 7)
+    velocities, forces = model.nq, model.nq + model.nv
+    joints = [first + place for first in (0, velocities, forces) for place in order]
+    places = [*joints, x, y, z, i, j, k, w, *range(velocities + ball, velocities + ball + 6)]
+    pick: Callable[[list[float]], Sample] = itemgetter(*places)
+    return pick

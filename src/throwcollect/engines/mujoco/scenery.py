@@ -1,0 +1,236 @@
+"""What is in a MuJoCo world, and how it is set up: ground, robot with its tool, ball.
+
+As in Bullet, only the ball collides, with everything, as long as nothing is added.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from throwcollect.engines.engine import GROUND, Box, Physics, Scene
+from throwcollect.engines.mujoco.contacts import HARDNESS
+from throwcollect.errors import ConfigError
+from throwcollect.reproducible_math import matmul
+
+BALL = "ball"
+"""Name of the ball's body and shape; those of added bodies begin with the name of the body and a slash."""
+
+_GROUND_BIT, _ROBOT_BIT, _FLOOR_BIT, _ADDED_BIT = 1, 2, 4, 8
+"""A pair collides if what one of both is (``contype``) is among what the other collides with (``conaffinity``)."""
+
+_EVERYTHING = _GROUND_BIT | _ROBOT_BIT | _FLOOR_BIT | _ADDED_BIT
+_REACH_M = 0.02
+"""Distance from which on a contact is looked at, so that a ball does not come to be inside of what it flies against."""
+
+_BALL_PRIORITY = 1
+"""The ball's friction and restitution are those of its contacts, whatever it touches."""
+
+_COMPILER = '<mujoco><compiler strippath="false" discardvisual="true" fusestatic="false"/></mujoco>'
+_ROOT_TAG_END = ">"
+
+
+@dataclass(frozen=True)
+class Surface:
+    """What can press on the ball.
+
+    Attributes:
+        body: Name of its body in the model; all shapes of it are meant.
+        name: Its name among what touches the ball.
+    """
+
+    body: str
+    name: str
+
+
+def read_urdf(text: str, meshes: dict[str, bytes] | None = None) -> mujoco.MjSpec:
+    """Read a description, whose links all become bodies.
+
+    Args:
+        text: The description.
+        meshes: Files that it speaks of; None for those on disk.
+
+    Raises:
+        ValueError: If MuJoCo cannot read it.
+    """
+    begin = text.index("<robot")
+    at = text.index(_ROOT_TAG_END, begin) + 1
+    spec = mujoco.MjSpec.from_string(text[:at] + _COMPILER + text[at:], assets=meshes)
+    for joint in spec.joints:
+        # A motor overcomes friction, as in Bullet, where it is part of what the motor does.
+        joint.frictionloss = 0.0
+    return spec
+
+
+def make_spec(scene: Scene) -> tuple[mujoco.MjSpec, list[Surface]]:
+    """Put ground, robot and ball together.
+
+    Args:
+        scene: What the world is made of.
+
+    Returns:
+        The world, and what of it can press on the ball.
+
+    Raises:
+        ConfigError: If MuJoCo cannot read the robot's description.
+    """
+    try:
+        spec = read_urdf(scene.urdf)
+    except ValueError as error:
+        raise ConfigError(f"MuJoCo cannot read the robot's description: {error}") from error
+    world = spec.worldbody
+    world.first_body().pos = (0.0, 0.0, scene.base_height_m)
+    surfaces = [Surface(world.name, GROUND)]
+    for body in spec.bodies[1:]:
+        surfaces.append(Surface(body.name, scene.tool.name if body.name == scene.tool.link else body.name))
+        for geom in body.geoms:
+            geom.contype, geom.conaffinity = _ROBOT_BIT, 0
+    world.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_PLANE,
+        size=(0.0, 0.0, 1.0),
+        contype=_GROUND_BIT if scene.ground_is_solid else _FLOOR_BIT,
+        conaffinity=0,
+    )
+    _add_ball(spec, scene.ball_radius_m)
+    for surface in surfaces:
+        watch(spec, surface)
+    option = spec.option
+    option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    # A world that diverges is told of by its numbers; MuJoCo would begin it anew, from nobody's state.
+    option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    return spec, surfaces
+
+
+def _add_ball(spec: mujoco.MjSpec, radius: float) -> None:
+    """Put a ball into the world; its mass and its surface are set later."""
+    ball = spec.worldbody.add_body(name=BALL)
+    ball.add_freejoint(name=BALL)
+    ball.add_geom(
+        name=BALL,
+        type=mujoco.mjtGeom.mjGEOM_SPHERE,
+        size=(radius, 0.0, 0.0),
+        mass=1.0,
+        contype=0,
+        conaffinity=_GROUND_BIT | _ROBOT_BIT | _ADDED_BIT,
+        priority=_BALL_PRIORITY,
+    )
+
+
+def watch(spec: mujoco.MjSpec, surface: Surface) -> None:
+    """Have the force measured with which something presses on the ball; its first number is the normal force."""
+    force, strongest, one = 1 << int(mujoco.mjtConDataField.mjCONDATA_FORCE), 2, 1
+    spec.add_sensor(
+        type=mujoco.mjtSensor.mjSENS_CONTACT,
+        objtype=mujoco.mjtObj.mjOBJ_GEOM,
+        objname=BALL,
+        reftype=mujoco.mjtObj.mjOBJ_BODY,
+        refname=surface.body,
+        intprm=(force, strongest, one),
+    )
+
+
+def collide_with_everything(spec: mujoco.MjSpec) -> None:
+    """Let all links of an added body collide with everything but each other."""
+    bodies = spec.bodies[1:]
+    for body in bodies:
+        for geom in body.geoms:
+            geom.contype, geom.conaffinity = _ADDED_BIT, _EVERYTHING
+    for number, body in enumerate(bodies):
+        for other in bodies[:number]:
+            spec.add_exclude(bodyname1=other.name, bodyname2=body.name)
+
+
+def resize_ball(model: mujoco.MjModel, radius: float) -> None:
+    """Give the ball another radius, as if the model had been compiled with it."""
+    geom, body = model.geom(BALL).id, model.body(BALL).id
+    model.geom_size[geom, 0] = model.geom_rbound[geom] = radius
+    model.geom_aabb[geom, 3:] = radius
+    model.bvh_aabb[model.body_bvhadr[body], 3:] = radius
+    first = model.body_dofadr[body]
+    model.dof_length[first + 3 : first + 6] = radius
+
+
+def set_physics(model: mujoco.MjModel, physics: Physics) -> None:
+    """Set time step, solver, gravity, masses and surfaces; all of them, so that nothing of the trial before remains.
+
+    Args:
+        model: The world.
+        physics: The numbers.
+    """
+    model.opt.timestep = 1 / physics.hz
+    model.opt.iterations = physics.solver_iterations
+    model.opt.gravity[:] = (0.0, 0.0, -physics.gravity_mps2)
+    ball, sphere = model.body(BALL).id, model.geom(BALL).id
+    model.body_mass[ball] = physics.ball_mass_kg
+    model.body_inertia[ball] = 0.4 * physics.ball_mass_kg * model.geom_size[sphere, 0] ** 2
+    # Frictions are multiplied, as in Bullet. Rolling and turning on the spot are not braked.
+    model.geom_friction[:] = (physics.surface_friction**2, 0.0, 0.0)
+    model.geom_friction[sphere, 0] = physics.ball_friction * physics.surface_friction
+    model.geom_margin[sphere] = _REACH_M
+    # Friction stops what slides in one step if it can. What contacts ask for along their normals, the engine says.
+    model.geom_solref[:] = (2 / physics.hz, 1.0)
+    model.geom_solimp[:, :2] = HARDNESS
+    # Numbers that the solver derives from masses, such as those by which it scales contacts.
+    mujoco.mj_setConst(model, mujoco.MjData(model))
+
+
+def restitutions_of(model: mujoco.MjModel, physics: Physics) -> NDArray[np.float64] | None:
+    """Factor of each shape by which the ball bounces off it; None if it does not bounce.
+
+    Args:
+        model: The world.
+        physics: Of it, the restitution of the ball matters.
+    """
+    if physics.ball_restitution == 0:
+        return None
+    # What moves on its own does not bounce, as in Bullet; the robot does.
+    added = model.geom_contype == _ADDED_BIT
+    moves = model.body_weldid[model.geom_bodyid] != 0
+    factors = np.where(added & moves, 0.0, 1.0)
+    factors[model.geom(BALL).id] = physics.ball_restitution
+    return factors
+
+
+def keep_motion(model: mujoco.MjModel, data: mujoco.MjData, other_model: mujoco.MjModel, other: mujoco.MjData) -> None:
+    """Have all joints that another world has too go on there as in this one."""
+    there = {other_model.joint(number).name for number in range(other_model.njnt)}
+    for name in (model.joint(number).name for number in range(model.njnt)):
+        if name in there:
+            for what in ("qpos", "qvel", "qacc_warmstart", "qfrc_applied", "qfrc_constraint"):
+                setattr(other.joint(name), what, getattr(data.joint(name), what))
+
+
+Frame = tuple[NDArray[np.float64], NDArray[np.float64]]
+"""Origin [m], shape ``(3,)``, and orientation, shape ``(3, 3)``, in world."""
+
+WORLD: Frame = (np.zeros(3), np.eye(3))
+
+
+def boxes(model: mujoco.MjModel, data: mujoco.MjData, bodies: Iterable[int], frame: Frame = WORLD) -> list[Box]:
+    """Boxes along the axes of a frame that enclose the bodies which have a shape."""
+    found = []
+    for body in bodies:
+        first, count = int(model.body_geomadr[body]), int(model.body_geomnum[body])
+        if count:
+            corners = [_reach(model, data, geom, frame) for geom in range(first, first + count)]
+            lowest = np.min([low for low, _ in corners], axis=0)
+            highest = np.max([high for _, high in corners], axis=0)
+            found.append((tuple(lowest.tolist()), tuple(highest.tolist())))
+    return found
+
+
+def _reach(
+    model: mujoco.MjModel, data: mujoco.MjData, geom: int, frame: Frame
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Lowest and highest corner of the box around a shape's own box."""
+    origin, axes = frame
+    turned = matmul(axes.T, data.geom_xmat[geom].reshape(3, 3))
+    box = model.geom_aabb[geom].reshape(2, 3, 1)
+    centre = matmul(axes.T, (data.geom_xpos[geom] - origin).reshape(3, 1)) + matmul(turned, box[0])
+    half = matmul(np.abs(turned), box[1])
+    return (centre - half).ravel(), (centre + half).ravel()

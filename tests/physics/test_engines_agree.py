@@ -1,0 +1,40 @@
+"""Two engines, written apart from each other, simulate the same throws."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import pytest
+
+from throwcollect import Simulator, Throw
+
+POINTS: list[Mapping[str, float]] = [
+    {},
+    {"task.end.arm_right_4_joint": -0.9, "task.duration_s": 1.2},
+    {"task.end.arm_right_4_joint": -0.3, "task.end.arm_right_7_joint": 0.2, "task.duration_s": 1.05},
+    {"task.end.torso_1_joint": 0.3, "task.trajectory.gamma": 1.0},
+    {"task.end.torso_1_joint": -0.3, "task.trajectory.gamma": 1.25, "ball.mass_kg": 0.06},
+    {"ball.drag_coefficient": 0.47, "ball.radius_m": 0.02},
+]
+
+
+def throws(engine: str) -> Iterator[Throw]:
+    with Simulator("configs/quickstart.yaml", overrides=[f"sim.engine={engine}"]) as simulator:
+        yield from simulator.throw_many(POINTS)
+
+
+def test_throws_of_both_engines_land_within_centimetres_of_each_other() -> None:
+    for point, bullet, mujoco in zip(POINTS, throws("bullet"), throws("mujoco"), strict=True):
+        one, other = bullet.row, mujoco.row
+        assert one["outcome"] == other["outcome"] == "landed", point
+        for key, tolerance in {
+            "landing_x_m": 0.015,
+            "landing_y_m": 0.015,
+            "landing_time_s": 0.003,
+            "release_time_s": 0.006,
+            "release_speed_mps": 0.03,
+            "effort_peak_share": 0.005,
+        }.items():
+            assert other[key] == pytest.approx(one[key], abs=tolerance), (key, point)
+        assert one["recontacts"] == other["recontacts"] == 0
+        assert one["digest"] != other["digest"]

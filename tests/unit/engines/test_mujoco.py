@@ -1,0 +1,221 @@
+"""What MuJoCo does besides keeping to the contract: contacts, motors, and what does not depend on chance."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.unit.engines.test_engine_contract import (
+    END,
+    MOVING,
+    PHYSICS,
+    SCENE,
+    SEAT,
+    START,
+    Watcher,
+    begin,
+    still,
+    swing,
+)
+from tests.unit.sim.bodies import box
+
+from throwcollect.engines.engine import BodyState, Observer, Physics, Scene, ball_of
+from throwcollect.engines.mujoco.mujoco_engine import MujocoEngine
+from throwcollect.engines.mujoco.scenery import make_spec, resize_ball
+from throwcollect.errors import ConfigError, RequestError
+from throwcollect.sim.urdf import read_model
+
+TRIALS: list[tuple[Scene, Physics]] = [
+    (SCENE, PHYSICS),
+    (replace(SCENE, ball_radius_m=0.02), replace(PHYSICS, ball_mass_kg=0.06)),
+    (SCENE, replace(PHYSICS, ball_friction=0.2, ball_restitution=0.6, velocity_gain=0.7)),
+    (SCENE, replace(PHYSICS, gravity_mps2=3.0, efforts=tuple(0.7 * effort for effort in PHYSICS.efforts))),
+    (replace(SCENE, ground_is_solid=False), replace(PHYSICS, surface_friction=1.0, solver_iterations=10)),
+]
+
+
+@pytest.fixture
+def engine() -> Iterator[MujocoEngine]:
+    made = MujocoEngine()
+    begin(made)
+    yield made
+    made.close()
+
+
+def trial(engine: MujocoEngine, scene: Scene, physics: Physics) -> Watcher:
+    engine.load(scene)
+    engine.configure(physics)
+    engine.rest(START.tolist(), SEAT)
+    seen = Watcher()
+    engine.run(still(engine, 25), seen)
+    engine.reset(engine.state)
+    engine.run(swing(600), seen)
+    return seen
+
+
+def alone(number: int) -> Watcher:
+    engine = MujocoEngine()
+    seen = trial(engine, *TRIALS[number])
+    engine.close()
+    return seen
+
+
+def test_the_order_of_trials_does_not_matter_whatever_varies() -> None:
+    engine = MujocoEngine()
+    forwards = [trial(engine, *each) for each in TRIALS]
+    backwards = [trial(engine, *each) for each in reversed(TRIALS)]
+    engine.close()
+    assert forwards == backwards[::-1] == [alone(number) for number in range(len(TRIALS))]
+    assert len({repr(seen.samples[-1]) for seen in forwards}) == len(TRIALS)
+
+
+def test_worlds_of_several_threads_leave_each_other_alone() -> None:
+    with ThreadPoolExecutor(4) as pool:
+        assert list(pool.map(alone, range(len(TRIALS)))) == [alone(number) for number in range(len(TRIALS))]
+
+
+def test_steps_may_be_cut_anywhere(engine: MujocoEngine) -> None:
+    whole = Watcher()
+    engine.run(swing(600), whole)
+    begin(engine)
+    cut = Watcher()
+    for first, last in ((0, 1), (1, 138), (138, 300), (300, 333), (333, 600)):
+        cut.offset = first
+        engine.run(swing(last - first, first=first), cut)
+    assert cut.samples == whole.samples
+    assert cut.touches == whole.touches
+
+
+def test_the_ball_stays_in_the_tool_until_it_leaves_it_for_good(engine: MujocoEngine) -> None:
+    # With contacts as MuJoCo has them, it hops some 15 times before.
+    seen = Watcher()
+    engine.run(swing(600), seen)
+    assert [bodies for _, bodies in seen.touches] == [frozenset()]
+
+
+def test_motors_follow_as_those_of_bullet_and_carry_the_ball(engine: MujocoEngine) -> None:
+    steps, seen = swing(600), Watcher()
+    engine.run(steps, seen)
+    errors = [np.abs(np.array(sample[: len(MOVING)]) - steps.targets[number]).max() for number, sample in seen.samples]
+    assert max(errors) < 2e-5
+
+
+def test_motors_that_are_too_weak_give_what_they_have(engine: MujocoEngine) -> None:
+    weak = tuple(0.5 * effort for effort in PHYSICS.efforts)
+    seen = trial(engine, SCENE, replace(PHYSICS, efforts=weak))
+    shares = [np.abs(sample[2 * len(MOVING) : 3 * len(MOVING)]) / weak for _, sample in seen.samples]
+    assert np.max(shares) == 1.0
+
+
+@pytest.mark.parametrize("speed", [0.5, 3.0, 8.0])
+@pytest.mark.parametrize("restitution", [0.0, 0.3, 0.7, 1.0])
+def test_a_ball_bounces_off_the_ground_by_its_restitution(
+    engine: MujocoEngine, restitution: float, speed: float
+) -> None:
+    engine.configure(replace(PHYSICS, ball_restitution=restitution, gravity_mps2=1e-9))
+    engine.place_ball(BodyState((2.0, 0.0, 0.1), linear_velocity=(0.0, 0.0, -speed)))
+    seen = Watcher()
+    engine.run(still(engine, 120), seen)
+    assert ball_of(seen.samples[-1][1]).linear_velocity[2] == pytest.approx(restitution * speed, abs=0.01 * speed)
+    assert min(ball_of(sample).position[2] for _, sample in seen.samples) > SCENE.ball_radius_m - 1e-3
+
+
+def test_friction_is_the_product_of_both_and_the_same_in_all_directions(engine: MujocoEngine) -> None:
+    for angle in (0.0, 0.4, np.pi / 4):
+        engine.place_ball(
+            BodyState((2.0, 0.0, SCENE.ball_radius_m), linear_velocity=(2 * np.cos(angle), 2 * np.sin(angle), 0.0))
+        )
+        engine.run(still(engine, 50), Observer())
+        lost = 2 - np.hypot(*ball_of(engine.state.sample).linear_velocity[:2])
+        friction = PHYSICS.ball_friction * PHYSICS.surface_friction
+        assert lost == pytest.approx(friction * PHYSICS.gravity_mps2 * 50 / PHYSICS.hz, rel=0.01)
+
+
+def test_a_ball_of_another_size_is_as_if_it_had_been_compiled() -> None:
+    spec, _ = make_spec(SCENE)
+    resized = spec.compile()
+    resize_ball(resized, 0.04)
+    spec, _ = make_spec(replace(SCENE, ball_radius_m=0.04))
+    compiled = spec.compile()
+    # They are worked out from the inertia, which is set with the mass.
+    derived = ("inertia", "inertia0", "invweight0", "M0", "acc0", "stat")
+    arrays = [name for name in dir(compiled) if isinstance(getattr(compiled, name), np.ndarray)]
+    assert len(arrays) > 300
+    for name in arrays:
+        if not name.endswith(derived):
+            np.testing.assert_array_equal(getattr(resized, name), getattr(compiled, name), err_msg=name)
+
+
+def test_a_world_that_diverges_tells_it_by_its_numbers_and_leaves_nothing_behind(
+    engine: MujocoEngine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    whole = Watcher()
+    engine.run(swing(600), whole)
+    engine.place_ball(BodyState((1.0, 2.0, 3.0), linear_velocity=(1e300, 0.0, 0.0)))
+    engine.run(still(engine, 20), Observer())
+    assert not np.isfinite(engine.state.sample).all()
+    begin(engine)
+    again = Watcher()
+    engine.run(swing(600), again)
+    assert again == whole
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_body_that_mujoco_does_not_take_is_refused_and_the_world_goes_on(
+    engine: MujocoEngine,
+) -> None:
+    flat = np.zeros((4, 3, 3), np.float32)
+    mesh = box().replace('<box size="0.2 0.2 0.2"/>', '<mesh filename="flat.stl"/>')
+    before = engine.state
+    with pytest.raises(RequestError, match="the physics engine cannot load it"):
+        engine.bodies.add("flat", read_model(mesh, lambda _: flat), BodyState((3.0, 0.0, 1.0)))
+    assert "flat" not in engine.bodies
+    assert engine.state == before
+    engine.run(still(engine, 10), Observer())
+    assert engine.state.touching == before.touching
+
+
+def test_a_mesh_that_would_be_filled_in_is_refused(engine: MujocoEngine) -> None:
+    mesh = box(mass=0).replace('<box size="0.2 0.2 0.2"/>', '<mesh filename="bucket.stl"/>')
+    bucket = read_model(mesh, lambda _: np.zeros((4, 3, 3), np.float32))
+    with pytest.raises(RequestError, match="fill in the mesh of a body that is attached to the world"):
+        engine.bodies.add("bucket", bucket, BodyState((3.0, 0.0, 1.0)))
+
+
+def test_a_link_of_a_body_may_have_any_name(engine: MujocoEngine) -> None:
+    strange = box(name="strange", mass=0).replace('name="body"', 'name="world"')
+    engine.bodies.add("a/b c", read_model(strange, _no_mesh), BodyState((3.0, 0.0, 0.5)))
+    engine.place_ball(BodyState((3.0, 0.0, 0.63)))
+    engine.run(still(engine, 50), Observer())
+    assert engine.state.touching == {"a/b c/world"}
+
+
+def test_bodies_stay_where_they_are_while_others_come_and_go(engine: MujocoEngine) -> None:
+    engine.bodies.add("one", read_model(box(), _no_mesh), BodyState((3.0, 0.0, 2.0)))
+    engine.run(still(engine, 50), Observer())
+    fallen = engine.bodies.state("one")
+    assert fallen.position[2] < 2.0
+    arm = engine.state.sample
+    engine.bodies.add("two", read_model(box(), _no_mesh), BodyState((4.0, 0.0, 2.0)))
+    assert engine.bodies.state("one") == fallen
+    assert engine.state.sample == arm
+    engine.bodies.remove("two")
+    assert engine.bodies.state("one") == fallen
+
+
+def test_a_description_that_mujoco_does_not_take_is_refused() -> None:
+    broken = MujocoEngine()
+    with pytest.raises(ConfigError, match="MuJoCo cannot"):
+        broken.load(replace(SCENE, urdf=SCENE.urdf.replace('type="revolute"', 'type="elastic"')))
+    begin(broken)
+    assert broken.state.sample[: len(MOVING)] != END.tolist()
+    broken.close()
+
+
+def _no_mesh(filename: str) -> np.ndarray:
+    raise AssertionError(filename)

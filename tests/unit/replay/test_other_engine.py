@@ -1,0 +1,47 @@
+"""How much columns differ by another engine, and which engines can be asked for."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from throwcollect.dataset.reader import Dataset
+from throwcollect.errors import ConfigError
+from throwcollect.replay.other_engine import Deviation, Distribution, distributions, simulate_with
+from throwcollect.report.throw.deviations import write_deviations
+
+
+def test_a_distribution_has_what_both_throws_have() -> None:
+    found = distributions(
+        [
+            Deviation(0, "landed", "landed", {"landing_x_m": 0.003, "apex_z_m": 0.0}),
+            Deviation(2, "landed", "landed", {"landing_x_m": -0.004, "apex_z_m": 0.0}),
+            Deviation(3, "landed", "dropped", {"apex_z_m": 3.0}),
+        ]
+    )
+    assert found == [
+        Distribution(
+            "landing_x_m", 2, pytest.approx(-0.0005), pytest.approx(0.0125**0.5 * 0.0316227766), 0.0035, 0.004
+        ),
+        Distribution("apex_z_m", 3, 1.0, pytest.approx(3**0.5), 0.0, 3.0),
+    ]
+
+
+def test_the_engine_is_another_one_that_is_there(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    from throwcollect.config.schema import Config
+
+    class Stored:
+        config = Config()
+
+    monkeypatch.setattr(Dataset, "open", lambda _: Stored())
+    with pytest.raises(ConfigError, match=r"--engine bullet: the throws of .* are by bullet themselves"):
+        simulate_with(tmp_path, "bullet", [0])
+    with pytest.raises(ConfigError, match="--engine physx: there is no such engine") as refused:
+        simulate_with(tmp_path, "physx", [0])
+    assert "expected: mujoco, ballistic" in str(refused.value)
+
+
+def test_a_picture_of_landings_is_written(tmp_path: Path) -> None:
+    write_deviations([[0.001, -0.002], [0.0, 0.003]], tmp_path / "apart.png")
+    assert (tmp_path / "apart.png").read_bytes().startswith(b"\x89PNG")
