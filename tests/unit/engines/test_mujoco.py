@@ -195,6 +195,25 @@ def test_a_link_of_a_body_may_have_any_name(engine: MujocoEngine) -> None:
     assert engine.state.touching == {"a/b c/world"}
 
 
+@pytest.mark.parametrize("restitution", [0.0, 0.5])
+def test_bodies_that_merely_touch_change_nothing_elsewhere(engine: MujocoEngine, restitution: float) -> None:
+    bouncy = replace(PHYSICS, ball_restitution=restitution)
+    without = trial(engine, SCENE, bouncy)
+    engine.load(SCENE)
+    engine.configure(bouncy)
+    # Their lower faces are on the ground, to the last bit.
+    for number in range(3):
+        engine.bodies.add(f"crate{number}", read_model(box(mass=1), _no_mesh), BodyState((5.0, number, 0.1)))
+    engine.rest(START.tolist(), SEAT)
+    seen = Watcher()
+    engine.run(still(engine, 25), seen)
+    engine.reset(engine.state)
+    engine.run(swing(600), seen)
+    assert seen.touches == without.touches
+    for (_, sample), (_, other) in zip(seen.samples, without.samples, strict=True):
+        assert sample == pytest.approx(other, abs=1e-4)
+
+
 def test_bodies_stay_where_they_are_while_others_come_and_go(engine: MujocoEngine) -> None:
     engine.bodies.add("one", read_model(box(), _no_mesh), BodyState((3.0, 0.0, 2.0)))
     engine.run(still(engine, 50), Observer())

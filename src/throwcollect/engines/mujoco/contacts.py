@@ -36,13 +36,14 @@ def aim_contacts(data: mujoco.MjData, hz: float, restitutions: NDArray[np.float6
         hz: Steps per second.
         restitutions: Of each shape of the model; of a contact, it is the product of both. None if nothing bounces.
     """
-    # Rows of contacts are the last ones, and each has three: along its normal, and two of friction.
-    first = data.nefc - _ROWS * data.ncon
+    # Rows of contacts are the last ones, and each has three: along its normal, and two of friction. Contacts of shapes
+    # that merely touch have none.
+    first = data.ne + data.nf + data.nl
     away, speeds = data.efc_pos[first::_ROWS] * hz, data.efc_vel[first::_ROWS]
     wanted = np.maximum(away, _CORRECTED * away)
     if restitutions is not None:
         bounces = (speeds < -_LEAST_BOUNCE_MPS) & (speeds + away < 0.0)
-        wanted[bounces] = (restitutions[data.contact.geom].prod(axis=1) * speeds)[bounces]
+        wanted[bounces] = (restitutions[data.contact.geom[data.efc_id[first::_ROWS]]].prod(axis=1) * speeds)[bounces]
     wanted += speeds
     wanted *= -hz / HARDNESS
     data.efc_aref[first::_ROWS] = wanted
