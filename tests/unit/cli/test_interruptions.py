@@ -1,8 +1,20 @@
 import signal
+from collections.abc import Iterator
+
+import pytest
 
 from throwcollect.cli.interruptions import Interruptions
 
 
+@pytest.fixture
+def heeds_hangups() -> Iterator[None]:
+    """Whatever these tests were started by: `nohup` has it ignored."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    yield
+    signal.signal(signal.SIGHUP, before)
+
+
+@pytest.mark.usefixtures("heeds_hangups")
 def test_signals_are_counted_and_then_what_they_were() -> None:
     before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
     with Interruptions() as interruptions:
