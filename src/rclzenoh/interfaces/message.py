@@ -128,6 +128,12 @@ def as_numbers(value: Any, field: Field, where: str) -> NDArray[Any]:
         return value
     is_octets = isinstance(value, (bytes, bytearray))
     array = np.frombuffer(value, np.uint8).copy() if is_octets else np.asarray(value)
+    if dtype.kind in "iu" and array.size and array.dtype.kind in "fO" and all(isinstance(each, int) for each in value):
+        # NumPy knows no whole numbers among which are both 0 and 2 to the power of 63, and takes fractions.
+        info = np.iinfo(dtype)
+        if min(value) < info.min or max(value) > info.max:
+            raise ValueError(f"{where}.{field.name}: {value!r:.80} does not fit {field.type}")
+        array = np.array(value, dtype)
     if array.dtype != dtype:
         given = array
         if given.size and (given.dtype.kind not in "biuf" or (given.dtype.kind == "f") > (dtype.kind == "f")):

@@ -9,6 +9,7 @@ from rclzenoh.interfaces import get_message
 JointState = get_message("sensor_msgs/msg/JointState")
 Pose = get_message("geometry_msgs/msg/Pose")
 Uuid = get_message("unique_identifier_msgs/msg/UUID")
+UInt64MultiArray = get_message("std_msgs/msg/UInt64MultiArray")
 
 
 def test_fields_have_defaults_of_their_own():
@@ -56,6 +57,15 @@ def test_what_is_no_sequence_of_numbers_is_refused(value, error, match):
 def test_numbers_that_do_not_fit_are_refused(value, match):
     with pytest.raises(ValueError, match=match):
         Uuid(uuid=value)
+
+
+def test_small_and_very_large_numbers_stand_beside_one_another():
+    numbers = [0, 2**63, 2**64 - 1]
+    assert UInt64MultiArray(data=numbers).data.tolist() == numbers
+    for wrong in ([-1, 2**63], [0, 2**64]):
+        with pytest.raises(ValueError, match="does not fit uint64"):
+            UInt64MultiArray(data=wrong)
+    assert UInt64MultiArray(data=[]).data.tolist() == []
 
 
 def test_floats_are_not_taken_for_integers():
