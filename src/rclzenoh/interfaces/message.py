@@ -130,7 +130,7 @@ def as_numbers(value: Any, field: Field, where: str) -> NDArray[Any]:
     array = np.frombuffer(value, np.uint8).copy() if is_octets else np.asarray(value)
     if dtype.kind in "iu" and array.size and array.dtype.kind in "fO" and all(isinstance(each, int) for each in value):
         # NumPy knows no whole numbers among which are both 0 and 2 to the power of 63, and takes fractions.
-        info = np.iinfo(dtype)
+        info = np.iinfo(dtype.name)
         if min(value) < info.min or max(value) > info.max:
             raise ValueError(f"{where}.{field.name}: {value!r:.80} does not fit {field.type}")
         array = np.array(value, dtype)
