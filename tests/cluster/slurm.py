@@ -149,9 +149,15 @@ class Slurm:
         """End the slurmd of a node alone. Its jobs run on, and after a while Slurm starts them elsewhere, too."""
         _end(self._process(node), signal.SIGKILL)
 
-    def revive(self, node: str) -> None:
-        """Start the slurmd of a node, which ends what is left there of jobs that have been given to another."""
-        self._start("slurmd", "-f", self.environment["SLURM_CONF"], "-N", node)
+    def revive(self, node: str, *, without: Path | None = None) -> None:
+        """Start the slurmd of a node, which ends what is left there of jobs that have been given to another.
+
+        Args:
+            node: Its name.
+            without: Directory in which the node sees nothing, as if a shared file system was not mounted there.
+        """
+        apart = ("unshare", "--mount", "sh", "-c", 'mount -t tmpfs none "$0" && exec "$@"', str(without))
+        self._start(*(apart if without else ()), "slurmd", "-f", self.environment["SLURM_CONF"], "-N", node)
 
     def state(self, node: str) -> str:
         """Short name of a node's state: `idle`, `allocated`, `down*`, ..."""

@@ -138,6 +138,31 @@ def test_what_is_missing_is_submitted_again_and_nothing_else(
     assert "nothing is left to submit" in call(slurm, "resume", data)
 
 
+def test_a_node_that_does_not_see_the_directory_is_named(
+    slurm: Slurm, short: tuple[Path, dict[str, str]], tmp_path: Path
+) -> None:
+    config, whole = short
+    data = tmp_path / "share" / "data"
+    data.parent.mkdir()
+    node = slurm.nodes[0]
+    slurm.kill_slurmd(node)
+    slurm.revive(node, without=data.parent)
+    try:
+        wait_until(lambda: slurm.state(node) == "idle")
+        submit(slurm, config, data, f'cluster.lines=["#SBATCH --nodelist={node}"]', tasks=2)
+        began = time.monotonic()
+        said = call(slurm, "wait", "--run", data, expect=3)
+        assert f"node {node} does not see {data}" in said
+        assert time.monotonic() - began < 30
+    finally:
+        slurm.kill_slurmd(node)
+        slurm.revive(node)
+    wait_until(lambda: slurm.state(node) == "idle")
+    call(slurm, "resume", data)
+    call(slurm, "wait", "--run", data)
+    assert fingerprints(data) == whole
+
+
 def test_a_run_is_listed_and_can_be_stopped(slurm: Slurm, tmp_path: Path) -> None:
     config = configure(tmp_path, trials=240)
     data = tmp_path / "data"
