@@ -121,9 +121,15 @@ def listen(directory: Path, *options: str) -> tuple[Running, str, int]:
         "--listen", f"tcp/0.0.0.0:{port}", *options,
     )  # fmt: skip
     assert running.process.stderr is not None
-    for line in running.process.stderr:
-        if found := re.search(r"join-run (tc1\.\S+)", line):
-            return running, found[1], port
+    # Nobody else would end what prints no token.
+    late = threading.Timer(60, running.process.kill)
+    late.start()
+    try:
+        for line in running.process.stderr:
+            if found := re.search(r"join-run (tc\d+\.\S+)", line):
+                return running, found[1], port
+    finally:
+        late.cancel()
     raise AssertionError("no token was printed")
 
 
