@@ -34,9 +34,11 @@ DELAY_S = 0.05
 class Machine:
     """A machine with an address of its own, on one wire with this one."""
 
-    def __init__(self, number: int) -> None:
+    def __init__(self) -> None:
         self.name = f"tc{secrets.token_hex(4)}"
-        self.gateway, self.address = f"10.213.{number}.1", f"10.213.{number}.2"
+        # Drawn, so that tests that run at the same time have wires of their own.
+        network = f"10.{secrets.randbelow(64) + 190}.{secrets.randbelow(256)}"
+        self.gateway, self.address = f"{network}.1", f"{network}.2"
         self.wire = f"{self.name}w"
 
     def __enter__(self) -> Machine:
@@ -74,7 +76,7 @@ def can_make_machines() -> bool:
     if os.getuid() or shutil.which("ip") is None:
         return False
     try:
-        with Machine(9):
+        with Machine():
             return True
     except subprocess.CalledProcessError:
         return False
@@ -147,10 +149,22 @@ def join(machine: Machine, token: str) -> subprocess.Popen[str]:
     return subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, start_new_session=True)
 
 
+def wait_for(written: int, running: Running, joined: list[subprocess.Popen[str]]) -> None:
+    """Wait until a run has written so many bytes; say what the joined simulations said if it does not come to that."""
+    try:
+        running.wait_until(lambda: running.written() >= written or any(each.poll() for each in joined), seconds=120)
+        assert running.written() >= written, "a simulation that joined has failed"
+    except AssertionError as error:
+        for each in joined:
+            each.kill()
+            error.add_note(f"{each.args}: exit code {each.wait()}: {each.communicate()[1]}")
+        raise
+
+
 @pytest.fixture
 def machines() -> Iterator[list[Machine]]:
     with ExitStack() as stack:
-        yield [stack.enter_context(Machine(number)) for number in (1, 2, 3)]
+        yield [stack.enter_context(Machine()) for _ in range(3)]
 
 
 @pytest.fixture
@@ -170,13 +184,12 @@ def test_machines_come_and_go_and_the_files_are_the_same(
     running, token, port = listen(tmp_path, "--set", SLOW)
     steady, late, gone = machines
     processes += [join(steady, moved(token, steady.gateway, port)), join(gone, moved(token, gone.gateway, port))]
-    running.wait_until(lambda: running.written() > 100_000)
+    wait_for(100_000, running, processes)
     gone.cut()  # so that nothing can be said any more
     processes[1].kill()
     wire = SlowWire(late.gateway, port)
     processes.append(join(late, moved(token, late.gateway, wire.port)))
-    written = running.written()
-    running.wait_until(lambda: running.written() > written + 100_000)
+    wait_for(running.written() + 100_000, running, [processes[0], processes[2]])
     steady.cut()
     time.sleep(CUT_S)
     steady.mend()

@@ -146,9 +146,11 @@ def _read_configuration(connection: Connection, token: JoinToken) -> str:
         executor = ros.SingleThreadedExecutor(context=context)
         executor.add_node(node)
         client = node.create_client(GetParameters, f"/{LAUNCHER}/get_parameters")
+        if not client.wait_for_service(_ANSWER_S):
+            raise WorkerError(f"run {token.run}: its launcher is not to be found at {connection.endpoint}")
+        # What is asked before the service is found is lost.
         future = client.call_async(GetParameters.Request(names=[CONFIGURATION]))
-        if client.wait_for_service(_ANSWER_S):
-            executor.spin_until_future_complete(future, timeout_sec=_ANSWER_S)
+        executor.spin_until_future_complete(future, timeout_sec=_ANSWER_S)
         if not future.done():
             raise WorkerError(f"run {token.run}: its launcher does not answer at {connection.endpoint}")
         text: str = future.result().values[0].string_value
