@@ -12,11 +12,10 @@ import pytest
 from tests.e2e.collection import FAST, call, command, write_config
 from throwcollect import ros
 from throwcollect.config.loader import load
-from throwcollect.coordinator.goals import FollowJointTrajectory
 from throwcollect.dataset.reader import Dataset
 from throwcollect.episode.message import pack
 from throwcollect.replay.throw import Replayer
-from throwcollect.ros import ActionServer, SetParametersResult, get_message
+from throwcollect.ros import SetParametersResult, get_message
 from throwcollect.ros.router import router
 from throwcollect.run_key import Signer
 from throwcollect.sweep.plan import make_plan
@@ -33,25 +32,15 @@ class Impostor(ros.Node):
         super().__init__(name, namespace=f"/{name}", context=context)
         self.leases = 0
         self._answer = answer
-        for key, value in (
-            ("trial.number", -1), ("trial.controllers", [""]), ("trial.lease", ""), ("ball.mass_kg", 0.045)
-        ):  # fmt: skip
-            self.declare_parameter(key, value)
+        self.declare_parameter("trial.leases", "")
         self.add_on_set_parameters_callback(self._lease)
-        self._servers = [
-            ActionServer(self, FollowJointTrajectory, f"{limb}_controller/follow_joint_trajectory", self._execute)
-            for limb in ("arm_right", "torso")
-        ]
         self._episodes = self.create_publisher(UInt8MultiArray, "episode", WHOLE)
 
     def _lease(self, _parameters: Any) -> Any:
         self.leases += 1
+        if self._answer is not None:
+            self._episodes.publish(self._answer)
         return SetParametersResult(successful=self._answer is not None, reason="never")
-
-    def _execute(self, handle: Any) -> Any:
-        handle.succeed()
-        self._episodes.publish(self._answer)
-        return FollowJointTrajectory.Result()
 
 
 @contextmanager
@@ -123,7 +112,7 @@ def forged(directory: Path, path: Path) -> bytes:
     """A sound episode of the first trial, of another configuration, and with another key."""
     config = load(path)
     delivery = Replayer(config).delivery(make_plan(config, directory=directory).trials[0])
-    return pack(delivery.episode, delivery.conditions, Signer(b"a key of its own"))
+    return pack(delivery, Signer(b"a key of its own"))
 
 
 def test_a_collection_ends_when_every_simulation_refuses_everything(graph: ros.Context, tmp_path: Path) -> None:
@@ -132,4 +121,4 @@ def test_a_collection_ends_when_every_simulation_refuses_everything(graph: ros.C
         ended = call("coordinator", tmp_path / "data", "--config", write_config(tmp_path, trials=TRIALS, sim=FAST))
     assert ended.returncode == 3
     assert "every simulation refuses its trials, and none was ever done" in ended.stderr
-    assert "evidence: parameters: never" in ended.stderr
+    assert "evidence: leases: never" in ended.stderr

@@ -1,7 +1,8 @@
 """A leased trial belongs to its coordinator: nobody else can change what it is simulated with."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -10,7 +11,7 @@ from tests.integration.robot import ARM, CONFIG, ELBOW, HEAD, POSTURE, TORSO, Ro
 from throwcollect.episode.message import Delivery, unpack
 from throwcollect.ros import DurabilityPolicy, QoSProfile, get_message
 from throwcollect.run_key import Signer
-from throwcollect.trial.lease import Lease
+from throwcollect.trial.lease import Lease, leases_to_json
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """As ros2_controllers have it; DDS connects no others."""
@@ -20,51 +21,88 @@ Result: Any = get_message("simulation_interfaces/msg/Result")
 SimulationState: Any = get_message("simulation_interfaces/msg/SimulationState")
 
 
-def ask_for(robot: Robot, values: dict[str, float], *, by: Signer | None = None, trial: int = 4) -> Any:
-    lease = Lease(f"/{robot.name}", trial, (ARM, TORSO), values)
-    parameters = {"trial.number": trial, "trial.controllers": [ARM, TORSO], "trial.lease": lease.sign(by or signer())}
-    return robot.set({**parameters, **values})
+def lease(robot: Robot, values: dict[str, float], *, by: Signer | None = None, trial: int = 4) -> Lease:
+    return Lease.make(f"/{robot.name}", trial, values, by or signer())
 
 
-@pytest.fixture
-def leased(robot: Robot) -> Iterator[Robot]:
-    assert ask_for(robot, {"ball.mass_kg": 0.05}).successful
-    yield robot
-    robot.set({"trial.number": -1})
+def ask_for(robot: Robot, *leases: Lease) -> Any:
+    return robot.set({"trial.leases": leases_to_json(leases)})
 
 
-def finished(robot: Robot) -> Delivery:
+def by_hand(robot: Robot) -> Delivery:
+    """The episode of a trial that was set up by parameters."""
     with robot.listening("std_msgs/msg/UInt8MultiArray", "episode", raw=True) as heard:
         assert robot.send(swing()).accepted
         assert robot.send(goal(TORSO), TORSO).accepted
         robot.wait_until(lambda: bool(heard), "an episode")
-    return unpack(heard[0], signer())
+    delivery = unpack(heard[0], signer())
+    assert isinstance(delivery, Delivery)
+    return delivery
 
 
-def test_a_lease_begins_its_trial_at_once(leased: Robot) -> None:
-    assert leased.now_ns() == CONFIG.trial_start_ns(4)
-    delivery = finished(leased)
-    assert delivery.episode.header.trial == 4
-    conditions = json.loads(delivery.conditions)
-    assert conditions["values"] == {"ball.mass_kg": 0.05}
-    assert sorted(conditions["inputs"]) == [ARM, TORSO]
+SLOWLY = {"sim.real_time_factor": 1.0}
 
 
-@pytest.mark.parametrize("stranger", [Signer(b"another key")])
-def test_a_lease_that_is_not_signed_is_refused(robot: Robot, stranger: Signer) -> None:
-    result = ask_for(robot, {}, by=stranger)
-    assert not result.successful
-    assert result.reason == "trial.lease: is not signed with the key of this run"
+@pytest.fixture
+def leased(robot: Robot) -> Iterator[Robot]:
+    """A simulation that is at a leased trial for more than a second."""
+    assert robot.set(SLOWLY).successful
+    assert ask_for(robot, lease(robot, {"ball.mass_kg": 0.05})).successful
+    yield robot
+    robot.set({"trial.number": -1})
+    robot.set({"sim.real_time_factor": 0.0})
+
+
+def handed_over(robot: Robot, *leases: Lease, meanwhile: Callable[[], object] = lambda: None) -> list[Any]:
+    """What a simulation hands over of these leases."""
+    with robot.listening("std_msgs/msg/UInt8MultiArray", "episode", raw=True) as heard:
+        assert ask_for(robot, *leases).successful
+        meanwhile()
+        robot.wait_until(lambda: len(heard) == len(leases), "all episodes")
+    return [unpack(message, signer()) for message in heard]
+
+
+def test_leased_trials_are_simulated_and_judged_in_their_order(robot: Robot) -> None:
+    leases = [lease(robot, {"ball.mass_kg": 0.04 + trial / 1000}, trial=trial) for trial in (4, 2, 3)]
+    deliveries = handed_over(robot, *leases)
+    assert [delivery.episode.header.trial for delivery in deliveries] == [4, 2, 3]
+    conditions = [json.loads(delivery.conditions) for delivery in deliveries]
+    assert [each["values"] for each in conditions] == [dict(each.values) for each in leases]
+    assert [each["lease"] for each in conditions] == [each.token for each in leases]
+    assert [json.loads(delivery.result)["outcome"] for delivery in deliveries] == ["landed"] * 3
+    start_ns = [delivery.episode.header.start_ns for delivery in deliveries]
+    assert start_ns == [CONFIG.trial_start_ns(trial) for trial in (4, 2, 3)]
+
+
+def test_a_trial_that_cannot_be_simulated_is_refused_and_the_others_are_not(robot: Robot) -> None:
+    wrong, right = lease(robot, {"ball.mass_kg": -1.0}), lease(robot, {}, trial=5)
+    refusal, delivery = handed_over(robot, wrong, right)
+    assert refusal.token == wrong.token
+    assert "ball.mass_kg" in refusal.reason
+    assert delivery.episode.header.trial == 5
+
+
+def test_leases_that_are_not_signed_are_refused(robot: Robot) -> None:
+    for wrong in (lease(robot, {}, by=Signer(b"another key")), replace(lease(robot, {}), simulation="/sim_9")):
+        result = ask_for(robot, wrong)
+        assert not result.successful
+        assert result.reason == f"trial.leases: is not signed for /{robot.name} with the key of this run"
+    assert not robot.set({"trial.leases": "trial 5, please"}).successful
     assert robot.now_ns() == 0
+
+
+def test_leases_are_set_alone(robot: Robot) -> None:
+    result = robot.set({"trial.leases": "[]", "ball.mass_kg": 0.05})
+    assert not result.successful
+    assert result.reason == "trial.leases: is set alone, not with ball.mass_kg"
 
 
 def test_what_a_lease_does_not_say_is_as_configured(robot: Robot) -> None:
     assert robot.set({"ball.friction": 0.1, "scene.gravity_mps2": 1.6}).successful
-    assert ask_for(robot, {"ball.mass_kg": 0.05}).successful
-    values = robot.parameters("get_parameters", names=["ball.friction", "scene.gravity_mps2", "ball.mass_kg"]).values
-    shown = [value.double_value for value in values]
-    assert shown == [CONFIG.ball.friction, CONFIG.scene.gravity_mps2, 0.05]
-    assert json.loads(finished(robot).conditions)["values"] == {"ball.mass_kg": 0.05}
+    (delivery,) = handed_over(robot, lease(robot, {"ball.mass_kg": 0.05}))
+    assert json.loads(delivery.conditions)["values"] == {"ball.mass_kg": 0.05}
+    values = robot.parameters("get_parameters", names=["ball.friction", "scene.gravity_mps2"]).values
+    assert [value.double_value for value in values] == [CONFIG.ball.friction, CONFIG.scene.gravity_mps2]
 
 
 @pytest.mark.parametrize(
@@ -98,33 +136,28 @@ def test_the_world_of_a_leased_trial_cannot_be_changed(service: str, fields: dic
     assert (result.result, result.error_message) == (Result.RESULT_INCORRECT_STATE, LEASED)
 
 
-def test_a_leased_trial_takes_one_goal_for_each_of_its_controllers(leased: Robot) -> None:
-    assert not leased.send(goal(HEAD), HEAD).accepted
-    assert leased.send(swing()).accepted
-    assert not leased.send(swing(0.5)).accepted
+def test_nothing_else_moves_or_stops_a_leased_controller(robot: Robot) -> None:
+    asked = [lease(robot, {"ball.mass_kg": 0.05}) for _ in range(2)]
+    (untouched,) = handed_over(robot, asked[0])
+    assert robot.set(SLOWLY).successful
+
+    def disturb() -> None:
+        assert not robot.send(swing()).accepted
+        assert not robot.send(goal(HEAD), HEAD).accepted
+        robot.publish(f"{ARM}/joint_trajectory", trajectory(ARM, 0.5))
+        robot.publish(f"{ARM}/speed_scaling_input", SpeedScalingFactor(factor=0.5), LATCHED)
+
+    (touched,) = handed_over(robot, asked[1], meanwhile=disturb)
+    robot.set({"sim.real_time_factor": 0.0})
+    assert touched.episode.digest == untouched.episode.digest
 
 
-def test_nothing_else_moves_or_stops_a_leased_controller(leased: Robot) -> None:
-    with leased.listening("std_msgs/msg/UInt8MultiArray", "episode", raw=True) as heard:
-        arm = leased.send(swing())
-        leased.publish(f"{ARM}/joint_trajectory", trajectory(ARM, 0.5))
-        leased.publish(f"{ARM}/speed_scaling_input", SpeedScalingFactor(factor=0.5), LATCHED)
-        answer = leased.result(arm.cancel_goal_async())
-        assert not answer.goals_canceling
-        assert leased.send(goal(TORSO), TORSO).accepted
-        leased.wait_until(lambda: bool(heard), "an episode")
-    touched = unpack(heard[0], signer()).episode
-    assert ask_for(leased, {"ball.mass_kg": 0.05}).successful
-    untouched = finished(leased).episode
-    assert touched.digest == untouched.digest
-
-
-def test_controllers_are_as_configured_in_every_leased_trial(leased: Robot) -> None:
-    untouched = finished(leased).episode
-    assert leased.set({f"constraints.{ELBOW}.trajectory": 1e-12}, node=ARM).successful
-    leased.publish(f"{ARM}/speed_scaling_input", SpeedScalingFactor(factor=0.5), LATCHED)
-    assert ask_for(leased, {"ball.mass_kg": 0.05}).successful
-    assert finished(leased).episode.digest == untouched.digest
+def test_controllers_are_as_configured_in_every_leased_trial(robot: Robot) -> None:
+    (untouched,) = handed_over(robot, lease(robot, {}))
+    assert robot.set({f"constraints.{ELBOW}.trajectory": 1e-12}, node=ARM).successful
+    robot.publish(f"{ARM}/speed_scaling_input", SpeedScalingFactor(factor=0.5), LATCHED)
+    (touched,) = handed_over(robot, lease(robot, {}))
+    assert touched.episode.digest == untouched.episode.digest
 
 
 def test_a_lease_can_be_ended_by_hand(leased: Robot) -> None:
@@ -137,4 +170,7 @@ def test_a_lease_can_be_ended_by_hand(leased: Robot) -> None:
 def test_what_was_simulated_without_a_lease_says_so(robot: Robot) -> None:
     assert robot.set({"trial.number": 4, "trial.controllers": [ARM, TORSO], "ball.mass_kg": 0.05}).successful
     robot.reset()
-    assert json.loads(finished(robot).conditions)["lease"] == ""
+    delivery = by_hand(robot)
+    conditions = json.loads(delivery.conditions)
+    assert (conditions["lease"], conditions["trajectory"], delivery.result) == ("", "", "")
+    assert conditions["values"] == {"ball.mass_kg": 0.05}

@@ -13,7 +13,7 @@ from throwcollect.config.values import sweepable_keys
 from throwcollect.episode.message import unpack
 from throwcollect.ros import Parameter
 
-OWN = ["trial.number", "trial.controllers", "trial.lease", "sim.real_time_factor"]
+OWN = ["trial.number", "trial.controllers", "trial.leases", "sim.real_time_factor"]
 FOREIGN = ("use_sim_time", "start_type_description_service")
 """Parameters that every node of ROS has."""
 INTEGER, DOUBLE, STRING, STRINGS = 2, 3, 4, 9
@@ -130,7 +130,7 @@ def test_a_trial_waits_for_all_its_controllers_and_then_hands_in_its_episode(rob
     assert [robot.outcome(handle)[1] for handle in (first, second)] == [0, 0]
     (message,) = heard
     parts = [each.label for each in deserialize(message, message_class("std_msgs/msg/UInt8MultiArray")).layout.dim]
-    assert parts == ["header", "conditions", "chunk", "signature"]
+    assert parts == ["header", "result", "conditions", "hashes", "chunk", "signature"]
     episode = unpack(message, signer()).episode
     episode.check_records()
     header = episode.header

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
-import struct
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -80,26 +78,3 @@ class TrajectoryGoal:
     path_tolerance: Sequence[JointTolerance] = ()
     goal_tolerance: Sequence[JointTolerance] = ()
     goal_time_tolerance_ns: int = 0
-
-    @property
-    def digest(self) -> str:
-        """SHA-256 over everything that the goal says, in hexadecimal: equal goals give equal digests."""
-        digest = hashlib.sha256()
-        for part in _parts(self):
-            # With lengths, so that what is absent in one field cannot be made up for by the next.
-            digest.update(struct.pack("<Q", len(part)) + part)
-        return digest.hexdigest()
-
-
-def _parts(goal: TrajectoryGoal) -> Iterator[bytes]:
-    trajectory = goal.trajectory
-    yield struct.pack("<qq", trajectory.stamp_ns or 0, goal.goal_time_tolerance_ns)
-    yield "\0".join(trajectory.joint_names).encode()
-    for point in trajectory.points:
-        yield struct.pack("<q", point.time_from_start_ns)
-        for values in (point.positions, point.velocities, point.accelerations, point.effort):
-            yield np.asarray(values, "<f8").tobytes()
-    for tolerances in (goal.path_tolerance, goal.goal_tolerance):
-        for each in tolerances:
-            yield each.name.encode() + struct.pack("<ddd", each.position, each.velocity, each.acceleration)
-        yield b"end of tolerances"

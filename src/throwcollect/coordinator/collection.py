@@ -10,20 +10,21 @@ from __future__ import annotations
 import math
 import time
 from collections import Counter, deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from types import TracebackType
 
-from throwcollect.coordinator.acceptance import Acceptance, PreparedTrial
+from throwcollect.coordinator.acceptance import Acceptance
 from throwcollect.coordinator.growth import Growth
 from throwcollect.coordinator.leases import Leases
+from throwcollect.coordinator.lookahead import Lookahead
 from throwcollect.coordinator.progress import Progress
 from throwcollect.coordinator.replay_check import check_by_replay
 from throwcollect.dataset.directory import find_known_directory
 from throwcollect.dataset.inspect import info, loss
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.episode.message import Delivery, Episode
-from throwcollect.errors import Interrupted, WorkerError
+from throwcollect.errors import DatasetError, Interrupted, WorkerError
 from throwcollect.sweep.plan import Trial
 from throwcollect.tasks.result import Result
 from throwcollect.tasks.task import task_of
@@ -44,7 +45,8 @@ class TrialCollection:
     Attributes:
         writer: The dataset that is filled.
         warn: Is told of trials that go to another simulation; to be replaced by whoever knows a log.
-        on_more_trials: Is called when the plan has grown, so that idle simulations can be given something to do.
+        on_change: Is called when simulations may have other trials to do than before: the plan has grown, or none shall
+            be begun any more.
 
     Args:
         writer: A dataset that is open.
@@ -53,15 +55,17 @@ class TrialCollection:
     def __init__(self, writer: DatasetWriter) -> None:
         self.writer = writer
         self.warn: Callable[[str], object] = lambda _: None
-        self.on_more_trials: Callable[[], None] = lambda: None
+        self.on_change: Callable[[], None] = lambda: None
         self._config = writer.plan.config
         self._trials: dict[int, Trial] = {trial.number: trial for trial in writer.plan.trials if trial.refused is None}
         self._leases = Leases(self._trials, retries=self._config.run.retries)
         self._growth = Growth(writer.plan) if self._config.grows else None
         self._names: dict[str, str] = {}
         self._acceptance = Acceptance(self._config)
-        self._prepared: dict[int, PreparedTrial] = {}
-        self._backlog: deque[tuple[Episode, PreparedTrial]] = deque()
+        task = task_of(self._config)
+        self._columns, self._outcome_names = task.columns, task.outcomes
+        self._lookahead = Lookahead()
+        self._backlog: deque[tuple[Episode, Result]] = deque()
         self._set_aside: dict[str, str] = {}
         self._outcomes: Counter[str] = Counter()
         self._ends: deque[tuple[float, int]] = deque([(time.monotonic(), 0)])
@@ -125,10 +129,13 @@ class TrialCollection:
         return self._leases.finished and self._growth is None
 
     def drain(self) -> None:
-        """Lease no more trials; those that run may end within `run.grace_s`."""
+        """Have no more trials begun; those that run may end within `run.grace_s`."""
         if not self._draining:
             self._draining = True
             self._drain_deadline = time.monotonic() + self._config.run.grace_s
+            for simulation in self._names:
+                self._leases.release(simulation)
+            self.on_change()
 
     def recall(self, trial: int, result: Result) -> None:
         """Count a trial as ended whose episode is in the dataset already, before anything is leased.
@@ -151,89 +158,93 @@ class TrialCollection:
         self._names[simulation] = name
 
     def leave(self, simulation: str, reason: str) -> None:
-        """Take a trial back from a simulation that is gone, and forget it; the next one of its name is another one."""
+        """Take its trials back from a simulation that is gone, and forget it; the next of its name is another one."""
         self.take_back(simulation, reason)
         self._leases.forget(simulation)
+        self._lookahead.forget(simulation)
         del self._names[simulation]
 
-    def find_trial(self, simulation: str) -> int | None:
-        """Trial that a simulation works at; None if at none."""
-        return self._leases.find_trial(simulation)
-
-    def lease(self, simulation: str) -> tuple[int, PreparedTrial] | None:
-        """Give the next trial to a simulation that has none.
+    def lease(self, simulation: str) -> tuple[int, ...]:
+        """Give further trials to a simulation that has few.
 
         Returns:
-            Number of the trial, and all that is worked out of it; None if the simulation gets none for now.
+            All trials that it shall do, in their order.
         """
-        if self._draining or self._leases.find_trial(simulation) is not None:
-            return None
-        trial = self._leases.lease(simulation, others=self._names)
-        if trial is None:
-            return None
-        prepared = self._prepared.get(trial) or self._prepare(trial)
-        self._prepared[trial] = prepared
-        self.writer.note("lease", trial=trial, simulation=self.name_of(simulation))
-        return trial, prepared
+        held = self._leases.find_held(simulation)
+        wanted = self._lookahead.count_for(
+            simulation, waiting=self._leases.waiting + len(held), simulations=len(self._names)
+        )
+        if self._draining or len(held) > wanted // 2:
+            return held
+        if not held:
+            self._lookahead.begin(simulation)
+        while len(held) < wanted and (trial := self._leases.lease(simulation, others=self._names)) is not None:
+            self.writer.note("lease", trial=trial, simulation=self.name_of(simulation))
+            held = (*held, trial)
+        return held
 
-    def take_in(self, simulation: str, delivery: Delivery, token: str) -> bool:
-        """Take an episode in, to be written by `write_one`, if it is the one that was asked for.
+    def values_of(self, trial: int) -> Mapping[str, float]:
+        """What a trial replaces of the configuration, by dotted key."""
+        return self._trials[trial].values
+
+    def take_in(self, simulation: str, delivery: Delivery, token: str = "") -> None:
+        """Take an episode in, to be written by `write_one`; one that is not as it was asked for goes back.
 
         Args:
-            simulation: The simulation that has handed it over.
+            simulation: The simulation that has handed it over, which holds its trial.
             delivery: The episode, with what the simulation says of it.
-            token: Signature of the lease; empty if it was not signed.
-
-        Returns:
-            Whether it was; if not, its trial goes to another simulation.
+            token: That of its lease; empty if there was none.
         """
-        trial = delivery.episode.header.trial
-        prepared = self._prepared[trial]
-        if (reason := self._acceptance.foreign(delivery, prepared, token)) is not None:
-            self.take_back(simulation, f"its episode is refused: {reason}", refused=True)
-            return False
-        self._leases.deliver(simulation, trial)
-        self._backlog.append((delivery.episode, self._prepared.pop(trial)))
-        return True
+        episode = delivery.episode
+        trial = episode.header.trial
+        try:
+            result = self._columns.from_json(self._outcome_names, delivery.result)
+            plan = self.writer.plan
+            reason = self._acceptance.find_difference(delivery.conditions, plan, self._trials[trial], token=token)
+        except DatasetError as error:
+            reason = error.message
+        if reason is not None:
+            self.refuse(simulation, trial, f"its episode is refused: {reason}")
+            return
+        self._lookahead.end(simulation)
+        self._leases.complete(simulation, trial)
+        self._tell_set_aside()
+        self._backlog.append((episode, result))
+
+    def refuse(self, simulation: str, trial: int, reason: str) -> None:
+        """Take a trial back that a simulation could not do, or did otherwise; it may refuse all others, too.
+
+        Args:
+            simulation: Its address.
+            trial: The trial, which it holds.
+            reason: Why, kept as evidence.
+        """
+        self._give_back(simulation, trial, reason, self._leases.fail(simulation, trial, reason, refused=True))
 
     def take_back(self, simulation: str, reason: str, *, refused: bool = False) -> None:
-        """Take a trial back from a simulation that did not do it; without one, nothing happens.
+        """Take all trials back from a simulation; it failed with the first, the others it had not begun.
 
         Args:
             simulation: Its address.
             reason: What happened, kept as evidence.
-            refused: Whether the simulation refused the trial, so that it may refuse all others, too.
+            refused: Whether the simulation refused them, so that it may refuse all others, too.
         """
-        trial = self._leases.find_trial(simulation)
-        if trial is not None:
-            given_up = self._leases.fail(simulation, reason, refused=refused)
-            self._give_back(simulation, trial, reason, given_up and given_up[1])
+        self._leases.release(simulation)
+        for trial in self._leases.find_held(simulation):
+            self._give_back(simulation, trial, reason, self._leases.fail(simulation, trial, reason, refused=refused))
 
     def write_one(self) -> None:
-        """Check, judge and write the oldest episode of the backlog.
+        """Write the oldest episode of the backlog.
 
         Raises:
             DatasetError: If the dataset cannot be written.
         """
-        episode, prepared = self._backlog.popleft()
-        trial = episode.header.trial
-        if (problem := self._acceptance.unsound(episode, prepared)) is not None:
-            simulation = self._leases.deliverer(trial)
-            self._prepared[trial] = prepared
-            self._give_back(
-                simulation, trial, f"its episode is refused: {problem}", self._leases.reject(trial, problem)
-            )
-            return
-        result = task_of(prepared.config).judge(episode.samples(), episode.header, prepared.trajectory)
+        episode, result = self._backlog.popleft()
         self.writer.append(episode, result)
-        self._leases.complete(trial)
-        self._tell_set_aside()
-        self._note(trial, result)
+        self._note(episode.header.trial, result)
 
-    def prepare_one(self) -> bool:
-        """Do a piece of work that can wait, of some milliseconds, so that no simulation will wait for it.
-
-        That is to work out one of the trials that will be leased next, or to get on with the next round of the plan.
+    def grow_plan(self) -> bool:
+        """Get on with the next round of the plan, for some milliseconds.
 
         Returns:
             Whether there was something to do.
@@ -241,10 +252,6 @@ class TrialCollection:
         Raises:
             DatasetError: If the plan, or a shard that is complete without further trials, cannot be written.
         """
-        for trial in self._leases.upcoming(len(self._names)):
-            if trial not in self._prepared:
-                self._prepared[trial] = self._prepare(trial)
-                return True
         return self._growth is not None and self._grow(self._growth)
 
     def look_after(self) -> None:
@@ -325,9 +332,6 @@ class TrialCollection:
         """Name of a simulation's node, also when it has left."""
         return self._names.get(simulation, simulation.strip("/"))
 
-    def _prepare(self, number: int) -> PreparedTrial:
-        return self._acceptance.prepare(self.writer.plan, self._trials[number])
-
     def _grow(self, growth: Growth) -> bool:
         if growth.over:
             self._growth = None
@@ -339,7 +343,7 @@ class TrialCollection:
             fresh = {trial.number: trial for trial in trials if trial.refused is None}
             self._trials |= fresh
             self._leases.add(fresh)
-            self.on_more_trials()
+            self.on_change()
         return trials is not None
 
     def _note(self, trial: int, result: Result) -> None:
@@ -358,6 +362,5 @@ class TrialCollection:
         self.warn(f"{simulation}: trial {trial} is given to another simulation: {reason}")
         self.writer.note("fail", trial=trial, simulation=self.name_of(simulation), reason=reason)
         if given_up is not None:
-            del self._prepared[trial]
             self.writer.append_lost(trial, "; ".join(given_up))
             self._note(trial, task_of(self._config).lose("; ".join(given_up)))

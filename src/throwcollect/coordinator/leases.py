@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Collection, Iterable
-from itertools import islice
 
 _MOST_IN_A_ROW = 3
 """After so many refused trials, and none that it could do, a simulation is doubted."""
@@ -13,10 +12,10 @@ _MOST_IN_A_ROW = 3
 class Leases:
     """Hands out trials and takes them back; every trial is completed or given up exactly once.
 
-    A trial is *waiting*, then *held* by a simulation, then *delivered*: its episode is there but not checked yet. From
-    there it is completed, or it waits again. Trials are handed out by number; one that comes back goes before all that
-    are new, so that the dataset's open shards stay few, but not to a simulation that has failed with it, as long as
-    there is another one.
+    A trial is *waiting*, then *held* by a simulation, until it is completed or waits again. A simulation does the
+    trials that it holds in their order. Trials are handed out by number; one that comes back goes before all that are
+    new, so that the dataset's open shards stay few, but not to a simulation that has failed with it, as long as there
+    is another one.
 
     Some trials are refused by every simulation, and some simulations refuse every trial. So one that refuses is doubted
     at first: others get the trials. It is set aside for good when others could do what it refused.
@@ -30,8 +29,7 @@ class Leases:
         self._fresh = deque(sorted(set(trials)))
         self._returned: list[int] = []
         self._retries = retries
-        self._holders: dict[str, int] = {}
-        self._delivered: dict[int, str] = {}
+        self._held: dict[str, list[int]] = {}
         self._failures: dict[int, list[tuple[str, str]]] = {}
         self._refusals: dict[str, list[tuple[int, str]]] = {}
         """Trials that a simulation has refused since it could do one, with the reasons."""
@@ -53,8 +51,13 @@ class Leases:
 
     @property
     def leased(self) -> int:
-        """Number of trials that are with a simulation, or delivered and not checked yet."""
-        return len(self._holders) + len(self._delivered)
+        """Number of trials that are with a simulation."""
+        return sum(map(len, self._held.values()))
+
+    @property
+    def waiting(self) -> int:
+        """Number of trials that no simulation holds, and that are to be done."""
+        return len(self._fresh) + len(self._returned)
 
     @property
     def finished(self) -> bool:
@@ -79,29 +82,20 @@ class Leases:
         self._fresh.extend(fresh)
         self._total += len(fresh)
 
-    def upcoming(self, count: int) -> list[int]:
-        """The trials that will be handed out next, at most so many."""
-        return [*sorted(self._returned), *islice(self._fresh, count)][:count]
-
-    def find_trial(self, simulation: str) -> int | None:
-        """Trial that a simulation holds, or None."""
-        return self._holders.get(simulation)
+    def find_held(self, simulation: str) -> tuple[int, ...]:
+        """The trials that a simulation holds, in their order."""
+        return tuple(self._held.get(simulation, ()))
 
     def lease(self, simulation: str, *, others: Collection[str] = ()) -> int | None:
         """Give the next trial to a simulation.
 
         Args:
-            simulation: Name of a simulation that holds no trial.
+            simulation: Name of a simulation.
             others: Names of the other simulations that there are.
 
         Returns:
             Number of the trial, or None when none is waiting for it.
-
-        Raises:
-            ValueError: If the simulation still holds a trial.
         """
-        if simulation in self._holders:
-            raise ValueError(f"{simulation} still holds trial {self._holders[simulation]}")
         rivals = [other for other in others if other != simulation and not self._is_doubted(other)]
         if self.why_set_aside(simulation) is not None or (rivals and self._is_doubted(simulation)):
             return None
@@ -112,7 +106,7 @@ class Leases:
             trial = self._fresh.popleft()
         else:
             return None
-        self._holders[simulation] = trial
+        self._held.setdefault(simulation, []).append(trial)
         return trial
 
     def recall(self, trial: int) -> None:
@@ -124,25 +118,13 @@ class Leases:
         self._fresh.remove(trial)
         self._ended += 1
 
-    def deliver(self, simulation: str, trial: int) -> bool:
-        """A simulation handed in the episode of a trial, which is to be checked.
+    def complete(self, simulation: str, trial: int) -> None:
+        """A simulation has done a trial that it held.
 
-        Returns:
-            Whether the simulation held that trial; an episode that comes too late is not wanted any more.
+        Raises:
+            ValueError: If it does not hold the trial.
         """
-        if self._holders.get(simulation) != trial:
-            return False
-        del self._holders[simulation]
-        self._delivered[trial] = simulation
-        return True
-
-    def deliverer(self, trial: int) -> str:
-        """Name of the simulation that has delivered a trial."""
-        return self._delivered[trial]
-
-    def complete(self, trial: int) -> None:
-        """The episode of a delivered trial is as it should be."""
-        simulation = self._delivered.pop(trial)
+        self._drop(simulation, trial)
         self._refusals.pop(simulation, None)
         self._wrong_refusals.pop(simulation, None)
         for other, refused in self._refusals.items():
@@ -151,48 +133,22 @@ class Leases:
         self._ended += 1
         self._completed += 1
 
-    def reject(self, trial: int, reason: str) -> list[str] | None:
-        """The episode of a delivered trial is not as it should be; the trial goes back, or is given up.
-
-        Args:
-            trial: Number of the trial.
-            reason: What is wrong with it, kept as evidence.
-
-        Returns:
-            All reasons when its retries are used up, else None.
-        """
-        return self._return(self._delivered.pop(trial), trial, reason, refused=True)
-
-    def fail(self, simulation: str, reason: str, *, refused: bool = False) -> tuple[int, list[str]] | None:
-        """A simulation was lost or could not do its trial; the trial goes back, or is given up.
+    def fail(self, simulation: str, trial: int, reason: str, *, refused: bool = False) -> list[str] | None:
+        """A simulation was lost with a trial, or could not do it; the trial goes back, or is given up.
 
         Args:
             simulation: Name of the simulation.
+            trial: A trial that it holds.
             reason: What happened, kept as evidence.
             refused: Whether the simulation refused the trial, so that it may refuse all others, too.
 
         Returns:
-            The trial and all reasons when its retries are used up, else None.
+            All reasons when its retries are used up, else None.
+
+        Raises:
+            ValueError: If it does not hold the trial.
         """
-        trial = self._holders.pop(simulation, None)
-        if trial is None:
-            return None
-        reasons = self._return(simulation, trial, reason, refused=refused)
-        return None if reasons is None else (trial, reasons)
-
-    def forget(self, simulation: str) -> None:
-        """A simulation is gone; the next one of its name is another one."""
-        self._refusals.pop(simulation, None)
-        self._wrong_refusals.pop(simulation, None)
-
-    def _is_doubted(self, simulation: str) -> bool:
-        return len(self._refusals.get(simulation, ())) >= _MOST_IN_A_ROW
-
-    def _may_try(self, simulation: str, trial: int, rivals: Collection[str]) -> bool:
-        failed = {name for name, _ in self._failures[trial]}
-        return simulation not in failed or failed.issuperset(rivals)
-
-    def _return(self, simulation: str, trial: int, reason: str, *, refused: bool) -> list[str] | None:
+        self._drop(simulation, trial)
         if refused:
             self._refusals.setdefault(simulation, []).append((trial, reason))
         failures = self._failures.setdefault(trial, [])
@@ -206,3 +162,27 @@ class Leases:
             for name, refusals in self._refusals.items():
                 self._refusals[name] = [each for each in refusals if each[0] != trial]
         return [f"{name}: {why}" for name, why in failures]
+
+    def release(self, simulation: str) -> None:
+        """Take from a simulation all trials but the first, which runs; they were not begun, so nobody failed."""
+        held = self._held.get(simulation, [])
+        self._returned += held[1:]
+        del held[1:]
+
+    def forget(self, simulation: str) -> None:
+        """A simulation is gone; the next one of its name is another one."""
+        self._refusals.pop(simulation, None)
+        self._wrong_refusals.pop(simulation, None)
+
+    def _is_doubted(self, simulation: str) -> bool:
+        return len(self._refusals.get(simulation, ())) >= _MOST_IN_A_ROW
+
+    def _may_try(self, simulation: str, trial: int, rivals: Collection[str]) -> bool:
+        failed = {name for name, _ in self._failures.get(trial, ())}
+        return simulation not in failed or failed.issuperset(rivals)
+
+    def _drop(self, simulation: str, trial: int) -> None:
+        held = self._held.get(simulation, [])
+        held.remove(trial)
+        if not held:
+            self._held.pop(simulation, None)

@@ -78,7 +78,7 @@ def _collect(node: Coordinator, collection: TrialCollection, executor: ros.Execu
     while not collection.finished:
         heartbeat.beat()
         # Simulations come first: what can wait is done when no message is there.
-        waiting = collection.backlog or collection.prepare_one()
+        waiting = collection.backlog or collection.grow_plan()
         ros.spin_some(executor, timeout_sec=0.0 if waiting else _IDLE_S)
         if collection.backlog:
             collection.write_one()

@@ -11,13 +11,13 @@ from throwcollect.coordinator.collection import TrialCollection
 from throwcollect.coordinator.progress import Progress
 from throwcollect.coordinator.progress_topic import PROGRESS_QOS, PROGRESS_TOPIC
 from throwcollect.coordinator.simulation_client import EPISODE_TOPIC, SimulationClient
-from throwcollect.episode.message import unpack
+from throwcollect.episode.message import Refusal, unpack
 from throwcollect.errors import DatasetError
-from throwcollect.robots.description import robot_of
 from throwcollect.ros import Node, graph_changes
-from throwcollect.ros.action import FollowJointTrajectory
 from throwcollect.ros.msg import String
 from throwcollect.run_key import Signer
+from throwcollect.trial.conditions import conditions_from_json
+from throwcollect.trial.lease import Lease
 
 _DISCOVERY_PERIOD_S = 0.1
 _REPORT_PERIOD_S = 0.2
@@ -42,7 +42,7 @@ class Coordinator(Node):
         super().__init__("coordinator")
         self._collection = collection
         collection.warn = self.get_logger().warning
-        collection.on_more_trials = self._lease_to_all
+        collection.on_change = self._lease_to_all
         config = collection.writer.plan.config
         self._simulations: dict[str, SimulationClient] = {}
         self._discovered_changes = -1
@@ -52,9 +52,6 @@ class Coordinator(Node):
         # With a real-time factor a trial takes as long as onlookers were promised, so the simulation is not lost.
         slowed_s = config.sim.max_trial_s / (config.sim.real_time_factor or math.inf)
         self._patience_s = config.run.trial_timeout_s + slowed_s
-        robot, naming = robot_of(config), config.controllers.names
-        used = {robot.controller_of(joint) for joint in config.task.end}
-        self._controllers = {name: robot.graph_name(name, naming) for name in robot.controllers if name in used}
         self._progress = self.create_publisher(String, PROGRESS_TOPIC, PROGRESS_QOS)
         self.create_timer(_DISCOVERY_PERIOD_S, self._discover)
         self.create_timer(_REPORT_PERIOD_S, self.report)
@@ -75,11 +72,10 @@ class Coordinator(Node):
         for namespace, simulation in list(self._simulations.items()):
             if now > simulation.deadline:
                 simulation.hung = True
-                besides = f", and no answer to {simulation.unanswered[0]}" if simulation.unanswered else ""
+                besides = ", and no answer to the lease" if simulation.unanswered else ""
                 self._take_back(namespace, f"no episode within {self._patience_s:g} s{besides}")
             elif (missing := simulation.remind()) is not None:
-                trial = self._collection.find_trial(namespace)
-                self.get_logger().warning(f"{namespace}: no answer to {missing} of trial {trial}, which is sent again")
+                self.get_logger().warning(f"{namespace}: no answer to the lease of {missing}, which is sent again")
             self._lease(namespace)
         self._notice_unreached(now)
 
@@ -111,8 +107,7 @@ class Coordinator(Node):
                 self,
                 namespace,
                 *offered[namespace],
-                controllers=self._controllers,
-                action_type=FollowJointTrajectory,
+                make_lease=self._make_lease,
                 on_episode=self._receive,
                 on_refusal=lambda address, reason: self._take_back(address, reason, refused=True),
             )
@@ -152,35 +147,36 @@ class Coordinator(Node):
 
     def _lease(self, namespace: str) -> None:
         simulation = self._simulations.get(namespace)
-        if simulation is None or simulation.hung or self._collection.find_trial(namespace) is not None:
+        if simulation is None or simulation.hung or not simulation.ready():
             return
-        if self._collection.draining or not simulation.ready() or (leased := self._collection.lease(namespace)) is None:
-            return
-        trial, prepared = leased
-        simulation.deadline = time.monotonic() + self._patience_s
-        lease = prepared.lease(namespace, trial)
-        simulation.begin(lease, lease.sign(self._signer), prepared.messages)
+        if simulation.ask(self._collection.lease(namespace)) and simulation.deadline == math.inf:
+            simulation.deadline = time.monotonic() + self._patience_s
+
+    def _make_lease(self, namespace: str, trial: int) -> Lease:
+        return Lease.make(namespace, trial, self._collection.values_of(trial), self._signer)
 
     def _receive(self, namespace: str, message: bytes) -> None:
         try:
-            delivery = unpack(message, self._signer)
-            # What cannot be read must not end the collection later.
-            delivery.episode.samples()
+            handed = unpack(message, self._signer)
+            token = handed.token if isinstance(handed, Refusal) else conditions_from_json(handed.conditions).lease
         except DatasetError as error:
             # Anybody may have sent it, so it says nothing about the simulation.
             self.get_logger().warning(
                 f"{namespace}: an episode is dropped: {error}", throttle_duration_sec=_UNREADABLE_PERIOD_S
             )
             return
-        trial = delivery.episode.header.trial
         simulation = self._simulations[namespace]
         simulation.hung = False
-        if self._collection.find_trial(namespace) != trial:
-            self.get_logger().warning(f"{namespace}: trial {trial} came too late and was dropped")
+        trial = simulation.finish(token)
+        if trial is None:
+            self.get_logger().warning(f"{namespace}: an episode came too late and was dropped")
             return
-        simulation.abandon()
-        if self._collection.take_in(namespace, delivery, simulation.token):
-            self._lease(namespace)
+        simulation.deadline = time.monotonic() + self._patience_s if simulation.trials else math.inf
+        if isinstance(handed, Refusal):
+            self._collection.refuse(namespace, trial, handed.reason)
+        else:
+            self._collection.take_in(namespace, handed, token)
+        self._lease(namespace)
 
     def _take_back(self, namespace: str, reason: str, *, refused: bool = False) -> None:
         self._simulations[namespace].abandon()

@@ -3,45 +3,34 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Sequence
 from collections.abc import Set as AbstractSet
-from typing import Any
-from uuid import uuid4
 
-from throwcollect.ros import (
-    Future,
-    HistoryPolicy,
-    Node,
-    Parameter,
-    QoSProfile,
-    ReliabilityPolicy,
-)
-from throwcollect.ros.action import FollowJointTrajectory
-from throwcollect.ros.msg import UUID, UInt8MultiArray
+from throwcollect.ros import Future, HistoryPolicy, Node, Parameter, QoSProfile, ReliabilityPolicy
+from throwcollect.ros.msg import UInt8MultiArray
 from throwcollect.ros.srv import SetParametersAtomically
-from throwcollect.trial.lease import CONTROLLERS, LEASE, NUMBER, Lease
+from throwcollect.trial.lease import LEASES, Lease, leases_to_json
+from throwcollect.wording import format_count
 
-_LEASE = "the lease"
 _ANSWER_S = 5.0
-"""Lease and goals are answered within milliseconds, before anything is simulated; whatever is not answered in this real
-time went astray, as on the way through a router that was started again."""
+"""Leases are answered within milliseconds, or between two slices of a trial; what is not answered in this real time
+went astray, as on the way through a router that was started again."""
 
 EPISODE_TOPIC = "episode"
 EPISODE_QOS = QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy.RELIABLE)
 
 
 class SimulationClient:
-    """Clients for the services and actions of one simulation.
+    """Asks one simulation for trials, and hears what it hands over.
 
     Args:
         node: The coordinator.
         namespace: Namespace of the simulation, such as ``/sim_0`` or ``/``.
         name: Name of its node there.
         publishers: Identifiers of its publishers of episodes: a simulation that is started again has other ones.
-        controllers: Controllers that trials send goals to, and their names in the ROS graph.
-        action_type: The FollowJointTrajectory action.
-        on_episode: Called with the serialised message of an episode.
-        on_refusal: Called with the reason when the simulation refuses a trial.
+        make_lease: Makes a new lease of a trial for a simulation, which is given by its namespace.
+        on_episode: Called with the serialised message of an episode, or of a refusal.
+        on_refusal: Called with the reason when the simulation refuses to be asked.
     """
 
     def __init__(
@@ -51,8 +40,7 @@ class SimulationClient:
         name: str,
         publishers: AbstractSet[bytes],
         *,
-        controllers: Mapping[str, str],
-        action_type: type[FollowJointTrajectory],
+        make_lease: Callable[[str, int], Lease],
         on_episode: Callable[[str, bytes], None],
         on_refusal: Callable[[str, str], None],
     ) -> None:
@@ -60,29 +48,20 @@ class SimulationClient:
         self.name = name
         self.publishers = publishers
         self.deadline = float("inf")
-        """Monotonic time [s] at which the running trial counts as lost."""
+        """Monotonic time [s] at which the trial that runs counts as lost; infinite while none does."""
         self.hung = False
         """Whether a trial was lost that way and nothing has come from the simulation since."""
-        self.token = ""
-        """Signature of the lease of the running trial, or of the last one."""
-        self.unanswered: list[str] = []
-        """What the simulation was sent for the running trial and has not answered yet."""
+        self.unanswered = False
+        """Whether the simulation has not answered yet what it was asked for last."""
         self._node = node
+        self._make_lease = make_lease
         self._on_refusal = on_refusal
         self._generation = 0
-        self._sent: tuple[Lease, Mapping[str, Any]]
-        self._sent_at = self._patience_s = 0.0
+        self._leases: dict[int, Lease] = {}
+        self._sent_at = 0.0
+        self._patience_s = _ANSWER_S
         prefix = namespace.removesuffix("/")
         self._parameters = node.create_client(SetParametersAtomically, f"{prefix}/{name}/set_parameters_atomically")
-        # Of the action, the service that takes goals is all that is needed. A whole action client would also subscribe
-        # to the feedback, and simulations advance in short slices of time while somebody listens to that.
-        self._send_goal = action_type.Impl.SendGoalService
-        self._goals = {
-            controller: node.create_client(
-                self._send_goal, f"{prefix}/{shown}/follow_joint_trajectory/_action/send_goal"
-            )
-            for controller, shown in controllers.items()
-        }
         self._episodes = node.create_subscription(
             UInt8MultiArray,
             f"{prefix}/{EPISODE_TOPIC}",
@@ -91,98 +70,83 @@ class SimulationClient:
             raw=True,
         )
 
+    @property
+    def trials(self) -> tuple[int, ...]:
+        """The trials that the simulation was asked for and has not handed over, in their order."""
+        return tuple(self._leases)
+
     def ready(self) -> bool:
         """Whether everything that a trial needs is offered."""
-        return all(client.service_is_ready() for client in (self._parameters, *self._goals.values()))
+        return self._parameters.service_is_ready()
 
-    def begin(self, lease: Lease, token: str, goals: Mapping[str, FollowJointTrajectory.Goal]) -> None:
-        """Start a trial.
-
-        The goals leave when the lease has been accepted, as nothing in ROS 2 says in which order a node handles
-        requests to different services and actions.
+    def ask(self, trials: Sequence[int]) -> bool:
+        """Ask for trials instead of those that were asked for before; one that runs goes on if it is among them.
 
         Args:
-            lease: The trial.
-            token: Its signature.
-            goals: Joint trajectory goal of each controller, as a message.
-        """
-        self.token = token
-        self._patience_s = _ANSWER_S
-        self._send(lease, goals)
-
-    def remind(self) -> str | None:
-        """Start the trial once more if something that was sent has had no answer; a trial may be started twice.
+            trials: All trials that it shall do, in their order.
 
         Returns:
-            What had no answer; None if there is nothing to remind of yet.
+            Whether it was not asked for just these already.
+        """
+        if tuple(trials) == self.trials:
+            return False
+        self._leases = {trial: self._leases.get(trial) or self._make_lease(self.namespace, trial) for trial in trials}
+        self._patience_s = _ANSWER_S
+        self._send()
+        return True
+
+    def remind(self) -> str | None:
+        """Ask once more if there was no answer, with new leases, as episodes of the old ones may be lost, too.
+
+        Returns:
+            What had no answer, in words; None if there is nothing to remind of yet.
         """
         if not self.unanswered or time.monotonic() < self._sent_at + self._patience_s:
             return None
-        missing = self.unanswered[0]
         # A simulation that was frozen for a while shall not find a pile of requests.
         self._patience_s *= 2
-        self._send(*self._sent)
-        return missing
+        self._leases = {trial: self._make_lease(self.namespace, trial) for trial in self._leases}
+        self._send()
+        return format_count(len(self._leases), "trial")
+
+    def finish(self, token: str) -> int | None:
+        """Take note that a trial was handed over, or refused.
+
+        Args:
+            token: That of its lease.
+
+        Returns:
+            The trial; None if the simulation was not asked for that, or is not any more.
+        """
+        trial = next((trial for trial, lease in self._leases.items() if lease.token == token), None)
+        if trial is not None:
+            del self._leases[trial]
+        return trial
 
     def abandon(self) -> None:
-        """Forget the running trial: late answers to it are ignored."""
+        """Forget all trials: late answers and episodes are ignored."""
         self._generation += 1
-        self.unanswered = []
+        self._leases = {}
+        self.unanswered = False
         self.deadline = float("inf")
 
     def destroy(self) -> None:
         """Take all clients off the graph."""
         self.abandon()
-        for client in (self._parameters, *self._goals.values()):
-            self._node.destroy_client(client)
+        self._node.destroy_client(self._parameters)
         self._node.destroy_subscription(self._episodes)
 
-    def _send(self, lease: Lease, goals: Mapping[str, FollowJointTrajectory.Goal]) -> None:
+    def _send(self) -> None:
         self._generation += 1
-        self._sent, self._sent_at = (lease, goals), time.monotonic()
-        self.unanswered = [_LEASE, *goals]
-        parameters = [
-            Parameter(NUMBER, value=lease.trial),
-            Parameter(CONTROLLERS, value=list(lease.controllers)),
-            Parameter(LEASE, value=self.token),
-            *(Parameter(key, value=float(value)) for key, value in lease.values.items()),
-        ]
-        request = SetParametersAtomically.Request(parameters=[item.to_parameter_msg() for item in parameters])
+        generation, self._sent_at, self.unanswered = self._generation, time.monotonic(), True
 
-        def send_goals() -> None:
-            for controller, goal in goals.items():
-                goal_id = UUID(uuid=list(uuid4().bytes))
-                answer = self._goals[controller].call_async(self._send_goal.Request(goal_id=goal_id, goal=goal))
-                self._expect(controller, answer, _refusal_of(controller))
-
-        self._expect(
-            _LEASE,
-            self._parameters.call_async(request),
-            lambda response: None if response.result.successful else f"parameters: {response.result.reason}",
-            send_goals,
-        )
-
-    def _expect(
-        self,
-        sent: str,
-        answer: Future,
-        refusal: Callable[[Any], str | None],
-        proceed: Callable[[], None] | None = None,
-    ) -> None:
-        """Report a refusal, or else proceed, unless the trial that it concerns is over by then."""
-        generation = self._generation
-
-        def check(future: Future) -> None:
+        def check(answer: Future) -> None:
             if generation != self._generation:
                 return
-            self.unanswered.remove(sent)
-            if (reason := refusal(future.result())) is not None:
-                self._on_refusal(self.namespace, reason)
-            elif proceed is not None:
-                proceed()
+            self.unanswered = False
+            result = answer.result().result
+            if not result.successful:
+                self._on_refusal(self.namespace, f"leases: {result.reason}")
 
-        answer.add_done_callback(check)
-
-
-def _refusal_of(controller: str) -> Callable[[Any], str | None]:
-    return lambda response: None if response.accepted else f"{controller} refused the goal; its log says why"
+        asked = Parameter(LEASES, value=leases_to_json(self._leases.values())).to_parameter_msg()
+        self._parameters.call_async(SetParametersAtomically.Request(parameters=[asked])).add_done_callback(check)

@@ -16,10 +16,10 @@ from throwcollect.dataset.mcap_reader import StoredEpisode
 from throwcollect.dataset.recorded_trial import RecordedTrial
 from throwcollect.dataset.throws_table import Place, Row, ThrowsTable
 from throwcollect.dataset.verify_header import find_header_problems
-from throwcollect.dataset.verify_motion import find_ball_problems, find_infinite_columns, find_joint_problems
+from throwcollect.dataset.verify_motion import find_ball_problems, find_joint_problems
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.message import Episode
-from throwcollect.episode.record import Samples
+from throwcollect.episode.record import Samples, find_infinite_columns
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.robots.description import robot_of, touchable_bodies
 from throwcollect.sweep.plan import Plan

@@ -7,14 +7,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import fields
 
 import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
 from throwcollect.dataset.recorded_trial import RecordedTrial
-from throwcollect.episode.record import Samples
 from throwcollect.robots.description import find_locked_joints, robot_of, start_posture
 from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.quintic_curve import sample_positions
@@ -37,15 +35,6 @@ _FOLLOW_RAD = 0.02
 """With the default gains, motors that are not saturated stay within 0.0002 rad of their commands."""
 _AT_LIMIT = 0.999
 _FAILED_GOALS = (5, 6)
-
-
-def find_infinite_columns(samples: Samples) -> Iterator[str]:
-    """Columns that hold numbers that are not finite, a sentence each."""
-    for field in fields(samples):
-        finite = np.isfinite(getattr(samples, field.name))
-        if not finite.all():
-            row = int(np.argmin(finite.reshape(len(samples), -1).all(axis=1)))
-            yield f"{field.name} holds numbers that are not finite, first in sample {row}"
 
 
 def find_joint_problems(trial: RecordedTrial) -> Iterator[str]:

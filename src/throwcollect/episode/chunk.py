@@ -237,7 +237,11 @@ class ChunkEncoder:
         self._dtype = _row_type({topic.name: topic.layout for topic in channels.recorded.values()})
 
     def encode(self, samples: Samples, controllers: Mapping[str, ControllerSamples] | None = None) -> Chunk:
-        """Encode and compress an episode.
+        """Encode and compress an episode; see `lay_out`."""
+        return self.compress(self.lay_out(samples, controllers), samples)
+
+    def lay_out(self, samples: Samples, controllers: Mapping[str, ControllerSamples] | None = None) -> memoryview:
+        """The message records of an episode.
 
         Args:
             samples: The samples, at least one.
@@ -255,7 +259,10 @@ class ChunkEncoder:
             column["sequence"] = np.arange(len(samples))
             column["log_time"] = column["publish_time"] = samples.stamps_ns
             topic.fill(column["message"], recording)
-        contents = table.data.cast("B")
+        return table.data.cast("B")
+
+    def compress(self, contents: memoryview, samples: Samples) -> Chunk:
+        """The chunk of the records that were laid out of samples."""
         start, end = int(samples.stamps_ns[0]), int(samples.stamps_ns[-1])
         return Chunk.of(contents, self._compressor.compress(contents), start_ns=start, end_ns=end)
 

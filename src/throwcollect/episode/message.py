@@ -1,8 +1,12 @@
 """The one message that carries an episode from a simulation to the coordinator: std_msgs/UInt8MultiArray.
 
-Its layout names the parts of its data: ``header``, an `EpisodeHeader` in JSON; ``conditions``, what it was simulated
-with, in JSON; ``chunk``, one MCAP Chunk record or several after each other; and ``signature``, that of everything
-before it. The receiver hashes the records itself, so it believes no hash, and none is computed twice.
+Its layout names the parts of its data: ``header``, an `EpisodeHeader` in JSON; ``result``, what came of the trial, in
+JSON; ``conditions``, what it was simulated with, in JSON; ``hashes``, the SHA-256 of the records of each chunk as 32
+bytes; ``chunk``, one MCAP Chunk record or several after each other; and ``signature``, that of everything before it.
+Whoever has the key of the run is believed, so nothing is decompressed, hashed or judged twice on the way.
+
+The same message carries a refusal: its header and its chunk are empty, its result is the reason, and its conditions
+are the token of the lease that was refused.
 """
 
 from __future__ import annotations
@@ -27,7 +31,8 @@ from throwcollect.episode.recorded_chunk import RecordedChunk
 from throwcollect.errors import DatasetError
 from throwcollect.run_key import Signer
 
-_PARTS = ("header", "conditions", "chunk", "signature")
+_PARTS = ("header", "result", "conditions", "hashes", "chunk", "signature")
+_HASH_BYTES = 32
 _SHA256 = re.compile(r"[0-9a-f]{64}")
 _HEADER = TypeAdapter(EpisodeHeader)
 _LATEST_NS = 2**62
@@ -190,17 +195,40 @@ class Delivery(NamedTuple):
 
     Attributes:
         episode: The episode.
+        result: What came of the trial, in JSON; empty if the simulation was not asked for it.
         conditions: What it was simulated with, in JSON.
     """
 
     episode: Episode
+    result: str
     conditions: str
 
 
-def pack(episode: Episode, conditions: str, signer: Signer) -> bytes:
-    """The CDR bytes of the message that carries an episode."""
-    chunks = b"".join(each.chunk.record() for each in episode.chunks)
-    parts = [episode.header_json.encode(), conditions.encode(), chunks]
+class Refusal(NamedTuple):
+    """Why a simulation does not do a trial.
+
+    Attributes:
+        token: That of the trial's lease.
+        reason: The reason.
+    """
+
+    token: str
+    reason: str
+
+
+def pack(handed: Delivery | Refusal, signer: Signer) -> bytes:
+    """The CDR bytes of the message that carries an episode or a refusal."""
+    if isinstance(handed, Refusal):
+        parts = [b"", handed.reason.encode(), handed.token.encode(), b"", b""]
+    else:
+        episode = handed.episode
+        parts = [
+            episode.header_json.encode(),
+            handed.result.encode(),
+            handed.conditions.encode(),
+            b"".join(bytes.fromhex(each.records_sha256) for each in episode.chunks),
+            b"".join(each.chunk.record() for each in episode.chunks),
+        ]
     signature = signer.sign(*parts).encode()
     return b"".join((_prefix([*map(len, parts), len(signature)]), *parts, signature))
 
@@ -213,8 +241,8 @@ def _prefix(sizes: list[int]) -> bytes:
     return bytes(prefix)
 
 
-def unpack(message: bytes, signer: Signer) -> Delivery:
-    """Read the message that carries an episode.
+def unpack(message: bytes, signer: Signer) -> Delivery | Refusal:
+    """Read the message that carries an episode or a refusal.
 
     Args:
         message: CDR bytes of a std_msgs/UInt8MultiArray.
@@ -236,15 +264,18 @@ def unpack(message: bytes, signer: Signer) -> Delivery:
         raise DatasetError(f"episode: {len(message) - length} bytes of data", expected=f"{sum(sizes)} as announced")
     whole = memoryview(message)
     ends = list(itertools.accumulate(sizes, initial=length))
-    header, conditions, chunks, signature = (whole[start:end] for start, end in itertools.pairwise(ends))
+    *parts, signature = (whole[start:end] for start, end in itertools.pairwise(ends))
     if not signer.has_signed(bytes(signature).decode(errors="replace"), whole[length : ends[-2]]):
         raise DatasetError("episode: is not signed with the key of this run")
+    header, result, conditions, hashes, chunks = parts
     try:
-        text = bytes(conditions).decode()
+        texts = bytes(result).decode(), bytes(conditions).decode()
     except UnicodeDecodeError as error:
-        raise DatasetError("episode: its conditions are no UTF-8 text") from error
-    state, *sensors = Chunk.parse_all(chunks)
-    return Delivery(Episode(header_from_json(bytes(header)), state, sensors=[*map(RecordedChunk, sensors)]), text)
+        raise DatasetError("episode: its result or its conditions are no UTF-8 text") from error
+    if not header:
+        return Refusal(token=texts[1], reason=texts[0])
+    said = [hashes[start : start + _HASH_BYTES].hex() for start in range(0, len(hashes), _HASH_BYTES)]
+    return Delivery(make_episode(bytes(header), said, Chunk.parse_all(chunks)), *texts)
 
 
 def make_episode(header: bytes | str, hashes: Sequence[str], chunks: Sequence[Chunk]) -> Episode:

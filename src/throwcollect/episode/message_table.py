@@ -56,10 +56,10 @@ class FirstRow:
         DatasetError: If the contents cannot be so many rows, or the first one is not one message per channel.
     """
 
-    def __init__(self, contents: bytes | bytearray, samples: int) -> None:
+    def __init__(self, contents: bytes | bytearray | memoryview, samples: int) -> None:
         if samples < 1 or len(contents) % samples or not contents:
             raise DatasetError(f"chunk: {len(contents)} bytes are not the records of {samples} samples")
-        self._row = contents[: len(contents) // samples]
+        self._row = bytes(contents[: len(contents) // samples])
         self.columns: dict[int, Column] = {}
         offset = 0
         while offset < len(self._row):
@@ -121,7 +121,7 @@ class MessageTable:
         DatasetError: If the records are not such a table.
     """
 
-    def __init__(self, contents: bytes | bytearray, samples: int) -> None:
+    def __init__(self, contents: bytes | bytearray | memoryview, samples: int) -> None:
         self._first = FirstRow(contents, samples)
         self.columns = self._first.columns
         self._table: NDArray[np.uint8] = np.frombuffer(contents, np.uint8).reshape(samples, -1)
@@ -209,7 +209,7 @@ class MessageList:
         DatasetError: If the contents are anything but such records, at least one.
     """
 
-    def __init__(self, contents: bytes | bytearray) -> None:
+    def __init__(self, contents: bytes | bytearray | memoryview) -> None:
         offsets, offset = [], 0
         shortest = MESSAGE_HEADER.size - RECORD_PREFIX_BYTES + _STAMP_OFFSET + _STAMP.itemsize
         while offset < len(contents):

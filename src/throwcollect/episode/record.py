@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
 from typing import Literal
 
 import numpy as np
@@ -117,3 +118,12 @@ class EpisodeHeader:
     contacts: tuple[Contact, ...]
     goals: tuple[GoalOutcome, ...]
     samples: int
+
+
+def find_infinite_columns(samples: Samples) -> Iterator[str]:
+    """Columns that hold numbers that are not finite, a sentence each."""
+    for field in fields(samples):
+        finite = np.isfinite(getattr(samples, field.name))
+        if not finite.all():
+            row = int(np.argmin(finite.reshape(len(samples), -1).all(axis=1)))
+            yield f"{field.name} holds numbers that are not finite, first in sample {row}"

@@ -2,19 +2,11 @@
 
 from __future__ import annotations
 
-from throwcollect.config.key import Effect
 from throwcollect.config.schema import Config
-from throwcollect.config.values import sweepable_keys, with_values
-from throwcollect.coordinator.goals import trial_goals
-from throwcollect.episode.channels import Channels
-from throwcollect.episode.chunk import ChunkEncoder
 from throwcollect.episode.message import Delivery, Episode
-from throwcollect.errors import ThrowcollectError
-from throwcollect.robots.description import full_description, robot_of, start_posture
-from throwcollect.sim.present_trial import TrialSetup
 from throwcollect.sim.simulation import Simulation
+from throwcollect.sim.trial_runner import TrialRunner
 from throwcollect.sweep.plan import Trial
-from throwcollect.tasks.task import task_of
 
 
 class Replayer:
@@ -29,11 +21,9 @@ class Replayer:
     """
 
     def __init__(self, config: Config) -> None:
-        self._config = config
-        self._physics = set(sweepable_keys(config, Effect.PHYSICS))
         self._simulation = Simulation(config)
         self._simulation.real_time_factor = None
-        self._encoder = ChunkEncoder(Channels(config, full_description(config)), level=config.record.zstd_level)
+        self._runner = TrialRunner(self._simulation)
 
     def close(self) -> None:
         """Free the world; no trial can be run afterwards."""
@@ -44,25 +34,15 @@ class Replayer:
         return self.delivery(trial).episode
 
     def delivery(self, trial: Trial) -> Delivery:
-        """The episode of a trial, and what it was simulated with.
+        """The episode of a trial, what came of it, and what it was simulated with.
 
         Args:
             trial: A trial of the collection, whether its plan has it or not.
 
         Raises:
-            ThrowcollectError: If a controller refuses its goal, as it would in a collection.
+            ThrowcollectError: If a controller refuses its goal, or the samples are not finite, as in a collection.
         """
-        simulation = self._simulation
-        config = with_values(self._config, trial.values)
-        goals = trial_goals(robot_of(config), task_of(config).trajectory(), start_posture(config))
-        physics = with_values(self._config, {key: trial.values[key] for key in trial.values if key in self._physics})
-        simulation.trial.setup = TrialSetup(trial.number, tuple(goals), physics)
-        simulation.reset()
-        for controller, goal in goals.items():
-            refusal = simulation.submit(controller, trial.number, goal)
-            if refusal is not None:
-                raise ThrowcollectError(f"trial {trial.number}: {controller} refuses its goal: {refusal}")
-        while (ended := simulation.episode()) is None:
-            simulation.advance(watched=False)
-        header, samples, states = ended
-        return Delivery(Episode(header, self._encoder.encode(samples, states)), simulation.trial.conditions().to_json())
+        self._runner.begin(trial.number, trial.values)
+        while (delivery := self._runner.hand_over()) is None:
+            self._simulation.advance(watched=False)
+        return delivery

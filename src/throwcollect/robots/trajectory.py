@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,3 +27,11 @@ class JointTrajectory:
     positions: NDArray[np.float64]
     velocities: NDArray[np.float64]
     accelerations: NDArray[np.float64]
+
+    @cached_property
+    def digest(self) -> str:
+        """SHA-256 over names, times and all numbers, in hexadecimal: equal trajectories give equal digests."""
+        digest = hashlib.sha256("\0".join(self.joints).encode())
+        for values in (self.times, self.positions, self.velocities, self.accelerations):
+            digest.update(np.asarray(values, "<f8").tobytes())
+        return digest.hexdigest()

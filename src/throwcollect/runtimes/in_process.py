@@ -103,15 +103,15 @@ class InProcess:
         while not collection.finished:
             if session.interruptions():
                 collection.drain()
-            if (leased := collection.lease(_SIMULATION)) is not None:
+            if leased := collection.lease(_SIMULATION):
                 try:
                     delivery = simulation.delivery(collection.writer.plan.trial(leased[0]))
                 except ThrowcollectError as error:
-                    collection.take_back(_SIMULATION, str(error), refused=True)
+                    collection.refuse(_SIMULATION, leased[0], str(error))
                 else:
-                    collection.take_in(_SIMULATION, delivery, token="")
+                    collection.take_in(_SIMULATION, delivery)
             else:
-                collection.prepare_one()
+                collection.grow_plan()
             if collection.backlog:
                 collection.write_one()
             collection.look_after()

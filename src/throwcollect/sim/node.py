@@ -11,11 +11,11 @@ from throwcollect.config.key import Effect
 from throwcollect.config.schema import Config
 from throwcollect.config.values import leaves, sweepable_keys, with_values
 from throwcollect.episode.channels import Channels
-from throwcollect.episode.chunk import ChunkEncoder, encode_message
-from throwcollect.episode.message import Episode, pack
+from throwcollect.episode.chunk import encode_message
+from throwcollect.episode.message import pack
 from throwcollect.episode.record import Samples
 from throwcollect.episode.topics import Topic
-from throwcollect.errors import ConfigError
+from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.robots.description import full_description
 from throwcollect.ros import (
     DurabilityPolicy,
@@ -35,15 +35,19 @@ from throwcollect.run_key import Signer
 from throwcollect.sim import descriptors
 from throwcollect.sim.controller_manager import ControllerManager
 from throwcollect.sim.controller_node import ControllerNode
+from throwcollect.sim.lease_queue import LeaseQueue
 from throwcollect.sim.present_trial import TrialSetup
 from throwcollect.sim.simulation import Simulation, State
 from throwcollect.sim.simulation_control import SimulationControl
-from throwcollect.trial.lease import CONTROLLERS, LEASE, NUMBER, Lease
+from throwcollect.sim.trial_runner import TrialRunner
+from throwcollect.trial.lease import LEASES, Lease, leases_from_json
 
 _CLOCK = "rosgraph_msgs/msg/Clock"
 Clock: Any = get_message(_CLOCK)
 
 _EPISODE = "episode"
+NUMBER, CONTROLLERS = "trial.number", "trial.controllers"
+"""Parameters that set up a trial by hand."""
 _LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _SAMPLED = QoSProfile(depth=100)
 _WHOLE = QoSProfile(history=HistoryPolicy.KEEP_ALL)
@@ -86,7 +90,8 @@ class SimulationNode(Node):
         self._declare_parameters(config)
         description = full_description(config)
         self._publish_latched(Channels(config, description))
-        self._encoder = ChunkEncoder(Channels(config, description), level=config.record.zstd_level)
+        self._runner = TrialRunner(simulation)
+        self._leases = LeaseQueue(self._runner)
         self._live = [
             (topic, self.create_publisher(get_message(topic.type_name), topic.name.lstrip("/"), _SAMPLED))
             for topic in Channels(_everything(config), description).recorded.values()
@@ -100,6 +105,7 @@ class SimulationNode(Node):
         self._told_ns = -1
         self._signer = Signer.of_environment()
         self._restoring = False
+        self._asked: tuple[Lease, ...] = ()
         self._control = SimulationControl(self, simulation)
         # Episodes come last: a coordinator that sees their publisher takes the whole simulation for ready.
         self._episodes = self.create_publisher(UInt8MultiArray, _EPISODE, _WHOLE)
@@ -138,10 +144,10 @@ class SimulationNode(Node):
         self._publish_samples()
         for controller in self._heard:
             controller.publish_state()
-        if (episode := simulation.episode()) is not None:
-            header, samples, states = episode
-            whole = Episode(header, self._encoder.encode(samples, states))
-            self._episodes.publish(pack(whole, simulation.trial.conditions().to_json(), self._signer))
+        if (handed := self._leases.hand_over()) is not None:
+            # The next trial begins before the last one leaves, so that nobody can reach a controller in between.
+            self._begin_next()
+            self._episodes.publish(pack(handed, self._signer))
         self._control.follow_up()
 
     def _require_own_namespace(self) -> None:
@@ -225,8 +231,8 @@ class SimulationNode(Node):
         )
         about_controllers = "Controllers that must have a goal before the clock of a trial runs; with none, any goal."
         self.declare_parameter(CONTROLLERS, [""], ParameterDescriptor(description=about_controllers))
-        about_lease = "Signature of a coordinator over all that is set with it; begins the trial at once."
-        self.declare_parameter(LEASE, "", ParameterDescriptor(description=about_lease))
+        about_leases = "Trials that a coordinator wants, in JSON with its signatures, instead of those before."
+        self.declare_parameter(LEASES, "", ParameterDescriptor(description=about_leases))
         factor = config.sim.real_time_factor or _NO_LIMIT
         about_factor = descriptors.of_key(_FACTOR, factor)
         about_factor.additional_constraints = "a number; 0 stands for none"
@@ -237,38 +243,49 @@ class SimulationNode(Node):
             if isinstance(value, str | int | float) and not self.has_parameter(key):
                 self.declare_parameter(key, value, descriptors.of_key(key, value, read_only=True))
         self.add_on_set_parameters_callback(self._set_up)
-        self.add_post_set_parameters_callback(self._restore_physics)
+        self.add_post_set_parameters_callback(self._take_leases)
 
     def _set_up(self, parameters: list[Parameter]) -> SetParametersResult:
-        """Take over parameters: a lease begins its trial at once, others take effect with the next reset."""
+        """Take over parameters: leases begin their trials at once, others take effect with the next reset."""
         values = {parameter.name: parameter.value for parameter in parameters}
         try:
             self._check_factor(values.get(_FACTOR, _NO_LIMIT))
-            if values.get(LEASE):
-                self._lease(values)
+            if values.get(LEASES):
+                self._asked = self._read_leases(values)
             elif not self._restoring:
                 self._prepare(values)
-        except ConfigError as error:
+        except (ConfigError, DatasetError) as error:
             return SetParametersResult(successful=False, reason=str(error))
         if _FACTOR in values:
             self._simulation.real_time_factor = values[_FACTOR] or None
         return SetParametersResult(successful=True)
 
-    def _lease(self, values: Mapping[str, Any]) -> None:
-        """Begin the trial of a lease; what it does not say is as configured, whatever was set before.
+    def _read_leases(self, values: Mapping[str, Any]) -> tuple[Lease, ...]:
+        """Read and check what a coordinator asks for.
 
         Raises:
-            ConfigError: If the lease is incomplete, or is not signed with the key of this run.
+            ConfigError: If a lease is for another simulation, or is not signed with the key of this run.
+            DatasetError: If they cannot be read.
         """
-        if missing := [name for name in (NUMBER, CONTROLLERS) if name not in values]:
-            raise ConfigError(f"{LEASE}: comes without {missing[0]}")
-        number, controllers = self._check_trial(values)
-        physics = {key: values[key] for key in self._physics if key in values}
-        lease = Lease(self.get_namespace(), number, controllers, physics)
-        if not lease.is_signed(values[LEASE], self._signer):
-            raise ConfigError(f"{LEASE}: is not signed with the key of this run")
-        config = with_values(self._simulation.config, physics)
-        self._simulation.lease(TrialSetup(number, controllers, config, values[LEASE]))
+        if len(values) > 1:
+            raise ConfigError(f"{LEASES}: is set alone, not with {next(name for name in values if name != LEASES)}")
+        leases = leases_from_json(values[LEASES])
+        for lease in leases:
+            if lease.simulation != self.get_namespace() or not lease.is_signed(self._signer):
+                raise ConfigError(f"{LEASES}: is not signed for {self.get_namespace()} with the key of this run")
+        return leases
+
+    def _take_leases(self, parameters: list[Parameter]) -> None:
+        """Begin what a coordinator has asked for; what it does not say is as configured, whatever was set before."""
+        if not any(parameter.name == LEASES and parameter.value for parameter in parameters):
+            return
+        self._leases.replace(self._asked)
+        self._restore_physics()
+        self._begin_next()
+
+    def _begin_next(self) -> None:
+        while (refusal := self._leases.begin_next()) is not None:
+            self._episodes.publish(pack(refusal, self._signer))
 
     def _prepare(self, values: Mapping[str, Any]) -> None:
         """Set up what the next reset prepares, unless the simulation is leased; a negative number ends the lease.
@@ -279,6 +296,7 @@ class SimulationNode(Node):
         trial = self._simulation.trial
         changed = [name for name in values if name != _FACTOR]
         if trial.leased and changed == [NUMBER] and values[NUMBER] < 0:
+            self._leases.clear()
             trial.set_up_nothing()
         elif trial.leased and changed:
             raise ConfigError(f"{changed[0]}: {trial.lease_in_words}")
@@ -302,12 +320,9 @@ class SimulationNode(Node):
         if not 0 <= factor < math.inf:
             raise ConfigError(f"{_FACTOR}: should be a finite number, 0 for no limit, got {factor}")
 
-    def _restore_physics(self, parameters: list[Parameter]) -> None:
-        """Have parameters that a lease leaves as configured show that, should somebody have set them before."""
-        given = {parameter.name for parameter in parameters}
-        if LEASE not in given or not self._simulation.trial.leased:
-            return
-        stray = [key for key, value in self._physics.items() if key not in given and self._get_value(key) != value]
+    def _restore_physics(self) -> None:
+        """Have the node show the physics of the configuration, should somebody have set another one before."""
+        stray = [key for key, value in self._physics.items() if self._get_value(key) != value]
         if stray:
             self._restoring = True
             self.set_parameters([Parameter(key, value=self._physics[key]) for key in stray])

@@ -15,7 +15,7 @@ import numpy as np
 from throwcollect.config.schema import Config
 from throwcollect.control import GoalResult, JointTrajectoryController, Refusal, Trajectory, TrajectoryGoal
 from throwcollect.episode.record import ControllerSamples, EpisodeHeader, Samples
-from throwcollect.errors import RequestError
+from throwcollect.errors import RequestError, ThrowcollectError
 from throwcollect.robots.description import robot_of, start_posture
 from throwcollect.sim.entities import Entities
 from throwcollect.sim.limb_controller import LimbController
@@ -91,21 +91,32 @@ class Simulation:
         """Whether there is something to `advance`: the clock runs, or steps are left to be taken."""
         return self._steps is not None or (self._running and self.state == State.PLAYING)
 
-    def lease(self, setup: TrialSetup) -> None:
-        """Begin a trial for a coordinator, with controllers as they are configured.
+    def lease(self, number: int, config: Config, goals: Mapping[str, TrajectoryGoal]) -> None:
+        """Begin a trial for a coordinator, with controllers as they are configured, which nobody else may touch.
 
         Args:
-            setup: The trial, with its lease.
+            number: Number of the trial.
+            config: Configuration of the trial.
+            goals: Goal of each controller that moves.
 
         Raises:
             ConfigError: If there is no such start state.
+            ThrowcollectError: If a controller refuses its goal.
         """
         self.trial.leased = False
         for limb in self.limbs.values():
             limb.restore()
-        self.trial.setup = setup
+        self.trial.setup = TrialSetup(number, tuple(goals), config)
         self.reset()
+        for controller, goal in goals.items():
+            if (refusal := self.submit(controller, number, goal)) is not None:
+                raise ThrowcollectError(f"trial {number}: {controller} refuses its goal: {refusal}")
         self.trial.leased = True
+
+    def end_lease(self) -> None:
+        """Forget a leased trial that nobody wants any more; all is as configured."""
+        self.trial.set_up_nothing()
+        self.reset()
 
     def set_state(self, state: State) -> None:
         """Play, pause, stop or quit; stopping resets everything.
@@ -141,16 +152,15 @@ class Simulation:
             return
         self._interrupt_steps("the simulation was reset")
         self._running = False
+        self.trial.begin()
         setup = self.trial.setup
         start_ns = self.now_ns
         if of_time:
             start_ns = 0 if setup.number < 0 else setup.config.trial_start_ns(setup.number)
         if of_state:
-            self.trial.begin(setup.config)
             self.world.reset(setup.config, start_ns=start_ns)
             posture = start_posture(setup.config)
         else:
-            self.trial.begin(None)
             self.world.restart_clock(start_ns)
             posture = self.world.posture()
         for limb in self.limbs.values():
@@ -166,13 +176,13 @@ class Simulation:
         Returns:
             None if the goal is accepted, else the reason of the refusal.
         """
-        if (leased := self.trial.refusal(controller, goal=True)) is not None:
+        if (leased := self.trial.refusal) is not None:
             return leased
         limb = self.limbs[controller]
         refusal = limb.refuse_locked(goal.trajectory) or limb.controller.submit(goal_id, goal, self.now_ns)
         self._collect_results()
         if refusal is None:
-            self.trial.note_goal(controller, goal)
+            self.trial.note_goal(controller)
             self._run_unless_awaiting()
         return refusal
 
@@ -182,9 +192,8 @@ class Simulation:
         Returns:
             Whether it was being executed, and may be cancelled.
         """
-        if self.trial.refusal(controller, goal=False) is not None:
+        if self.trial.leased:
             return False
-        self.trial.note_other_input(controller)
         cancelled = self.observe(controller).cancel(goal_id)
         self._collect_results()
         return cancelled
@@ -195,13 +204,12 @@ class Simulation:
         Returns:
             None if it is accepted, else the reason of the refusal.
         """
-        if (leased := self.trial.refusal(controller, goal=False)) is not None:
+        if (leased := self.trial.refusal) is not None:
             return leased
         limb = self.limbs[controller]
         refusal = limb.refuse_locked(trajectory) or limb.controller.replace(trajectory, self.now_ns)
         self._collect_results()
         if refusal is None:
-            self.trial.note_other_input(controller)
             self._run_unless_awaiting()
         return refusal
 

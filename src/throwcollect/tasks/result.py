@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import Field, dataclass, fields
 from enum import Enum
 from typing import Any, Generic, TypeVar
 
+from throwcollect.errors import DatasetError
 from throwcollect.tasks.columns import Column, Columns, JointColumns, Number, PeakColumns, columns_of, measured
 from throwcollect.tasks.measures import Peak
 
@@ -85,6 +87,26 @@ class ResultColumns(Generic[AnyResult]):
             parts = [None] * len(declared) if value is None else columns.split(value, self._joints)
             values |= zip((column.name for column in declared), parts, strict=True)
         return values
+
+    def to_json(self, result: AnyResult) -> str:
+        """A result in JSON: its outcome, its reason, and the values of all columns."""
+        return json.dumps({**self.write(result), "outcome": result.outcome.value, "reason": result.reason})
+
+    def from_json(self, outcomes: type[Outcome], text: str) -> AnyResult:
+        """Read what `to_json` writes.
+
+        Args:
+            outcomes: All outcomes that there are.
+            text: The JSON.
+
+        Raises:
+            DatasetError: If the text is anything else.
+        """
+        try:
+            row = json.loads(text)
+            return self.read(outcomes(row["outcome"]), row["reason"], row)
+        except (ValueError, LookupError, TypeError) as error:
+            raise DatasetError(f"result of a trial: {error}") from error
 
     def read(self, outcome: Outcome, reason: str | None, row: Mapping[str, Any]) -> AnyResult:
         """The result whose values stand in a row of the table.

@@ -30,14 +30,14 @@ class Conditions:
         build: Digest of sources, engine and model (`build.build_digest`).
         settings: Digest of what the configuration of the whole collection says of the simulation.
         values: What the trial replaces of it, by dotted key.
-        inputs: Digest of the goal that each moving controller was given, by the controller's name.
+        trajectory: Digest of the joint trajectory that its controllers were given.
         lease: Token of the lease that it was simulated for; empty if for none.
     """
 
     build: str
     settings: str
     values: Mapping[str, float]
-    inputs: Mapping[str, str]
+    trajectory: str
     lease: str
 
     def to_json(self) -> str:
@@ -56,18 +56,12 @@ class Conditions:
             used, wanted = self.values.get(key), expected.values.get(key)
             if used != wanted:
                 yield f"{key} was {_describe(used)}, not {_describe(wanted)}"
-        for controller in sorted({*self.inputs, *expected.inputs}):
-            used_goal, wanted_goal = self.inputs.get(controller), expected.inputs.get(controller)
-            if used_goal != wanted_goal:
-                yield f"{controller} was given {'another goal' if used_goal and wanted_goal else _goal(wanted_goal)}"
+        if self.trajectory != expected.trajectory:
+            yield "its controllers were given another trajectory"
 
 
 def _describe(value: float | None) -> str:
     return "as configured" if value is None else repr(value)
-
-
-def _goal(wanted: str | None) -> str:
-    return "a goal that the trial does not have" if wanted is None else "no goal"
 
 
 _CONDITIONS = TypeAdapter(Conditions)
@@ -100,7 +94,7 @@ class Settings:
         physics = set(sweepable_keys(config, Effect.PHYSICS))
         self._physics = [(leaf.name, leaf.name.split("."), leaf.value) for leaf in found if leaf.name in physics]
         heeded = {leaf.name: leaf.value for leaf in found if leaf.key.effect in _HEEDED}
-        # Which joints move decides which are simulated as rigid; where they go, the goals say.
+        # Which joints move decides which are simulated as rigid; where they go, the trajectory says.
         heeded["task.end"] = sorted(config.task.end)
         lines = [f"{key}={json.dumps(value)}" for key, value in sorted(heeded.items())]
         self.digest = hashlib.sha256("\n".join(lines).encode()).hexdigest()

@@ -1,21 +1,24 @@
-"""The lease of a trial: what a coordinator asks of a simulation, in words that nobody else can say.
+"""Leases: what a coordinator asks of a simulation, in words that nobody else can say.
 
-A lease travels as parameters of the simulation's node, which it accepts all or none. One of them, `LEASE`, signs the
-others with the key of the run.
+A simulation holds a list of leases and simulates them in order. The coordinator sends the whole list again whenever it
+changes, as one parameter of the simulation's node, so a list that arrives twice changes nothing.
 """
 
 from __future__ import annotations
 
-import hmac
 import json
 import secrets
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
+from pydantic import TypeAdapter, ValidationError
+
+from throwcollect.errors import DatasetError
 from throwcollect.run_key import Signer
 
-NUMBER, CONTROLLERS, LEASE = "trial.number", "trial.controllers", "trial.lease"
-"""Names of the parameters."""
+LEASES = "trial.leases"
+"""Name of the parameter."""
 
 
 @dataclass(frozen=True)
@@ -25,23 +28,60 @@ class Lease:
     Attributes:
         simulation: Namespace of the simulation, such as ``/sim_0``.
         trial: Number of the trial.
-        controllers: Controllers that will get a goal.
         values: What the trial replaces of the configuration, by dotted key.
+        nonce: Tells the lease from every other one of the same trial.
+        signature: That of a coordinator over all of this.
     """
 
     simulation: str
     trial: int
-    controllers: tuple[str, ...]
     values: Mapping[str, float]
+    nonce: str = ""
+    signature: str = ""
 
-    def sign(self, signer: Signer) -> str:
-        """A token that stands for this lease alone: no two leases have the same."""
-        return self._token(signer, secrets.token_hex(8))
+    @classmethod
+    def make(cls, simulation: str, trial: int, values: Mapping[str, float], signer: Signer) -> Lease:
+        """Make a new lease.
 
-    def is_signed(self, token: str, signer: Signer) -> bool:
-        """Whether a token was made for this lease with the key of this run."""
-        return hmac.compare_digest(token.encode(), self._token(signer, token.partition(".")[0]).encode())
+        Args:
+            simulation: Namespace of the simulation.
+            trial: Number of the trial.
+            values: What the trial replaces of the configuration, by dotted key.
+            signer: That of the run.
+        """
+        nonce = secrets.token_hex(8)
+        said = cls(simulation, trial, values, nonce)
+        return cls(simulation, trial, values, nonce, signer.sign(said._text))
 
-    def _token(self, signer: Signer, nonce: str) -> str:
-        text = json.dumps([nonce, self.simulation, self.trial, self.controllers, dict(sorted(self.values.items()))])
-        return f"{nonce}.{signer.sign(text.encode())}"
+    def is_signed(self, signer: Signer) -> bool:
+        """Whether it was signed with the key of this run."""
+        return signer.has_signed(self.signature, self._text)
+
+    @property
+    def token(self) -> str:
+        """What stands for this lease alone."""
+        return f"{self.nonce}.{self.signature}"
+
+    @cached_property
+    def _text(self) -> bytes:
+        return json.dumps([self.nonce, self.simulation, self.trial, sorted(self.values.items())]).encode()
+
+
+_LEASES = TypeAdapter(tuple[Lease, ...])
+
+
+def leases_to_json(leases: Iterable[Lease]) -> str:
+    """A list of leases in JSON."""
+    return _LEASES.dump_json(tuple(leases)).decode()
+
+
+def leases_from_json(text: str) -> tuple[Lease, ...]:
+    """Read what `leases_to_json` writes.
+
+    Raises:
+        DatasetError: If the text is anything else.
+    """
+    try:
+        return _LEASES.validate_json(text, strict=True)
+    except ValidationError as error:
+        raise DatasetError(f"list of leases: {error.errors()[0]['msg']}") from error

@@ -5,48 +5,56 @@ from hypothesis import strategies as st
 from throwcollect.coordinator.leases import Leases
 
 
-def test_trials_go_out_by_number_one_to_each_simulation() -> None:
+def test_trials_go_out_by_number() -> None:
     leases = Leases([2, 0, 1], retries=0)
-    assert [leases.lease("a"), leases.lease("b")] == [0, 1]
-    with pytest.raises(ValueError, match="a still holds trial 0"):
-        leases.lease("a")
-    assert leases.deliver("a", 0)
-    leases.complete(0)
-    assert leases.lease("a") == 2
+    assert [leases.lease("a"), leases.lease("b"), leases.lease("a")] == [0, 1, 2]
+    assert leases.find_held("a") == (0, 2)
+    assert leases.waiting == 0
+    leases.complete("a", 0)
+    assert leases.find_held("a") == (2,)
     assert leases.lease("c") is None
+    assert leases.leased == 2
 
 
 def test_a_lost_trial_goes_out_again_before_new_ones() -> None:
     leases = Leases(range(4), retries=1)
     leases.lease("a")
     leases.lease("b")
-    assert leases.fail("a", "killed") is None
+    assert leases.fail("a", 0, "killed") is None
     assert leases.lease("c") == 0
+
+
+def test_trials_that_were_not_begun_go_out_again_and_count_as_nobodys_failure() -> None:
+    leases = Leases(range(5), retries=0)
+    assert [leases.lease("a") for _ in range(3)] == [0, 1, 2]
+    leases.release("a")
+    assert leases.find_held("a") == (0,)
+    assert leases.fail("a", 0, "killed") == ["a: killed"]
+    assert [leases.lease("a", others="ab"), leases.lease("b", others="ab"), leases.lease("b")] == [1, 2, 3]
 
 
 def test_a_trial_is_given_up_with_all_its_evidence() -> None:
     leases = Leases([7], retries=1)
     leases.lease("a")
-    assert leases.fail("a", "exit 137") is None
+    assert leases.fail("a", 7, "exit 137") is None
     leases.lease("b")
-    assert leases.fail("b", "timeout") == (7, ["a: exit 137", "b: timeout"])
+    assert leases.fail("b", 7, "timeout") == ["a: exit 137", "b: timeout"]
     assert leases.finished
 
 
-def test_an_episode_that_comes_after_the_lease_was_taken_back_is_refused() -> None:
+def test_only_who_holds_a_trial_can_complete_it() -> None:
     leases = Leases([0], retries=3)
     leases.lease("a")
-    leases.fail("a", "timeout")
+    leases.fail("a", 0, "timeout")
     leases.lease("b")
-    assert not leases.deliver("a", 0)
-    assert leases.deliver("b", 0)
-    assert leases.ended == 0
-    assert leases.leased == 1
-    leases.complete(0)
-    assert leases.ended == 1
+    with pytest.raises(ValueError, match="not in list"):
+        leases.complete("a", 0)
+    assert (leases.ended, leases.leased) == (0, 1)
+    leases.complete("b", 0)
+    assert (leases.ended, leases.leased) == (1, 0)
 
 
-ACTIONS = st.tuples(st.sampled_from("abcd"), st.sampled_from(["lease", "complete", "reject", "fail", "refuse"]))
+ACTIONS = st.tuples(st.sampled_from("abcd"), st.sampled_from(["lease", "complete", "release", "fail", "refuse"]))
 
 
 @given(st.lists(ACTIONS), st.integers(0, 3), st.booleans())
@@ -55,19 +63,20 @@ def test_every_trial_ends_exactly_once(actions: list[tuple[str, str]], retries: 
     ended: list[int] = []
 
     def act(simulation: str, action: str) -> None:
-        held = leases.find_trial(simulation)
-        if action == "lease" and held is None:
+        held = leases.find_held(simulation)
+        if action == "lease":
             leases.lease(simulation, others="abcdz" if present else "")
-        elif action == "complete" and held is not None:
-            assert leases.deliver(simulation, held)
-            leases.complete(held)
-            ended.append(held)
-        elif action == "reject" and held is not None:
-            assert leases.deliver(simulation, held)
-            if leases.reject(held, "x"):
-                ended.append(held)
-        elif action in ("fail", "refuse") and (given_up := leases.fail(simulation, "x", refused=action == "refuse")):
-            ended.append(given_up[0])
+        elif action == "release":
+            leases.release(simulation)
+        elif action == "complete" and held:
+            leases.complete(simulation, held[-1])
+            ended.append(held[-1])
+        elif (
+            action in ("fail", "refuse") and held and leases.fail(simulation, held[0], "x", refused=action == "refuse")
+        ):
+            ended.append(held[0])
+        assert len(ended) == leases.ended
+        assert leases.ended + leases.leased + leases.waiting == leases.total
 
     for simulation, action in actions:
         act(simulation, action)
@@ -80,21 +89,11 @@ def test_every_trial_ends_exactly_once(actions: list[tuple[str, str]], retries: 
     assert sorted(ended) == list(range(6))
 
 
-def test_upcoming_trials_are_those_that_are_handed_out_next() -> None:
-    leases = Leases(range(5), retries=1)
-    leases.lease("a")
-    leases.lease("b")
-    leases.fail("a", "killed")
-    assert leases.upcoming(3) == [0, 2, 3]
-    assert [leases.lease("a"), leases.lease("c")] == [0, 2]
-
-
 def test_trials_may_be_added_while_others_run() -> None:
     leases = Leases([0, 1], retries=1)
     assert [leases.lease("a"), leases.lease("b"), leases.lease("c")] == [0, 1, None]
     for simulation, trial in (("a", 0), ("b", 1)):
-        leases.deliver(simulation, trial)
-        leases.complete(trial)
+        leases.complete(simulation, trial)
     assert leases.finished
     leases.add([4, 2])
     assert not leases.finished
@@ -109,11 +108,11 @@ def do_all(leases: Leases) -> list[int]:
     """Let one simulation refuse whatever it gets, and the other one do everything; trials that were given up."""
     given_up = []
     while not leases.finished:
-        if leases.lease("hole", others=BOTH) is not None and (lost := leases.fail("hole", "no", refused=True)):
-            given_up.append(lost[0])
+        trial = leases.lease("hole", others=BOTH)
+        if trial is not None and leases.fail("hole", trial, "no", refused=True):
+            given_up.append(trial)
         if (trial := leases.lease("well", others=BOTH)) is not None:
-            leases.deliver("well", trial)
-            leases.complete(trial)
+            leases.complete("well", trial)
     return given_up
 
 
@@ -124,20 +123,10 @@ def test_a_simulation_that_refuses_everything_takes_no_trial_with_it() -> None:
     assert leases.why_set_aside("well") is None
 
 
-def test_a_simulation_that_spoils_episodes_is_set_aside_too() -> None:
-    leases = Leases(range(60), retries=3)
-    for _ in range(3):
-        trial = leases.lease("hole", others=BOTH)
-        leases.deliver("hole", trial)
-        assert leases.reject(trial, "not finite") is None
-    assert do_all(leases) == []
-    assert leases.why_set_aside("hole") == "not finite"
-
-
 def test_a_returned_trial_goes_to_another_simulation_while_there_is_one() -> None:
     leases = Leases(range(2), retries=3)
     leases.lease("a", others="ab")
-    leases.fail("a", "refused", refused=True)
+    leases.fail("a", 0, "refused", refused=True)
     assert leases.lease("a", others="ab") == 1
     assert leases.lease("b", others="ab") == 0
 
@@ -145,7 +134,7 @@ def test_a_returned_trial_goes_to_another_simulation_while_there_is_one() -> Non
 def test_a_simulation_alone_gets_its_trial_back() -> None:
     leases = Leases([0], retries=3)
     leases.lease("a", others="a")
-    leases.fail("a", "killed")
+    leases.fail("a", 0, "killed")
     assert leases.lease("a", others="a") == 0
 
 
@@ -158,11 +147,10 @@ def test_trials_that_nobody_can_do_cost_no_simulation_its_place() -> None:
             if trial is None:
                 continue
             if trial < 20 and trial:
-                if given_up := leases.fail(name, "it cannot be done", refused=True):
-                    lost.append(given_up[0])
+                if leases.fail(name, trial, "it cannot be done", refused=True):
+                    lost.append(trial)
             else:
-                leases.deliver(name, trial)
-                leases.complete(trial)
+                leases.complete(name, trial)
     assert sorted(lost) == list(range(1, 20))
     assert leases.why_set_aside("a") is None
     assert leases.why_set_aside("b") is None
@@ -172,21 +160,18 @@ def test_there_is_no_hope_when_all_refuse_and_none_ever_did_a_trial() -> None:
     leases = Leases(range(30), retries=3)
     for _ in range(3):
         assert leases.hopeless("ab") is None
-        for name in "ab":
-            leases.lease(name, others="ab")
-        for name in "ab":
-            leases.fail(name, "other sources", refused=True)
+        trials = {name: leases.lease(name, others="ab") for name in "ab"}
+        for name, trial in trials.items():
+            leases.fail(name, trial, "other sources", refused=True)
     assert leases.hopeless("ab") == "other sources"
     assert leases.hopeless("abc") is None
 
 
 def test_one_completed_trial_gives_hope_for_good() -> None:
     leases = Leases(range(30), retries=3)
-    leases.deliver("a", leases.lease("a"))
-    leases.complete(0)
+    leases.complete("a", leases.lease("a"))
     for _ in range(9):
-        leases.lease("a", others="a")
-        leases.fail("a", "no", refused=True)
+        leases.fail("a", leases.lease("a", others="a"), "no", refused=True)
     assert leases.hopeless("a") is None
 
 

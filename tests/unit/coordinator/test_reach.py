@@ -11,10 +11,9 @@ from throwcollect import ros
 from throwcollect.config.loader import load
 from throwcollect.coordinator import node as coordinator_node
 from throwcollect.coordinator.collection import TrialCollection
-from throwcollect.coordinator.goals import FollowJointTrajectory
 from throwcollect.coordinator.node import Coordinator
 from throwcollect.dataset.writer import DatasetWriter, create
-from throwcollect.ros import ActionServer, get_message
+from throwcollect.ros import get_message
 from throwcollect.ros.router import router
 from throwcollect.sweep.plan import make_plan
 
@@ -39,11 +38,8 @@ class Bench:
         self.executor.add_node(self.coordinator)
 
     def simulation(self, *, whole: bool) -> ros.Node:
-        node = ros.Node("sim_0", namespace="/sim_0")
+        node = ros.Node("sim_0", namespace="/sim_0", start_parameter_services=whole)
         self.executor.add_node(node)
-        if whole:
-            for limb in ("arm_right", "torso"):
-                ActionServer(node, FollowJointTrajectory, f"{limb}_controller/follow_joint_trajectory", lambda _: None)
         node.create_publisher(UInt8MultiArray, "episode", 10)
         return node
 

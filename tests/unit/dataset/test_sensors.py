@@ -32,7 +32,7 @@ from throwcollect.derive.selection import sample
 from throwcollect.episode import channels as declared
 from throwcollect.episode.channels import Channel, Qos
 from throwcollect.episode.chunk import Chunk, encode_records
-from throwcollect.episode.message import Episode, pack, unpack
+from throwcollect.episode.message import Delivery, Episode, pack, unpack
 from throwcollect.episode.recorded_chunk import RecordedChunk
 from throwcollect.run_key import Signer
 
@@ -100,7 +100,7 @@ def flip(path: Path, place: int) -> None:
 def test_it_travels_in_the_message_of_its_episode(collection: Collection) -> None:
     signer = Signer(b"key of the run")
     sent = filmed(collection.episode(2))
-    arrived = unpack(pack(sent, "", signer), signer).episode
+    arrived = unpack(pack(Delivery(sent, "", ""), signer), signer).episode
     assert [each.chunk for each in arrived.chunks] == [each.chunk for each in sent.chunks]
     assert arrived.digest == sent.digest == collection.episode(2).digest
 

@@ -12,13 +12,23 @@ from rclzenoh.interfaces import deserialize, get_message
 from throwcollect.config.schema import Config
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.chunk import ChunkEncoder
-from throwcollect.episode.message import Episode, header_from_json, header_to_json, make_episode, pack, unpack
+from throwcollect.episode.message import (
+    Delivery,
+    Episode,
+    Refusal,
+    header_from_json,
+    header_to_json,
+    make_episode,
+    pack,
+    unpack,
+)
 from throwcollect.episode.record import EpisodeHeader
 from throwcollect.errors import DatasetError
 from throwcollect.robots.description import full_description
 from throwcollect.run_key import Signer
 
 SIGNER = Signer(b"key of the run")
+RESULT = '{"outcome": "landed"}'
 CONDITIONS = '{"ball.mass_kg": 0.05}'
 
 
@@ -33,23 +43,25 @@ def sent(encoder: ChunkEncoder, header: EpisodeHeader, make_samples: Any) -> Epi
 
 
 def test_an_episode_arrives_as_it_was_sent(sent: Episode, make_samples: Any) -> None:
-    episode, conditions = unpack(pack(sent, CONDITIONS, SIGNER), SIGNER)
-    assert conditions == CONDITIONS
+    episode, result, conditions = unpack(pack(Delivery(sent, RESULT, CONDITIONS), SIGNER), SIGNER)
+    assert (result, conditions) == (RESULT, CONDITIONS)
     assert (episode.header, episode.chunk, episode.sensors) == (sent.header, sent.chunk, ())
-    assert episode.state.said_sha256 is None
+    assert episode.state.said_sha256 == sent.state.records_sha256
     assert episode.digest == sent.digest
     assert episode.samples().ball_position.tolist() == make_samples(50).ball_position.tolist()
 
 
 def test_the_message_is_a_stock_one_that_names_its_parts(sent: Episode) -> None:
-    message = deserialize(pack(sent, CONDITIONS, SIGNER), get_message("std_msgs/msg/UInt8MultiArray"))
+    message = deserialize(pack(Delivery(sent, RESULT, CONDITIONS), SIGNER), get_message("std_msgs/msg/UInt8MultiArray"))
     sizes = {part.label: part.size for part in message.layout.dim}
-    assert list(sizes) == ["header", "conditions", "chunk", "signature"]
+    assert list(sizes) == ["header", "result", "conditions", "hashes", "chunk", "signature"]
     data, parts = message.data.tobytes(), {}
     for name, size in sizes.items():
         parts[name], data = data[:size], data[size:]
     assert header_from_json(parts["header"]) == sent.header
+    assert parts["result"].decode() == RESULT
     assert parts["conditions"].decode() == CONDITIONS
+    assert parts["hashes"].hex() == sent.state.records_sha256
     assert parts["chunk"] == sent.chunk.record()
     assert SIGNER.has_signed(parts.pop("signature").decode(), *parts.values())
 
@@ -116,21 +128,21 @@ def test_a_wrong_header_is_refused(header: EpisodeHeader, old: str, new: str) ->
 def test_more_samples_than_there_are_is_an_error(sent: Episode) -> None:
     claim = Episode(replace(sent.header, samples=51), sent.chunk, sent.state.records_sha256)
     with pytest.raises(DatasetError, match="are not the records of 51 samples"):
-        unpack(pack(claim, "", SIGNER), SIGNER).episode.samples()
+        unpack(pack(Delivery(claim, "", ""), SIGNER), SIGNER).episode.samples()
 
 
 @pytest.mark.parametrize("length", [0, 3, 60, 100, 300, -1])
 def test_a_message_that_is_cut_off_is_refused(sent: Episode, length: int) -> None:
     with pytest.raises(DatasetError, match="episode: "):
-        unpack(pack(sent, "", SIGNER)[:length], SIGNER)
+        unpack(pack(Delivery(sent, "", ""), SIGNER)[:length], SIGNER)
 
 
 def test_padding_is_left_alone(sent: Episode) -> None:
-    assert unpack(pack(sent, "", SIGNER) + bytes(3), SIGNER).episode.chunk == sent.chunk
+    assert unpack(pack(Delivery(sent, "", ""), SIGNER) + bytes(3), SIGNER).episode.chunk == sent.chunk
 
 
 def test_a_message_of_another_layout_is_refused(sent: Episode) -> None:
-    message = pack(sent, "", SIGNER)
+    message = pack(Delivery(sent, "", ""), SIGNER)
     for wrong in (message[:-1], message.replace(b"chunk", b"blobs", 1), b"\1" + message[1:]):
         with pytest.raises(DatasetError, match="episode: "):
             unpack(wrong, SIGNER)
@@ -138,7 +150,8 @@ def test_a_message_of_another_layout_is_refused(sent: Episode) -> None:
 
 @pytest.fixture(scope="module")
 def whole(encoder: ChunkEncoder, header: EpisodeHeader, make_samples: Any) -> bytes:
-    return pack(Episode(replace(header, samples=3), encoder.encode(make_samples(3))), CONDITIONS, SIGNER)
+    episode = Episode(replace(header, samples=3), encoder.encode(make_samples(3)))
+    return pack(Delivery(episode, RESULT, CONDITIONS), SIGNER)
 
 
 @settings(max_examples=300)
@@ -156,17 +169,34 @@ def test_garbage_is_refused_with_one_kind_of_error(whole: bytes, data: st.DataOb
     except DatasetError:
         return
     assert bytes(message).startswith(whole)
+    assert isinstance(delivery, Delivery)
     assert delivery.conditions == CONDITIONS
+
+
+def test_a_refusal_arrives_as_it_was_sent() -> None:
+    refusal = Refusal("ab.cd", "zu schnell für den Ellbogen")
+    assert unpack(pack(refusal, SIGNER), SIGNER) == refusal
+    with pytest.raises(DatasetError, match="signed"):
+        unpack(pack(refusal, Signer(b"another")), SIGNER)
+
+
+def test_each_chunk_comes_with_a_hash(sent: Episode) -> None:
+    message = pack(Delivery(sent, "", ""), SIGNER)
+    without = Episode(sent.header, sent.chunk, "")
+    without.state.__dict__["records_sha256"] = ""
+    with pytest.raises(DatasetError, match="episode: 1 chunks"):
+        unpack(pack(Delivery(without, "", ""), SIGNER), SIGNER)
+    assert unpack(message, SIGNER).episode.digest == sent.digest
 
 
 def test_what_another_key_has_signed_is_refused(sent: Episode) -> None:
     with pytest.raises(DatasetError, match="episode: is not signed with the key of this run"):
-        unpack(pack(sent, CONDITIONS, Signer(b"another")), SIGNER)
+        unpack(pack(Delivery(sent, RESULT, CONDITIONS), Signer(b"another")), SIGNER)
 
 
-@pytest.mark.parametrize("part", [b'"trial":7', CONDITIONS.encode()])
+@pytest.mark.parametrize("part", [b'"trial":7', RESULT.encode(), CONDITIONS.encode()])
 def test_every_part_is_signed(sent: Episode, part: bytes) -> None:
-    message = pack(sent, CONDITIONS, SIGNER)
+    message = pack(Delivery(sent, RESULT, CONDITIONS), SIGNER)
     assert message.count(part) == 1
     with pytest.raises(DatasetError, match="signed"):
         unpack(message.replace(part, bytes(byte ^ 1 for byte in part)), SIGNER)

@@ -1,4 +1,4 @@
-"""The joint trajectory goals of a trial, and the messages that carry them."""
+"""The joint trajectory goals of a trial."""
 
 from __future__ import annotations
 
@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 from throwcollect.control import Trajectory, TrajectoryGoal, TrajectoryPoint
 from throwcollect.robots.robot import Robot
 from throwcollect.robots.trajectory import JointTrajectory
-from throwcollect.ros.action import FollowJointTrajectory
-from throwcollect.ros.msg import Duration, JointTrajectoryPoint
 
 
 def trial_goals(robot: Robot, trajectory: JointTrajectory, posture: Mapping[str, float]) -> dict[str, TrajectoryGoal]:
@@ -26,22 +24,6 @@ def trial_goals(robot: Robot, trajectory: JointTrajectory, posture: Mapping[str,
     """
     moved = {robot.controller_of(joint) for joint in trajectory.joints}
     return {name: _goal(trajectory, joints, posture) for name, joints in robot.controllers.items() if name in moved}
-
-
-def goal_message(goal: TrajectoryGoal) -> FollowJointTrajectory.Goal:
-    """The goal of a FollowJointTrajectory action that `trial_goals` gives."""
-    message = FollowJointTrajectory.Goal()
-    message.trajectory.joint_names = list(goal.trajectory.joint_names)
-    message.trajectory.points = [
-        JointTrajectoryPoint(
-            positions=point.positions,
-            velocities=point.velocities,
-            accelerations=point.accelerations,
-            time_from_start=Duration(sec=point.time_from_start_ns // 10**9, nanosec=point.time_from_start_ns % 10**9),
-        )
-        for point in goal.trajectory.points
-    ]
-    return message
 
 
 def _goal(trajectory: JointTrajectory, joints: tuple[str, ...], posture: Mapping[str, float]) -> TrajectoryGoal:

@@ -1,0 +1,56 @@
+"""How many trials a simulation is given at once."""
+
+from __future__ import annotations
+
+import math
+import time
+
+_AHEAD_S = 0.5
+"""Real time that the trials of a simulation last: what is lost with it, and what others wait for at the end."""
+_MOST = 16
+"""A list of more trials saves no time that could be measured."""
+_WEIGHT = 0.3
+"""Of the last trial in the mean time of a trial."""
+
+
+class Lookahead:
+    """Measures how long simulations take for a trial, so that each has work for a while and none for too long.
+
+    A simulation that has done no trial yet is given one.
+    """
+
+    def __init__(self) -> None:
+        self._since: dict[str, float] = {}
+        self._durations: dict[str, float] = {}
+
+    def begin(self, simulation: str) -> None:
+        """Note that a simulation that had nothing to do has got something."""
+        self._since[simulation] = time.monotonic()
+
+    def end(self, simulation: str) -> None:
+        """Note that a simulation has done a trial."""
+        now = time.monotonic()
+        took = now - self._since.get(simulation, now)
+        before = self._durations.get(simulation, took)
+        self._since[simulation] = now
+        self._durations[simulation] = before + _WEIGHT * (took - before)
+
+    def forget(self, simulation: str) -> None:
+        """Forget a simulation that is gone."""
+        self._since.pop(simulation, None)
+        self._durations.pop(simulation, None)
+
+    def count_for(self, simulation: str, *, waiting: int, simulations: int) -> int:
+        """Number of trials that a simulation should have.
+
+        Args:
+            simulation: The simulation.
+            waiting: Number of trials that no simulation has.
+            simulations: Number of simulations that there are.
+        """
+        duration = self._durations.get(simulation)
+        if duration is None:
+            return 1
+        # Towards the end each gets less, so that all have work until then.
+        share = math.ceil(waiting / (2 * max(simulations, 1)))
+        return max(1, min(_MOST, share, math.ceil(_AHEAD_S / max(duration, 1e-3))))

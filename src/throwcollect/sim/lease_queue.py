@@ -1,0 +1,81 @@
+"""The trials that a coordinator wants of a simulation, in their order."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable
+
+from throwcollect.episode.message import Delivery, Refusal
+from throwcollect.errors import ThrowcollectError
+from throwcollect.sim.trial_runner import TrialRunner
+from throwcollect.trial.lease import Lease
+
+_REMEMBERED = 1000
+"""Leases that were done, which a list that was on its way meanwhile may still name; a list never has as many."""
+
+
+class LeaseQueue:
+    """Holds the leases of a simulation and begins them one after the other.
+
+    Args:
+        runner: Runs their trials.
+    """
+
+    def __init__(self, runner: TrialRunner) -> None:
+        self._runner = runner
+        self._running: Lease | None = None
+        self._waiting: deque[Lease] = deque()
+        self._done: deque[str] = deque(maxlen=_REMEMBERED)
+
+    def replace(self, leases: Iterable[Lease]) -> None:
+        """Have these trials simulated, and no others; one that runs goes on if it is among them.
+
+        Args:
+            leases: The leases in their order; those that were done already are left out.
+        """
+        wanted = [lease for lease in leases if lease.token not in self._done]
+        if self._running is not None and self._running.token not in {lease.token for lease in wanted}:
+            self._running = None
+            self._runner.drop()
+        running = self._running.token if self._running else ""
+        self._waiting = deque(lease for lease in wanted if lease.token != running)
+
+    def clear(self) -> None:
+        """Forget all leases; the trial that runs is nobody's any more."""
+        self._running = None
+        self._waiting.clear()
+        self._runner.disown()
+
+    def begin_next(self) -> Refusal | None:
+        """Begin the next trial if none runs.
+
+        Returns:
+            Why it cannot be begun; None if it was, or if nothing was to be begun.
+        """
+        if self._running is not None or not self._waiting:
+            return None
+        lease = self._waiting.popleft()
+        try:
+            self._runner.begin(lease.trial, lease.values, token=lease.token)
+        except ThrowcollectError as error:
+            self._runner.drop()
+            return self._refuse(lease, error)
+        self._running = lease
+        return None
+
+    def hand_over(self) -> Delivery | Refusal | None:
+        """What the trial that has just ended yielded, or why it is not handed over; None if none has ended."""
+        try:
+            delivery = self._runner.hand_over()
+        except ThrowcollectError as error:
+            # Only what was begun for a lease is judged, and so refused.
+            lease, self._running = self._running, None
+            return self._refuse(lease, error) if lease else None
+        if delivery is not None and self._running is not None:
+            self._done.append(self._running.token)
+            self._running = None
+        return delivery
+
+    def _refuse(self, lease: Lease, error: ThrowcollectError) -> Refusal:
+        self._done.append(lease.token)
+        return Refusal(lease.token, str(error))

@@ -1,0 +1,113 @@
+"""Runs trials of a collection in one simulation: begins them, and makes of each what a coordinator takes in."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from throwcollect.build import build_digest
+from throwcollect.config.schema import Config
+from throwcollect.config.values import with_values
+from throwcollect.episode.channels import Channels
+from throwcollect.episode.chunk import ChunkEncoder
+from throwcollect.episode.message import Delivery, Episode
+from throwcollect.episode.message_table import MessageTable
+from throwcollect.episode.record import EpisodeHeader, Samples, find_infinite_columns
+from throwcollect.errors import ThrowcollectError
+from throwcollect.robots.description import full_description, robot_of, start_posture
+from throwcollect.robots.trajectory import JointTrajectory
+from throwcollect.sim.simulation import Simulation
+from throwcollect.tasks.task import task_of
+from throwcollect.trial.conditions import Conditions, Settings
+from throwcollect.trial.goals import trial_goals
+
+
+@dataclass(frozen=True)
+class _Begun:
+    """A trial that was begun for a coordinator."""
+
+    config: Config
+    trajectory: JointTrajectory
+    token: str
+
+
+class TrialRunner:
+    """Begins trials and hands over what they yielded; whoever uses it advances the simulation in between.
+
+    Args:
+        simulation: The simulation that they run in.
+    """
+
+    def __init__(self, simulation: Simulation) -> None:
+        self._simulation = simulation
+        config = simulation.config
+        self._settings = Settings(config)
+        self._encoder = ChunkEncoder(Channels(config, full_description(config)), level=config.record.zstd_level)
+        self._columns = task_of(config).columns
+        self._begun: _Begun | None = None
+
+    def begin(self, trial: int, values: Mapping[str, float], *, token: str = "") -> None:
+        """Begin a trial; its controllers get the goals that its configuration makes.
+
+        Args:
+            trial: Number of the trial.
+            values: What the trial replaces of the configuration, by dotted key.
+            token: That of its lease; empty if it is leased by nobody.
+
+        Raises:
+            ConfigError: If the values make no motion, or no start state.
+            ThrowcollectError: If a controller refuses its goal.
+        """
+        self._begun = None
+        config = with_values(self._simulation.config, values)
+        trajectory = task_of(config).trajectory()
+        self._simulation.lease(trial, config, trial_goals(robot_of(config), trajectory, start_posture(config)))
+        self._begun = _Begun(config, trajectory, token)
+
+    def disown(self) -> None:
+        """Let the trial that runs be nobody's: its episode is not judged, and names no lease."""
+        self._begun = None
+
+    def drop(self) -> None:
+        """Break off the trial that runs; all is as configured."""
+        self.disown()
+        self._simulation.end_lease()
+
+    def hand_over(self) -> Delivery | None:
+        """What a trial has yielded, once it has ended; then never again.
+
+        Returns:
+            The episode, judged if `begin` began it; None if none has ended.
+
+        Raises:
+            ThrowcollectError: If it yielded what nobody could want in a dataset: numbers that are not finite.
+        """
+        ended = self._simulation.episode()
+        if ended is None:
+            return None
+        header, samples, states = ended
+        begun, self._begun = self._begun, None
+        config = begun.config if begun else self._simulation.trial.setup.config
+        conditions = Conditions(
+            build=build_digest(config.sim.engine),
+            settings=self._settings.digest,
+            values=self._settings.find_replaced(config),
+            trajectory=begun.trajectory.digest if begun else "",
+            lease=begun.token if begun else "",
+        )
+        records = self._encoder.lay_out(samples, states)
+        # Judged is what the records say, as everybody does who reads them: they hold velocities in the ball's frame.
+        result = self._judge(begun, MessageTable(records, header.samples).samples, header) if begun else ""
+        episode = Episode(header, self._encoder.compress(records, samples), hashlib.sha256(records).hexdigest())
+        return Delivery(episode, result, conditions.to_json())
+
+    def _judge(self, begun: _Begun, samples: Samples, header: EpisodeHeader) -> str:
+        """The result of a trial in JSON.
+
+        Raises:
+            ThrowcollectError: If its samples hold numbers that are not finite.
+        """
+        if (infinite := next(find_infinite_columns(samples), None)) is not None:
+            raise ThrowcollectError(f"trial {header.trial}: {infinite}")
+        return self._columns.to_json(task_of(begun.config).judge(samples, header, begun.trajectory))

@@ -1,0 +1,66 @@
+"""How many trials a simulation is given at once."""
+
+import pytest
+
+from throwcollect.coordinator import lookahead
+from throwcollect.coordinator.lookahead import Lookahead
+
+
+class Clock:
+    def __init__(self) -> None:
+        self.now = 100.0
+
+    def monotonic(self) -> float:
+        return self.now
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    clock = Clock()
+    monkeypatch.setattr(lookahead, "time", clock)
+    return clock
+
+
+def after_one_of(seconds: float, clock: Clock) -> Lookahead:
+    ahead = Lookahead()
+    ahead.begin("a")
+    clock.now += seconds
+    ahead.end("a")
+    return ahead
+
+
+def test_a_simulation_of_which_nothing_is_known_gets_one() -> None:
+    assert Lookahead().count_for("a", waiting=1000, simulations=2) == 1
+
+
+@pytest.mark.parametrize(("seconds", "count"), [(0.0, 16), (0.01, 16), (0.11, 5), (0.3, 2), (0.5, 1), (20.0, 1)])
+def test_it_gets_work_for_half_a_second(seconds: float, count: int, clock: Clock) -> None:
+    assert after_one_of(seconds, clock).count_for("a", waiting=1000, simulations=2) == count
+
+
+@pytest.mark.parametrize(("waiting", "count"), [(1000, 16), (40, 10), (4, 1), (1, 1), (0, 1)])
+def test_towards_the_end_trials_are_shared(waiting: int, count: int, clock: Clock) -> None:
+    assert after_one_of(0.01, clock).count_for("a", waiting=waiting, simulations=2) == count
+
+
+def test_a_simulation_that_has_become_slow_gets_fewer(clock: Clock) -> None:
+    ahead = after_one_of(0.01, clock)
+    for _ in range(20):
+        clock.now += 1.0
+        ahead.end("a")
+    assert ahead.count_for("a", waiting=1000, simulations=1) == 1
+
+
+def test_time_in_which_it_had_nothing_to_do_does_not_count(clock: Clock) -> None:
+    ahead = after_one_of(0.11, clock)
+    clock.now += 60.0
+    ahead.begin("a")
+    clock.now += 0.11
+    ahead.end("a")
+    assert ahead.count_for("a", waiting=1000, simulations=1) == 5
+
+
+def test_a_simulation_that_is_gone_is_forgotten(clock: Clock) -> None:
+    ahead = after_one_of(0.1, clock)
+    ahead.forget("a")
+    assert ahead.count_for("a", waiting=1000, simulations=1) == 1

@@ -1,0 +1,124 @@
+"""Which trial a simulation does next, whatever a coordinator asks for meanwhile."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from throwcollect.episode.message import Refusal
+from throwcollect.errors import ThrowcollectError
+from throwcollect.run_key import Signer
+from throwcollect.sim.lease_queue import LeaseQueue
+from throwcollect.trial.lease import Lease
+
+A, B, C, D = (Lease.make("/sim_0", trial, {}, Signer(b"")) for trial in range(4))
+BAD = Lease.make("/sim_0", 99, {}, Signer(b""))
+
+
+class Runner:
+    """Stands in for the runner of trials: they end when a test says so."""
+
+    def __init__(self) -> None:
+        self.begun: list[int] = []
+        self.dropped = 0
+        self.disowned = False
+        self.yields: Any = None
+
+    def begin(self, trial: int, _values: Mapping[str, float], *, token: str) -> None:
+        if trial == BAD.trial:
+            raise ThrowcollectError("out of reach")
+        self.begun.append(trial)
+
+    def drop(self) -> None:
+        self.dropped += 1
+
+    def disown(self) -> None:
+        self.disowned = True
+
+    def hand_over(self) -> Any:
+        yields, self.yields = self.yields, None
+        if isinstance(yields, ThrowcollectError):
+            raise yields
+        return yields
+
+
+def queue_of(*leases: Lease) -> tuple[LeaseQueue, Runner]:
+    runner = Runner()
+    queue = LeaseQueue(runner)  # type: ignore[arg-type]
+    queue.replace(leases)
+    assert queue.begin_next() is None
+    return queue, runner
+
+
+def end_trial(queue: LeaseQueue, runner: Runner) -> None:
+    runner.yields = "an episode"
+    assert queue.hand_over() == "an episode"
+    assert queue.begin_next() is None
+
+
+def test_trials_are_done_in_order() -> None:
+    queue, runner = queue_of(A, B, C)
+    assert queue.begin_next() is None
+    assert runner.begun == [0]
+    end_trial(queue, runner)
+    end_trial(queue, runner)
+    assert runner.begun == [0, 1, 2]
+    end_trial(queue, runner)
+    assert runner.begun == [0, 1, 2]
+    assert queue.hand_over() is None
+
+
+def test_the_trial_that_runs_goes_on_if_it_is_asked_for_again() -> None:
+    queue, runner = queue_of(A, B)
+    queue.replace([A, C])
+    assert queue.begin_next() is None
+    assert (runner.begun, runner.dropped) == ([0], 0)
+    end_trial(queue, runner)
+    assert runner.begun == [0, 2]
+
+
+def test_the_trial_that_runs_is_dropped_if_nobody_wants_it() -> None:
+    queue, runner = queue_of(A, B)
+    queue.replace([C])
+    assert queue.begin_next() is None
+    assert (runner.begun, runner.dropped) == ([0, 2], 1)
+    queue.replace([])
+    assert queue.begin_next() is None
+    assert (runner.begun, runner.dropped) == ([0, 2], 2)
+
+
+def test_what_was_done_is_not_done_again_for_a_list_that_came_late() -> None:
+    queue, runner = queue_of(A)
+    end_trial(queue, runner)
+    queue.replace([A, B])
+    assert queue.begin_next() is None
+    assert runner.begun == [0, 1]
+
+
+def test_a_trial_that_cannot_be_begun_is_refused_and_the_next_one_begins() -> None:
+    runner = Runner()
+    queue = LeaseQueue(runner)  # type: ignore[arg-type]
+    queue.replace([BAD, A])
+    assert queue.begin_next() == Refusal(BAD.token, "out of reach")
+    assert queue.begin_next() is None
+    assert (runner.begun, runner.dropped) == ([0], 1)
+
+
+def test_a_trial_whose_yield_is_worthless_is_refused() -> None:
+    queue, runner = queue_of(A, B)
+    runner.yields = ThrowcollectError("not finite")
+    assert queue.hand_over() == Refusal(A.token, "not finite")
+    assert queue.begin_next() is None
+    assert runner.begun == [0, 1]
+
+
+def test_a_trial_by_hand_is_handed_over_like_any_other() -> None:
+    queue, runner = queue_of()
+    runner.yields = "an episode"
+    assert queue.hand_over() == "an episode"
+
+
+def test_leases_that_are_cleared_are_forgotten() -> None:
+    queue, runner = queue_of(A, B)
+    queue.clear()
+    assert runner.disowned
+    assert queue.begin_next() is None
+    assert (runner.begun, runner.dropped) == ([0], 0)

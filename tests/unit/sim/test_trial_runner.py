@@ -1,0 +1,93 @@
+"""What a simulation makes of a trial that it is asked for: episode, result and conditions."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from throwcollect.config.schema import Config
+from throwcollect.config.values import with_values
+from throwcollect.control import ErrorCode, Refusal
+from throwcollect.dataset.judging import judge_episode
+from throwcollect.episode.message import Delivery
+from throwcollect.errors import ConfigError, ThrowcollectError
+from throwcollect.sim.limb_controller import LimbController
+from throwcollect.sim.simulation import Simulation
+from throwcollect.sim.trial_runner import TrialRunner
+from throwcollect.tasks.task import task_of
+from throwcollect.trial.conditions import conditions_from_json
+
+CONFIG = Config.model_validate({"sim": {"engine": "ballistic"}})
+VALUES = {"ball.mass_kg": 0.05, "task.duration_s": 1.1}
+
+
+@pytest.fixture(scope="module")
+def simulation() -> Iterator[Simulation]:
+    simulation = Simulation(CONFIG)
+    yield simulation
+    simulation.world.close()
+
+
+def finish(runner: TrialRunner, simulation: Simulation) -> Delivery:
+    while (delivery := runner.hand_over()) is None:
+        simulation.advance(watched=False)
+    assert runner.hand_over() is None
+    return delivery
+
+
+@pytest.mark.parametrize("engine", ["ballistic", "bullet"])
+def test_a_trial_is_judged_as_whoever_reads_it_judges_it(engine: str) -> None:
+    config = Config.model_validate({"sim": {"engine": engine}})
+    simulation = Simulation(config)
+    runner = TrialRunner(simulation)
+    runner.begin(3, VALUES, token="ab.cd")  # noqa: S106
+    assert simulation.trial.leased
+    delivery = finish(runner, simulation)
+    assert not simulation.trial.leased
+    trial = with_values(config, VALUES)
+    task = task_of(config)
+    assert task.columns.from_json(task.outcomes, delivery.result) == judge_episode(trial, delivery.episode)
+    delivery.episode.check_records()
+    conditions = conditions_from_json(delivery.conditions)
+    assert conditions.values == {"ball.mass_kg": 0.05}
+    assert conditions.trajectory == task_of(trial).trajectory().digest
+    assert conditions.lease == "ab.cd"
+    simulation.world.close()
+
+
+def test_what_cannot_be_begun_is_an_error(simulation: Simulation, monkeypatch: pytest.MonkeyPatch) -> None:
+    runner = TrialRunner(simulation)
+    with pytest.raises(ConfigError):
+        runner.begin(0, {"ball.colour": 1.0})
+    monkeypatch.setattr(LimbController, "refuse_locked", lambda *_: Refusal(ErrorCode.INVALID_JOINTS, "is locked"))
+    with pytest.raises(ThrowcollectError, match="trial 0: arm_right_controller refuses its goal"):
+        runner.begin(0, {})
+
+
+def test_numbers_that_are_not_finite_are_not_handed_over(
+    simulation: Simulation, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    runner = TrialRunner(simulation)
+    runner.begin(0, {})
+    whole = simulation.world.samples
+
+    def spoilt(first: int = 0):
+        samples = whole(first)
+        if len(samples) > 7:
+            samples.effort[7, 0] = np.nan
+        return samples
+
+    monkeypatch.setattr(simulation.world, "samples", spoilt)
+    with pytest.raises(ThrowcollectError, match="trial 0: effort holds numbers that are not finite, first in sample 7"):
+        finish(runner, simulation)
+
+
+def test_a_trial_that_is_dropped_yields_nothing(simulation: Simulation) -> None:
+    runner = TrialRunner(simulation)
+    runner.begin(0, VALUES)
+    simulation.advance(watched=False)
+    runner.drop()
+    assert not simulation.running
+    assert not simulation.trial.leased
+    assert runner.hand_over() is None
+    assert simulation.now_ns == 0

@@ -1,0 +1,52 @@
+from dataclasses import replace
+
+import numpy as np
+
+from throwcollect.config.schema import Config
+from throwcollect.robots.description import start_posture
+from throwcollect.robots.talos import TALOS
+from throwcollect.tasks.task import task_of
+from throwcollect.trial.goals import trial_goals
+
+CONFIG = Config()
+ARM = "arm_right_controller"
+TRAJECTORY = task_of(CONFIG).trajectory()
+POSTURE = start_posture(CONFIG)
+
+
+def test_each_moving_limb_gets_one_goal_over_all_of_its_joints() -> None:
+    goals = trial_goals(TALOS, TRAJECTORY, POSTURE)
+    assert list(goals) == [ARM, "torso_controller"]
+    for controller, goal in goals.items():
+        assert tuple(goal.trajectory.joint_names) == TALOS.controllers[controller]
+        assert len(goal.trajectory.points) == len(TRAJECTORY.times)
+
+
+def test_joints_that_do_not_move_are_sent_where_they_are() -> None:
+    arm = trial_goals(TALOS, TRAJECTORY, POSTURE)[ARM].trajectory
+    still = arm.joint_names.index("arm_right_3_joint")
+    for point in arm.points:
+        assert point.positions[still] == POSTURE["arm_right_3_joint"]
+        assert (point.velocities[still], point.accelerations[still]) == (0.0, 0.0)
+
+
+def test_moving_joints_are_sent_their_trajectory() -> None:
+    arm = trial_goals(TALOS, TRAJECTORY, POSTURE)[ARM].trajectory
+    column, own = arm.joint_names.index("arm_right_4_joint"), TRAJECTORY.joints.index("arm_right_4_joint")
+    sent = np.array([[point.positions[column], point.velocities[column]] for point in arm.points])
+    assert np.array_equal(sent, np.stack([TRAJECTORY.positions[:, own], TRAJECTORY.velocities[:, own]], axis=1))
+    stamps = [point.time_from_start_ns / 1e9 for point in arm.points]
+    assert np.allclose(stamps, TRAJECTORY.times, atol=1e-9)
+
+
+def test_the_digest_of_a_trajectory_covers_all_that_it_says() -> None:
+    nudged = np.nextafter(TRAJECTORY.positions, 9.0)
+    changes = [
+        replace(TRAJECTORY, joints=tuple(reversed(TRAJECTORY.joints))),
+        replace(TRAJECTORY, times=TRAJECTORY.times + 1e-9),
+        replace(TRAJECTORY, positions=nudged),
+        replace(TRAJECTORY, velocities=TRAJECTORY.accelerations),
+        replace(TRAJECTORY, accelerations=TRAJECTORY.velocities),
+    ]
+    assert len({TRAJECTORY.digest, *(change.digest for change in changes)}) == len(changes) + 1
+    assert replace(TRAJECTORY).digest == TRAJECTORY.digest
