@@ -3,40 +3,49 @@
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
 import os
 import statistics
 import tempfile
 from dataclasses import asdict
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from bench import collection, containers, intake, raw, reading, soak
 from throwcollect.config.loader import load
+from throwcollect.engine_packages import PACKAGES
 from throwcollect.sweep.plan import make_plan
 
 CONFIG = Path(__file__).parents[1] / "configs" / "quickstart.yaml"
 RESULT = Path("build/bench.json")
+_ENGINES = ("bullet", "mujoco")
+_MANY = 8
 
 
 def main() -> None:
     """Measure the raw loop and the collection in turns, as the machine's speed drifts, and print medians."""
     parser = argparse.ArgumentParser(prog="python -m bench", description=__doc__)
-    parser.add_argument("--rounds", type=int, default=3, help="measurements of each kind [%(default)s]")
+    parser.add_argument("--rounds", type=int, default=5, help="measurements of each kind [%(default)s]")
     parser.add_argument("--trials", type=int, default=400, help="throws of each collection [%(default)s]")
     arguments = parser.parse_args()
     cores = len(os.sched_getaffinity(0))
-    plan = make_plan(load(CONFIG, [f"trials={arguments.trials}"]))
+    plans = {
+        engine: make_plan(load(CONFIG, [f"trials={arguments.trials}", f"sim.engine={engine}"]))
+        for engine in _ENGINES
+        if find_spec(PACKAGES[engine].module) is not None
+    }
     report: dict[str, Any] = {"cores": cores, "trials": arguments.trials, "rounds": arguments.rounds}
     with tempfile.TemporaryDirectory(prefix="throwcollect-bench-") as scratch:
-        for simulations in sorted({1, cores}):
+        for (engine, plan), simulations in itertools.product(plans.items(), sorted({1, cores, _MANY})):
             rounds = []
             for index in range(arguments.rounds):
-                limit = raw.measure(plan, simulations, arguments.trials // 4)
-                found = collection.measure(plan, simulations, Path(scratch) / f"{simulations}-{index}")
+                limit = raw.measure(plan, min(simulations, cores), arguments.trials // 4)
+                found = collection.measure(plan, simulations, Path(scratch) / f"{engine}-{simulations}-{index}")
                 rounds.append({"raw_throws_per_s": limit, "ratio": found.throws_per_s / limit, **asdict(found)})
-            report[f"n={simulations}"] = rounds
-            _print_table(simulations, rounds)
+            report[f"{engine}, n={simulations}"] = rounds
+            _print_table(engine, simulations, rounds, loops=min(simulations, cores))
         if containers.image_mb() is None:
             print("\nno containers: no engine answers, or it does not have the image (throwcollect image build)")
         else:
@@ -46,21 +55,21 @@ def main() -> None:
         looks = soak.measure()
         report["soak"] = [asdict(look) for look in looks]
         soak.show(looks)
-        episodes = [intake.measure(Path(scratch) / "1-0") for _ in range(arguments.rounds)]
-        read = reading.measure(Path(scratch) / "1-0", rounds=arguments.rounds)
+        episodes = [intake.measure(Path(scratch) / "bullet-1-0") for _ in range(arguments.rounds)]
+        read = reading.measure(Path(scratch) / "bullet-1-0", rounds=arguments.rounds)
         report["reading"] = asdict(read)
         reading.show(read)
     report["intake_episodes_per_s"] = [rate for rate, _ in episodes]
     report["intake_raw_episodes_per_s"] = [limit for _, limit in episodes]
     rate, share = (statistics.median(values) for values in zip(*((r, r / limit) for r, limit in episodes), strict=True))
-    print(f"\ncoordinator takes in {rate:.0f} episodes/s (unpack, judge, append; one thread)")
-    print(f"{share:.2f} of what decompressing, CRC and writing alone reach")
+    print(f"\ncoordinator takes in {rate:.0f} episodes/s (unpack, check, append; one thread)")
+    print(f"{share:.2f} of what signatures and writing alone reach")
     RESULT.parent.mkdir(exist_ok=True)
     RESULT.write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")
     print(f"all numbers: {RESULT}")
 
 
-def _print_table(simulations: int, rounds: list[dict]) -> None:
+def _print_table(engine: str, simulations: int, rounds: list[dict], *, loops: int) -> None:
     def median(*keys: str) -> float:
         values = rounds
         for key in keys:
@@ -68,18 +77,18 @@ def _print_table(simulations: int, rounds: list[dict]) -> None:
         return statistics.median(values)
 
     plural = "s" if simulations > 1 else ""
-    print(f"\n## {simulations} simulation{plural}, medians of {len(rounds)}\n")
+    print(f"\n## {engine}, {simulations} simulation{plural}, medians of {len(rounds)}\n")
     print("| what | |\n|---|---|")
-    print(f"| raw pybullet loop, {simulations} at once | {median('raw_throws_per_s'):.1f} throws/s |")
+    print(f"| raw loop of the engine, {loops} at once | {median('raw_throws_per_s'):.1f} throws/s |")
     print(f"| `throwcollect up -n {simulations}` | {median('throws_per_s'):.1f} throws/s |")
     print(f"| ratio | {median('ratio'):.2f} |")
     spent = {role: median("cpu_ms_per_throw", role) for role in collection.ROLES}
-    physics = simulations * 1e3 / median("raw_throws_per_s")
+    physics = loops * 1e3 / median("raw_throws_per_s")
     parts = {
         "physics, as in the raw loop": physics,
-        "controllers, ROS and encoding in the simulation": spent["sim"] - physics,
+        "controllers, judging, encoding and ROS in the simulation": spent["sim"] - physics,
         "router": spent["router"],
-        "coordinator: judging, ROS": spent["coordinator"] - median("disk_ms_per_throw"),
+        "coordinator: checks, ROS": spent["coordinator"] - median("disk_ms_per_throw"),
         "coordinator: kernel, disk and network": median("disk_ms_per_throw"),
     }
     for part, milliseconds in parts.items():

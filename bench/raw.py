@@ -1,14 +1,16 @@
-"""The raw limit: the same physics in a bare pybullet loop, without ROS, without files, without checks."""
+"""The raw limit: the same physics in a bare loop of the engine's own calls, without ROS, without files, without checks."""
 
 from __future__ import annotations
 
 import multiprocessing
 import os
 import time
+from importlib import import_module
 from multiprocessing.synchronize import Barrier
+from typing import NamedTuple
 
 import numpy as np
-import pybullet
+from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
 from throwcollect.robots.description import physics_description
@@ -19,50 +21,34 @@ from throwcollect.sim.world import World
 from throwcollect.sweep.plan import Plan
 from throwcollect.tasks.task import task_of
 
-Commands = tuple[list[list[float]], list[list[float]]]
+
+class Commands(NamedTuple):
+    """What the motors of a trial are told in every physics step, until its longest duration.
+
+    Attributes:
+        config: Configuration of the trial.
+        positions: [rad], shape ``(n_steps + 1, n_moving)``.
+        velocities: [rad/s], shape ``(n_steps, n_moving)``.
+        efforts: Most torque of each motor [Nm], shape ``(n_moving,)``.
+    """
+
+    config: Config
+    positions: NDArray[np.float64]
+    velocities: NDArray[np.float64]
+    efforts: NDArray[np.float64]
 
 
-def commands_of(config: Config, moving: tuple[str, ...]) -> Commands:
-    """Positions and feed-forward velocities of every physics step of a trial, until its longest duration."""
+def commands_of(config: Config) -> Commands:
+    """The commands of a trial."""
+    moving = physics_description(config).moving
     trajectory = task_of(config).trajectory()
     steps = int(config.sim.max_trial_s * config.sim.physics_hz)
     times = np.minimum(np.arange(steps + 1) / config.sim.physics_hz, trajectory.times[-1])
     positions = sample_quintic(trajectory, times)[0]
     positions = positions[:, [trajectory.joints.index(joint) for joint in moving]]
-    velocities = np.diff(positions, axis=0) * config.sim.physics_hz
-    return positions.tolist(), velocities.tolist()
-
-
-def throw(world: World, state: int, commands: Commands, config: Config, forces: list[float]) -> int:
-    """Run one trial the barest way; returns the number of steps."""
-    engine = world.engine
-    robot, joints, ball = engine._scenery.robot, engine._scenery.joints, engine._ball
-    hz, stride = config.sim.physics_hz, config.sim.physics_hz // config.record.rate_hz
-    gains, damping = [config.robot.position_gain_per_s / hz] * len(joints), [1.0] * len(joints)
-    plane = config.scene.landing_height_m + config.ball.radius_m
-    pybullet.restoreState(state)
-    positions, velocities = commands
-    rows = []
-    pressed = True
-    for step in range(len(velocities)):
-        pybullet.setJointMotorControlArray(
-            robot,
-            joints,
-            pybullet.POSITION_CONTROL,
-            targetPositions=positions[step],
-            targetVelocities=velocities[step],
-            forces=forces,
-            positionGains=gains,
-            velocityGains=damping,
-        )
-        pybullet.stepSimulation()
-        pressed = any(point[9] > 0 for point in pybullet.getContactPoints(ball))
-        if (step + 1) % stride == 0:
-            pose = pybullet.getBasePositionAndOrientation(ball)
-            rows.append((pybullet.getJointStates(robot, joints), pose, pybullet.getBaseVelocity(ball)))
-            if pose[0][2] < plane and not pressed:
-                break
-    return step + 1
+    limits = joint_limits(TALOS).effort * config.robot.effort_scale
+    efforts = limits[[TALOS.joints.index(joint) for joint in moving]]
+    return Commands(config, positions, np.diff(positions, axis=0) * config.sim.physics_hz, efforts)
 
 
 def _loop(
@@ -71,16 +57,14 @@ def _loop(
     if core is not None:
         os.sched_setaffinity(0, {core})
     world = World(plan.config)
-    limits = joint_limits(TALOS).effort * plan.config.robot.effort_scale
-    forces = [float(limits[TALOS.joints.index(joint)]) for joint in world.moving]
-    trials = [plan.config_of(plan.trials[number]) for number in numbers]
-    prepared = [(config, commands_of(config, physics_description(config).moving)) for config in trials]
-    state = pybullet.saveState()
-    throw(world, state, prepared[0][1], prepared[0][0], forces)
+    # Each engine has a module of its own here, as only that of the configuration need be installed.
+    throw = import_module(f"bench.raw_{plan.config.sim.engine}").make_throw(world)
+    prepared = [commands_of(plan.config_of(plan.trials[number])) for number in numbers]
+    throw(prepared[0])
     barrier.wait()
     began = time.perf_counter()
-    for config, commands in prepared:
-        throw(world, state, commands, config, forces)
+    for commands in prepared:
+        throw(commands)
     seconds.put(time.perf_counter() - began)
 
 
