@@ -1,4 +1,4 @@
-"""The raw limit: the same physics in a bare loop of the engine's own calls, without ROS, without files, without checks."""
+"""The raw limit: the same physics in a bare loop of the engine's own calls, without ROS, files and checks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One throw in a bare loop of MuJoCo: its own step and its own contacts, torques by gains and MuJoCo's own bias forces."""
+"""One throw in a bare loop of MuJoCo: its own step and contacts, torques by gains and MuJoCo's own bias forces."""
 
 from __future__ import annotations
 

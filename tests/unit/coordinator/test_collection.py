@@ -1,0 +1,102 @@
+"""What becomes of the trials that simulations hold, whatever happens to these."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from throwcollect.config.schema import Config
+from throwcollect.coordinator.collection import TrialCollection
+from throwcollect.coordinator.lookahead import Lookahead
+from throwcollect.dataset.writer import create
+from throwcollect.episode.message import Delivery
+from throwcollect.replay.throw import Replayer
+from throwcollect.sweep.plan import Plan, make_plan
+
+PLAN: Plan = make_plan(
+    Config.model_validate(
+        {
+            "name": "leased",
+            "trials": 6,
+            "sweep": {"sampler": "uniform", "parameters": {"ball.mass_kg": {"min": 0.03, "max": 0.06}}},
+            "sim": {"engine": "ballistic"},
+            "run": {"retries": 0, "replay": 0},
+        }
+    )
+)
+
+
+@pytest.fixture
+def collection(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[TrialCollection]:
+    monkeypatch.setattr(Lookahead, "count_for", lambda *_, **__: 4)
+    create(tmp_path / "data", PLAN)
+    with TrialCollection.open(tmp_path / "data", say=print) as collection:
+        collection.join("/sim_0", "sim_0")
+        yield collection
+
+
+@pytest.fixture(scope="module")
+def deliveries() -> list[Delivery]:
+    replayer = Replayer(PLAN.config)
+    found = [replayer.delivery(trial) for trial in PLAN.trials]
+    replayer.close()
+    return found
+
+
+def events(directory: Path, kind: str) -> list[dict[str, Any]]:
+    lines = (directory / "data" / "logs" / "journal.jsonl").read_text().splitlines()
+    return [event for event in map(json.loads, lines) if event["event"] == kind]
+
+
+def test_a_simulation_that_dies_costs_the_trial_that_ran_and_no_other(
+    collection: TrialCollection, deliveries: list[Delivery], tmp_path: Path
+) -> None:
+    assert collection.lease("/sim_0") == (0, 1, 2, 3)
+    collection.take_in("/sim_0", deliveries[0])
+    collection.leave("/sim_0", "left the ROS graph")
+    assert [(event["trial"], event["reason"]) for event in events(tmp_path, "fail")] == [(1, "left the ROS graph")]
+    assert [event["trial"] for event in events(tmp_path, "lost")] == [1]
+    collection.join("/sim_1", "sim_1")
+    assert collection.lease("/sim_1") == (2, 3, 4, 5)
+    for trial in (2, 3, 4, 5):
+        collection.take_in("/sim_1", deliveries[trial])
+    while collection.backlog:
+        collection.write_one()
+    assert collection.complete
+    assert collection.progress().outcomes == {"landed": 5, "lost": 1}
+
+
+def test_more_is_given_when_half_is_done(collection: TrialCollection, deliveries: list[Delivery]) -> None:
+    assert collection.lease("/sim_0") == (0, 1, 2, 3)
+    collection.take_in("/sim_0", deliveries[0])
+    assert collection.lease("/sim_0") == (1, 2, 3)
+    collection.take_in("/sim_0", deliveries[1])
+    assert collection.lease("/sim_0") == (2, 3, 4, 5)
+
+
+def test_draining_leaves_each_simulation_the_trial_that_runs(
+    collection: TrialCollection, deliveries: list[Delivery]
+) -> None:
+    changes: list[tuple[int, ...]] = []
+    collection.on_change = lambda: changes.append(collection.lease("/sim_0"))
+    collection.lease("/sim_0")
+    collection.drain()
+    assert changes == [(0,)]
+    assert not collection.finished
+    collection.take_in("/sim_0", deliveries[0])
+    collection.write_one()
+    assert collection.lease("/sim_0") == ()
+    assert collection.finished
+
+
+def test_an_episode_that_is_another_one_goes_back(collection: TrialCollection, deliveries: list[Delivery]) -> None:
+    said: list[str] = []
+    collection.warn = said.append
+    collection.lease("/sim_0")
+    collection.take_in("/sim_0", deliveries[0]._replace(conditions=deliveries[1].conditions))
+    collection.take_in("/sim_0", deliveries[1]._replace(result="{}"))
+    assert "trial 0 is given to another simulation: its episode is refused: ball.mass_kg was" in said[0]
+    assert "trial 1 is given to another simulation: its episode is refused: result of a trial: " in said[1]
+    assert not collection.backlog
