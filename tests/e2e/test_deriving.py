@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from tests.e2e.collection import INPROCESS, collect, fingerprints
+from tests.e2e.collection import collect_here, fingerprints
 from throwcollect.cli.main import app
 from throwcollect.dataset.verify import verify
 
@@ -56,14 +56,14 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
         name = text.split()[1]
         config = directory / f"{name}.yaml"
         config.write_text(text)
-        collect(config, directory / "datasets" / name, 1, *INPROCESS)
+        collect_here(config, directory / "datasets" / name)
     for block in re.findall(r"```sh\n(.*?)```", PAGE, flags=re.DOTALL):
         for line in block.replace("\\\n", " ").splitlines():
             program, command, *arguments = shlex.split(line)
             assert program == "throwcollect"
             if command == "up":
                 config, _, output = arguments
-                collect(directory / config, directory / output, 1, *INPROCESS)
+                collect_here(directory / config, directory / output)
             else:
                 with pytest.MonkeyPatch.context() as patch:
                     patch.chdir(directory)
@@ -73,7 +73,7 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def collected_anew(derived: Path, directory: Path) -> dict[str, str]:
-    collect(derived / "config.yaml", directory, 1, *INPROCESS)
+    collect_here(derived / "config.yaml", directory)
     return as_derived(directory)
 
 
