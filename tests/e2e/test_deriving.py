@@ -17,29 +17,33 @@ PAGE = (Path(__file__).parents[2] / "docs" / "deriving.md").read_text(encoding="
 
 MONDAY = """\
 name: monday
-trials: 8
+trials: 6
 seed: 7
 ball: {mass_kg: 0.045, drag_coefficient: 0.4}
+sim: {engine: ballistic, physics_hz: 250}
 sweep:
   parameters:
     task.end.arm_right_4_joint: {min: -0.7, max: -0.2}
     task.duration_s: {min: 0.9, max: 1.2}
 record:
+  rate_hz: 125
   topics: [joint_states, ball/odometry, controller_state, tf, clock]
-  trials_per_shard: 6
+  trials_per_shard: 4
 run: {replay: 0}
 """
 TUESDAY = """\
 name: tuesday
-trials: 6
+trials: 4
 seed: 8
 ball: {mass_kg: 0.03, drag_coefficient: 0.4}
+sim: {engine: ballistic, physics_hz: 250}
 sweep:
   sampler: uniform
   parameters:
     task.duration_s: {min: 0.9, max: 1.2}
     task.trajectory.gamma: {min: 1.0, max: 1.2}
 record:
+  rate_hz: 125
   topics: [joint_states, ball/odometry, controller_state, tf, clock]
   zstd_level: 3
 run: {replay: 0}
