@@ -105,7 +105,7 @@ class Running:
             if self.process.poll() is not None or time.monotonic() > deadline:
                 self.process.kill()
                 raise AssertionError(f"did not happen; the command says: {self.process.communicate()}")
-            time.sleep(0.01)
+            time.sleep(0.03)
 
     def finish(self) -> tuple[int, str, str]:
         out, err = self.process.communicate(timeout=120)
