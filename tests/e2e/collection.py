@@ -53,14 +53,14 @@ def call_here(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
     with pytest.MonkeyPatch.context() as patch, redirect_stdout(out), redirect_stderr(err):
         patch.setattr(sys, "argv", wanted)
         try:
-            main()
-        except SystemExit as end:
-            assert isinstance(end.code, int)
-            return subprocess.CompletedProcess(wanted, end.code, out.getvalue(), err.getvalue())
+            with pytest.raises(SystemExit) as end:
+                main()
         finally:
             for number, handler in before:
                 signal.signal(number, handler)
-    raise AssertionError("the command did not exit")
+    code = end.value.code
+    assert isinstance(code, int)
+    return subprocess.CompletedProcess(wanted, code, out.getvalue(), err.getvalue())
 
 
 FAST = "engine: ballistic"
@@ -140,7 +140,7 @@ def collect(config: Path, directory: Path, simulations: int, *options: str, **en
 def collect_here(config: Path, directory: Path, *options: str) -> dict[str, object]:
     """A whole collection in this process; returns its summary.
 
-    It writes the files that nodes write (`test_purity.py`), so that it makes the dataset wherever that is all that is needed.
+    It writes the files that nodes write (`test_purity.py`), so it makes the dataset wherever nodes are not the point.
     """
     done = call_here("up", *INPROCESS, config, "--output", directory, "--json", *options)
     assert done.returncode == 0, done.stderr

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import pytest
 
-from tests.e2e.collection import FAST, INPROCESS, call, call_here, collect_here, command, write_config
+from tests.e2e.collection import FAST, INPROCESS, call_here, collect_here, command, write_config
 from throwcollect.robots.talos import TALOS
 from throwcollect.runs.records import Records
 

@@ -59,7 +59,9 @@ def test_its_third_round_comes_from_results_and_those_before_from_sobol(
     config: Path, undisturbed: tuple[Path, str]
 ) -> None:
     ordinary = ["--set", "sweep.target=null", "--set", "until=null", "--trials", str(TRIALS), "--json"]
-    sobol = np.array([list(trial["values"].values()) for trial in json.loads(call_here("plan", config, *ordinary).stdout)])
+    sobol = np.array(
+        [list(trial["values"].values()) for trial in json.loads(call_here("plan", config, *ordinary).stdout)]
+    )
     plan = pq.read_table(undisturbed[0] / "plan.parquet")
     ours = np.column_stack([plan[key].to_numpy() for key in load(config).sweep.parameters])
     assert (ours[:128] == sobol[:128]).all()
