@@ -87,7 +87,7 @@ def arm(process: ProcessPoolExecutor, tmp_path_factory: pytest.TempPathFactory) 
     """A dataset that two simulation nodes have collected."""
     scratch = tmp_path_factory.mktemp("arm")
     (scratch / "arm.yaml").write_text(CONFIG)
-    summary = process.submit(collect, scratch / "arm.yaml", scratch / "data", 2).result()
+    summary = process.submit(collect, scratch / "arm.yaml", scratch / "data", 2, "--set", "run.replay=0").result()
     assert summary["outcomes"] == {"landed": 6}
     return scratch / "data"
 
@@ -105,11 +105,11 @@ def run(process: ProcessPoolExecutor, arm: Path, tmp_path: Path) -> Run:
 
 
 def test_nodes_and_one_process_write_the_same_files(say: Say, arm: Path, tmp_path: Path) -> None:
-    done = say(
-        "up", arm / "config.yaml", "--runtime", "inprocess", "--set", "run.replay=0", "--output", tmp_path / "data"
-    )
+    done = say("up", arm.parent / "arm.yaml", "--runtime", "inprocess", "--output", tmp_path / "data")
     assert done.returncode == 0, done.stderr
+    assert "2 trials simulated again in a fresh process: the same bit for bit" in done.stderr
     assert fingerprints(tmp_path / "data") == fingerprints(arm)
+    assert "nothing wrong" in say("dataset", "verify", arm).stdout
 
 
 def test_its_throws_can_be_read_and_simulated_again(run: Run) -> None:
