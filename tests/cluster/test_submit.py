@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import shutil
 import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -17,7 +15,7 @@ import pytest
 
 from tests.cluster.conftest import USER
 from tests.cluster.slurm import Slurm
-from tests.e2e.collection import CONFIG, FAST, fingerprints, write_config
+from tests.e2e.collection import CONFIG, FAST, call_here, fingerprints, write_config
 from throwcollect import runs
 from throwcollect.cluster.submission import read_submission
 
@@ -29,18 +27,14 @@ SLOW = "sim.real_time_factor=4"
 
 
 def call(slurm: Slurm, *arguments: str | Path, expect: int = 0, **environment: str) -> str:
-    """Call throwcollect where Slurm is; returns what it prints on both streams."""
-    done = subprocess.run(
-        [sys.executable, "-m", "throwcollect", *map(str, arguments)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        check=False,
-        timeout=240,
-        env={**os.environ, **slurm.environment, **environment},
-    )
-    assert done.returncode == expect, done.stdout
-    return done.stdout
+    """Call throwcollect where Slurm is, in this process; returns what it prints on both streams."""
+    with pytest.MonkeyPatch.context() as patch:
+        for name, value in {**slurm.environment, **environment}.items():
+            patch.setenv(name, value)
+        done = call_here(*arguments)
+    said = done.stderr + done.stdout
+    assert done.returncode == expect, said
+    return said
 
 
 def configure(directory: Path, *, trials: int, shards: int = 2 * TASKS) -> Path:

@@ -12,7 +12,7 @@ from pathlib import Path
 import docker
 import pytest
 
-from tests.e2e.collection import FAST, Running, call, collect, fingerprints, start, write_config
+from tests.e2e.collection import FAST, Running, call, call_here, collect_here, fingerprints, start, write_config
 from throwcollect.runtimes.docker.options import KEY_LABEL
 
 pytestmark = [pytest.mark.docker, pytest.mark.usefixtures("client")]
@@ -26,9 +26,9 @@ def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def expected(config: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """Fingerprints of the files that processes collect."""
+    """Fingerprints of the files that are collected without containers."""
     directory = tmp_path_factory.mktemp("reference") / "data"
-    collect(config, directory, 2)
+    collect_here(config, directory)
     return fingerprints(directory)
 
 
@@ -92,7 +92,7 @@ def test_what_a_killed_launcher_leaves_is_cleaned_up(config: Path, engine: docke
     running.wait_until(lambda: len(containers_of(engine, directory)) == 4)
     running.process.kill()
     running.process.communicate()
-    done = call("down", "--run", directory)
+    done = call_here("down", "--run", directory)
     assert done.returncode == 0, done.stderr
     assert not containers_of(engine, directory)
 
@@ -147,10 +147,10 @@ def test_a_detached_run_is_followed_scaled_and_waited_for(
     directory = tmp_path / "data"
     begun = call("up", "-d", "-n", "1", config, "--runtime", "docker", "--output", directory)
     assert begun.returncode == 0, begun.stderr
-    assert "sim_0" in call("ps").stdout
-    assert call("scale", "3", "--run", directory).returncode == 0
+    assert "sim_0" in call_here("ps").stdout
+    assert call_here("scale", "3", "--run", directory).returncode == 0
     done = call("wait", "--run", directory)
     assert done.returncode == 0, done.stderr
     assert fingerprints(directory) == expected
-    told = call("logs", "--run", directory).stdout
+    told = call_here("logs", "--run", directory).stdout
     assert "sim_0" in told

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import io
 import json
 import os
 import signal
@@ -10,11 +11,16 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import psutil
+import pytest
+
+from throwcollect.cli.main import main
+from throwcollect.interruption import stop_signals
 
 CONFIG = """\
 name: small
@@ -37,6 +43,24 @@ def command(*arguments: str | Path) -> list[str]:
 
 def call(*arguments: str | Path, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command(*arguments), capture_output=True, text=True, timeout=120, cwd=cwd, check=False)
+
+
+def call_here(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
+    """The same command in this process, for what does not depend on a process: starting one takes a second."""
+    out, err = io.StringIO(), io.StringIO()
+    before = [(number, signal.getsignal(number)) for number in stop_signals()]
+    wanted = ["throwcollect", *map(str, arguments)]
+    with pytest.MonkeyPatch.context() as patch, redirect_stdout(out), redirect_stderr(err):
+        patch.setattr(sys, "argv", wanted)
+        try:
+            with pytest.raises(SystemExit) as end:
+                main()
+        finally:
+            for number, handler in before:
+                signal.signal(number, handler)
+    code = end.value.code
+    assert isinstance(code, int)
+    return subprocess.CompletedProcess(wanted, code, out.getvalue(), err.getvalue())
 
 
 FAST = "engine: ballistic"
@@ -81,7 +105,7 @@ class Running:
             if self.process.poll() is not None or time.monotonic() > deadline:
                 self.process.kill()
                 raise AssertionError(f"did not happen; the command says: {self.process.communicate()}")
-            time.sleep(0.01)
+            time.sleep(0.03)
 
     def finish(self) -> tuple[int, str, str]:
         out, err = self.process.communicate(timeout=120)
@@ -110,6 +134,17 @@ def collect(config: Path, directory: Path, simulations: int, *options: str, **en
     code, out, err = start(config, directory, simulations, "--json", *options, **environment).finish()
     assert code == 0, err
     summary: dict[str, object] = json.loads(out)
+    return summary
+
+
+def collect_here(config: Path, directory: Path, *options: str) -> dict[str, object]:
+    """A whole collection in this process; returns its summary.
+
+    It writes the files that nodes write (`test_purity.py`), so it makes the dataset wherever nodes are not the point.
+    """
+    done = call_here("up", *INPROCESS, config, "--output", directory, "--json", *options)
+    assert done.returncode == 0, done.stderr
+    summary: dict[str, object] = json.loads(done.stdout)
     return summary
 
 

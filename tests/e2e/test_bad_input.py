@@ -6,20 +6,16 @@ import json
 import os
 import pty
 import resource
-import signal
 import socket
 import subprocess
-import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
 import pytest
 
-from tests.e2e.collection import FAST, call, command, write_config
-from throwcollect.cli.main import main
-from throwcollect.interruption import stop_signals
+from tests.e2e.collection import FAST, INPROCESS, call_here, collect_here, command, write_config
 from throwcollect.robots.talos import TALOS
 from throwcollect.runs.records import Records
 
@@ -38,24 +34,15 @@ class Said(NamedTuple):
 
 
 @pytest.fixture
-def say(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> Iterator[Callable[..., Said]]:
+def say(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Said]:
     """The command, called in this process, as most mistakes are found before any other is started."""
     monkeypatch.chdir(tmp_path)
-    before = [(number, signal.getsignal(number)) for number in stop_signals()]
 
     def run(*arguments: str) -> Said:
-        monkeypatch.setattr(sys, "argv", ["throwcollect", *arguments])
-        try:
-            main()
-        except SystemExit as end:
-            return Said(end.code, *capfd.readouterr())
-        raise AssertionError("the command did not exit")
+        done = call_here(*arguments)
+        return Said(done.returncode, done.stdout, done.stderr)
 
-    yield run
-    for number, handler in before:
-        signal.signal(number, handler)
+    return run
 
 
 @pytest.fixture
@@ -283,9 +270,7 @@ def dataset(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, o
     """A dataset, and the summary that was printed."""
     directory = tmp_path_factory.mktemp("whole")
     config = write_config(directory, trials=2, sim=FAST)
-    said = call("up", "-n", "1", config, "--output", directory / "data", "--json")
-    assert (said.returncode, said.stderr) == (0, "")
-    return directory / "data", json.loads(said.stdout)
+    return directory / "data", collect_here(config, directory / "data")
 
 
 @pytest.mark.parametrize("moment", ["plan", "collection", "finish"])
@@ -297,8 +282,10 @@ def test_a_full_disk(moment: str, small: Path, tmp_path: Path, dataset: tuple[Pa
         "collection": (shard // 2, "small_00000.mcap.part"),
         "finish": (shard - 100, "small_00000.mcap"),
     }[moment]
+    # The coordinator, a node of its own, finds it out while it collects.
+    runtime = ("-n", "1") if moment == "collection" else INPROCESS
     said = subprocess.run(
-        command("up", "-n", "1", small, "--output", tmp_path / "data"),
+        command("up", *runtime, small, "--output", tmp_path / "data"),
         capture_output=True,
         text=True,
         timeout=60,
@@ -313,7 +300,7 @@ def test_a_full_disk(moment: str, small: Path, tmp_path: Path, dataset: tuple[Pa
     assert left == (set() if moment == "plan" else {"small_00000.mcap.part"})
     assert (tmp_path / "data").exists() == (moment != "plan")
     if moment != "plan":
-        resumed = call("resume", tmp_path / "data", "-n", "1", "--json")
+        resumed = call_here("resume", tmp_path / "data", *INPROCESS, "--json")
         assert resumed.returncode == 0, resumed.stderr
         assert json.loads(resumed.stdout)["digest"] == dataset[1]["digest"]
 
@@ -384,7 +371,7 @@ def test_a_collection_outlives_its_readers(lost: str, small: Path, tmp_path: Pat
     reading, writing = os.pipe()
     os.close(reading)
     collecting = subprocess.run(
-        command("up", "-n", "1", small, "--output", tmp_path / "data"),
+        command("up", *(("-n", "1") if lost == "both" else INPROCESS), small, "--output", tmp_path / "data"),
         stdin=subprocess.DEVNULL,
         stdout=writing if lost == "both" else subprocess.PIPE,
         stderr=writing,
@@ -435,7 +422,7 @@ def test_every_command_has_help(say: Callable[..., Said]) -> None:
 def test_progress_is_a_bar_on_a_terminal(small: Path, tmp_path: Path) -> None:
     master, slave = pty.openpty()
     running = subprocess.Popen(
-        command("up", "-n", "1", small, "--output", tmp_path / "bar"),
+        command("up", *INPROCESS, small, "--output", tmp_path / "bar"),
         stdout=subprocess.DEVNULL,
         stderr=slave,
         env={**os.environ, "TERM": "xterm", "COLUMNS": "80", "NO_COLOR": "1"},

@@ -8,7 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from tests.e2e.collection import CONFIG, FAST, INPROCESS, collect, fingerprints, write_config
+from tests.e2e.collection import CONFIG, FAST, collect_here, fingerprints, write_config
 
 PAGE = Path(__file__).parents[2] / "docs" / "cluster.md"
 
@@ -19,5 +19,5 @@ def test_a_loop_is_a_scheduler(tmp_path: Path) -> None:
     config = write_config(tmp_path, trials=10, text=text, sim=FAST).rename(tmp_path / "throws.yaml")
     environment = {**os.environ, "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"}
     subprocess.run(["sh", "-e", "-c", script], cwd=tmp_path, check=True, env=environment)
-    collect(config, tmp_path / "whole", 1, *INPROCESS)
+    collect_here(config, tmp_path / "whole")
     assert fingerprints(tmp_path / "data") == fingerprints(tmp_path / "whole")

@@ -1,11 +1,10 @@
 """Every configuration that comes with the project can be collected."""
 
-import json
 from pathlib import Path
 
 import pytest
 
-from tests.e2e.collection import INPROCESS, call
+from tests.e2e.collection import collect_here
 from throwcollect.dataset.verify import verify
 
 pytestmark = pytest.mark.e2e
@@ -22,9 +21,7 @@ def test_there_are_configurations() -> None:
 def test_a_configuration_is_collected_and_verified(config: Path, tmp_path: Path) -> None:
     trials = WHOLE.get(config.stem, 3)
     options = [] if config.stem in WHOLE else ["--trials", str(trials)]
-    collected = call("up", *INPROCESS, config, "--output", tmp_path / "data", "--json", *options)
-    assert collected.returncode == 0, collected.stderr
-    summary = json.loads(collected.stdout)
+    summary = collect_here(config, tmp_path / "data", *options)
     assert summary["trials"] == trials
     assert summary["episodes"] > 0
     assert verify(tmp_path / "data") == []

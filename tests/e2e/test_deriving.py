@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from tests.e2e.collection import INPROCESS, collect, fingerprints
+from tests.e2e.collection import collect_here, fingerprints
 from throwcollect.cli.main import app
 from throwcollect.dataset.verify import verify
 
@@ -17,29 +17,33 @@ PAGE = (Path(__file__).parents[2] / "docs" / "deriving.md").read_text(encoding="
 
 MONDAY = """\
 name: monday
-trials: 8
+trials: 6
 seed: 7
 ball: {mass_kg: 0.045, drag_coefficient: 0.4}
+sim: {engine: ballistic, physics_hz: 250}
 sweep:
   parameters:
     task.end.arm_right_4_joint: {min: -0.7, max: -0.2}
     task.duration_s: {min: 0.9, max: 1.2}
 record:
+  rate_hz: 125
   topics: [joint_states, ball/odometry, controller_state, tf, clock]
-  trials_per_shard: 6
+  trials_per_shard: 4
 run: {replay: 0}
 """
 TUESDAY = """\
 name: tuesday
-trials: 6
+trials: 4
 seed: 8
 ball: {mass_kg: 0.03, drag_coefficient: 0.4}
+sim: {engine: ballistic, physics_hz: 250}
 sweep:
   sampler: uniform
   parameters:
     task.duration_s: {min: 0.9, max: 1.2}
     task.trajectory.gamma: {min: 1.0, max: 1.2}
 record:
+  rate_hz: 125
   topics: [joint_states, ball/odometry, controller_state, tf, clock]
   zstd_level: 3
 run: {replay: 0}
@@ -56,14 +60,14 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
         name = text.split()[1]
         config = directory / f"{name}.yaml"
         config.write_text(text)
-        collect(config, directory / "datasets" / name, 1, *INPROCESS)
+        collect_here(config, directory / "datasets" / name)
     for block in re.findall(r"```sh\n(.*?)```", PAGE, flags=re.DOTALL):
         for line in block.replace("\\\n", " ").splitlines():
             program, command, *arguments = shlex.split(line)
             assert program == "throwcollect"
             if command == "up":
                 config, _, output = arguments
-                collect(directory / config, directory / output, 1, *INPROCESS)
+                collect_here(directory / config, directory / output)
             else:
                 with pytest.MonkeyPatch.context() as patch:
                     patch.chdir(directory)
@@ -73,7 +77,7 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def collected_anew(derived: Path, directory: Path) -> dict[str, str]:
-    collect(derived / "config.yaml", directory, 1, *INPROCESS)
+    collect_here(derived / "config.yaml", directory)
     return as_derived(directory)
 
 

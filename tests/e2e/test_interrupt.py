@@ -16,7 +16,18 @@ from mcap.exceptions import McapError
 from mcap.records import Chunk, Metadata
 from mcap.stream_reader import StreamReader
 
-from tests.e2e.collection import FAST, Running, call, collect, fingerprints, journal, start, write_config
+from tests.e2e.collection import (
+    FAST,
+    INPROCESS,
+    Running,
+    call,
+    call_here,
+    collect_here,
+    fingerprints,
+    journal,
+    start,
+    write_config,
+)
 
 pytestmark = pytest.mark.e2e
 TRIALS = 16
@@ -35,7 +46,7 @@ def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def reference(config: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     directory = tmp_path_factory.mktemp("reference") / "data"
-    collect(config, directory, 2)
+    collect_here(config, directory)
     return directory
 
 
@@ -87,7 +98,7 @@ def episodes(part: Path, *, cut: bool = False) -> Counter[str]:
 
 def assert_goes_on(directory: Path, reference: Path) -> None:
     """Resuming ends with the files of an undisturbed collection, and runs no trial twice."""
-    said = call("resume", directory, "-n", "2", "--runtime", "local")
+    said = call_here("resume", directory, *INPROCESS)
     assert said.returncode == 0, said.stderr
     assert fingerprints(directory) == fingerprints(reference)
     assert Counter(event["trial"] for event in events(directory) if event["event"] == "commit") == dict.fromkeys(
@@ -125,7 +136,7 @@ def test_an_interruption_finishes_what_runs(
     found = episodes(tmp_path / "data" / "small_00000.mcap.part")
     assert 0 < len(found) < TRIALS
     assert set(found.values()) == {1}
-    assert "the dataset is not finished" in call("dataset", "info", tmp_path / "data").stderr
+    assert "the dataset is not finished" in call_here("dataset", "info", tmp_path / "data").stderr
     assert f"try: throwcollect resume {tmp_path / 'data'}" in err
     assert_goes_on(tmp_path / "data", reference)
 
@@ -194,12 +205,12 @@ def test_a_finished_dataset_whose_recording_was_cut_goes_on_to_the_same_files(
     config: Path, reference: Path, tmp_path: Path
 ) -> None:
     directory = Path(shutil.copytree(reference, tmp_path / "data"))
-    said = call("resume", directory, "--check")
+    said = call_here("resume", directory, "--check")
     assert (said.returncode, "every trial has ended, nothing is left to do" in said.stderr) == (0, True)
     shard = directory / "small_00000.mcap"
     size = shard.stat().st_size
     os.truncate(shard, size * 2 // 3)
-    said = call("resume", directory, "-n", "2", "--runtime", "local")
+    said = call_here("resume", directory, *INPROCESS)
     assert said.returncode == 0, said.stderr
     assert f"{directory}: small_00000.mcap: " in said.stderr
     assert fingerprints(directory) == fingerprints(reference)

@@ -19,7 +19,17 @@ from pathlib import Path
 import pytest
 
 from rclzenoh.session_config import OVERRIDE_VARIABLE, Key, client_override
-from tests.e2e.collection import CONFIG, FAST, INPROCESS, Running, call, collect, command, fingerprints, launched
+from tests.e2e.collection import (
+    CONFIG,
+    FAST,
+    Running,
+    call,
+    call_here,
+    collect_here,
+    command,
+    fingerprints,
+    launched,
+)
 from throwcollect.run_key import RunKey
 
 pytestmark = pytest.mark.e2e
@@ -199,7 +209,7 @@ def test_machines_come_and_go_and_the_files_are_the_same(
         assert process.wait(30) == 0
         assert process.stderr is not None
         assert "the run is over" in process.stderr.read()
-    collect(tmp_path / "small.yaml", tmp_path / "whole", 1, *INPROCESS)
+    collect_here(tmp_path / "small.yaml", tmp_path / "whole")
     whole, joined = fingerprints(tmp_path / "whole"), fingerprints(tmp_path / "data")
     same = [name for name in whole if name.endswith(".mcap") or name == "throws.parquet"]
     assert len(same) == 2
@@ -251,14 +261,14 @@ def test_other_sources_are_refused_with_a_clear_word(tmp_path: Path) -> None:
     from throwcollect.runs.token import JoinToken
 
     token = JoinToken("many-1234", "tls/127.0.0.1:1", "11" * 32, 0, "bullet", build="another").encode()
-    done = call("join-run", token)
+    done = call_here("join-run", token)
     assert done.returncode == 2
     assert "run many-1234: other sources, or another engine bullet or robot model" in done.stderr
 
 
 @pytest.mark.parametrize("word", ["", "tc2.", "tc2.e30", "x" * 50, "tc2.!!!"])
 def test_what_is_no_token_is_refused(word: str) -> None:
-    done = call("join-run", word)
+    done = call_here("join-run", word)
     assert done.returncode == 2
     assert "this is no token of a run, or not a whole one" in done.stderr
 
@@ -280,7 +290,7 @@ def test_a_token_is_written_for_its_owner_alone(tmp_path: Path) -> None:
     assert "tc2." not in done.stdout + done.stderr
     assert (tmp_path / "token").stat().st_mode & 0o777 == 0o600
     assert (tmp_path / "token").read_text().startswith("tc2.")
-    done = call("up", path, "--output", tmp_path / "other", "--token-file", tmp_path / "token")
+    done = call_here("up", path, "--output", tmp_path / "other", "--token-file", tmp_path / "token")
     assert done.returncode == 2
     assert "other machines cannot join the run" in done.stderr
 
@@ -291,7 +301,7 @@ def test_a_run_that_is_over_cannot_be_joined() -> None:
 
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]
-    done = call(
+    done = call_here(
         "join-run",
         JoinToken("many-1234", f"tls/127.0.0.1:{port}", "11" * 32, 0, "bullet", build_digest("bullet")).encode(),
     )

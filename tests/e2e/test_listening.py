@@ -10,7 +10,7 @@ import pytest
 from mcap.reader import make_reader
 
 from rclzenoh.interfaces import get_message
-from tests.e2e.collection import FAST, collect, fingerprints, start, write_config
+from tests.e2e.collection import FAST, collect_here, fingerprints, start, write_config
 from tests.integration.robot import connected
 from throwcollect.dataset.reader import Dataset
 from throwcollect.ros import Context, HistoryPolicy, Node, QoSProfile, SingleThreadedExecutor
@@ -126,5 +126,5 @@ def test_whole_trials_are_heard(listened: tuple[Path, dict[str, Messages]]) -> N
 
 def test_a_listener_does_not_change_the_dataset(listened: tuple[Path, dict[str, Messages]], tmp_path: Path) -> None:
     directory, _ = listened
-    collect(write_config(tmp_path, trials=TRIALS, sim=FAST), tmp_path / "data", 2)
+    collect_here(write_config(tmp_path, trials=TRIALS, sim=FAST), tmp_path / "data")
     assert fingerprints(tmp_path / "data") == fingerprints(directory)

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from tests import processors
-from tests.e2e.collection import INPROCESS, call, collect, fingerprints, start, write_config
+from tests.e2e.collection import INPROCESS, call_here, collect, collect_here, fingerprints, start, write_config
 from throwcollect import Simulator, load
 from throwcollect.dataset.verify import verify
 
 pytestmark = pytest.mark.e2e
-TRIALS = 24
+TRIALS = 12
 
 
 @pytest.fixture(scope="module")
@@ -22,9 +22,9 @@ def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def reference(config: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """An undisturbed collection with one simulation."""
+    """An undisturbed collection in one process."""
     directory = tmp_path_factory.mktemp("reference") / "data"
-    summary = collect(config, directory, 1)
+    summary = collect_here(config, directory)
     assert summary["episodes"] == TRIALS
     return directory
 
@@ -43,7 +43,7 @@ def test_a_collection_is_whole(reference: Path) -> None:
 
 
 def test_stored_throws_come_out_of_the_simulation_again(reference: Path) -> None:
-    said = call("dataset", "replay", reference, "--all", "--sample", "5")
+    said = call_here("dataset", "replay", reference, "--all", "--sample", "5")
     assert (said.returncode, said.stderr) == (0, "")
     assert said.stdout == f"{reference}: 5 throws replayed, the same bit for bit\n"
 
@@ -63,7 +63,7 @@ def test_a_simulator_gives_the_throws_of_the_dataset(config: Path, reference: Pa
             assert np.array_equal(throw.joints.effort, stored.joints.effort)
 
 
-@pytest.mark.parametrize("simulations", [2, 4])
+@pytest.mark.parametrize("simulations", [1, 2, 4])
 def test_every_file_is_the_same_for_any_number_of_simulations(
     simulations: int, config: Path, reference: Path, tmp_path: Path
 ) -> None:
@@ -105,14 +105,14 @@ def test_every_file_is_the_same_on_another_processor(tmp_path: Path) -> None:
         "--set",
         "record.topics=[joint_states, ball/odometry, controller_state, tf, clock]",
     )
-    collect(config, tmp_path / "here", 1, *options)
-    collect(config, tmp_path / "there", 1, *options, **processors.PLAIN)
+    collect_here(config, tmp_path / "here", *options)
+    collect(config, tmp_path / "there", 1, *INPROCESS, *options, **processors.PLAIN)
     assert fingerprints(tmp_path / "there") == fingerprints(tmp_path / "here")
 
 
 def test_another_seed_gives_another_digest(config: Path, reference: Path, tmp_path: Path) -> None:
     other = write_config(tmp_path, trials=2)
     other.write_text(other.read_text().replace("seed: 7", "seed: 8"))
-    collect(other, tmp_path / "data", 1, *INPROCESS)
-    digests = [call("dataset", "digest", directory).stdout for directory in (reference, tmp_path / "data")]
+    collect_here(other, tmp_path / "data")
+    digests = [call_here("dataset", "digest", directory).stdout for directory in (reference, tmp_path / "data")]
     assert digests[0] != digests[1]

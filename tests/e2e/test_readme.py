@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.e2e.collection import collect
+from tests.e2e.collection import collect_here
 from throwcollect.config.loader import load
 
 pytestmark = pytest.mark.e2e
@@ -24,7 +24,7 @@ def test_the_yaml_and_the_python_work(tmp_path: Path, capsys: pytest.CaptureFixt
     assert load(config).trials == 2000
     few = tmp_path / "few.yaml"
     few.write_text(yaml.replace("trials: 2000", "trials: 2"), encoding="utf-8")
-    collect(few, tmp_path / "data", 1)
+    collect_here(few, tmp_path / "data")
     named = re.sub(r'"datasets/[^"]*"', repr(str(tmp_path / "data")), python)
     assert named != python
     exec(named, {})  # noqa: S102
@@ -38,7 +38,7 @@ def test_the_directory_is_as_drawn(tmp_path: Path) -> None:
     (yaml,) = blocks("yaml")
     config = tmp_path / "quickstart.yaml"
     config.write_text(yaml.replace("trials: 2000", "trials: 1").replace("name: throws", "name: quickstart"))
-    collect(config, tmp_path / "data", 1)
+    collect_here(config, tmp_path / "data")
     assert {path.name for path in (tmp_path / "data").iterdir()} == drawn
 
 

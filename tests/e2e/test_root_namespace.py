@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from tests.e2e.collection import CONFIG, FAST, call, collect, fingerprints, write_config
+from tests.e2e.collection import CONFIG, FAST, call_here, collect, collect_here, fingerprints, write_config
 
 ROOT = CONFIG.replace("replay: 0", "replay: 0, simulations: 1, root_namespace: true")
 
@@ -10,7 +10,7 @@ ROOT = CONFIG.replace("replay: 0", "replay: 0, simulations: 1, root_namespace: t
 def test_the_dataset_does_not_know_where_the_simulation_lived(tmp_path: Path) -> None:
     (tmp_path / "root").mkdir()
     usual, rooted = tmp_path / "a", tmp_path / "b"
-    collect(write_config(tmp_path, trials=6, sim=FAST), usual, 2)
+    collect_here(write_config(tmp_path, trials=6, sim=FAST), usual)
     collect(write_config(tmp_path / "root", trials=6, text=ROOT, sim=FAST), rooted, 1)
     assert fingerprints(rooted) == fingerprints(usual)
     journal = (rooted / "logs" / "journal.jsonl").read_text()
@@ -19,6 +19,6 @@ def test_the_dataset_does_not_know_where_the_simulation_lived(tmp_path: Path) ->
 
 def test_several_simulations_cannot_live_there(tmp_path: Path) -> None:
     path = write_config(tmp_path, trials=6, text=ROOT, sim=FAST)
-    ended = call("up", "-n", "2", "--runtime", "local", path, "--output", tmp_path / "a")
+    ended = call_here("up", "-n", "2", "--runtime", "local", path, "--output", tmp_path / "a")
     assert ended.returncode == 2
     assert "run.root_namespace: should be left out, as 2 simulations (-n) cannot share" in ended.stderr

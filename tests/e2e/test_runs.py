@@ -5,7 +5,6 @@ import os
 import re
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -16,8 +15,16 @@ from typing import Any
 import psutil
 import pytest
 
-from tests.e2e.collection import FAST, call, collect, command, fingerprints, start, write_config
-from throwcollect.cli.main import main
+from tests.e2e.collection import (
+    FAST,
+    call,
+    call_here,
+    collect_here,
+    command,
+    fingerprints,
+    start,
+    write_config,
+)
 from throwcollect.runs.record import Record
 from throwcollect.runs.records import STATE_VARIABLE, Records
 
@@ -29,8 +36,6 @@ MANY = 100
 UNTIL_STOPPED = ("--trials", str(MANY), *SLOWLY)
 """Longer than any test: more than a minute, however long the commands in between take to start."""
 
-Say = Callable[..., tuple[object, str, str]]
-
 
 @pytest.fixture(scope="module")
 def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -41,7 +46,7 @@ def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def reference(config: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A collection that nobody disturbed."""
     directory = tmp_path_factory.mktemp("reference") / "data"
-    collect(config, directory, 2)
+    collect_here(config, directory)
     return directory
 
 
@@ -58,32 +63,21 @@ def records(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Records
             os.kill(run.record.launcher, signal.SIGKILL)
 
 
-@pytest.fixture
-def say(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Iterator[Say]:
+def say(*arguments: str | Path) -> tuple[int, str, str]:
     """The command, called in this process: exit code, output, errors."""
-    before = signal.getsignal(signal.SIGTERM)
-
-    def say(*arguments: str | Path) -> tuple[object, str, str]:
-        monkeypatch.setattr(sys, "argv", ["throwcollect", *map(str, arguments)])
-        try:
-            main()
-        except SystemExit as end:
-            return (end.code, *capfd.readouterr())
-        raise AssertionError("the command did not exit")
-
-    yield say
-    signal.signal(signal.SIGTERM, before)
+    said = call_here(*arguments)
+    return said.returncode, said.stdout, said.stderr
 
 
 def detach(config: Path, directory: Path, *options: str) -> str:
     """A run by itself; its id."""
-    said = call("up", "-d", config, "--output", directory, *options)
+    said = call_here("up", "-d", config, "--output", directory, *options)
     assert said.returncode == 0, said.stderr
     return said.stdout.strip()
 
 
 def listed(*options: str) -> list[dict[str, Any]]:
-    said = call("ps", "--json", *options)
+    said = call_here("ps", "--json", *options)
     assert (said.returncode, said.stderr) == (0, "")
     documents: list[dict[str, Any]] = json.loads(said.stdout)
     return documents
@@ -130,7 +124,7 @@ def test_a_run_goes_on_by_itself_and_is_waited_for_elsewhere(
     assert [node.name for node in record.nodes] == ["router", "sim_0", "sim_1", "coordinator"]
     waited = call("wait")
     assert waited.returncode == 0, waited.stderr
-    info = call("dataset", "info", tmp_path / "data").stdout
+    info = call_here("dataset", "info", tmp_path / "data").stdout
     assert waited.stdout.startswith(info)
     assert "look into it: throwcollect dataset info" in waited.stdout
     assert fingerprints(tmp_path / "data") == fingerprints(reference)
@@ -138,11 +132,11 @@ def test_a_run_goes_on_by_itself_and_is_waited_for_elsewhere(
     (ended,) = listed("-a")
     assert (ended["run"], ended["status"], ended["exit_code"], ended["trials_ended"]) == (run, "ended", 0, TRIALS)
     # Whoever comes late gets the same answer.
-    again = call("wait", "--run", tmp_path / "data", "--json")
+    again = call_here("wait", "--run", tmp_path / "data", "--json")
     assert (again.returncode, again.stderr) == (0, "")
     assert (
         json.loads(again.stdout).items()
-        >= json.loads(call("dataset", "info", tmp_path / "data", "--json").stdout).items()
+        >= json.loads(call_here("dataset", "info", tmp_path / "data", "--json").stdout).items()
     )
 
 
@@ -150,22 +144,22 @@ def test_scaling_and_losses_do_not_change_the_dataset(config: Path, records: Rec
     few = ("--trials", "24", *SLOWLY)
     undisturbed = start(config, tmp_path / "reference", 2, *few, **{STATE_VARIABLE: str(tmp_path / "elsewhere")})
     run = detach(config, tmp_path / "data", "-n", "1", *few)
-    assert call("scale", "3").stdout == f"{run}: 1 -> 3 simulations\n"
+    assert call_here("scale", "3").stdout == f"{run}: 1 -> 3 simulations\n"
     until(lambda: status(records, run, "sim_2") == "running")
     assert records.get(run).record.simulations == 3
     first = handle(records, run, "sim_0")
     os.kill(int(first), signal.SIGKILL)
     until(lambda: handle(records, run, "sim_0") not in ("", first))
     removed = nodes(records, run)["sim_2"]
-    assert call("scale", "2", "--run", run[:-1]).returncode == 0
+    assert call_here("scale", "2", "--run", run[:-1]).returncode == 0
     assert_gone({"sim_2": removed})
-    waited = call("wait")
+    waited = call_here("wait")
     assert waited.returncode == 0, waited.stderr
     # On standard error, too, unless it was over by then.
     assert re.search(r"^trials +24: 24 landed$", waited.stdout, re.MULTILINE)
     assert undisturbed.finish()[0] == 0
     assert fingerprints(tmp_path / "data") == fingerprints(tmp_path / "reference")
-    told = [re.sub(r": \d+$", "", line.split("  ", 1)[1]) for line in call("events").stdout.splitlines()]
+    told = [re.sub(r": \d+$", "", line.split("  ", 1)[1]) for line in call_here("events").stdout.splitlines()]
     for line in (
         f"{run} scaled: 3 simulations",
         "sim_0 lost: ended by SIGKILL",
@@ -179,7 +173,7 @@ def test_scaling_and_losses_do_not_change_the_dataset(config: Path, records: Rec
     assert told.index("sim_2 ready") < told.index("sim_2 removed")
 
 
-def test_stopping_drains_as_ctrl_c_does(config: Path, records: Records, say: Say, tmp_path: Path) -> None:
+def test_stopping_drains_as_ctrl_c_does(config: Path, records: Records, tmp_path: Path) -> None:
     run = detach(config, tmp_path / "data", "-n", "1", *UNTIL_STOPPED)
     in_the_middle(records, run)
     processes = nodes(records, run)
@@ -200,7 +194,7 @@ def test_down_ends_everything_and_keeps_the_directory(config: Path, records: Rec
     run = detach(config, tmp_path / "data", "-n", "1", *UNTIL_STOPPED)
     in_the_middle(records, run)
     processes = nodes(records, run)
-    said = call("down", "-v")
+    said = call_here("down", "-v")
     assert (said.returncode, said.stdout) == (0, f"{run}: ended and forgotten\n")
     assert_gone(processes)
     assert listed("-a") == []
@@ -209,7 +203,7 @@ def test_down_ends_everything_and_keeps_the_directory(config: Path, records: Rec
 
 
 def test_a_killed_launcher_takes_its_processes_along_and_is_told(
-    config: Path, records: Records, say: Say, tmp_path: Path
+    config: Path, records: Records, tmp_path: Path
 ) -> None:
     run = detach(config, tmp_path / "data", "-n", "1", *UNTIL_STOPPED)
     in_the_middle(records, run, 1)
@@ -236,7 +230,7 @@ def test_a_run_in_the_foreground_is_a_run_like_any_other(config: Path, records: 
     running.wait_until(lambda: bool(records.ids()))
     (run,) = records.ids()
     in_the_middle(records, run)
-    second = call("up", config, "--output", tmp_path / "data")
+    second = call_here("up", config, "--output", tmp_path / "data")
     assert (second.returncode, second.stdout) == (2, "")
     assert second.stderr == (
         f"throwcollect: {tmp_path / 'data'}: run {run} collects into it\n"
@@ -255,7 +249,7 @@ def test_a_run_in_the_foreground_is_a_run_like_any_other(config: Path, records: 
     assert (third.returncode, third.stdout) == (4, "")
     assert f"throwcollect: {tmp_path / 'data'}: another process collects into it" in third.stderr
     assert (tmp_path / "data" / "plan.parquet").read_bytes() == plan
-    table = call("ps").stdout.splitlines()
+    table = call_here("ps").stdout.splitlines()
     assert table[0].split() == ["RUN", "RUNTIME", "SIMULATIONS", "THROWS", "STATUS", "DATASET"]
     assert [line.split()[:2] for line in table[1:]] == [
         [run, "local"],
@@ -264,7 +258,7 @@ def test_a_run_in_the_foreground_is_a_run_like_any_other(config: Path, records: 
         ["sim_1", "running"],
         ["coordinator", "running"],
     ]
-    assert call("stop").returncode == 0
+    assert call_here("stop").returncode == 0
     code, out, err = running.finish()
     assert (code, out) == (130, "")
     assert "interrupted: finishing the running trials; once more ends at once" in err
@@ -314,10 +308,10 @@ def test_logs_follow_a_run_to_its_end(config: Path, records: Records, tmp_path: 
     assert {line.split(" | ")[0].rstrip() for line in lines} == {"router", "coordinator", "sim_0", "sim_1"}
     assert "sim_1       | sim_1 is ready" in lines
     assert any(line.startswith("coordinator | 12/12 throws: 12 landed") for line in lines)
-    assert sorted(call("logs", "--run", run).stdout.splitlines()) == sorted(lines)
-    only = call("logs", "sim_1").stdout.splitlines()
+    assert sorted(call_here("logs", "--run", run).stdout.splitlines()) == sorted(lines)
+    only = call_here("logs", "sim_1").stdout.splitlines()
     assert only == [line for line in lines if line.startswith("sim_1 ")]
-    unknown = call("logs", "sim_7")
+    unknown = call_here("logs", "sim_7")
     assert unknown.returncode == 2
     assert f"throwcollect: run {run}: no node 'sim_7' has printed anything" in unknown.stderr
     events = [json.loads(line) for line in documents.communicate(timeout=30)[0].splitlines()]
@@ -327,7 +321,7 @@ def test_logs_follow_a_run_to_its_end(config: Path, records: Records, tmp_path: 
 
 
 def test_mistakes_are_seen_in_the_foreground_and_leave_nothing_behind(
-    config: Path, say: Say, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    config: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "used").mkdir()
@@ -372,7 +366,7 @@ def test_a_failure_is_told_to_whoever_waits(config: Path, tmp_path: Path, monkey
     (tmp_path / "pybullet.py").write_text("raise ImportError('broken pybullet')")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     detach(config, tmp_path / "data", "--set", "run.restarts=0", "--set", "sim.engine=bullet")
-    waited = call("wait")
+    waited = call_here("wait")
     assert (waited.returncode, waited.stdout) == (3, "")
     assert "throwcollect: no simulation can be kept alive; the last, sim_" in waited.stderr
     assert "broken pybullet" in waited.stderr
@@ -394,7 +388,7 @@ def test_ctrl_c_while_a_run_is_being_started_ends_it(config: Path, records: Reco
     assert [run.status for run in records.all() if run.lives] == []
 
 
-def test_among_several_runs_one_must_be_named(records: Records, say: Say, tmp_path: Path) -> None:
+def test_among_several_runs_one_must_be_named(records: Records, tmp_path: Path) -> None:
     started = datetime.now(timezone.utc)
     runs = [records.new(name) for name in ("first", "second")]
     for run in runs:
@@ -408,7 +402,7 @@ def test_among_several_runs_one_must_be_named(records: Records, say: Say, tmp_pa
         run.close()
 
 
-def test_without_any_run_every_verb_says_so(say: Say) -> None:
+def test_without_any_run_every_verb_says_so() -> None:
     for verb in (["wait"], ["stop"], ["scale", "2"], ["down"], ["logs"], ["events"]):
         code, out, err = say(*verb)
         assert (verb, code, out) == (verb, 2, "")
@@ -418,7 +412,7 @@ def test_without_any_run_every_verb_says_so(say: Say) -> None:
     assert (code, out.split()) == (0, ["RUN", "RUNTIME", "SIMULATIONS", "THROWS", "STATUS", "DATASET"])
 
 
-def test_a_damaged_record_is_named_and_can_be_forgotten(say: Say, tmp_path: Path) -> None:
+def test_a_damaged_record_is_named_and_can_be_forgotten(tmp_path: Path) -> None:
     path = tmp_path / "state" / "runs" / "small-0000.json"
     path.write_text('{"run": "small-0000"')
     message = f"throwcollect: {path}: the record of the run is damaged\n  try: throwcollect down --run small-0000"
@@ -432,7 +426,7 @@ def test_a_damaged_record_is_named_and_can_be_forgotten(say: Say, tmp_path: Path
 
 
 def test_a_state_directory_that_cannot_be_used_is_named(
-    config: Path, say: Say, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    config: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "file").write_text("")
     monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "file"))

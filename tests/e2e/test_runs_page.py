@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.e2e.collection import FAST
 from throwcollect.dataset.inspect import digest
 from throwcollect.runs.records import STATE_VARIABLE
 
@@ -18,7 +19,12 @@ BLOCKS = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "runs.md").read_tex
 
 
 def test_two_runs_of_one_program_are_followed_side_by_side(tmp_path: Path) -> None:
-    (tmp_path / "configs").symlink_to(ROOT / "configs")
+    text = (ROOT / "configs" / "quickstart.yaml").read_text(encoding="utf-8")
+    (tmp_path / "configs").mkdir()
+    # The page says nothing of contacts, nor of replays; and the first run must not be over when the second has begun.
+    (tmp_path / "configs" / "quickstart.yaml").write_text(
+        f"{text}\nsim: {{{FAST}, real_time_factor: 1}}\nrun: {{replay: 0}}\n"
+    )
     said = subprocess.run(
         [sys.executable, "-c", "\n".join(BLOCKS)],
         cwd=tmp_path,

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-import json
-import os
+import shutil
 import subprocess
-import sys
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from tests.e2e.collection import call, collect, fingerprints
+from tests.e2e.collection import call_here, collect, fingerprints
+from tests.e2e.plugins import process_with_plugins, run_program
 
 pytestmark = pytest.mark.e2e
+Say = Callable[..., subprocess.CompletedProcess[str]]
+Run = Callable[[str], dict[str, Any]]
 
-PLUGINS = Path(__file__).parents[1] / "plugins"
 CONFIG = """\
 name: arm
 robot: {name: planar_arm}
@@ -53,7 +55,7 @@ throwcollect.merge_datasets([scratch / "parts/train", scratch / "parts/test"], s
 throwcollect.filter_dataset(directory, scratch / "some", where="trial < 3")
 found = {
     "findings": [len(throwcollect.verify_dataset(scratch / name)) for name in ("parts/train", "merged", "some")],
-    "replayed": len(throwcollect.verify_dataset(scratch / "merged", replay=6)),
+    "replayed": len(throwcollect.verify_dataset(scratch / "merged", replay=2)),
     "trials": [len(throwcollect.load(scratch / name)) for name in ("merged", "some")],
 }
 """
@@ -75,41 +77,43 @@ found = {
 
 
 @pytest.fixture(scope="module")
-def with_plugins() -> Any:
-    """Whatever is started finds the package of the robot."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("PYTHONPATH", os.pathsep.join([str(PLUGINS), os.environ.get("PYTHONPATH", "")]))
-        yield
+def process() -> Iterator[ProcessPoolExecutor]:
+    with process_with_plugins() as process:
+        yield process
 
 
 @pytest.fixture(scope="module")
-def arm(with_plugins: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def arm(process: ProcessPoolExecutor, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A dataset that two simulation nodes have collected."""
     scratch = tmp_path_factory.mktemp("arm")
     (scratch / "arm.yaml").write_text(CONFIG)
-    summary = collect(scratch / "arm.yaml", scratch / "data", 2)
+    summary = process.submit(collect, scratch / "arm.yaml", scratch / "data", 2, "--set", "run.replay=0").result()
     assert summary["outcomes"] == {"landed": 6}
     return scratch / "data"
 
 
-def run(program: str, directory: Path, scratch: Path) -> dict[str, Any]:
-    """What a program finds that knows of a dataset and of a directory for what it makes of it."""
-    head = f"from pathlib import Path\ndirectory, scratch = Path({str(directory)!r}), Path({str(scratch)!r})\n"
-    tail = "\nimport json\nprint(json.dumps(found))\n"
-    done = subprocess.run([sys.executable, "-c", head + program + tail], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    found: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
-    return found
+@pytest.fixture
+def say(process: ProcessPoolExecutor) -> Say:
+    """The command where the package of the robot is installed."""
+    return lambda *arguments: process.submit(call_here, *arguments).result()
 
 
-def test_nodes_and_one_process_write_the_same_files(arm: Path, tmp_path: Path) -> None:
-    done = call("up", arm / "config.yaml", "--runtime", "inprocess", "--output", tmp_path / "data")
+@pytest.fixture
+def run(process: ProcessPoolExecutor, arm: Path, tmp_path: Path) -> Run:
+    """What a program finds that knows of the dataset and of a directory for what it makes of it."""
+    return lambda program: process.submit(run_program, program, directory=arm, scratch=tmp_path).result()
+
+
+def test_nodes_and_one_process_write_the_same_files(say: Say, arm: Path, tmp_path: Path) -> None:
+    done = say("up", arm.parent / "arm.yaml", "--runtime", "inprocess", "--output", tmp_path / "data")
     assert done.returncode == 0, done.stderr
+    assert "2 trials simulated again in a fresh process: the same bit for bit" in done.stderr
     assert fingerprints(tmp_path / "data") == fingerprints(arm)
+    assert "nothing wrong" in say("dataset", "verify", arm).stdout
 
 
-def test_its_throws_can_be_read_and_simulated_again(arm: Path, tmp_path: Path) -> None:
-    found = run(READ, arm, tmp_path)
+def test_its_throws_can_be_read_and_simulated_again(run: Run) -> None:
+    found = run(READ)
     joints = ["shoulder_joint", "elbow_joint"]
     assert found["joints"] == [joints] * 4
     assert found["digests"][0] == found["digests"][1]
@@ -119,42 +123,41 @@ def test_its_throws_can_be_read_and_simulated_again(arm: Path, tmp_path: Path) -
     assert [found["statistics"][group] for group in ("position_rad", "velocity_radps", "effort_nm")] == [joints] * 3
 
 
-def test_datasets_are_made_of_it(arm: Path, tmp_path: Path) -> None:
-    assert run(DERIVE, arm, tmp_path) == {"findings": [0, 0, 0], "replayed": 0, "trials": [6, 3]}
+def test_datasets_are_made_of_it(run: Run) -> None:
+    assert run(DERIVE) == {"findings": [0, 0, 0], "replayed": 0, "trials": [6, 3]}
 
 
-def test_it_is_exported(arm: Path, tmp_path: Path) -> None:
-    found = run(EXPORT, arm, tmp_path)
+def test_it_is_exported(run: Run) -> None:
+    found = run(EXPORT)
     assert found["lerobot"] == ["planar_arm", ["shoulder_joint.pos", "elbow_joint.pos"]]
     assert found["npz"] == [["shoulder_joint", "elbow_joint"], 2]
     assert found["cards"] == [1, 1]
 
 
-def test_it_is_reported_and_viewed(arm: Path, tmp_path: Path) -> None:
-    reported = call("dataset", "report", arm, "--output", tmp_path / "report.html")
+def test_it_is_reported_and_viewed(say: Say, arm: Path, tmp_path: Path) -> None:
+    reported = say("dataset", "report", arm, "--output", tmp_path / "report.html")
     assert reported.returncode == 0, reported.stderr
     assert "simulated throws of a ball by the planar arm" in (tmp_path / "report.html").read_text()
-    viewed = call("dataset", "view", arm, tmp_path / "view")
+    viewed = say("dataset", "view", arm, tmp_path / "view")
     assert viewed.returncode == 0, viewed.stderr
     assert (tmp_path / "view" / "throws.mcap").stat().st_size > 0
 
 
-def test_a_damaged_dataset_of_it_is_repaired(arm: Path, tmp_path: Path) -> None:
+def test_a_damaged_dataset_of_it_is_repaired(say: Say, arm: Path, tmp_path: Path) -> None:
     broken = tmp_path / "broken"
-    subprocess.run(["cp", "-r", str(arm), str(broken)], check=True)
+    shutil.copytree(arm, broken)
     (shard,) = broken.glob("*.mcap")
     # The summary at the end of the file is lost, and so is the table.
     shard.write_bytes(shard.read_bytes()[:-1000])
     (broken / "throws.parquet").unlink()
-    assert call("dataset", "verify", broken).returncode != 0
-    repaired = call("dataset", "repair", broken, tmp_path / "repaired")
+    assert say("dataset", "verify", broken).returncode != 0
+    repaired = say("dataset", "repair", broken, tmp_path / "repaired")
     assert repaired.returncode == 0, repaired.stderr
     assert fingerprints(tmp_path / "repaired") == fingerprints(arm)
 
 
-def test_without_its_package_it_is_not_read(arm: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("PYTHONPATH", os.environ["PYTHONPATH"].removeprefix(f"{PLUGINS}{os.pathsep}"))
-    done = call("dataset", "info", arm)
+def test_without_its_package_it_is_not_read(arm: Path) -> None:
+    done = call_here("dataset", "info", arm)
     assert done.returncode == 2
     sentence = "robot.name: should be 'talos', got 'planar_arm'; no package that is installed brings it"
     assert sentence in done.stderr

@@ -8,7 +8,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from tests.e2e.collection import INPROCESS, call, fingerprints, interrupt, start
+from tests.e2e.collection import INPROCESS, call, call_here, fingerprints, interrupt, start
 from throwcollect.config.loader import load
 from throwcollect.dataset.verify import verify
 
@@ -34,9 +34,9 @@ def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def undisturbed(config: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     """A collection with one simulation, and what was said meanwhile."""
     directory = tmp_path_factory.mktemp("undisturbed") / "data"
-    code, _, err = start(config, directory, 1, *INPROCESS).finish()
-    assert code == 0, err
-    return directory, err
+    done = call_here("up", *INPROCESS, config, "--output", directory)
+    assert done.returncode == 0, done.stderr
+    return directory, done.stderr
 
 
 def test_a_collection_ends_with_the_round_in_which_it_knows_that_enough_have_landed(
@@ -59,7 +59,9 @@ def test_its_third_round_comes_from_results_and_those_before_from_sobol(
     config: Path, undisturbed: tuple[Path, str]
 ) -> None:
     ordinary = ["--set", "sweep.target=null", "--set", "until=null", "--trials", str(TRIALS), "--json"]
-    sobol = np.array([list(trial["values"].values()) for trial in json.loads(call("plan", config, *ordinary).stdout)])
+    sobol = np.array(
+        [list(trial["values"].values()) for trial in json.loads(call_here("plan", config, *ordinary).stdout)]
+    )
     plan = pq.read_table(undisturbed[0] / "plan.parquet")
     ours = np.column_stack([plan[key].to_numpy() for key in load(config).sweep.parameters])
     assert (ours[:128] == sobol[:128]).all()

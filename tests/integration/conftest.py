@@ -1,5 +1,7 @@
 """A router and one simulation in a process of its own, for all tests of a session.
 
+Runs of tests are remembered apart from those of the user: each looks at all that are remembered.
+
 Nodes on Fast DDS meet as those of a run do: at a discovery server.
 """
 
@@ -22,8 +24,16 @@ from tests.integration.robot import (
 from throwcollect.ros import Context
 from throwcollect.ros.middleware import Middleware
 from throwcollect.ros.router import router
+from throwcollect.runs.records import STATE_VARIABLE
 
 NAME = "sim_0"
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _state(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv(STATE_VARIABLE, str(tmp_path_factory.mktemp("state")))
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -1,15 +1,18 @@
 """A task that only moves, in a package of its own (`tests/plugins/reach`), goes all the way that a throw goes."""
 
 import json
-import os
-import subprocess
-import sys
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-PLUGINS = Path(__file__).parents[1] / "plugins"
+from tests.e2e.collection import call_here
+from tests.e2e.plugins import process_with_plugins, run_program
+
+Command = Callable[..., str]
+
 REACH = """\
 name: reach
 task: {name: reach}
@@ -20,56 +23,59 @@ sweep: {parameters: {task.duration_s: {min: 0.8, max: 2.4}}}
 record: {rate_hz: 50}
 """
 READ = """\
-import json, sys, throwcollect
-dataset = throwcollect.load(sys.argv[1])
+import throwcollect
+dataset = throwcollect.load(directory)
 trial = dataset.select("outcome == 'missed'")[0]
-print(json.dumps({
+found = {
     "columns": dataset.throws.column_names,
     "description": dataset.throws.schema.field("outcome").metadata[b"description"].decode(),
     "landing": trial.events.landing,
     "reason": trial.reason,
     "end_rad": float(trial.joints.position[-1, trial.joints.names.index("torso_1_joint")]),
     "end_error_rad": trial.row["torso_1_joint_end_error_rad"],
-}))
+}
 """
 
 
-def run(*arguments: str) -> subprocess.CompletedProcess[str]:
-    """Run Python where the packages of `tests/plugins` are installed."""
-    path = os.pathsep.join([str(PLUGINS), os.environ.get("PYTHONPATH", "")])
-    return subprocess.run(
-        [sys.executable, *arguments],
-        env={**os.environ, "PYTHONPATH": path},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-
-
-def throwcollect(*arguments: object) -> str:
-    """Run a command that has to succeed, and return what it prints."""
-    done = run("-m", "throwcollect", *map(str, arguments))
-    assert done.returncode == 0, done.stderr
-    return done.stdout
-
-
-def refusal(*arguments: object) -> str:
-    """Run a command that has to be refused, and return why it is."""
-    done = run("-m", "throwcollect", *map(str, arguments))
-    assert done.returncode == 2, done.stderr
-    assert "Traceback" not in done.stderr
-    return done.stderr
+@pytest.fixture(scope="module")
+def process() -> Iterator[ProcessPoolExecutor]:
+    with process_with_plugins() as process:
+        yield process
 
 
 @pytest.fixture(scope="module")
-def reached(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def throwcollect(process: ProcessPoolExecutor) -> Command:
+    """A command that has to succeed, where the package of the task is installed; returns what it prints."""
+
+    def run(*arguments: str | Path) -> str:
+        done = process.submit(call_here, *arguments).result()
+        assert done.returncode == 0, done.stderr
+        return str(done.stdout)
+
+    return run
+
+
+@pytest.fixture
+def refusal(process: ProcessPoolExecutor) -> Command:
+    """A command that has to be refused; returns why it is."""
+
+    def run(*arguments: str | Path) -> str:
+        done = process.submit(call_here, *arguments).result()
+        assert done.returncode == 2, done.stderr
+        return str(done.stderr)
+
+    return run
+
+
+@pytest.fixture(scope="module")
+def reached(throwcollect: Command, tmp_path_factory: pytest.TempPathFactory) -> Path:
     directory = tmp_path_factory.mktemp("reach")
     (directory / "reach.yaml").write_text(REACH)
     throwcollect("up", directory / "reach.yaml", "--runtime", "inprocess", "--output", directory / "data")
     return directory / "data"
 
 
-def test_until_counts_what_the_task_calls_a_success(reached: Path) -> None:
+def test_until_counts_what_the_task_calls_a_success(throwcollect: Command, reached: Path) -> None:
     info: dict[str, Any] = json.loads(throwcollect("dataset", "info", reached, "--json"))
     assert info["trials"] == 128  # of 200: two rounds hold more than the 30 that were wanted
     assert info["outcomes"]["reached"] >= info["wanted"] == 30
@@ -78,10 +84,8 @@ def test_until_counts_what_the_task_calls_a_success(reached: Path) -> None:
     assert "landing" not in throwcollect("dataset", "info", reached)
 
 
-def test_what_it_measures_stands_in_the_table(reached: Path) -> None:
-    done = run("-c", READ, str(reached))
-    assert done.returncode == 0, done.stderr
-    found = json.loads(done.stdout)
+def test_what_it_measures_stands_in_the_table(process: ProcessPoolExecutor, reached: Path) -> None:
+    found = process.submit(run_program, READ, directory=reached).result()
     own = found["columns"].index("torso_1_joint_end_error_rad")
     assert own < found["columns"].index("position_peak_share")
     assert not [column for column in found["columns"] if column.startswith(("release", "landing"))]
@@ -91,7 +95,7 @@ def test_what_it_measures_stands_in_the_table(reached: Path) -> None:
     assert found["reason"] == f"torso_1_joint ended {found['end_error_rad']:.3g} rad away from its end"
 
 
-def test_it_is_verified_judged_again_and_rebuilt(reached: Path) -> None:
+def test_it_is_verified_judged_again_and_rebuilt(throwcollect: Command, reached: Path) -> None:
     assert "nothing wrong" in throwcollect("dataset", "verify", reached)
     table = (reached / "throws.parquet").read_bytes()
     (reached / "throws.parquet").unlink()
@@ -100,13 +104,13 @@ def test_it_is_verified_judged_again_and_rebuilt(reached: Path) -> None:
     throwcollect("dataset", "replay", reached, "--trial", "3")
 
 
-def test_datasets_are_made_of_it(reached: Path, tmp_path: Path) -> None:
+def test_datasets_are_made_of_it(throwcollect: Command, reached: Path, tmp_path: Path) -> None:
     throwcollect("dataset", "filter", reached, tmp_path / "some", "--where", "torso_1_joint_end_error_rad > 0.01")
     info = json.loads(throwcollect("dataset", "info", tmp_path / "some", "--json"))
     assert list(info["outcomes"]) == ["missed"]
 
 
-def test_it_is_exported_and_reported(reached: Path, tmp_path: Path) -> None:
+def test_it_is_exported_and_reported(throwcollect: Command, reached: Path, tmp_path: Path) -> None:
     throwcollect("dataset", "export", reached, tmp_path / "parquet", "--to", "parquet")
     assert "simulated trials of the task reach" in (tmp_path / "parquet" / "README.md").read_text()
     throwcollect("dataset", "report", reached, "--output", tmp_path / "report.html")
@@ -116,7 +120,7 @@ def test_it_is_exported_and_reported(reached: Path, tmp_path: Path) -> None:
     assert "Where the balls land" not in page
 
 
-def test_what_only_throws_have_is_refused_in_words(reached: Path, tmp_path: Path) -> None:
+def test_what_only_throws_have_is_refused_in_words(refusal: Command, reached: Path, tmp_path: Path) -> None:
     said = refusal("dataset", "export", reached, tmp_path / "mat", "--to", "mat")
     assert "mat has the structure of a throwing database, and the task reach throws no ball" in said
     path = tmp_path / "wrong.yaml"
@@ -130,7 +134,7 @@ def test_what_only_throws_have_is_refused_in_words(reached: Path, tmp_path: Path
     assert f"{path}:6: sweep.target: should be left out, as the task reach throws no ball" in said
 
 
-def test_configurations_that_name_no_task_throw_all_the_same(tmp_path: Path) -> None:
+def test_configurations_that_name_no_task_throw_all_the_same(throwcollect: Command, tmp_path: Path) -> None:
     path = tmp_path / "throws.yaml"
     path.write_text("task: {duration_s: 1.1}\nuntil: {landed: 3}\n")
     printed = throwcollect("config", path)
@@ -138,7 +142,7 @@ def test_configurations_that_name_no_task_throw_all_the_same(tmp_path: Path) -> 
     assert "until:\n  landed: 3\n" in printed
 
 
-def test_a_task_that_there_is_not_is_refused_in_words(tmp_path: Path) -> None:
+def test_a_task_that_there_is_not_is_refused_in_words(refusal: Command, tmp_path: Path) -> None:
     path = tmp_path / "wrong.yaml"
     path.write_text("task: {name: reech, duration_s: 1.1}\nuntil: {lands: 3}\n")
     said = refusal("config", path)

@@ -3,6 +3,7 @@
 import inspect
 import re
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +40,7 @@ CLASSES: dict[str, Any] = {
 MODULES = {"rclpy": embedded, "rclpy.action": action, "rclpy.executors": embedded, "rclpy.qos": embedded}
 
 
+@cache
 def members(kind: type) -> set[str]:
     """Names of a class and its bases, and of what its instances are given when they are made."""
     names = set(dir(kind))

@@ -84,13 +84,3 @@ def test_with_a_robot_that_there_is_not_its_joints_are_not_complained_of(tmp_pat
     assert done.returncode == 2
     assert "robot.name: should be 'talos' or 'planar_arm', got 'planar_hand'; did you mean 'planar_arm'?" in done.stderr
     assert "joint" not in done.stderr
-
-
-def test_a_robot_of_another_package_is_recorded(tmp_path: Path) -> None:
-    path, data = tmp_path / "arm.yaml", tmp_path / "data"
-    path.write_text(f"{ARM}sweep: {{parameters: {{task.duration_s: {{min: 0.5, max: 0.6}}}}}}\ntrials: 2\n")
-    collected = with_plugins("up", str(path), "--runtime", "inprocess", "--output", str(data))
-    assert collected.returncode == 0, collected.stderr
-    assert "2 trials simulated again in a fresh process: the same bit for bit" in collected.stderr
-    verified = with_plugins("dataset", "verify", str(data))
-    assert (verified.returncode, "nothing wrong" in verified.stdout) == (0, True), verified.stderr

@@ -13,20 +13,44 @@ from throwcollect.runtimes.node_server import ForkedNode, NodeServer
 WAIT_S = 30.0
 
 
-@pytest.fixture
-def server() -> Iterator[NodeServer]:
-    server = NodeServer({**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "COLUMNS": "80"})
+ENVIRONMENT = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "COLUMNS": "80"}
+
+
+@pytest.fixture(scope="module")
+def lasting() -> Iterator[NodeServer]:
+    """For what leaves it as it is: starting one takes a second."""
+    server = NodeServer(ENVIRONMENT)
     yield server
     server.close()
 
 
 @pytest.fixture
-def start(server: NodeServer, tmp_path: Path) -> Callable[..., ForkedNode]:
+def server() -> Iterator[NodeServer]:
+    """For what ends or stops it."""
+    server = NodeServer(ENVIRONMENT)
+    yield server
+    server.close()
+
+
+Start = Callable[..., ForkedNode]
+
+
+def starting(server: NodeServer, log: Path) -> Start:
     def start(*arguments: str, core: int | None = None) -> ForkedNode:
-        with open(tmp_path / "log", "ab") as log:
-            return server.start(arguments, log=log, core=core)
+        with log.open("ab") as file:
+            return server.start(arguments, log=file, core=core)
 
     return start
+
+
+@pytest.fixture
+def start_there(lasting: NodeServer, tmp_path: Path) -> Start:
+    return starting(lasting, tmp_path / "log")
+
+
+@pytest.fixture
+def start(server: NodeServer, tmp_path: Path) -> Start:
+    return starting(server, tmp_path / "log")
 
 
 def router() -> tuple[str, ...]:
@@ -42,14 +66,14 @@ def wait_until(condition: Callable[[], bool]) -> None:
 
 
 @pytest.mark.parametrize(("argument", "code", "words"), [("--version", 0, "throwcollect "), ("dance", 2, "dance")])
-def test_a_node_does_what_the_command_does_and_its_end_is_told(start, tmp_path, argument, code, words) -> None:
-    assert start(argument).wait(WAIT_S) == code
+def test_a_node_does_what_the_command_does_and_its_end_is_told(start_there, tmp_path, argument, code, words) -> None:
+    assert start_there(argument).wait(WAIT_S) == code
     assert words in (tmp_path / "log").read_text()
 
 
-def test_nodes_are_processes_like_those_that_are_started_by_themselves(start, tmp_path) -> None:
+def test_nodes_are_processes_like_those_that_are_started_by_themselves(start_there, tmp_path) -> None:
     core = max(os.sched_getaffinity(0))
-    node = start(*(arguments := router()), core=core)
+    node = start_there(*(arguments := router()), core=core)
     wait_until(lambda: "listening" in (tmp_path / "log").read_text())
     process = psutil.Process(node.pid)
     assert process.cmdline()[-len(arguments) :] == list(arguments)
@@ -62,8 +86,8 @@ def test_nodes_are_processes_like_those_that_are_started_by_themselves(start, tm
     assert node.wait(WAIT_S) == 0
 
 
-def test_a_node_that_is_killed_is_told_apart_from_the_others(start) -> None:
-    killed, other = start(*router()), start(*router())
+def test_a_node_that_is_killed_is_told_apart_from_the_others(start_there) -> None:
+    killed, other = start_there(*router()), start_there(*router())
     killed.send_signal(signal.SIGKILL)
     assert killed.wait(WAIT_S) == -signal.SIGKILL
     assert other.poll() is None
