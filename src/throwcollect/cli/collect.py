@@ -27,7 +27,7 @@ from throwcollect.wording import command
 
 if TYPE_CHECKING:
     from throwcollect.cli.terminal import Display
-    from throwcollect.runs.preparation import PreparedRun
+    from throwcollect.runs.prepared_run import PreparedRun
 
 SimulationsOption = Annotated[
     str | None, typer.Option("-n", metavar="N", help="Number of simulations: run.simulations.")
@@ -94,7 +94,12 @@ def up(
     elif resume is None:
         _collect(
             lambda runs, shown: runs.prepare(
-                config or DEFAULT_CONFIG, overrides=changes, output=output, processes=count_cores(), onlooker=shown
+                config or DEFAULT_CONFIG,
+                overrides=changes,
+                output=output,
+                processes=count_cores(),
+                ahead=not detach,
+                onlooker=shown,
             ),
             detach=detach,
             json=json,
@@ -207,7 +212,9 @@ def _go_on(
     from throwcollect.dataset.inspect import info
 
     launched = _collect(
-        lambda runs, shown: runs.resume(directory, config=config, overrides=changes, check=check, onlooker=shown),
+        lambda runs, shown: runs.resume(
+            directory, config=config, overrides=changes, check=check, ahead=not detach, onlooker=shown
+        ),
         detach=detach,
         json=json,
         token_file=token_file,
