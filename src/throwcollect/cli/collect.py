@@ -27,7 +27,7 @@ from throwcollect.wording import command
 
 if TYPE_CHECKING:
     from throwcollect.cli.terminal import Display
-    from throwcollect.runs.preparation import PreparedRun
+    from throwcollect.runs.prepared_run import PreparedRun
 
 SimulationsOption = Annotated[
     str | None, typer.Option("-n", metavar="N", help="Number of simulations: run.simulations.")
@@ -94,7 +94,12 @@ def up(
     elif resume is None:
         _collect(
             lambda runs, shown: runs.prepare(
-                config or DEFAULT_CONFIG, overrides=changes, output=output, processes=count_cores(), onlooker=shown
+                config or DEFAULT_CONFIG,
+                overrides=changes,
+                output=output,
+                processes=count_cores(),
+                ahead=not detach,
+                onlooker=shown,
             ),
             detach=detach,
             json=json,
@@ -203,16 +208,18 @@ def _go_on(
     check: bool = False,
     token_file: Path | None = None,
 ) -> None:
-    from throwcollect.cli.dataset.info import print_summary
-    from throwcollect.dataset.inspect import info
-
     launched = _collect(
-        lambda runs, shown: runs.resume(directory, config=config, overrides=changes, check=check, onlooker=shown),
+        lambda runs, shown: runs.resume(
+            directory, config=config, overrides=changes, check=check, ahead=not detach, onlooker=shown
+        ),
         detach=detach,
         json=json,
         token_file=token_file,
     )
     if not launched:
+        from throwcollect.cli.dataset.info import print_summary
+        from throwcollect.dataset.inspect import info
+
         print_summary(info(directory), directory, as_json=json)
 
 
@@ -230,10 +237,8 @@ def _collect(
     Returns:
         Whether there was anything to do.
     """
-    from throwcollect.cli.dataset.info import print_summary
     from throwcollect.cli.interruptions import Interruptions
     from throwcollect.cli.terminal import display
-    from throwcollect.dataset.inspect import loss
     from throwcollect.runs import preparation
 
     with ExitStack() as held:
@@ -252,6 +257,10 @@ def _collect(
         if detach:
             _start(run, json=json)
             return True
+    # They read datasets; what takes long to import is not imported before nodes have begun to.
+    from throwcollect.cli.dataset.info import print_summary
+    from throwcollect.dataset.inspect import loss
+
     print_summary(summary, run.directory, as_json=json)
     if (lost := loss(summary.outcomes, hint=run.place.way_on)) is not None:
         raise lost

@@ -7,8 +7,9 @@ import os
 import signal
 import sys
 import traceback
+from collections.abc import Callable
 from contextlib import suppress
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import typer
 from typer.exceptions import TyperException
@@ -23,15 +24,15 @@ _WRONG_PATHS = (errno.ENAMETOOLONG, errno.ELOOP, errno.EACCES, errno.ENOTDIR)
 """What a path that somebody has named may lead to."""
 
 
-def execute(app: typer.Typer) -> NoReturn:
-    """Run a command, print errors as messages, exit with their codes."""
+def execute(command: Callable[..., Any]) -> NoReturn:
+    """Run a command of typer, print errors as messages, exit with their codes."""
     for number in stop_signals():
         # What cleans up after Ctrl-C does so after the others, too.
         signal.signal(number, signal.default_int_handler)
     try:
         _check_surroundings()
         with explain_missing():
-            code = app(prog_name="throwcollect", standalone_mode=False) or 0
+            code = command(prog_name="throwcollect", standalone_mode=False) or 0
         if code == Interrupted.exit_code:
             raise Interrupted("interrupted")
         ensure_written(reader_may_leave=True)

@@ -6,9 +6,12 @@ import sys
 import time
 from abc import ABC, abstractmethod
 from types import TracebackType
+from typing import TYPE_CHECKING
 
-from throwcollect.coordinator.progress import Progress
-from throwcollect.runs.launcher import Onlooker
+from throwcollect.runs.onlooker import Onlooker
+
+if TYPE_CHECKING:
+    from throwcollect.coordinator.progress import Progress
 
 _LINE_EVERY_S = 2.0
 

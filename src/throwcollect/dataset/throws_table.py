@@ -12,6 +12,7 @@ import pyarrow as pa
 from throwcollect.config.schema import Config
 from throwcollect.dataset.directory import THROWS
 from throwcollect.errors import DatasetError
+from throwcollect.sweep.arrow_column import make_table
 from throwcollect.sweep.parquet_file import read_parquet
 from throwcollect.sweep.plan import Plan, Trial
 from throwcollect.tasks.columns import ball_columns, join_ball
@@ -129,7 +130,8 @@ class ThrowsTable:
 
     def table(self, rows: Iterable[Row]) -> pa.Table:
         """Rows, in the given order, as an Arrow table; what a row lacks is null."""
-        return pa.Table.from_pylist(list(rows), schema=self.schema)
+        rows = list(rows)
+        return make_table([[row.get(name) for row in rows] for name in self.schema.names], self.schema)
 
 
 def read_throws_table(path: Path, plan: Plan) -> pa.Table:

@@ -12,10 +12,10 @@ if TYPE_CHECKING:
     from throwcollect.runs.following import Look as Look
     from throwcollect.runs.following import follow as follow
     from throwcollect.runs.following import wait as wait
-    from throwcollect.runs.launcher import Onlooker as Onlooker
-    from throwcollect.runs.preparation import PreparedRun as PreparedRun
+    from throwcollect.runs.onlooker import Onlooker as Onlooker
     from throwcollect.runs.preparation import prepare as prepare
     from throwcollect.runs.preparation import resume as resume
+    from throwcollect.runs.prepared_run import PreparedRun as PreparedRun
     from throwcollect.runs.record import Summary as Summary
     from throwcollect.runs.records import Run as Run
     from throwcollect.runs.selection import find as find
@@ -27,8 +27,9 @@ else:
         rooms = {
             "control": ("down", "scale", "stop"),
             "following": ("Look", "follow", "wait"),
-            "launcher": ("Onlooker",),
-            "preparation": ("PreparedRun", "prepare", "resume"),
+            "onlooker": ("Onlooker",),
+            "preparation": ("prepare", "resume"),
+            "prepared_run": ("PreparedRun",),
             "record": ("Summary",),
             "records": ("Run",),
             "selection": ("find",),

@@ -16,7 +16,7 @@ from throwcollect.ros.connection import Connection
 from throwcollect.ros.endpoint import answers
 from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
-from throwcollect.runs.launcher import SILENT, Onlooker
+from throwcollect.runs.onlooker import SILENT, Onlooker
 from throwcollect.runs.own_directory import make_own_directory
 from throwcollect.runs.token import JoinToken
 from throwcollect.runtimes.local import LocalNodes

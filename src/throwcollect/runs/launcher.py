@@ -20,35 +20,27 @@ from throwcollect.dataset.lock import hold_together
 from throwcollect.errors import ConfigError, Interrupted, LossError, ThrowcollectError, WorkerError
 from throwcollect.files import open_log
 from throwcollect.runs.events import EventLog
+from throwcollect.runs.onlooker import Onlooker
 from throwcollect.runs.record import Failure, Record, Summary
 from throwcollect.runs.records import OpenRun, Records
 from throwcollect.runtimes.node_logs import NodeLogs
 from throwcollect.runtimes.nodes import LAUNCHER
 from throwcollect.runtimes.registry import get_runtime
-from throwcollect.runtimes.runtime import Host, NodeState, RunEvent
+from throwcollect.runtimes.runtime import Host, NodeState, RunEvent, Runtime
 from throwcollect.wording import command
 
 _POLL_S = 0.05
 _WRITE_PROGRESS_S = 1.0
 
 
-class Onlooker:
-    """Is told what goes on in a run that this process prepares or launches; this one heeds nothing of it."""
-
-    def update(self, progress: Progress) -> None:
-        """Take in a progress report of the coordinator."""
-
-    def say(self, line: str) -> None:
-        """Take in what is good to know."""
-
-    def warn(self, line: str) -> None:
-        """Take in what went wrong."""
-
-
-SILENT = Onlooker()
-
-
-def launch(run: OpenRun, config: Config, *, onlooker: Onlooker, interruptions: Callable[[], int]) -> Summary:
+def launch(
+    run: OpenRun,
+    config: Config,
+    *,
+    onlooker: Onlooker,
+    interruptions: Callable[[], int],
+    runtime: Runtime | None = None,
+) -> Summary:
     """Run a prepared collection until its last trial has ended, or go on with one whose launcher died.
 
     Args:
@@ -56,6 +48,7 @@ def launch(run: OpenRun, config: Config, *, onlooker: Onlooker, interruptions: C
         config: Configuration of the collection.
         onlooker: Is told what goes on.
         interruptions: How often the user has asked to stop: at first running trials are finished, then no more.
+        runtime: That of the run, with what it has begun, which is ended here; None if nothing has been begun.
 
     Returns:
         What the dataset holds; its outcomes say whether trials are lost.
@@ -73,7 +66,7 @@ def launch(run: OpenRun, config: Config, *, onlooker: Onlooker, interruptions: C
     host: Host | None = None
     try:
         run.record.middleware.joining.settle()
-        host = get_runtime(run.record.runtime).host(place, config, warn=onlooker.warn)
+        host = (runtime or get_runtime(run.record.runtime)).host(place, config, warn=onlooker.warn)
         with hold_together(place.directory):
             run.update(launcher=os.getpid(), nodes=(), endpoint=None)
             summary = Summary(**vars(host.collect(session)), open=config.run.open)
@@ -84,6 +77,8 @@ def launch(run: OpenRun, config: Config, *, onlooker: Onlooker, interruptions: C
         code, failure = error.exit_code, Failure.of(error)
         raise
     finally:
+        if runtime is not None:
+            runtime.close()
         # What was there before may be there still, if it could not even be looked for.
         left = run.record.left if host is None else not host.cleared
         if left:

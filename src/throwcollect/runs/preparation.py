@@ -3,143 +3,34 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from datetime import datetime, timezone
 from pathlib import Path
-from types import TracebackType
+from typing import TYPE_CHECKING
 
-from throwcollect.build import build_digest
 from throwcollect.config.loader import load, load_locating_errors
 from throwcollect.config.schema import Config
-from throwcollect.coordinator.prepare import make_self_contained, more_trials
-from throwcollect.coordinator.prepare import prepare as prepare_plan
-from throwcollect.coordinator.resume import begun, finished
-from throwcollect.coordinator.resume import resume as resume_plan
 from throwcollect.dataset.directory import CONFIG, PLAN, TRIALS, config_path
 from throwcollect.dataset.lock import hold_together
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.ros.middleware import Middleware
-from throwcollect.runs.choice import Choice, choose
-from throwcollect.runs.launcher import SILENT, Onlooker, launch, start_launcher, wait_for_nodes
-from throwcollect.runs.record import Record, Summary
-from throwcollect.runs.records import OpenRun, Records, Run
+from throwcollect.runs.choice import Choice, begin, choose
+from throwcollect.runs.onlooker import SILENT, Onlooker
+from throwcollect.runs.prepared_run import PreparedRun
+from throwcollect.runs.record import Record
+from throwcollect.runs.records import OpenRun, Records
 from throwcollect.runs.selection import busy, find_left_in
-from throwcollect.runs.token import JoinToken
-from throwcollect.runtimes.ports import format_endpoint, reach_from_elsewhere, reserve_port, split_address
-from throwcollect.runtimes.runtime import Place
-from throwcollect.sweep.plan import Plan
+from throwcollect.runtimes.ports import reserve_port
 from throwcollect.wording import command, format_count
+
+if TYPE_CHECKING:
+    # What takes long to import is imported when the runtime has begun what it can, at the same time.
+    from throwcollect.sweep.plan import Plan
 
 _MANY_TRIALS = 1000
 """From here on the plan takes long enough to be announced."""
-
-
-class PreparedRun:
-    """A run that is ready to be launched; use it as a context manager, so that nothing is left if it is not.
-
-    Until it is launched, nobody else prepares a run into its directory.
-
-    Attributes:
-        records: All runs.
-        config: Its configuration.
-        directory: Directory of the dataset, as it was named; None if the dataset is in a volume.
-
-    Args:
-        records: All runs.
-        run: The run, with a record.
-        config: Its configuration.
-        directory: Directory of the dataset, as it was named.
-        onlooker: Is told what goes on.
-        held: Keeps others from the directory until the launcher, which may be another process, does so itself.
-        undo: Removes what was made for the run, if it is not launched.
-    """
-
-    def __init__(
-        self,
-        records: Records,
-        run: OpenRun,
-        config: Config,
-        directory: Path,
-        *,
-        onlooker: Onlooker,
-        held: ExitStack | None = None,
-        undo: ExitStack | None = None,
-    ) -> None:
-        self.records = records
-        self.config = config
-        self.directory = None if run.record.volume else directory
-        self._run = run
-        self._onlooker = onlooker
-        self._held = held or ExitStack()
-        self._undo = undo or ExitStack()
-
-    def __enter__(self) -> PreparedRun:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        with self._held:
-            self._undo.close()
-            self._run.close()
-
-    @property
-    def record(self) -> Record:
-        """What is known of it."""
-        return self._run.record
-
-    @property
-    def place(self) -> Place:
-        """Where it lies."""
-        return self._run.record.place(self._run.key)
-
-    @property
-    def token(self) -> str:
-        """The word by which other machines join it; a secret, as whoever has it may do so.
-
-        Raises:
-            ConfigError: If it listens to this machine alone, or its key cannot be read.
-        """
-        if self.config.run.listen is None:
-            raise ConfigError("other machines cannot join the run", hint="run.listen says where they can")
-        host, port = split_address(self.config.run.listen)
-        endpoint = format_endpoint("tls", reach_from_elsewhere(host), port)
-        run, secret, engine = self.record.run, self._run.key.secret.hex(), self.config.sim.engine
-        domain_id = self.config.run.domain_id
-        return JoinToken(run, endpoint, secret, domain_id, engine, build_digest(engine)).encode()
-
-    def collect(self, *, interruptions: Callable[[], int] = lambda: 0) -> Summary:
-        """Launch it in this process, and come back when it has ended; see `launcher.launch`.
-
-        Args:
-            interruptions: How often the user has asked to stop.
-
-        Returns:
-            What the dataset holds; its outcomes say whether trials are lost.
-
-        Raises:
-            ThrowcollectError: As `launcher.launch`.
-        """
-        self._undo.pop_all()
-        return launch(self._run, self.config, onlooker=self._onlooker, interruptions=interruptions)
-
-    def start(self, *, interruptions: Callable[[], int] = lambda: 0) -> Run:
-        """Launch it in a process of its own, which outlives this one, and come back when its nodes are started.
-
-        Args:
-            interruptions: How often the user has asked to stop; the launcher is told then, and waited for.
-
-        Raises:
-            WorkerError: If it cannot be started.
-            ThrowcollectError: What it ended with, if it did so already.
-        """
-        self._undo.pop_all()
-        record = self._run.record
-        process = start_launcher(self._run)
-        wait_for_nodes(self.records, record, process, interruptions=interruptions)
-        return self.records.get(record.run)
 
 
 @dataclass(frozen=True)
@@ -153,6 +44,7 @@ class Request:
         started: When.
         resumed: Whether the directory holds a dataset, with which the run goes on.
         processes: How many processes may check the trials of a large plan.
+        ahead: Whether the runtime begins what it can before there is a plan, for `PreparedRun.collect`.
     """
 
     config: Config
@@ -161,6 +53,7 @@ class Request:
     started: datetime
     resumed: bool
     processes: int = 1
+    ahead: bool = False
 
 
 def prepare(
@@ -169,6 +62,7 @@ def prepare(
     overrides: Sequence[str] = (),
     output: str | os.PathLike[str] | None = None,
     processes: int = 1,
+    ahead: bool = False,
     onlooker: Onlooker = SILENT,
 ) -> PreparedRun:
     """Prepare a collection into a new dataset.
@@ -179,6 +73,8 @@ def prepare(
         output: Directory of the dataset, new or empty; None for one that is named after the configuration.
         processes: How many processes may check the trials of a large plan; more than one import the program that calls
             this, as those of `multiprocessing` do.
+        ahead: Whether processes that nodes need start while the plan is made, which is worth it if `collect` follows;
+            they end with the run, or when it is left.
         onlooker: Is told what goes on.
 
     Raises:
@@ -192,7 +88,9 @@ def prepare(
         records = Records()
         if (run := _take_over(records, directory, read, onlooker)) is not None:
             return run
-        request = Request(read, Path(config).parent, directory, started, resumed=False, processes=processes)
+        request = Request(
+            read, Path(config).parent, directory, started, resumed=False, processes=processes, ahead=ahead
+        )
         return prepare_run(records, request, None, onlooker)
 
 
@@ -202,6 +100,7 @@ def resume(
     config: str | os.PathLike[str] | None = None,
     overrides: Sequence[str] = (),
     check: bool = False,
+    ahead: bool = False,
     onlooker: Onlooker = SILENT,
 ) -> PreparedRun | None:
     """Prepare to go on with the dataset that an earlier collection has left.
@@ -211,6 +110,7 @@ def resume(
         config: File with its configuration; None for the configuration that lies in the directory.
         overrides: What replaces keys of it, as `prepare` takes it.
         check: Whether the files of a finished dataset are compared byte for byte, and not only by their sizes.
+        ahead: As `prepare` takes it.
         onlooker: Is told what goes on.
 
     Returns:
@@ -221,6 +121,9 @@ def resume(
         WorkerError: If the runtime that is asked for cannot be had.
         DatasetError: If the dataset cannot be written.
     """
+    from throwcollect.coordinator.resume import begun, finished
+    from throwcollect.coordinator.resume import resume as resume_plan
+
     started = datetime.now(timezone.utc)
     directory = Path(directory)
     if not begun(directory):
@@ -241,7 +144,8 @@ def resume(
         if finished(directory, plan):
             onlooker.say(f"{directory}: every trial has ended, nothing is left to do")
             return None
-        return prepare_run(records, Request(read, sweep_directory, directory, started, resumed=True), plan, onlooker)
+        request = Request(read, sweep_directory, directory, started, resumed=True, ahead=ahead)
+        return prepare_run(records, request, plan, onlooker)
 
 
 def _take_over(records: Records, directory: Path, config: Config, onlooker: Onlooker) -> PreparedRun | None:
@@ -252,6 +156,8 @@ def _take_over(records: Records, directory: Path, config: Config, onlooker: Onlo
     """
     if (left := find_left_in(records, directory)) is None:
         return None
+    from throwcollect.coordinator.prepare import make_self_contained
+
     own = load(config_path(left.place.directory))
     if own.without_run() != make_self_contained(config).without_run():
         raise ConfigError(
@@ -284,13 +190,15 @@ def prepare_run(records: Records, request: Request, plan: Plan | None, onlooker:
     """
     config = request.config
     with ExitStack() as held, ExitStack() as undo:
+        if (begun := begin(config) if request.ahead else None) is not None:
+            undo.callback(begun.runtime.close)
         run = records.new(config.name)
         undo.callback(run.forget)
         reserve_port(config.run).close()
         # Getting an image may take minutes, so all that may be wrong is found before; but where there is a volume, it
         # is the runtime that decides where the dataset is.
         volume = config.containers.volume
-        choice = choose(config, say=onlooker.say, warn=onlooker.warn) if volume else None
+        choice = choose(config, say=onlooker.say, warn=onlooker.warn, begun=begun) if volume else None
         if choice is not None and not choice.runtime.has_volumes:
             volume = None
         if volume and plan is not None:
@@ -300,26 +208,44 @@ def prepare_run(records: Records, request: Request, plan: Plan | None, onlooker:
             )
         directory = run.directory / "data" if volume else request.directory
         made = not directory.exists()
-        if plan is None:
-            if (config.trials or 0) >= _MANY_TRIALS and not config.grows:
-                onlooker.say(
-                    f"plan: checking {config.trials} trials against limits and collisions, about 5 ms each and core"
-                )
-            plan = prepare_plan(config, directory, sweep_directory=request.sweep_directory, processes=request.processes)
+        plan = plan or _make_plan(request, directory, onlooker)
         held.enter_context(hold_together(directory))
         if not request.resumed:
             undo.callback(_remove_plan, directory, made=made)
-        choice = choice or choose(config, say=onlooker.say, warn=onlooker.warn)
+        choice = choice or choose(config, say=onlooker.say, warn=onlooker.warn, begun=begun)
         record = _record(run, request, choice, directory, volume)
         # A dry run: the host looks for image, mounts, networks and ports when it is made.
         choice.runtime.host(record.place(run.key), config, warn=onlooker.warn).close()
         run.write(record)
-        refused = sum(trial.refused is not None for trial in plan.trials)
-        note = f", {refused} refused by calculation (see `throwcollect plan`)" if refused else ""
         _warn_of_company(config, choice.middleware, onlooker)
-        where = f"volume {volume}" if volume else directory
-        onlooker.say(f"plan: {format_count(len(plan.trials), 'trial')}{note}{more_trials(plan)}; dataset: {where}")
-        return PreparedRun(records, run, config, directory, onlooker=onlooker, held=held.pop_all(), undo=undo.pop_all())
+        onlooker.say(f"plan: {_in_words(plan)}; dataset: {f'volume {volume}' if volume else directory}")
+        return PreparedRun(
+            records,
+            run,
+            config,
+            directory,
+            onlooker=onlooker,
+            runtime=choice.runtime,
+            held=held.pop_all(),
+            undo=undo.pop_all(),
+        )
+
+
+def _make_plan(request: Request, directory: Path, onlooker: Onlooker) -> Plan:
+    from throwcollect.coordinator.prepare import prepare as prepare_plan
+
+    config = request.config
+    if (config.trials or 0) >= _MANY_TRIALS and not config.grows:
+        onlooker.say(f"plan: checking {config.trials} trials against limits and collisions, about 5 ms each and core")
+    return prepare_plan(config, directory, sweep_directory=request.sweep_directory, processes=request.processes)
+
+
+def _in_words(plan: Plan) -> str:
+    from throwcollect.coordinator.prepare import more_trials
+
+    refused = sum(trial.refused is not None for trial in plan.trials)
+    note = f", {refused} refused by calculation (see `throwcollect plan`)" if refused else ""
+    return f"{format_count(len(plan.trials), 'trial')}{note}{more_trials(plan)}"
 
 
 def _record(run: OpenRun, request: Request, choice: Choice, directory: Path, volume: str | None) -> Record:

@@ -20,6 +20,7 @@ import secrets
 import shutil
 import tempfile
 import time
+from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field, replace
 from datetime import datetime, timezone
@@ -273,11 +274,19 @@ class Records:
 
     def all(self) -> list[Run]:
         """All runs whose records can be read, the latest last."""
-        found = []
-        for run in self.ids():
+        return sorted(self._read_all(self.ids()), key=lambda each: each.record.started)
+
+    def _read_all(self, runs: Iterable[str]) -> Iterator[Run]:
+        for run in runs:
             with suppress(ConfigError):
-                found.append(self.get(run))
-        return sorted(found, key=lambda each: each.record.started)
+                yield self.get(run)
+
+    def _age_s(self, run: str) -> float:
+        """Time since the record of a run was written [s]; 0 if it is gone."""
+        try:
+            return time.time() - (self._runs / f"{run}.json").stat().st_mtime
+        except OSError:
+            return 0.0
 
     def lives(self, run: str) -> bool:
         """Whether the launcher of a run lives."""
@@ -295,7 +304,9 @@ class Records:
 
     def _forget_old(self) -> None:
         now = datetime.now(timezone.utc)
-        for each in self.all():
+        # A record that was written since is not old, whatever it says, and need not be read.
+        old = [name for name in self.ids() if self._age_s(name) >= _REMEMBERED_S]
+        for each in self._read_all(old):
             record = each.record
             # Where nodes outlive their launcher, this record tells what they are as long as they do.
             over = each.status == "ended" or (each.status == "died" and not _outlived(record))

@@ -24,7 +24,7 @@ from throwcollect.dataset.slice_directory import (
 )
 from throwcollect.dataset.writer import create
 from throwcollect.errors import ConfigError, Interrupted, Problem
-from throwcollect.runs.launcher import SILENT, Onlooker
+from throwcollect.runs.onlooker import SILENT, Onlooker
 from throwcollect.runs.preparation import Request, prepare_run
 from throwcollect.runs.records import Records
 from throwcollect.sweep.plan import Plan
@@ -77,7 +77,7 @@ def collect_slice(
     if scratch is None:
         remove_stopped(earlier)
     onlooker.say(f"slice {slice}: trials {plan.trials[0].number} to {plan.trials[-1].number}")
-    request = Request(config, directory, attempt, started, resumed=True)
+    request = Request(config, directory, attempt, started, resumed=True, ahead=True)
     with prepare_run(Records(), request, plan, onlooker) as run:
         try:
             summary = run.collect(interruptions=interruptions)

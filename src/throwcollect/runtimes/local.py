@@ -12,9 +12,18 @@ from typing import TYPE_CHECKING
 
 from throwcollect.errors import WorkerError
 from throwcollect.files import open_log
+from throwcollect.ros.middleware import Middleware
 from throwcollect.runtimes.node_logs import NodeLogs
 from throwcollect.runtimes.node_server import ForkedNode, NodeServer
-from throwcollect.runtimes.nodes import ROUTER, NodeExit, NodeHost, NodeSpec, node_environment, protocol_of
+from throwcollect.runtimes.nodes import (
+    ROUTER,
+    NodeExit,
+    NodeHost,
+    NodeSpec,
+    library_environment,
+    node_environment,
+    protocol_of,
+)
 from throwcollect.runtimes.ports import format_endpoint, reach_from_here, reserve_port, split_address
 from throwcollect.runtimes.runtime import Place, Runtime, Session
 
@@ -30,6 +39,19 @@ _KILLED_S = 5.0
 class LocalRuntime(Runtime):
     """Nodes as child processes of the launcher."""
 
+    def __init__(self) -> None:
+        self._server: NodeServer | None = None
+
+    def begin(self, config: Config, middleware: Middleware) -> None:
+        """Have what nodes need imported; see `Runtime.begin`."""
+        self._server = _make_server(middleware)
+        self._server.begin()
+
+    def close(self) -> None:
+        """End what was begun; see `Runtime.close`."""
+        if self._server is not None:
+            self._server.close()
+
     def in_words(self, config: Config) -> str:
         """Where trials are simulated."""
         return "local processes"
@@ -40,7 +62,7 @@ class LocalRuntime(Runtime):
         Raises:
             ConfigError: If the router's port is taken.
         """
-        return LocalNodes(place, config)
+        return LocalNodes(place, config, server=self._server)
 
 
 class LocalNodes(NodeHost):
@@ -53,6 +75,7 @@ class LocalNodes(NodeHost):
         place: The run.
         config: Its configuration.
         elsewhere: Endpoint of the router, if that is another machine's; None if the router is one of the nodes.
+        server: What they are forked by, for its owner to close; None for one of their own.
 
     Raises:
         ConfigError: If the router's port is taken.
@@ -60,7 +83,9 @@ class LocalNodes(NodeHost):
 
     cleared = True
 
-    def __init__(self, place: Place, config: Config, *, elsewhere: str | None = None) -> None:
+    def __init__(
+        self, place: Place, config: Config, *, elsewhere: str | None = None, server: NodeServer | None = None
+    ) -> None:
         self.place = place
         self.config = config
         self.data = str(place.directory)
@@ -75,7 +100,9 @@ class LocalNodes(NodeHost):
             self.listen = format_endpoint(protocol, host, port)
             endpoint = format_endpoint(protocol, reach_from_here(host), port)
         self._address = split_address(endpoint)
-        self._server = NodeServer({**os.environ, **node_environment(self.connection_at(endpoint))})
+        self._environment = node_environment(self.connection_at(endpoint))
+        self._server = server or _make_server(place.middleware)
+        self._owns_server = server is None
         self._processes: dict[str, ForkedNode] = {}
 
     def collect(self, session: Session) -> Info:
@@ -99,7 +126,9 @@ class LocalNodes(NodeHost):
             self._reserved.close()
         try:
             with open(open_log(self.logs.path(node.name)), "ab") as log:
-                self._processes[node.name] = self._server.start(node.arguments, log=log, core=node.core)
+                self._processes[node.name] = self._server.start(
+                    node.arguments, log=log, core=node.core, environment=self._environment
+                )
         except OSError as error:
             raise WorkerError(f"{node.name}: cannot be started: {error}") from error
 
@@ -147,7 +176,12 @@ class LocalNodes(NodeHost):
             self._reserved.close()
         self.stop([name for name in self._processes if name != ROUTER])
         self.stop([ROUTER])
-        self._server.close()
+        if self._owns_server:
+            self._server.close()
+
+
+def _make_server(middleware: Middleware) -> NodeServer:
+    return NodeServer({**os.environ, **library_environment(middleware)})
 
 
 def _reason(code: int) -> str:

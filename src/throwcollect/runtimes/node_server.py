@@ -23,6 +23,7 @@ import sys
 import time
 import warnings
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import BinaryIO
 
 from throwcollect.config import shape
@@ -33,6 +34,7 @@ _MESSAGE_BYTES = 1 << 16
 _ANSWER_S = 60.0
 """Importing takes a second, on machines that do a lot else some more."""
 _LOOK_S = 0.5
+_NO_VARIABLES: Mapping[str, str] = MappingProxyType({})
 _LIBRARIES = (
     "throwcollect.cli.main",
     "throwcollect.ros.router",
@@ -80,32 +82,50 @@ class NodeServer:
     """Starts nodes that are there at once; if it dies, its nodes die with it, and the next node has a new one.
 
     Args:
-        environment: Environment variables of all nodes.
+        environment: Environment variables that hold while libraries are imported, and for all nodes.
     """
 
     def __init__(self, environment: Mapping[str, str]) -> None:
         self._environment = dict(environment)
         self._process: subprocess.Popen[bytes] | None = None
         self._socket: socket.socket | None = None
+        self._silent = False
         self._running: set[int] = set()
         self._ends: dict[int, int] = {}
 
-    def start(self, arguments: Sequence[str], *, log: BinaryIO, core: int | None) -> ForkedNode:
+    def begin(self) -> None:
+        """Have libraries imported from now on, so that the first node does not wait for all of that."""
+        with contextlib.suppress(OSError), open(os.devnull, "wb") as nowhere:
+            self._connect(nowhere)
+            self._silent = True
+
+    def start(
+        self,
+        arguments: Sequence[str],
+        *,
+        log: BinaryIO,
+        core: int | None,
+        environment: Mapping[str, str] = _NO_VARIABLES,
+    ) -> ForkedNode:
         """Start a node.
 
         Args:
             arguments: Arguments of the `throwcollect` command.
             log: Where it prints to.
             core: Processor core that it is bound to; None for any.
+            environment: Further environment variables.
 
         Raises:
             OSError: If no node can be had.
         """
-        request = json.dumps({"arguments": list(arguments), "core": core}).encode()
-        socket.send_fds(self._connect(log), [request], [log.fileno()])
-        pid = self._await_pid()
-        self._running.add(pid)
-        return ForkedNode(self, pid)
+        request = json.dumps({"arguments": list(arguments), "core": core, "environment": dict(environment)}).encode()
+        if self._silent:
+            self._silent = False
+            with contextlib.suppress(OSError):
+                return self._request(request, log)
+            # Nobody has heard why; the next one has a log for that.
+            self.close()
+        return self._request(request, log)
 
     def take_end(self, pid: int) -> int | None:
         """How a node ended, as `subprocess.Popen.returncode` says it; None while it runs. It is forgotten then."""
@@ -125,6 +145,17 @@ class NodeServer:
             self._process.kill()
             self._process.wait()
             self._process = None
+
+    def _request(self, request: bytes, log: BinaryIO) -> ForkedNode:
+        """The node that the server starts for a request.
+
+        Raises:
+            OSError: If it starts none.
+        """
+        socket.send_fds(self._connect(log), [request], [log.fileno()])
+        pid = self._await_pid()
+        self._running.add(pid)
+        return ForkedNode(self, pid)
 
     def _connect(self, log: BinaryIO) -> socket.socket:
         """The socket to the server, which is started if none runs."""
@@ -221,6 +252,7 @@ def serve(connection: socket.socket) -> list[str]:
             for each in (connection, awake, wake):
                 each.close()
             request = json.loads(packet)
+            os.environ.update(request["environment"])
             _become_node(logs[0], request["core"])
             return list(request["arguments"])
         os.close(logs[0])

@@ -204,8 +204,17 @@ def node_environment(connection: Connection) -> Mapping[str, str]:
     Args:
         connection: The way into the run's ROS graph.
     """
+    return {**connection.environment(), **library_environment(connection.middleware)}
+
+
+def library_environment(middleware: Middleware) -> Mapping[str, str]:
+    """Environment variables that have to hold when a node imports its libraries.
+
+    Args:
+        middleware: What carries the messages of the run.
+    """
     return {
-        **connection.environment(),
+        **middleware.environment(),
         # One process per core is the parallelism here; threads of numerical libraries would only fight it.
         "OMP_NUM_THREADS": "1",
         "OPENBLAS_NUM_THREADS": "1",

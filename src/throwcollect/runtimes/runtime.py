@@ -210,6 +210,25 @@ class Runtime(ABC):
             WorkerError: If there is no such runtime on this machine.
         """
 
+    def begin(self, config: Config, middleware: Middleware) -> None:
+        """Begin what takes long and can be begun as soon as the configuration is known, before there is a plan.
+
+        Its end is waited for by the host, and `close` ends what no host needed.
+
+        Args:
+            config: The configuration.
+            middleware: What this process can join.
+        """
+        return
+
+    def close(self) -> None:
+        """End what `begin` has begun."""
+        return
+
+    def is_absent(self) -> bool:
+        """Whether it can be seen at a glance that this machine does not have it."""
+        return False
+
     def prepare(
         self, config: Config, middleware: Middleware, *, say: Callable[[str], None], warn: Callable[[str], None]
     ) -> Middleware:

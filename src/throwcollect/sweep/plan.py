@@ -125,7 +125,7 @@ class Plan:
         Columns: ``trial`` int64, ``digest`` string, ``seed`` uint64, ``refused`` string or null, then one float64
         column per swept key, named like it.
         """
-        import pyarrow as pa
+        from throwcollect.sweep.arrow_column import make_table
 
         columns: list[Any] = [
             [trial.number for trial in self.trials],
@@ -138,8 +138,7 @@ class Plan:
         if self.slice is not None:
             metadata[_SLICE_KEY] = str(self.slice)
         schema = _schema(self.keys).with_metadata(metadata)
-        table = pa.table([pa.array(column, kind) for column, kind in zip(columns, schema.types, strict=True)], schema)
-        return encode_table(table)
+        return encode_table(make_table(columns, schema))
 
     @classmethod
     def read(cls, path: Path, config: Config, *, slice: Slice | None = None) -> Plan:

@@ -14,6 +14,8 @@ from throwcollect.runs import choice
 from throwcollect.runtimes.docker import engine as docker_engine
 from throwcollect.runtimes.docker import image as docker_image
 from throwcollect.runtimes.docker.image import default_tag
+from throwcollect.runtimes.docker.runtime import DockerRuntime
+from throwcollect.runtimes.node_server import NodeServer
 
 
 @pytest.fixture
@@ -192,3 +194,30 @@ def test_rclpy_that_is_asked_for_and_cannot_be_had_in_containers_is_an_error(
     with pytest.raises(ConfigError, match=problem) as caught:
         choice.choose(Config(run=RunConfig(runtime="docker", ros="rclpy")), say=print, warn=print)
     assert "run.ros" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("wanted", "no_docker", "name", "begun"),
+    [("local", False, "local", True), ("auto", True, "local", True), ("auto", False, "docker", False)],
+)
+def test_processes_are_begun_when_it_is_plain_that_they_will_be_needed(
+    wanted: str, no_docker: bool, name: str, begun: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begin = Mock()
+    monkeypatch.setattr(NodeServer, "begin", begin)
+    monkeypatch.setattr(DockerRuntime, "is_absent", lambda _: no_docker)
+    config = Config(run=RunConfig(runtime=wanted))
+    found = choice.begin(config)
+    assert found is not None
+    assert found.name == name
+    assert begin.called == begun
+    if begun:
+        chosen = choice.choose(
+            config.model_copy(update={"run": RunConfig(runtime="local")}), say=Mock(), warn=Mock(), begun=found
+        )
+        assert chosen.runtime is found.runtime
+
+
+def test_nothing_is_begun_of_a_runtime_that_cannot_be_had(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(DockerRuntime, "is_absent", lambda _: True)
+    assert choice.begin(Config(run=RunConfig(runtime="docker"))) is None

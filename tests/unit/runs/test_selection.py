@@ -1,3 +1,4 @@
+import os
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from datetime import datetime, timedelta, timezone
@@ -280,9 +281,11 @@ def test_an_engine_that_is_gone_holds_no_containers_that_run(
     assert find_left_in(records, tmp_path / "a") is None
 
 
-def test_the_record_of_containers_that_are_left_is_kept(records: Records, make: Make) -> None:
+def test_the_record_of_containers_that_are_left_is_kept(records: Records, make: Make, tmp_path: Path) -> None:
     left = make("a", "ended", age_h=999, ended=NOW - timedelta(hours=999), left=True)
     make("b", "ended", age_h=999, ended=NOW - timedelta(hours=999))
+    for path in (tmp_path / "state" / "runs").glob("*.json"):
+        os.utime(path, times=(0, 0))
     records.new("c").close()
     assert [(run.record.run, run.status) for run in records.all()] == [(left.run, "abandoned")]
 

@@ -1,5 +1,7 @@
+import os
 import signal
 import socket
+import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -31,7 +33,7 @@ def runtime(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[LocalNo
     (tmp_path / "sitecustomize.py").write_text(
         "import runpy, sys\nrunpy.run_module = lambda *_, **__: exec(sys.argv[1], {'sys': sys})\n"
     )
-    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), *sys.path]))
     monkeypatch.setenv("ANSWER", "42")
     local = nodes(tmp_path, domain_id=7)
     yield local

@@ -123,3 +123,17 @@ def _handles(pid: int, number: signal.Signals) -> bool:
     status = Path(f"/proc/{pid}/status").read_text()
     (mask,) = (line.split()[1] for line in status.splitlines() if line.startswith("SigCgt:"))
     return bool(int(mask, 16) >> (number - 1) & 1)
+
+
+def test_a_server_that_was_begun_forks_the_first_node(server, start) -> None:
+    server.begin()
+    (begun,) = (each.pid for each in psutil.Process().children() if "node_server" in " ".join(each.cmdline()))
+    assert psutil.Process(start(*router()).pid).ppid() == begun
+
+
+def test_where_a_server_that_was_begun_cannot_work_the_first_node_has_another_one(server, start, tmp_path) -> None:
+    server.begin()
+    (begun,) = (each for each in psutil.Process().children() if "node_server" in " ".join(each.cmdline()))
+    begun.kill()
+    assert start("--version").wait(WAIT_S) == 0
+    assert "throwcollect" in (tmp_path / "log").read_text()

@@ -35,6 +35,10 @@ class DockerRuntime(Runtime):
     outlives_launcher = True
     has_volumes = True
 
+    def is_absent(self) -> bool:
+        """Whether there is neither a client nor an engine to ask."""
+        return not is_installed("docker") or ("DOCKER_HOST" not in os.environ and not Path(_SOCKET).exists())
+
     def in_words(self, config: Config) -> str:
         """Where trials are simulated."""
         from throwcollect.runtimes.docker.options import image
@@ -91,7 +95,7 @@ class DockerRuntime(Runtime):
 
     def find_held(self) -> list[HeldRun]:
         """Runs of which the engine holds something; none if there is no engine that answers quickly, or no client."""
-        if not is_installed("docker") or ("DOCKER_HOST" not in os.environ and not Path(_SOCKET).exists()):
+        if self.is_absent():
             return []
         from throwcollect.runtimes.docker.engine import connect
         from throwcollect.runtimes.docker.held_runs import find_held_runs

@@ -1,0 +1,61 @@
+"""What starting a collection does, and what it leaves alone."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import psutil
+import pytest
+
+from throwcollect import runs
+from throwcollect.errors import ConfigError
+
+COLLECTION = """
+name: start
+trials: 1
+sim: {{engine: ballistic}}
+run: {{runtime: local}}
+sweep:
+  parameters:
+    task.duration_s: {{min: {least}, max: {most}}}
+"""
+
+
+@pytest.fixture
+def yaml(tmp_path: Path) -> Callable[..., Path]:
+    def write(least: float = 1.1, most: float = 1.2) -> Path:
+        path = tmp_path / "start.yaml"
+        path.write_text(COLLECTION.format(least=least, most=most))
+        return path
+
+    return write
+
+
+def _servers() -> list[psutil.Process]:
+    return [each for each in psutil.Process().children() if "node_server" in " ".join(each.cmdline())]
+
+
+def test_no_process_of_a_collection_imports_pandas(yaml, tmp_path: Path) -> None:
+    imported = tmp_path / "imported"
+    (tmp_path / "before" / "pandas").mkdir(parents=True)
+    (tmp_path / "before" / "pandas" / "__init__.py").write_text(
+        f"import sys\nopen({str(imported)!r}, 'a').write(f'{{sys.orig_argv}}\\n')\n"
+    )
+    path = os.pathsep.join([str(tmp_path / "before"), *filter(None, [os.environ.get("PYTHONPATH")])])
+    command = [sys.executable, "-m", "throwcollect", "up", "-n", "1", "--output", tmp_path / "data", yaml()]
+    subprocess.run(command, env={**os.environ, "PYTHONPATH": path}, check=True, capture_output=True)
+    assert not imported.exists(), imported.read_text()
+
+
+def test_what_was_begun_ends_with_a_run_that_is_refused_or_left(yaml, tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="all refused"):
+        runs.prepare(yaml(least=0.1, most=0.11), output=tmp_path / "data", ahead=True)
+    assert not _servers()
+    assert not (tmp_path / "data").exists()
+    with runs.prepare(yaml(), output=tmp_path / "data", ahead=True):
+        assert len(_servers()) == 1
+    assert not _servers()
+    with runs.prepare(yaml(), output=tmp_path / "data"):
+        assert not _servers()
