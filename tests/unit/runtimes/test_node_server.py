@@ -125,15 +125,20 @@ def _handles(pid: int, number: signal.Signals) -> bool:
     return bool(int(mask, 16) >> (number - 1) & 1)
 
 
-def test_a_server_that_was_begun_forks_the_first_node(server, start) -> None:
+def begin(server: NodeServer) -> psutil.Process:
+    """Begin a server; its process, beside which there may be those of other tests."""
+    before = set(psutil.Process().children())
     server.begin()
-    (begun,) = (each.pid for each in psutil.Process().children() if "node_server" in " ".join(each.cmdline()))
-    assert psutil.Process(start(*router()).pid).ppid() == begun
+    (begun,) = set(psutil.Process().children()) - before
+    return begun
+
+
+def test_a_server_that_was_begun_forks_the_first_node(server, start) -> None:
+    begun = begin(server)
+    assert psutil.Process(start(*router()).pid).ppid() == begun.pid
 
 
 def test_where_a_server_that_was_begun_cannot_work_the_first_node_has_another_one(server, start, tmp_path) -> None:
-    server.begin()
-    (begun,) = (each for each in psutil.Process().children() if "node_server" in " ".join(each.cmdline()))
-    begun.kill()
+    begin(server).kill()
     assert start("--version").wait(WAIT_S) == 0
     assert "throwcollect" in (tmp_path / "log").read_text()
