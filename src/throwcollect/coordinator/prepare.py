@@ -72,7 +72,7 @@ def _check_piece(piece: Sequence[Mapping[str, float]]) -> list[str | None]:
 
 
 def feasibility_check(config: Config) -> Check:
-    """Says of trials of a configuration why the robot cannot do them, in about 5 ms each.
+    """Says of trials of a configuration why the robot cannot do them, in 1 to 5 ms each.
 
     Raises:
         ConfigError: If the robot's files cannot be read.

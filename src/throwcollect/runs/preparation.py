@@ -303,7 +303,7 @@ def prepare_run(records: Records, request: Request, plan: Plan | None, onlooker:
         if plan is None:
             if (config.trials or 0) >= _MANY_TRIALS and not config.grows:
                 onlooker.say(
-                    f"plan: checking {config.trials} trials against limits and collisions, about 5 ms each and core"
+                    f"plan: checking {config.trials} trials against limits and collisions, 1 to 5 ms each and core"
                 )
             plan = prepare_plan(config, directory, sweep_directory=request.sweep_directory, processes=request.processes)
         held.enter_context(hold_together(directory))
