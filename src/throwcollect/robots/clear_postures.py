@@ -72,8 +72,7 @@ class ClearPostures:
         spent = np.zeros((len(postures), len(near)))
         for joint in np.flatnonzero((known != lowest).any(axis=0) | (lowest != highest)):
             spent += np.abs(postures[:, joint, np.newaxis] - known[:, joint]) * steepness[:, joint]
-        unknown: NDArray[np.bool_] = (spent >= 1).all(axis=1)
-        return unknown
+        return np.asarray((spent >= 1).all(axis=1))
 
     def look_at_first(self, postures: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Find out whether the first of some postures is clear, and which others are then, too.

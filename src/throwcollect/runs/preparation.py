@@ -305,7 +305,13 @@ def prepare_run(records: Records, request: Request, plan: Plan | None, onlooker:
                 onlooker.say(
                     f"plan: checking {config.trials} trials against limits and collisions, 1 to 5 ms each and core"
                 )
-            plan = prepare_plan(config, directory, sweep_directory=request.sweep_directory, processes=request.processes)
+            plan = prepare_plan(
+                config,
+                directory,
+                sweep_directory=request.sweep_directory,
+                processes=request.processes,
+                say=onlooker.say,
+            )
         held.enter_context(hold_together(directory))
         if not request.resumed:
             undo.callback(_remove_plan, directory, made=made)
