@@ -2,14 +2,9 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import os
-import signal
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
-from functools import cache, partial
 from pathlib import Path
 from types import TracebackType
 
@@ -25,9 +20,10 @@ from throwcollect.dataset.throw import Throw
 from throwcollect.dataset.throws_table import ThrowsTable
 from throwcollect.episode.message import Episode
 from throwcollect.episode.trajectory_rows import trajectory_rows
-from throwcollect.errors import ConfigError, PlanError, Problem, WorkerError
+from throwcollect.errors import ConfigError, PlanError, Problem
 from throwcollect.files import StrPath
 from throwcollect.replay.throw import Replayer
+from throwcollect.side_by_side import work_side_by_side
 from throwcollect.sweep.plan import Trial, make_trials
 from throwcollect.sweep.points import Points
 
@@ -126,15 +122,13 @@ class Simulator:
             for trial, point in enumerate(points):
                 yield self.throw(point, trial=trial)
             return
-        # A new interpreter each: the physics engine must not be forked.
-        spawn = multiprocessing.get_context("spawn")
-        pool = ProcessPoolExecutor(processes, spawn, _begin, (self._source, self._overrides))
-        try:
-            yield from pool.map(_throw, enumerate(points))
-        except BrokenProcessPool as error:
-            raise WorkerError("a process that simulates was killed", hint="the kernel's log may say why") from error
-        finally:
-            pool.shutdown(cancel_futures=True)
+        yield from work_side_by_side(
+            tuple(enumerate(points)),
+            _begin,
+            (self._source, self._overrides),
+            processes=processes,
+            doing="simulates",
+        )
 
     def _throw(self, trial: Trial) -> Throw:
         episode = self._replayer.run(trial)
@@ -170,17 +164,12 @@ class _Simulated:
         return trajectory_rows(self.episode.state.contents, self.samples, self.joints)
 
 
-_make: list[Callable[[], Simulator]] = []
-"""Makes the simulator of a process of `Simulator.throw_many`, or gives the one that was made before."""
+def _begin(config: str, overrides: tuple[str, ...]) -> Callable[[tuple[int, Point]], Throw]:
+    """Make the simulator of a process of `Simulator.throw_many`."""
+    simulator = Simulator(config, overrides=overrides)
 
+    def throw(numbered: tuple[int, Point]) -> Throw:
+        trial, point = numbered
+        return simulator.throw(point, trial=trial)
 
-def _begin(config: str, overrides: tuple[str, ...]) -> None:
-    # Ctrl-C is for the process that started this one, which ends it.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    # It is made for the first throw and not here, where an error would not reach whoever asked for throws.
-    _make[:] = [cache(partial(Simulator, config, overrides=overrides))]
-
-
-def _throw(numbered: tuple[int, Point]) -> Throw:
-    trial, point = numbered
-    return _make[0]().throw(point, trial=trial)
+    return throw

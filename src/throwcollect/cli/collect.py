@@ -18,11 +18,11 @@ from throwcollect.cli.options import (
     JsonOption,
     SetOption,
     TrialsOption,
-    count_cores,
     overrides,
 )
 from throwcollect.errors import ConfigError
 from throwcollect.files import write_secret
+from throwcollect.side_by_side import count_cores
 from throwcollect.wording import command
 
 if TYPE_CHECKING:

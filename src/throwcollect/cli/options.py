@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Annotated
 
@@ -22,11 +21,6 @@ SetOption = Annotated[
     list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Replace a key of the file; may be repeated.")
 ]
 TrialsOption = Annotated[str | None, typer.Option("--trials", metavar="K", help="Number of trials.")]
-
-
-def count_cores() -> int:
-    """Number of processor cores that this process may use."""
-    return len(os.sched_getaffinity(0))
 
 
 def overrides(settings: list[str] | None, **options: str | None) -> list[str]:

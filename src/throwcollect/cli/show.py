@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json as jsonlib
 from collections import Counter
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -15,10 +16,10 @@ from throwcollect.cli.options import (
     JsonOption,
     SetOption,
     TrialsOption,
-    count_cores,
     overrides,
 )
 from throwcollect.cli.streams import end_with_reader
+from throwcollect.side_by_side import count_cores
 from throwcollect.wording import format_count
 
 
@@ -58,9 +59,11 @@ def plan(
     end_with_reader()
     with load_locating_errors(path, overrides(settings, trials=trials)) as config:
         if output is None:
-            found = draw_plan(config, directory=path.parent, processes=count_cores())
+            found = draw_plan(config, directory=path.parent, processes=count_cores(), say=partial(typer.echo, err=True))
         else:
-            found = prepare(config, output, sweep_directory=path.parent, processes=count_cores())
+            found = prepare(
+                config, output, sweep_directory=path.parent, processes=count_cores(), say=partial(typer.echo, err=True)
+            )
     if json:
         rows = [
             {

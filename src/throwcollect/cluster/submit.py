@@ -33,6 +33,7 @@ from throwcollect.errors import ConfigError, Problem
 from throwcollect.files import unwritable, write_file
 from throwcollect.runs.slices import check_closed, check_sliceable, read_changed_config, read_frozen_config
 from throwcollect.runtimes.apptainer.contents import check_sif
+from throwcollect.side_by_side import count_cores
 from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.slice import Slice
 from throwcollect.wording import command, format_count
@@ -239,8 +240,7 @@ def _freeze(config: Config, directory: Path, sweep_directory: Path, say: Say) ->
         refuse_changes(directory, read_changed_config(directory), config)
         say(f"takes the plan in {directory}")
         return
-    processes = len(os.sched_getaffinity(0))
-    plan = prepare(config, directory, sweep_directory=sweep_directory, processes=processes)
+    plan = prepare(config, directory, sweep_directory=sweep_directory, processes=count_cores(), say=say)
     refused = sum(trial.refused is not None for trial in plan.trials)
     note = f", {refused} refused by calculation" if refused else ""
     say(f"plan: {format_count(len(plan.trials), 'trial')}{note}; dataset: {directory}")

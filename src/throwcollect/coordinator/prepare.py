@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
+import time
+from collections.abc import Callable
 from dataclasses import replace
-from multiprocessing import get_context
 from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
 from throwcollect.config.values import with_values
@@ -14,6 +16,7 @@ from throwcollect.dataset.directory import TRIALS
 from throwcollect.dataset.writer import create
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.robots.feasibility import Feasibility
+from throwcollect.side_by_side import work_side_by_side
 from throwcollect.sweep.plan import Check, Plan, make_plan, refusal
 from throwcollect.sweep.point_file import read_points
 from throwcollect.sweep.points import Points
@@ -23,9 +26,12 @@ from throwcollect.tasks.task import task_of
 _MANY_TRIALS = 500
 """From here on, checking trials side by side is worth the start of processes."""
 _TRIALS_A_PIECE = 100
+_TELL_EVERY_S = 10.0
+
+Say = Callable[[str], object]
 
 
-def draw_plan(config: Config, *, directory: Path, processes: int = 1) -> Plan:
+def draw_plan(config: Config, *, directory: Path, processes: int = 1, say: Say = lambda _: None) -> Plan:
     """Draw all trials that are known before anything runs, and refuse those that the robot cannot do.
 
     Args:
@@ -33,46 +39,46 @@ def draw_plan(config: Config, *, directory: Path, processes: int = 1) -> Plan:
         directory: Where a relative `sweep.file` is looked for: the directory of the configuration's file.
         processes: How many processes may check the trials of a large plan; more than one import the program that calls
             this, as those of `multiprocessing` do.
+        say: Is told now and then how many trials of a large plan have been checked.
 
     Raises:
         ConfigError: If the sweep cannot be drawn, or no trial is left.
+        WorkerError: If a process that checks trials is killed.
     """
-    check = feasibility_check(config)
-    if processes == 1 or (config.trials or 0) < _MANY_TRIALS:
-        return make_plan(config, check=check, directory=directory)
     plan = make_plan(config, directory=directory)
-    return plan.refuse(_check_side_by_side(plan, processes))
+    keys, count = plan.keys, len(plan.trials)
+    values = np.array([[trial.values[key] for key in keys] for trial in plan.trials])
+    pieces = [values[first : first + _TRIALS_A_PIECE] for first in range(0, count, _TRIALS_A_PIECE)]
+    found = work_side_by_side(
+        pieces,
+        _find_refusals,
+        (config, keys),
+        processes=processes if count >= _MANY_TRIALS else 1,
+        doing="checks trials",
+    )
+    reasons: list[str | None] = []
+    told = time.monotonic()
+    for piece in found:
+        reasons += piece
+        if time.monotonic() >= told + _TELL_EVERY_S:
+            told = time.monotonic()
+            say(f"plan: {len(reasons)} of {count} trials checked")
+    return plan.refuse(reasons)
 
 
-def _check_side_by_side(plan: Plan, processes: int) -> list[str | None]:
-    """Why trials of a plan cannot be run, in order; None for those that can."""
-    trials = [trial.values for trial in plan.trials]
-    pieces = [trials[first : first + _TRIALS_A_PIECE] for first in range(0, len(trials), _TRIALS_A_PIECE)]
-    # New processes, as one that was forked off might hold what threads of this one had locked.
-    with ProcessPoolExecutor(processes, get_context("spawn"), _prepare_to_check, (plan.config,)) as pool:
-        return [reason for piece in pool.map(_check_piece, pieces) for reason in piece]
-
-
-_find_refusal: Callable[[Mapping[str, float]], str | None]
-"""What a process of `_check_side_by_side` checks trials with."""
-
-
-def _prepare_to_check(config: Config) -> None:
-    global _find_refusal  # noqa: PLW0603 - the only place that a process of a pool has
+def _find_refusals(config: Config, keys: tuple[str, ...]) -> Callable[[NDArray[np.float64]], list[str | None]]:
+    """Make what says of trials, by rows of their values, why they cannot be run; None of those that can."""
     check = feasibility_check(config)
 
-    def find_refusal(values: Mapping[str, float]) -> str | None:
-        return refusal(with_values(config, values), check)
+    def find(rows: NDArray[np.float64]) -> list[str | None]:
+        trials = (dict(zip(keys, row, strict=True)) for row in rows.tolist())
+        return [refusal(with_values(config, values), check) for values in trials]
 
-    _find_refusal = find_refusal
-
-
-def _check_piece(piece: Sequence[Mapping[str, float]]) -> list[str | None]:
-    return [_find_refusal(values) for values in piece]
+    return find
 
 
 def feasibility_check(config: Config) -> Check:
-    """Says of trials of a configuration why the robot cannot do them, in about 5 ms each.
+    """Says of trials of a configuration why the robot cannot do them, in 1 to 5 ms each.
 
     Raises:
         ConfigError: If the robot's files cannot be read.
@@ -111,7 +117,9 @@ def read_listed_points(config: Config, *, directory: Path) -> Points | None:
     return None if config.sweep.file is None else read_points(directory / config.sweep.file, config)
 
 
-def prepare(config: Config, directory: Path, *, sweep_directory: Path, processes: int = 1) -> Plan:
+def prepare(
+    config: Config, directory: Path, *, sweep_directory: Path, processes: int = 1, say: Say = lambda _: None
+) -> Plan:
     """Freeze the plan: write a dataset directory that holds the resolved configuration and all trials.
 
     Args:
@@ -119,11 +127,13 @@ def prepare(config: Config, directory: Path, *, sweep_directory: Path, processes
         directory: Directory of the dataset, new or empty.
         sweep_directory: Where a relative `sweep.file` is looked for.
         processes: As `draw_plan` takes it.
+        say: As `draw_plan` takes it.
 
     Raises:
         ConfigError: If the sweep or the directory cannot be used; nothing is left behind then.
+        WorkerError: If a process that checks trials is killed.
     """
-    plan = draw_plan(config, directory=sweep_directory, processes=processes)
+    plan = draw_plan(config, directory=sweep_directory, processes=processes, say=say)
     plan = replace(plan, config=make_self_contained(config))
     try:
         create(directory, plan, listed=read_listed_points(config, directory=sweep_directory))

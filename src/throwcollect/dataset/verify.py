@@ -7,8 +7,6 @@ from __future__ import annotations
 
 import reprlib
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +22,7 @@ from throwcollect.dataset.verify_shard import ShardReport, check_shard
 from throwcollect.dataset.verify_tables import Tables, check_tables, shard_of
 from throwcollect.errors import DatasetError
 from throwcollect.robots.description import is_available as robot_is_available
+from throwcollect.side_by_side import work_side_by_side
 
 _MANY_EPISODES = 1000
 """From here on, checking files side by side is worth the start of processes."""
@@ -54,6 +53,7 @@ def verify(directory: Path, *, check_of: CheckOf | None = None, processes: int =
 
     Raises:
         DatasetError: If the directory holds no finished dataset.
+        WorkerError: If a process that checks recordings is killed.
     """
     bag, findings = None, []
     try:
@@ -99,25 +99,17 @@ def _check_shards(directory: Path, tables: Tables, processes: int) -> dict[str, 
     """Check the files that rows name; all that are there if there are no rows."""
     expected = _trials_by_file(directory, tables)
     names = sorted(_list_shards(directory) if expected is None else expected)
-    if processes == 1 or len(names) == 1 or expected is None or sum(map(len, expected.values())) < _MANY_EPISODES:
+    if expected is None or sum(map(len, expected.values())) < _MANY_EPISODES:
+        processes = 1
+    if processes == 1:
         check = _file_check(directory, tables)
         return {name: check(name) for name in names}
-    # New processes, as one that was forked off might hold what threads of this one had locked.
-    with ProcessPoolExecutor(min(processes, len(names)), get_context("spawn"), _prepare_to_check, (directory,)) as pool:
-        return dict(zip(names, pool.map(_check_one, names), strict=True))
+    reports = work_side_by_side(names, _read_and_check, (directory,), processes=processes, doing="checks recordings")
+    return dict(zip(names, reports, strict=True))
 
 
-_check_file: Callable[[str], ShardReport]
-"""What a process of `_check_shards` checks files with."""
-
-
-def _prepare_to_check(directory: Path) -> None:
-    global _check_file  # noqa: PLW0603 - the only place that a process of a pool has
-    _check_file = _file_check(directory, check_tables(directory))
-
-
-def _check_one(name: str) -> ShardReport:
-    return _check_file(name)
+def _read_and_check(directory: Path) -> Callable[[str], ShardReport]:
+    return _file_check(directory, check_tables(directory))
 
 
 def _file_check(directory: Path, tables: Tables) -> Callable[[str], ShardReport]:

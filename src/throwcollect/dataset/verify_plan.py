@@ -24,7 +24,7 @@ from throwcollect.sweep.samplers import draw_points
 from throwcollect.wording import format_count
 
 CHECKED_AGAIN = 100
-"""How many of the trials that the plan does not refuse are checked again as a sample; each takes 5 ms."""
+"""How many of the trials that the plan does not refuse are checked again as a sample; each takes 1 to 5 ms."""
 
 _RELATIVE_TOLERANCE = 1e-9
 """Values that are drawn again on another machine may differ in their last bits."""

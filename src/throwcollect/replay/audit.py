@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from throwcollect.dataset.reader import Dataset
@@ -10,7 +10,7 @@ from throwcollect.engine_packages import require_engine
 from throwcollect.errors import DatasetError
 from throwcollect.extras import require
 from throwcollect.replay.comparison import Comparison, compare
-from throwcollect.replay.processes import simulate_side_by_side
+from throwcollect.side_by_side import count_cores, work_side_by_side
 from throwcollect.trial.choice import choose_trials
 
 
@@ -45,10 +45,9 @@ def replay_throws(directory: Path, trials: Sequence[int]) -> Iterator[Comparison
         MissingExtraError: If what simulates is not installed.
         WorkerError: If the physics engine does not start.
     """
-    # Processes that cannot begin would be started again for ever.
     require_engine(Dataset.open(directory).config.sim.engine)
     require("pinocchio")
-    yield from simulate_side_by_side(trials, _begin, (directory,), _replay)
+    yield from work_side_by_side(trials, _begin, (directory,), processes=count_cores(), doing="simulates")
 
 
 class _Kept:
@@ -60,14 +59,10 @@ class _Kept:
         self.dataset = Dataset.open(directory)
         self.replayer = Replayer(self.dataset.config)
 
-
-_kept: list[_Kept] = []
-
-
-def _begin(directory: Path) -> None:
-    _kept[:] = [_Kept(directory)]
+    def replay(self, trial: int) -> Comparison:
+        """Simulate a trial again, and compare."""
+        return compare(self.dataset.episode(trial), self.replayer.run(self.dataset.plan.trial(trial)))
 
 
-def _replay(trial: int) -> Comparison:
-    kept = _kept[0]
-    return compare(kept.dataset.episode(trial), kept.replayer.run(kept.dataset.plan.trial(trial)))
+def _begin(directory: Path) -> Callable[[int], Comparison]:
+    return _Kept(directory).replay

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,8 +17,8 @@ from throwcollect.engine_packages import require_engine
 from throwcollect.errors import ConfigError
 from throwcollect.extras import require
 from throwcollect.members import names_of
-from throwcollect.replay.processes import simulate_side_by_side
 from throwcollect.replay.throw import Replayer
+from throwcollect.side_by_side import count_cores, work_side_by_side
 
 LANDING = ("landing_x_m", "landing_y_m")
 """Columns of where a throw landed."""
@@ -87,7 +87,7 @@ def simulate_with(directory: Path, engine: str, trials: Sequence[int]) -> Iterat
         raise ConfigError(f"--engine {engine}: {problem}", expected=", ".join(others))
     require_engine(engine)
     require("pinocchio")
-    return simulate_side_by_side(trials, _begin, (directory, engine), _simulate)
+    return work_side_by_side(trials, _begin, (directory, engine), processes=count_cores(), doing="simulates")
 
 
 def distributions(deviations: Sequence[Deviation]) -> list[Distribution]:
@@ -114,25 +114,21 @@ class _Kept:
         self.replayer = Replayer(self.config)
         self.stored = {row["trial"]: row for row in self.dataset.throws.to_pylist()}
 
+    def simulate(self, number: int) -> Deviation:
+        """Simulate a trial, and compare its row with the stored one."""
+        trial = self.dataset.plan.trial(number)
+        result = judge_episode(with_values(self.config, trial.values), self.replayer.run(trial))
+        stored, again = self.stored[number], self.table.row(trial, result, None)
+        # Counts and times come as they are; names, and what only one of both has, cannot be compared.
+        compared = [
+            column
+            for column in again
+            if column not in ("trial", *trial.values)
+            and all(isinstance(row.get(column), int | float) for row in (stored, again))
+        ]
+        values = {column: float(again[column]) - float(stored[column]) for column in compared}
+        return Deviation(number, stored["outcome"], again["outcome"], values)
 
-_kept: list[_Kept] = []
 
-
-def _begin(directory: Path, engine: str) -> None:
-    _kept[:] = [_Kept(directory, engine)]
-
-
-def _simulate(number: int) -> Deviation:
-    kept = _kept[0]
-    trial = kept.dataset.plan.trial(number)
-    result = judge_episode(with_values(kept.config, trial.values), kept.replayer.run(trial))
-    stored, again = kept.stored[number], kept.table.row(trial, result, None)
-    # Counts and times come as they are; names, and what only one of both has, cannot be compared.
-    compared = [
-        column
-        for column in again
-        if column not in ("trial", *trial.values)
-        and all(isinstance(row.get(column), int | float) for row in (stored, again))
-    ]
-    values = {column: float(again[column]) - float(stored[column]) for column in compared}
-    return Deviation(number, stored["outcome"], again["outcome"], values)
+def _begin(directory: Path, engine: str) -> Callable[[int], Deviation]:
+    return _Kept(directory, engine).simulate

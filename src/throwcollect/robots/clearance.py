@@ -9,12 +9,15 @@ from numpy.typing import NDArray
 
 from throwcollect.errors import ConfigError
 from throwcollect.pinocchio_library import pinocchio
+from throwcollect.robots.clear_postures import ClearPostures, find_reaches
 from throwcollect.robots.robot import Robot
 from throwcollect.tools.tool import Tool
 
 MARGIN_M = 0.002
 """Least distance between links. It covers how far the spoon, 1 m from the torso's axis, cuts into a body of the head's
 curvature on a path between two postures 0.02 rad apart."""
+_SHORT_CHAIN = 2
+"""Links with so few joints between them are always close, so that others are not looked at for their sake."""
 
 
 @dataclass(frozen=True)
@@ -74,9 +77,18 @@ class Clearance:
         for request in self._distances.collisionRequests:
             request.security_margin = MARGIN_M
         self._broadphase = pinocchio.BroadPhaseManager_DynamicAABBTreeCollisionManager(model, geometry, self._distances)
+        reaches = find_reaches(model, geometry)
+        short = (reaches > 0).sum(axis=1) <= _SHORT_CHAIN
+        self._clear = [
+            ClearPostures(model, geometry, reaches, np.flatnonzero(pairs), margin_m=MARGIN_M)
+            for pairs in (~short, short)
+            if pairs.any()
+        ]
 
     def first_approach(self, configurations: NDArray[np.float64]) -> Approach | None:
         """First posture in which two links are closer than `MARGIN_M`, and the closest links in it.
+
+        Most postures are near others that were clear by more than the way between them, and so are clear, too.
 
         Args:
             configurations: In the order of the model [rad], shape ``(n, 32)``.
@@ -84,7 +96,10 @@ class Clearance:
         Returns:
             None when no posture has such links.
         """
+        unknown = [known.find_unknown(configurations) for known in self._clear]
         for index, configuration in enumerate(configurations):
+            if self._is_clear(configurations[index:], [rows[index:] for rows in unknown]):
+                continue
             if pinocchio.computeCollisions(self._model, self._data, self._broadphase, configuration, True):
                 pinocchio.computeDistances(self._model, self._data, self.geometry, self._distances, configuration)
                 distances = [result.min_distance for result in self._distances.distanceResults]
@@ -96,6 +111,15 @@ class Clearance:
                     distance_m=distances[closest],
                 )
         return None
+
+    def _is_clear(self, configurations: NDArray[np.float64], unknown: list[NDArray[np.bool_]]) -> bool:
+        """Whether the first of some postures is known to be clear; of others, takes note in `unknown`."""
+        for known, rows in zip(self._clear, unknown, strict=True):
+            if rows[0]:
+                rows[:] &= known.look_at_first(configurations)
+            if rows[0]:
+                return False
+        return True
 
     def _add_tool(self, tool: Tool) -> None:
         frame = self._model.getFrameId(self._robot.hand, pinocchio.BODY)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from throwcollect.config.schema import Config
 from throwcollect.pinocchio_library import pinocchio
 from throwcollect.robots.clearance import MARGIN_M, Clearance
 from throwcollect.robots.description import find_locked_joints, joint_model, robot_of, start_posture
+from throwcollect.robots.dynamics import Dynamics, Motion
 from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.robots.trajectory import JointTrajectory
@@ -23,8 +24,8 @@ _CLEARANCE_STEP_RAD = 0.02
 _POSITION_SLACK_RAD = 1e-6
 _LOWEST_WAY_OUT_RAD = -0.02
 """A way out that goes down less than this is level but for rounding: the ball takes a second or more to leave."""
-
-Motion = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
+_SURELY = 1 - 1e-6
+"""Share of a limit below which torques that were rounded otherwise cannot exceed it: they agree to 1e-12."""
 
 
 class Feasibility:
@@ -50,8 +51,10 @@ class Feasibility:
         self._hand_placement = hand.placement
         chain = list(self._model.supports[self._hand])[1:]
         self._carrying = [self._robot.joints.index(self._model.names[joint]) for joint in chain]
-        self._bare_hand = self._model.inertias[self._hand].copy()
         self._limits = joint_limits(self._robot)
+        self._dynamics = Dynamics(self._robot, self._model, {})
+        self._locked: Mapping[str, float] = {}
+        self._free_dynamics = self._dynamics
         self._tool_config, self._tool = config.tool, tool_of(config.tool)
         self._clearance = Clearance(self._robot, self._model, self._tool)
 
@@ -115,8 +118,12 @@ class Feasibility:
                 f"{joints[joint]} moves at {abs(velocities[worst]):.4g} rad/s at {times[row]:.3f} s; "
                 f"its limit is {limits.velocity[joint]:.4g} rad/s"
             )
-        efforts = self.efforts(config, motion)
         limit = limits.effort * np.where([joint in locked for joint in joints], np.inf, config.robot.effort_scale)
+        free = self._dynamics_of_free_joints(locked)
+        shares = np.abs(free.efforts(config, self._tool_of(config), motion)) / limit[free.columns]
+        if (shares <= _SURELY).all():
+            return None
+        efforts = self.efforts(config, motion)
         if worst := _worst(efforts, limit):
             row, joint = worst
             return (
@@ -154,17 +161,15 @@ class Feasibility:
         Raises:
             ConfigError: If the ball does not fit the tool.
         """
-        tool = self._tool_of(config)
-        seat = np.array(tool.ball_seat(config.ball.radius_m))
-        ball = pinocchio.Inertia.FromSphere(config.ball.mass_kg, config.ball.radius_m)
-        load = tool.inertia + pinocchio.SE3(np.eye(3), seat).act(ball)
-        placement = self._hand_placement * tool.mount
-        self._model.inertias[self._hand] = self._bare_hand + placement.act(load)
-        self._model.gravity.linear = np.array([0.0, 0.0, -config.scene.gravity_mps2])
-        rows = zip(*map(self._model_order, motion), strict=True)
-        torques = np.array([pinocchio.rnea(self._model, self._data, *row) for row in rows])
-        needed: NDArray[np.float64] = torques[:, self._columns] + self._limits.damping * motion[1]
-        return needed
+        efforts = np.empty_like(motion[0])
+        efforts[:, self._dynamics.columns] = self._dynamics.efforts(config, self._tool_of(config), motion)
+        return efforts
+
+    def _dynamics_of_free_joints(self, locked: Mapping[str, float]) -> Dynamics:
+        """Return what gives the torques of all joints but locked ones, at a fraction of the cost."""
+        if locked != self._locked:
+            self._locked, self._free_dynamics = dict(locked), Dynamics(self._robot, self._model, locked)
+        return self._free_dynamics
 
     def _tool_of(self, config: Config) -> Tool:
         """Return the tool of a trial, and see that `_clearance` has it, too."""

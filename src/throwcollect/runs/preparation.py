@@ -236,8 +236,10 @@ def _make_plan(request: Request, directory: Path, onlooker: Onlooker) -> Plan:
 
     config = request.config
     if (config.trials or 0) >= _MANY_TRIALS and not config.grows:
-        onlooker.say(f"plan: checking {config.trials} trials against limits and collisions, about 5 ms each and core")
-    return prepare_plan(config, directory, sweep_directory=request.sweep_directory, processes=request.processes)
+        onlooker.say(f"plan: checking {config.trials} trials against limits and collisions, 1 to 5 ms each and core")
+    return prepare_plan(
+        config, directory, sweep_directory=request.sweep_directory, processes=request.processes, say=onlooker.say
+    )
 
 
 def _in_words(plan: Plan) -> str:

@@ -60,7 +60,7 @@ def test_several_processes_find_the_same(dataset: Path, monkeypatch: pytest.Monk
             super().__init__(processes, *others)
             started.append(processes)
 
-    monkeypatch.setattr("throwcollect.dataset.verify.ProcessPoolExecutor", Pool)
+    monkeypatch.setattr("concurrent.futures.ProcessPoolExecutor", Pool)
     zeroed_sector(dataset)
     alone = verify(dataset, processes=2)
     assert (len(alone), started) == (len(verify(dataset)), [])

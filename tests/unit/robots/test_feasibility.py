@@ -10,6 +10,7 @@ import pytest
 from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError
 from throwcollect.robots.clearance import MARGIN_M, Clearance
+from throwcollect.robots.description import joint_model
 from throwcollect.robots.feasibility import Feasibility
 from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.quintic_curve import sample_quintic
@@ -245,6 +246,56 @@ def test_broad_phase_finds_what_all_distances_find():
             found += 1
             assert approach.distance_m == pytest.approx(closest, abs=1e-5)
     assert found > 10
+
+
+class Unknowing:
+    """Knows no posture to be clear, so that all links are looked at in each."""
+
+    def find_unknown(self, postures):
+        return np.ones(len(postures), bool)
+
+    look_at_first = find_unknown
+
+
+def test_postures_near_clear_ones_are_clear():
+    """Of 6,000 postures on motions of an arm, many of them into something, those that are looked at closely decide."""
+    model = joint_model(TALOS)
+    quick, thorough = (Clearance(TALOS, model, tool_of(Config().tool)) for _ in range(2))
+    thorough._clear = [Unknowing()]
+    draw, limits = np.random.default_rng(5), joint_limits(TALOS)
+    rest = np.array([{**TALOS.rest_posture, **TASK.start}[joint] for joint in JOINTS])
+    columns = [JOINTS.index(joint) for joint in ("torso_1_joint", *(f"arm_right_{n}_joint" for n in range(1, 8)))]
+    order = [JOINTS.index(name) for name in list(model.names)[1:]]
+    approaches = []
+    for number in range(200):
+        # The same few joints again and again, as in a sweep, or all of them at random.
+        moved = columns if number % 4 == 0 else [columns[1], columns[2], columns[4]]
+        goal = draw.uniform(limits.lower[moved], limits.upper[moved])
+        motion = np.tile(rest, (30, 1))
+        motion[:, moved] += np.linspace(0, draw.uniform(0.1, 0.7), 30)[:, None] * (goal - rest[moved])
+        approaches.append(thorough.first_approach(motion[:, order]))
+        assert quick.first_approach(motion[:, order]) == approaches[-1]
+    assert 0.3 < np.mean([approach is None for approach in approaches]) < 0.9
+
+
+def test_torques_of_free_joints_are_those_of_the_whole_robot():
+    feasibility, whole = Feasibility(Config()), Feasibility(Config())
+    whole._dynamics_of_free_joints = lambda _: whole._dynamics
+    draw = np.random.default_rng(3)
+    reasons = []
+    for _ in range(150):
+        elbow, wrist, duration_s, gamma = draw.uniform([-0.5, 0.4, 0.85, 1.0], [-0.2, 0.6, 1.0, 1.3])
+        config = throw(
+            {"arm_right_4_joint": elbow, "arm_right_7_joint": wrist},
+            duration_s=duration_s,
+            gamma=gamma,
+            ball={"mass_kg": draw.uniform(0.03, 0.1)},
+            robot={"posture": {"head_1_joint": draw.uniform(0.0, 0.1)}},
+        )
+        trajectory = task_of(config).trajectory()
+        reasons.append(whole.check(config, trajectory))
+        assert feasibility.check(config, trajectory) == reasons[-1]
+    assert 0.2 < np.mean([reason is None for reason in reasons]) < 0.8
 
 
 @pytest.fixture

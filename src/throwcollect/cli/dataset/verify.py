@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from throwcollect.cli.options import DatasetArgument, JsonOption, count_cores
+from throwcollect.cli.options import DatasetArgument, JsonOption
 from throwcollect.errors import DatasetError
 from throwcollect.extras import install_command
+from throwcollect.side_by_side import count_cores
 from throwcollect.wording import command, format_count
 
 if TYPE_CHECKING:

@@ -1,0 +1,164 @@
+"""Postures that are known to be clear of collisions, and with them all that are near."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from throwcollect.pinocchio_library import pinocchio
+
+_DOUBT_M = 1e-4
+"""By how much a computed distance may be too large; the search for it ends at a hundredth of that."""
+_FAR_M = 0.3
+"""The distance between links that are farther apart than this need not be known exactly."""
+_FEW_PAIRS = 10
+"""So many distances are computed faster than all links are sorted by where they are."""
+_MOST_TRIES = 300
+"""Postures that may be taken in: with more, to find one that is near would take longer than it saves."""
+_LEAST_WORTH = 3
+"""Postures on the way that a posture has to vouch for, itself among them, to be kept."""
+_UNBOUNDED_M = 1e9
+"""Reach of links beyond a joint that does not turn about an axis, as nothing is known of their way."""
+
+
+class ClearPostures:
+    """Postures in which pairs of links are apart by more than a margin, and how far around each of them that is so.
+
+    A joint that turns by an angle moves no point of the links beyond it by more than the angle times a reach, which is
+    the same in all postures. So links that are apart by d stay apart by d minus the sum of angles times reaches, over
+    the joints between the two, at least.
+
+    Args:
+        model: The robot with all joints.
+        geometry: Its shapes, and the pairs of them that must stay apart.
+        reaches: As `find_reaches` gives them.
+        pairs: Which of the pairs are looked at, shape ``(n,)`` with at least one.
+        margin_m: By more than that [m].
+    """
+
+    def __init__(
+        self,
+        model: pinocchio.Model,
+        geometry: pinocchio.GeometryModel,
+        reaches: NDArray[np.float64],
+        pairs: NDArray[np.intp],
+        *,
+        margin_m: float,
+    ) -> None:
+        self._model, self._geometry = model, geometry
+        self._data, self._placed = model.createData(), geometry.createData()
+        self._needed = margin_m + _DOUBT_M
+        self._pairs, self._reaches = pairs, reaches[pairs]
+        self._tries = _MOST_TRIES
+        self._postures = np.empty((0, model.nq))
+        self._distances = np.empty((0, len(pairs)))
+        self._steepness = np.empty((0, model.nq))
+
+    def find_unknown(self, postures: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Which postures are not known to be clear.
+
+        Args:
+            postures: In the order of the model [rad], shape ``(n, n_joints)``, n at least 1.
+
+        Returns:
+            Shape ``(n,)``.
+        """
+        lowest, highest = postures.min(axis=0), postures.max(axis=0)
+        gaps = np.maximum(np.maximum(lowest - self._postures, self._postures - highest), 0.0)
+        near = np.flatnonzero((gaps * self._steepness).sum(axis=1) < 1)
+        known, steepness = self._postures[near], self._steepness[near]
+        spent = np.zeros((len(postures), len(near)))
+        for joint in np.flatnonzero((known != lowest).any(axis=0) | (lowest != highest)):
+            spent += np.abs(postures[:, joint, np.newaxis] - known[:, joint]) * steepness[:, joint]
+        return np.asarray((spent >= 1).all(axis=1))
+
+    def look_at_first(self, postures: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Find out whether the first of some postures is clear, and which others are then, too.
+
+        Args:
+            postures: In the order of the model [rad], shape ``(n, n_joints)``, n at least 1.
+
+        Returns:
+            Which are not known to be clear, shape ``(n,)``.
+        """
+        unknown: NDArray[np.bool_] = np.ones(len(postures), bool)
+        if not self._tries:
+            unknown[0] = len(self._pairs) > _FEW_PAIRS or self._compute_distances(postures[0]).min() <= self._needed
+            return unknown
+        self._tries -= 1
+        distances = self._find_least_distances(postures[0])
+        slack = distances - self._needed
+        if slack.min() <= 0:
+            return unknown
+        steepness = (self._reaches / slack[:, np.newaxis]).max(axis=0)
+        unknown = np.greater_equal(np.abs(postures - postures[0]) @ steepness, 1)
+        if np.count_nonzero(~unknown) >= _LEAST_WORTH:
+            self._postures = np.vstack([self._postures, postures[0]])
+            self._distances = np.vstack([self._distances, distances])
+            self._steepness = np.vstack([self._steepness, steepness])
+        return unknown
+
+    def _find_least_distances(self, posture: NDArray[np.float64]) -> NDArray[np.float64]:
+        """How far the links of each pair are apart at least [m]; exact to `_DOUBT_M` where that is below `_FAR_M`."""
+        if not len(self._postures):
+            return self._compute_distances(posture)
+        away = np.abs(self._postures - posture)
+        nearest = int(np.argmin(away @ self._reaches.max(axis=0)))
+        least: NDArray[np.float64] = self._distances[nearest] - self._reaches @ away[nearest]
+        close = np.flatnonzero(least < _FAR_M)
+        # One by one, each distance takes three times as long.
+        if 3 * len(close) > len(self._geometry.collisionPairs):
+            return self._compute_distances(posture)
+        self._place(posture)
+        least[close] = self._compute_distances_of(self._pairs[close])
+        return least
+
+    def _compute_distances(self, posture: NDArray[np.float64]) -> NDArray[np.float64]:
+        if len(self._pairs) <= _FEW_PAIRS:
+            self._place(posture)
+            return self._compute_distances_of(self._pairs)
+        pinocchio.computeDistances(self._model, self._data, self._geometry, self._placed, posture)
+        distances = np.array([result.min_distance for result in self._placed.distanceResults], np.float64)
+        return distances[self._pairs]
+
+    def _compute_distances_of(self, pairs: NDArray[np.intp]) -> NDArray[np.float64]:
+        numbers = pairs.tolist()
+        return np.array([pinocchio.computeDistance(self._geometry, self._placed, n).min_distance for n in numbers])
+
+    def _place(self, posture: NDArray[np.float64]) -> None:
+        pinocchio.updateGeometryPlacements(self._model, self._data, self._geometry, self._placed, posture)
+
+
+def find_reaches(model: pinocchio.Model, geometry: pinocchio.GeometryModel) -> NDArray[np.float64]:
+    """How far a turn of each joint moves the links of each pair against each other at most [m/rad].
+
+    Args:
+        model: The robot with all joints.
+        geometry: Its shapes and the pairs of them.
+
+    Returns:
+        Shape ``(n_pairs, n_joints)``, in the order of the model; 0 for joints that are not between the two.
+    """
+    shapes = np.array([_find_reach(model, shape) for shape in geometry.geometryObjects])
+    one, other = np.array([(pair.first, pair.second) for pair in geometry.collisionPairs]).T
+    between = (shapes[one] > 0) != (shapes[other] > 0)
+    reaches: NDArray[np.float64] = between * (shapes[one] + shapes[other])
+    return reaches
+
+
+def _find_reach(model: pinocchio.Model, shape: pinocchio.GeometryObject) -> NDArray[np.float64]:
+    """How far from each joint that carries it a shape can come, whatever the joints between do [m]; 0 for others."""
+    shape.geometry.computeLocalAABB()
+    box = shape.geometry.aabb_local
+    corners = [shape.placement.act(np.array(corner)) for corner in product(*zip(box.min_, box.max_, strict=True))]
+    reaches = np.zeros(model.nq)
+    joint, reach = shape.parentJoint, max(float(np.linalg.norm(corner)) for corner in corners)
+    while joint > 0:
+        if not model.joints[joint].shortname().startswith("JointModelR"):
+            reach = _UNBOUNDED_M
+        reaches[model.idx_qs[joint]] = reach
+        reach += float(np.linalg.norm(model.jointPlacements[joint].translation))
+        joint = model.parents[joint]
+    return reaches

@@ -1,0 +1,102 @@
+"""Work in several processes: results in order, and one message whatever happens to a process."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+
+import pytest
+
+from throwcollect.errors import ConfigError, WorkerError
+from throwcollect.side_by_side import work_side_by_side
+
+ASLEEP = """
+import time
+from test_side_by_side import begin_sleep
+from throwcollect.side_by_side import work_side_by_side
+
+if __name__ == "__main__":
+    for piece in work_side_by_side(range(3), begin_sleep, (), processes=2, doing="sleeps"):
+        print(piece, flush=True)
+"""
+
+
+def begin(factor: int) -> Callable[[int], tuple[int, int]]:
+    return lambda piece: (factor * piece, os.getpid())
+
+
+def begin_badly() -> Callable[[int], int]:
+    raise ConfigError("nothing to begin with")
+
+
+def begin_death() -> Callable[[int], None]:
+    return lambda piece: os.kill(os.getpid(), signal.SIGKILL) if piece == 3 else None
+
+
+def begin_sleep() -> Callable[[int], int]:
+    def sleep(piece: int) -> int:
+        time.sleep(0.01 if piece < 2 else 600)
+        return os.getpid()
+
+    return sleep
+
+
+def test_results_come_in_order_from_several_processes() -> None:
+    found = list(work_side_by_side(range(40), begin, (3,), processes=2, doing="counts"))
+    assert [number for number, _ in found] == [3 * piece for piece in range(40)]
+    assert os.getpid() not in {process for _, process in found}
+    assert multiprocessing.active_children() == []
+
+
+def test_one_process_or_one_piece_needs_no_other() -> None:
+    assert list(work_side_by_side([1, 2], begin, (1,), processes=1, doing="counts")) == [
+        (1, os.getpid()),
+        (2, os.getpid()),
+    ]
+    assert list(work_side_by_side([1], begin, (1,), processes=8, doing="counts")) == [(1, os.getpid())]
+    assert list(work_side_by_side([], begin, (1,), processes=8, doing="counts")) == []
+
+
+def test_what_a_process_raises_arrives() -> None:
+    with pytest.raises(ConfigError, match="nothing to begin with"):
+        list(work_side_by_side(range(4), begin_badly, (), processes=2, doing="counts"))
+
+
+def test_a_process_that_is_killed_is_named() -> None:
+    with pytest.raises(WorkerError, match="a process that counts was killed"):
+        list(work_side_by_side(range(40), begin_death, (), processes=2, doing="counts"))
+
+
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
+def test_the_end_of_the_one_that_asked_ends_all_at_once(how: signal.Signals) -> None:
+    here = os.path.dirname(__file__)
+    paths = os.pathsep.join([here, *filter(None, [os.environ.get("PYTHONPATH")])])
+    # A group of its own, as Ctrl-C reaches all processes of a terminal.
+    with subprocess.Popen(
+        [sys.executable, "-c", ASLEEP],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        env={**os.environ, "PYTHONPATH": paths},
+    ) as asking:
+        assert asking.stdout is not None
+        assert asking.stderr is not None
+        asleep = {int(asking.stdout.readline()) for _ in range(2)}
+        started = time.monotonic()
+        if how == signal.SIGINT:
+            os.killpg(asking.pid, how)
+        else:
+            asking.kill()
+        asking.wait(timeout=60)
+        while any(os.path.exists(f"/proc/{each}/cmdline") for each in asleep):
+            assert time.monotonic() < started + 60
+            time.sleep(0.02)
+        told = asking.stderr.read() if how == signal.SIGINT else ""
+    # No other process has something to say.
+    assert told.count("Traceback") == (how == signal.SIGINT)
