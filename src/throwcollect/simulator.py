@@ -21,11 +21,15 @@ from throwcollect.dataset.throws_table import ThrowsTable
 from throwcollect.episode.message import Episode
 from throwcollect.episode.trajectory_rows import trajectory_rows
 from throwcollect.errors import ConfigError, PlanError, Problem
+from throwcollect.extras import require
 from throwcollect.files import StrPath
 from throwcollect.replay.throw import Replayer
 from throwcollect.side_by_side import work_side_by_side
 from throwcollect.sweep.plan import Trial, make_trials
 from throwcollect.sweep.points import Points
+
+# Whoever takes the name hears what is missing, and not who simulates with it later.
+require("pinocchio")
 
 Point = Mapping[str, float]
 """Values that replace those of the configuration, by dotted key, in the key's unit."""
