@@ -70,7 +70,8 @@ for name, override in json.loads(sys.argv[1]).items():
 
 POSE = f"""
 import os, sys
-import concurrent.futures.thread, email.parser, mmap, pinocchio, pyarrow.parquet, scipy.stats
+import concurrent.futures.process, concurrent.futures.thread, email.parser, mmap, multiprocessing.pool
+import pinocchio, pyarrow.parquet, scipy.stats
 import throwcollect.coordinator.main, throwcollect.coordinator.resume, throwcollect.dataset.reader
 import throwcollect.cli.nodes, throwcollect.engines.bullet.bullet_engine, throwcollect.sim.main
 from throwcollect.cli.main import main
