@@ -83,5 +83,6 @@ def running(endpoint: str, session: Context, tmp_path: Path) -> Iterator[tuple[s
     yield process, robot
     process.kill()
     process.communicate()
+    robot.wait_until_gone()
     # Last: a session of rmw_zenoh_cpp hangs for good if a client is destroyed while its last answer is being taken in.
     robot.node.destroy_node()

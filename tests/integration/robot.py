@@ -110,6 +110,7 @@ def running_simulation(
     process.terminate()
     output, _ = process.communicate(timeout=20)
     assert process.returncode == 0, output
+    robot.wait_until_gone()
 
 
 @contextmanager
@@ -189,6 +190,10 @@ class Robot:
             return self.node.count_publishers(self.topic("episode")) == 1
 
         self.wait_until(ready, f"{self.name} is ready")
+
+    def wait_until_gone(self) -> None:
+        """Wait until no trace of an ended simulation is left: the next one of its name would pass for ready at once."""
+        self.wait_until(lambda: not self.node.count_publishers(self.topic("episode")), f"{self.name} is out of sight")
 
     def result(self, future: Future) -> Any:
         self.wait_until(future.done, "an answer")
