@@ -18,6 +18,7 @@ FIGURE = ROOT / "docs" / "architecture.svg"
 PLACES: dict[str, tuple[float, int, str]] = {
     "cli": (2.6, 0, "commands, exit codes"),
     "cluster": (0.3, 1, "Slurm: many machines"),
+    "serve": (-0.9, 1, "page, REST, rosbridge"),
     "runs": (0.3, 2, "prepare, follow, stop"),
     "simulator": (1.5, 2, "throws for Python"),
     "runtimes": (0.3, 3, "where nodes live"),
@@ -44,6 +45,7 @@ PLACES: dict[str, tuple[float, int, str]] = {
 }
 """Column, row and words of each room; rooms that are not named here lie below all others, without arrows."""
 DOORS = (
+    "fastapi",
     "pybullet",
     "mujoco",
     "pinocchio",

@@ -4,7 +4,9 @@
 
     ThrowcollectError                exit 1
     ├── ConfigError                  exit 2   the request is wrong; nothing has been started
-    │   └── PlanError                exit 2   the sweep yields no trial that could be run
+    │   ├── PlanError                exit 2   the sweep yields no trial that could be run
+    │   ├── NotFoundError            exit 2   what is named does not exist
+    │   └── ConflictError            exit 2   it does, but in a state that does not allow what is asked for
     ├── MissingExtraError            exit 2   a package that an extra brings is not installed (`throwcollect.extras`)
     ├── WorkerError                  exit 3   a process of the run could not be started or was lost for good
     ├── LossError                    exit 5   a dataset is there, but trials of it are lost or doubtful
@@ -109,6 +111,14 @@ class ConfigError(ThrowcollectError):
 
 class PlanError(ConfigError):
     """The sweep yields no trial that could be run."""
+
+
+class NotFoundError(ConfigError):
+    """What is named does not exist."""
+
+
+class ConflictError(ConfigError):
+    """What is named exists, but in a state that does not allow what is asked for."""
 
 
 class WorkerError(ThrowcollectError):

@@ -20,6 +20,7 @@ from throwcollect.errors import ConfigError, ThrowcollectError
 
 EXTRA_OF = MappingProxyType(
     {
+        "cbor2": "serve",
         "cryptography": "collect",
         "pinocchio": "collect",
         "pybullet": "collect",
@@ -29,11 +30,15 @@ EXTRA_OF = MappingProxyType(
         "xxhash": "collect",
         "zenoh": "collect",
         "docker": "docker",
+        "fastapi": "serve",
         "h5py": "export",
         "jinja2": "report",
         "matplotlib": "report",
         "mujoco": "mujoco",
+        "orjson": "serve",
         "plotly": "report",
+        "uvicorn": "serve",
+        "websockets": "serve",
     }
 )
 """The extra that brings a package, by the name under which the package is imported."""

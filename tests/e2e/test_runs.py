@@ -91,7 +91,7 @@ def until(condition: Callable[[], bool], *, seconds: float = 60) -> None:
 
 
 def in_the_middle(records: Records, run: str, ended: int = 2) -> None:
-    until(lambda: records.get(run).record.trials_ended >= ended)
+    until(lambda: (progress := records.get(run).record.progress) is not None and progress.ended >= ended)
 
 
 def nodes(records: Records, run: str) -> dict[str, psutil.Process]:
@@ -130,7 +130,7 @@ def test_a_run_goes_on_by_itself_and_is_waited_for_elsewhere(
     assert fingerprints(tmp_path / "data") == fingerprints(reference)
     assert listed() == []
     (ended,) = listed("-a")
-    assert (ended["run"], ended["status"], ended["exit_code"], ended["trials_ended"]) == (run, "ended", 0, TRIALS)
+    assert (ended["run"], ended["status"], ended["exit_code"], ended["progress"]["ended"]) == (run, "ended", 0, TRIALS)
     # Whoever comes late gets the same answer.
     again = call_here("wait", "--run", tmp_path / "data", "--json")
     assert (again.returncode, again.stderr) == (0, "")

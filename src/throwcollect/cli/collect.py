@@ -148,6 +148,19 @@ def launch(run: str, lock: Annotated[int, typer.Option("--lock", help="Descripto
         launch_inherited(run, lock, onlooker=shown, interruptions=lambda: interruptions.count)
 
 
+def begin(run: str, lock: Annotated[int, typer.Option("--lock", help="Descriptor of the run's locked file.")]) -> None:
+    """Prepare and launch a run that somebody else has begun, by the order in standard input."""
+    from throwcollect.cli.interruptions import Interruptions
+    from throwcollect.cli.streams import only_log
+    from throwcollect.cli.terminal import display
+    from throwcollect.runs.background import carry_out
+
+    only_log()
+    order = sys.stdin.buffer.read()
+    with display(quiet=True) as shown, Interruptions() as interruptions:
+        carry_out(run, lock, order, onlooker=shown, interruptions=lambda: interruptions.count)
+
+
 def _collect_slice(directory: Path, text: str, changes: list[str], *, json: bool) -> None:
     from throwcollect.cli.interruptions import Interruptions
     from throwcollect.cli.terminal import display

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from throwcollect.cli import cluster, collect, image, nodes, runs, show
+from throwcollect.cli import cluster, collect, image, nodes, runs, serve, show
 from throwcollect.cli.dataset.commands import dataset_app
 from throwcollect.cli.execution import execute
 from throwcollect.cli.ros.commands import ros_app
@@ -33,9 +33,10 @@ def _add(*commands: Callable[..., None], panel: str | None = None, hidden: bool 
 
 _add(collect.up, collect.resume, collect.join_run, cluster.submit, collect.join)
 _add(runs.ps, runs.wait, runs.logs, runs.events, runs.scale, runs.stop, runs.down, panel="Runs")
+_add(serve.serve, panel="Runs")
 _add(show.config, show.plan, show.doctor)
 _add(nodes.router, nodes.sim, nodes.coordinator, nodes.health, panel="Nodes, as `up` starts them")
-_add(collect.launch, nodes.simulate, hidden=True)
+_add(collect.launch, collect.begin, nodes.simulate, hidden=True)
 image_app.command("build")(image.build)
 image_app.command("sif")(image.sif)
 

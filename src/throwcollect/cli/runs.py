@@ -227,7 +227,7 @@ def _strange_document(runtime: str, held: HeldRun) -> dict[str, Any]:
 
 def _row(run: Run) -> tuple[str, ...]:
     record = run.record
-    throws = f"{record.trials_ended}/{record.trials}" if record.trials is not None else "-"
+    throws = f"{record.progress.ended}/{record.progress.total}" if record.progress is not None else "-"
     return run.id, record.runtime, str(record.simulations), throws, _status(run, record), run.place.dataset
 
 

@@ -40,8 +40,10 @@ def launch(
     onlooker: Onlooker,
     interruptions: Callable[[], int],
     runtime: Runtime | None = None,
-) -> Summary:
-    """Run a prepared collection until its last trial has ended, or go on with one whose launcher died.
+) -> Summary | None:
+    """Launch a prepared run until its last trial has ended, or go on with one whose launcher died.
+
+    A run that collects nothing goes on until the user stops it.
 
     Args:
         run: The run, with a record; its end is written there, and the run is let go of.
@@ -51,7 +53,7 @@ def launch(
         runtime: That of the run, with what it has begun, which is ended here; None if nothing has been begun.
 
     Returns:
-        What the dataset holds; its outcomes say whether trials are lost.
+        What the dataset holds, and whose outcomes say whether trials are lost; None if the run collects nothing.
 
     Raises:
         ConfigError: If the configuration cannot be used after all.
@@ -69,8 +71,9 @@ def launch(
         host = (runtime or get_runtime(run.record.runtime)).host(place, config, warn=onlooker.warn)
         with hold_together(place.directory):
             run.update(launcher=os.getpid(), nodes=(), endpoint=None)
-            summary = Summary(**vars(host.collect(session)), open=config.run.open)
-        lost = loss(summary.outcomes, hint=place.way_on)
+            info = host.collect(session)
+            summary = None if info is None else Summary(**vars(info), open=config.run.open)
+        lost = None if summary is None else loss(summary.outcomes, hint=place.way_on)
         code, failure = (0, None) if lost is None else (lost.exit_code, Failure.of(lost))
         return summary
     except ThrowcollectError as error:
@@ -120,11 +123,13 @@ class _Session:
         if states != self._states:
             before, self._states = self._states, list(states)
             self._write(lambda: self._events.node_events(before, states))
-        trials = {}
+        progress = self._run.record.progress
         if time.monotonic() >= self._written_at + _WRITE_PROGRESS_S:
             self._written_at = time.monotonic()
-            trials = self._trials()
-        self._write(lambda: self._run.update(nodes=tuple(states), endpoint=endpoint, simulations=simulations, **trials))
+            progress = self._progress or progress
+        self._write(
+            lambda: self._run.update(nodes=tuple(states), endpoint=endpoint, simulations=simulations, progress=progress)
+        )
 
     def end(self, code: int, failure: Failure | None, summary: Summary | None, *, left: bool) -> None:
         """How the run ended, last of all, and whether containers of it may be left."""
@@ -141,11 +146,8 @@ class _Session:
             "summary": summary,
             "left": left,
         }
-        self._write(lambda: self._run.update(nodes=(), endpoint=None, **end, **self._trials()))
-
-    def _trials(self) -> dict[str, int]:
-        progress = self._progress
-        return {} if progress is None else {"trials": progress.total, "trials_ended": progress.ended}
+        progress = self._progress or self._run.record.progress
+        self._write(lambda: self._run.update(nodes=(), endpoint=None, progress=progress, **end))
 
     def _write(self, write: Callable[[], None]) -> None:
         try:

@@ -19,7 +19,7 @@ from throwcollect.ros.middleware import Middleware
 from throwcollect.runs.choice import Choice, begin, choose
 from throwcollect.runs.onlooker import SILENT, Onlooker
 from throwcollect.runs.prepared_run import PreparedRun
-from throwcollect.runs.record import Record
+from throwcollect.runs.record import Origin, Record
 from throwcollect.runs.records import OpenRun, Records
 from throwcollect.runs.selection import busy, find_left_in
 from throwcollect.runtimes.ports import reserve_port
@@ -45,6 +45,7 @@ class Request:
         resumed: Whether the directory holds a dataset, with which the run goes on.
         processes: How many processes may check the trials of a large plan.
         ahead: Whether the runtime begins what it can before there is a plan, for `PreparedRun.collect`.
+        origin: What a client asked for; None if a command or a program did.
     """
 
     config: Config
@@ -54,6 +55,7 @@ class Request:
     resumed: bool
     processes: int = 1
     ahead: bool = False
+    origin: Origin | None = None
 
 
 def prepare(
@@ -174,7 +176,9 @@ def _take_over(records: Records, directory: Path, config: Config, onlooker: Onlo
     return PreparedRun(records, run, own, directory, onlooker=onlooker)
 
 
-def prepare_run(records: Records, request: Request, plan: Plan | None, onlooker: Onlooker) -> PreparedRun:
+def prepare_run(
+    records: Records, request: Request, plan: Plan | None, onlooker: Onlooker, *, run: OpenRun | None = None
+) -> PreparedRun:
     """A run that is ready to be launched; nothing is left behind if that fails.
 
     Args:
@@ -182,6 +186,7 @@ def prepare_run(records: Records, request: Request, plan: Plan | None, onlooker:
         request: What the user asked for.
         plan: The plan that lies in the directory; None if it is still to be made.
         onlooker: Is told what goes on.
+        run: The run, if it has a record already, which is kept even so; None for a new one.
 
     Raises:
         ConfigError: If the dataset is in a volume, from which a collection cannot go on.
@@ -192,8 +197,9 @@ def prepare_run(records: Records, request: Request, plan: Plan | None, onlooker:
     with ExitStack() as held, ExitStack() as undo:
         if (begun := begin(config) if request.ahead else None) is not None:
             undo.callback(begun.runtime.close)
-        run = records.new(config.name)
-        undo.callback(run.forget)
+        if run is None:
+            run = records.new(config.name)
+            undo.callback(run.forget)
         reserve_port(config.run).close()
         # Getting an image may take minutes, so all that may be wrong is found before; but where there is a volume, it
         # is the runtime that decides where the dataset is.
@@ -264,6 +270,7 @@ def _record(run: OpenRun, request: Request, choice: Choice, directory: Path, vol
         simulations=choice.runtime.simulations(request.config),
         begun_in=os.getcwd(),
         middleware=choice.middleware,
+        origin=request.origin,
     )
 
 

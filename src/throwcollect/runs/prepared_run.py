@@ -6,6 +6,7 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
+from typing import cast
 
 from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError
@@ -104,6 +105,18 @@ class PreparedRun:
 
         Returns:
             What the dataset holds; its outcomes say whether trials are lost.
+
+        Raises:
+            ThrowcollectError: As `launcher.launch`.
+        """
+        # Nobody but `background` begins runs that collect nothing.
+        return cast(Summary, self.launch(interruptions=interruptions))
+
+    def launch(self, *, interruptions: Callable[[], int] = lambda: 0) -> Summary | None:
+        """Launch it in this process, whatever it is for; see `collect`.
+
+        Returns:
+            What the dataset holds; None if the run collects nothing.
 
         Raises:
             ThrowcollectError: As `launcher.launch`.

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
 from typing import Literal
 
+from pydantic import JsonValue
+
+from throwcollect.coordinator.progress import Progress
 from throwcollect.dataset.summary import Info
 from throwcollect.errors import ConfigError, DatasetError, Interrupted, LossError, ThrowcollectError, WorkerError
 from throwcollect.ros.middleware import Middleware
@@ -64,13 +67,28 @@ class Failure:
 
 
 @dataclass(frozen=True)
+class Origin:
+    """What a client asked for, of which a run came.
+
+    Attributes:
+        component: Name of the component that the run is an instance of.
+        simulations: Number of simulations; None for that of the component's configuration.
+        changes: Values of dotted keys that replace those of the component's configuration.
+    """
+
+    component: str
+    simulations: int | None = None
+    changes: dict[str, JsonValue] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
 class Record:
     """What is known of one run.
 
     Attributes:
         run: Its id.
         name: Name of the collection.
-        runtime: Where its nodes live.
+        runtime: Where its nodes live; empty until that is chosen.
         directory: Absolute path of the dataset; if that is in a volume, of the files that it was made from.
         volume: Name of the volume that holds the dataset; None if a directory does.
         logs: Absolute path of the directory of its logs.
@@ -80,8 +98,7 @@ class Record:
         simulations: Number of simulations that are wanted.
         endpoint: Zenoh endpoint of the router, as this machine reaches it; None while there is none.
         nodes: Its nodes; none once it has ended.
-        trials: Number of trials to run; None before the first report of the coordinator.
-        trials_ended: Number of trials that have ended.
+        progress: How far it has come; None before the first report of the coordinator.
         ended: When it ended; None before.
         exit_code: Exit code of its launcher; None before it ended.
         left: Whether containers of it may be left, as its launcher could not remove them or did not come to it.
@@ -89,6 +106,8 @@ class Record:
         summary: What its dataset holds; None if it is not finished.
         begun_in: Absolute path of the directory in which it was begun; empty if an older version did not note it.
         middleware: What carries the messages of its nodes.
+        kind: Whether it collects a dataset, or has simulations for clients alone.
+        origin: What a client asked for; None if a command or a program began the run.
         version: Version of this layout.
     """
 
@@ -104,8 +123,7 @@ class Record:
     simulations: int
     endpoint: str | None = None
     nodes: tuple[NodeState, ...] = ()
-    trials: int | None = None
-    trials_ended: int = 0
+    progress: Progress | None = None
     ended: datetime | None = None
     exit_code: int | None = None
     left: bool = False
@@ -113,6 +131,8 @@ class Record:
     summary: Summary | None = None
     begun_in: str = ""
     middleware: Middleware = _EMBEDDED
+    kind: Literal["collection", "session"] = "collection"
+    origin: Origin | None = None
     version: Literal[1] = VERSION
 
     def place(self, key: RunKey) -> Place:
@@ -129,6 +149,7 @@ class Record:
             simulations=self.simulations,
             middleware=self.middleware,
             key=key,
+            collects=self.kind == "collection",
         )
 
     @property

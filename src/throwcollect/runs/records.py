@@ -29,7 +29,7 @@ from typing import Any, Literal
 
 from pydantic import TypeAdapter, ValidationError
 
-from throwcollect.errors import ConfigError
+from throwcollect.errors import ConfigError, ConflictError, NotFoundError
 from throwcollect.files import beside, write_all
 from throwcollect.ros.connection import Connection
 from throwcollect.run_key import RunKey
@@ -197,7 +197,7 @@ class Records:
     """
 
     def __init__(self) -> None:
-        state = _state_directory()
+        state = state_directory()
         self._runs = state / "runs"
         try:
             self._runs.mkdir(mode=0o700, exist_ok=True)
@@ -206,21 +206,26 @@ class Records:
         except OSError as error:
             raise _unusable(self._runs, error) from error
 
-    def new(self, name: str) -> OpenRun:
+    def new(self, name: str, *, run: str | None = None) -> OpenRun:
         """A new run, with a key but without a record yet; forgets what ended a week ago.
 
         Args:
             name: Name of the collection; part of the id.
+            run: Its id; None for one that nobody has.
 
         Raises:
+            ConflictError: If there is a run of that id.
             ConfigError: If it cannot be written.
         """
         self._forget_old()
+        wanted = run
         while True:
-            run = f"{name}-{secrets.token_hex(2)}"
+            run = wanted or f"{name}-{secrets.token_hex(2)}"
             try:
                 lock = os.open(self._runs / f"{run}.lock", os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o600)
-            except FileExistsError:
+            except FileExistsError as error:
+                if wanted:
+                    raise ConflictError(f"there is a run {run} already") from error
                 continue
             except OSError as error:
                 raise _unusable(self._runs / f"{run}.lock", error) from error
@@ -266,7 +271,8 @@ class Records:
         """A run.
 
         Raises:
-            ConfigError: If it has no record, or that is damaged or of another version.
+            NotFoundError: If it has no record.
+            ConfigError: If that is damaged or of another version.
         """
         # The lock first: a launcher that ends in between has written its end before it lets go.
         lives = self.lives(run)
@@ -324,7 +330,7 @@ def _outlived(record: Record) -> bool:
         return True
 
 
-def _state_directory() -> Path:
+def state_directory() -> Path:
     """A directory of this user alone; not that of the login, which vanishes when the last terminal is closed.
 
     Raises:
@@ -369,7 +375,7 @@ def _read(path: Path) -> Record:
             content["failure"] = {"message": message}
         return _ADAPTER.validate_python(content)
     except FileNotFoundError as error:
-        raise ConfigError(f"no run {path.stem}", hint="throwcollect ps -a lists all") from error
+        raise NotFoundError(f"no run {path.stem}", hint="throwcollect ps -a lists all") from error
     except OSError as error:
         raise _unusable(path, error) from error
     except (ValueError, ValidationError) as error:

@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from throwcollect.errors import ConfigError, WorkerError
+from throwcollect.errors import ConfigError, ConflictError, NotFoundError, WorkerError
 from throwcollect.members import names_of
 from throwcollect.runs.record import Record
 from throwcollect.runs.records import Records, Run
@@ -122,7 +122,7 @@ def id_of(records: Records, named: str) -> str:
         raise ConfigError(f"{len(alike)} runs begin with {named!r}", expected=f"one of {_list(alike)}")
     known = _list(_latest_first(records.all()))
     hint = "throwcollect ps -a lists all" if known else None
-    raise ConfigError(f"no run {named!r}", expected=f"one of {known}" if known else None, hint=hint)
+    raise NotFoundError(f"no run {named!r}", expected=f"one of {known}" if known else None, hint=hint)
 
 
 def _latest_first(runs: Sequence[Run]) -> list[str]:
@@ -167,9 +167,9 @@ def _into(records: Records, directory: Path) -> list[Run]:
     return [run for run in reversed(records.all()) if run.record.volume is None and run.record.directory == path]
 
 
-def busy(record: Record) -> ConfigError:
+def busy(record: Record) -> ConflictError:
     """The error that says that a run collects into a directory."""
-    return ConfigError(
+    return ConflictError(
         f"{record.directory}: run {record.run} collects into it",
         hint=f"{command('wait', '--run', record.run)} follows it",
     )
@@ -191,13 +191,13 @@ def require_living(run: Run) -> Record:
     """The record of a run that lives.
 
     Raises:
-        ConfigError: If it has ended.
+        ConflictError: If it has ended.
         WorkerError: If its launcher died.
     """
     if run.status == "died":
         raise describe_death(run)
     if run.status != "running":
-        raise ConfigError(f"run {run.id} has ended", hint="throwcollect ps lists those that live")
+        raise ConflictError(f"run {run.id} has ended", hint="throwcollect ps lists those that live")
     return run.record
 
 

@@ -105,7 +105,7 @@ class LocalNodes(NodeHost):
         self._owns_server = server is None
         self._processes: dict[str, ForkedNode] = {}
 
-    def collect(self, session: Session) -> Info:
+    def collect(self, session: Session) -> Info | None:
         """See `runtime.Host.collect`."""
         # It takes ROS along, so it is imported when it is known what ROS is to run on.
         from throwcollect.runtimes.node_collection import NodeCollection

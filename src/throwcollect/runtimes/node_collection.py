@@ -1,4 +1,4 @@
-"""A collection by nodes, from their start to their end: they are kept alive, listened to, scaled, and asked to stop.
+"""A run by nodes, from their start to their end: they are kept alive, listened to, scaled, and asked to stop.
 
 The process that does so is the node ``/launcher``; setting its integer parameter ``simulations`` scales the run.
 """
@@ -43,7 +43,7 @@ _MEET_S = 12.0
 
 
 def roster(host: NodeHost, simulations: int) -> list[NodeSpec]:
-    """The nodes of a collection: a router, simulations, and a coordinator.
+    """The nodes of a run: a router, simulations, and a coordinator if it collects.
 
     Args:
         host: Where they are to live.
@@ -64,7 +64,7 @@ def roster(host: NodeHost, simulations: int) -> list[NodeSpec]:
             )
             for index in range(simulations)
         ),
-        NodeSpec(COORDINATOR, ("coordinator", host.data), Role.MAIN),
+        *([NodeSpec(COORDINATOR, ("coordinator", host.data), Role.MAIN)] if host.place.collects else []),
     ]
 
 
@@ -92,7 +92,7 @@ def offer_scaling(
 
 
 class NodeCollection:
-    """One collection by nodes.
+    """One run by nodes: a collection, or simulations for clients.
 
     Args:
         host: Where the nodes live; closed at the end.
@@ -109,14 +109,17 @@ class NodeCollection:
         self._supervisor = Supervisor(host, host.config.run, roster(host, self._simulations))
         self._listener = RunListener(self._report, name=LAUNCHER, on_connect=self._offer)
 
-    def run_to_the_end(self) -> Info:
+    def run_to_the_end(self) -> Info | None:
         """See `runtime.Host.collect`."""
         with self._supervisor, self._listener:
             found = self._host.open()
             self._session.event("adopted" if found else "started", simulations=self._simulations)
             self._supervisor.start(found=found)
             self._session.take_over([state for state in self._supervisor.states() if state.name in found])
-            self._check(self._follow())
+            end = self._follow()
+            if not self._host.place.collects:
+                return None
+            self._check(end)
             return self._host.info()
 
     def _follow(self) -> NodeExit | None:
@@ -134,6 +137,8 @@ class NodeCollection:
             self._session.nodes(self._supervisor.states(), endpoint=self._endpoint, simulations=self._simulations)
         if end is None:
             self._session.event("stopping")
+            if not self._host.place.collects:
+                return None
             self._session.say("interrupted: finishing the running trials; once more ends at once")
             end = self._supervisor.drain(hurry=lambda: self._session.interruptions() > 1)
         self._listen()

@@ -91,6 +91,7 @@ class Place:
         simulations: Number of simulations at the start.
         middleware: What carries the messages of its nodes.
         key: What its router lets nobody in without.
+        collects: Whether it collects a dataset; if not, its simulations are there for clients, until it is stopped.
     """
 
     run: str
@@ -100,6 +101,7 @@ class Place:
     simulations: int
     middleware: Middleware
     key: RunKey
+    collects: bool = True
 
     @property
     def dataset(self) -> str:
@@ -109,7 +111,7 @@ class Place:
     @property
     def way_on(self) -> str | None:
         """The command that goes on with the dataset once the run is over; None if there is none, as for a volume."""
-        return None if self.volume else command("resume", self.directory)
+        return command("resume", self.directory) if self.collects and not self.volume else None
 
 
 @dataclass(frozen=True)
@@ -161,11 +163,11 @@ class Host(Protocol):
 
     cleared: bool
 
-    def collect(self, session: Session) -> Info:
-        """Collect until every trial has ended, finish the dataset, and close.
+    def collect(self, session: Session) -> Info | None:
+        """Collect until every trial has ended, finish the dataset, and close; or keep simulations until told to stop.
 
         Returns:
-            What the dataset holds.
+            What the dataset holds; None for a run that collects none.
 
         Raises:
             WorkerError: If nodes cannot be started or kept alive.

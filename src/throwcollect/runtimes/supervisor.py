@@ -31,7 +31,7 @@ class Supervisor:
     Args:
         host: Where the nodes live; closed at the end.
         run: How to run.
-        roster: The nodes that there are to be, in the order in which they are started; one of them is the main one.
+        roster: The nodes that there are to be, in the order in which they are started; at most one is the main one.
     """
 
     def __init__(self, host: NodeHost, run: RunConfig, roster: Sequence[NodeSpec]) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from throwcollect.coordinator.progress import Progress
 from throwcollect.errors import ConfigError
 from throwcollect.run_key import RunKey
 from throwcollect.runs.record import Failure, Record, Summary
@@ -20,6 +21,7 @@ NOW = datetime.now(timezone.utc)
 SUMMARY = Summary(
     "small", 3, 3, {"landed": 3}, None, {"x_m": (1.0, 2.0), "y_m": (0.0, 0.1)}, 30, 1.0, 1, 10, 5, {}, "0", open=True
 )
+PROGRESS = Progress(7, 0, {}, 2, 0.0, [])
 NODE = NodeState("sim_0", "restarting", 2, None, "ended by SIGKILL")
 
 
@@ -58,11 +60,11 @@ def remember(records: Records, **fields: object) -> str:
 
 def test_what_is_written_is_read_by_others(state: Path) -> None:
     run = Records().new("small")
-    written = record(run, nodes=(NODE,), trials=7, endpoint="tcp/127.0.0.1:1", summary=SUMMARY)
+    written = record(run, nodes=(NODE,), progress=PROGRESS, endpoint="tcp/127.0.0.1:1", summary=SUMMARY)
     run.write(written)
     assert Records().get(run.run).record == written
-    run.update(trials_ended=5, failure=Failure("ä"))
-    assert Records().get(run.run).record == replace(written, trials_ended=5, failure=Failure("ä"))
+    run.update(progress=replace(PROGRESS, ended=5), failure=Failure("ä"))
+    assert Records().get(run.run).record == replace(written, progress=replace(PROGRESS, ended=5), failure=Failure("ä"))
     assert Records().ids() == [run.run]
 
 

@@ -73,7 +73,9 @@ def test_the_record_and_the_events_tell_of_it(yaml: Path) -> None:
     summary = collect(yaml)
     run = runs.find(yaml.parent / "data")
     assert (run.status, run.record.runtime, run.record.simulations) == ("ended", "inprocess", 1)
-    assert (run.record.summary, run.record.error, run.record.trials_ended) == (summary, None, 3)
+    assert (run.record.summary, run.record.error) == (summary, None)
+    assert run.record.progress is not None
+    assert run.record.progress.outcomes == {"landed": 3}
     assert runs.wait(run) == summary
     events = [json.loads(line) for line in (yaml.parent / "data" / "logs" / "events.jsonl").read_text().splitlines()]
     assert [(each.get("node"), each["event"]) for each in events] == [

@@ -100,7 +100,7 @@ class DockerNodes(NodeHost):
             check(self._client, self._place, config)
             undo.pop_all()
 
-    def collect(self, session: Session) -> Info:
+    def collect(self, session: Session) -> Info | None:
         """See `runtime.Host.collect`."""
         # It takes ROS along, so it is imported when it is known what ROS is to run on.
         from throwcollect.runtimes.node_collection import NodeCollection

@@ -1,0 +1,88 @@
+"""`throwcollect serve` and `view`: look inside runs, and manage them, from a browser or by programs."""
+
+from __future__ import annotations
+
+import json as jsonlib
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from throwcollect.cli.options import DEFAULT_CONFIG, JsonOption
+from throwcollect.errors import ConfigError
+
+if TYPE_CHECKING:
+    from throwcollect.serve.server import Address
+
+_LOOPBACK = ("127.0.0.1", "localhost", "::1")
+
+
+def serve(
+    catalogue: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="[CATALOG]",
+            help="YAML file with components, or a configuration; throwcollect.yaml by default.",
+            readable=False,
+        ),
+    ] = None,
+    host: Annotated[str, typer.Option("--host", metavar="ADDRESS", help="Address to listen at.")] = "127.0.0.1",
+    port: Annotated[int, typer.Option("--port", min=0, max=65535, help="Port; 0 for any that is free.")] = 8080,
+    datasets: Annotated[
+        Path, typer.Option("--datasets", metavar="DIR", help="Where instances make their datasets.")
+    ] = Path("datasets"),
+    certificate: Annotated[
+        Path | None, typer.Option("--tls-cert", metavar="FILE", help="Certificate in PEM: speak HTTPS.")
+    ] = None,
+    key: Annotated[Path | None, typer.Option("--tls-key", metavar="FILE", help="Its key in PEM.")] = None,
+    in_the_clear: Annotated[
+        bool, typer.Option("--in-the-clear", help="Serve other machines without TLS, where the network is trusted.")
+    ] = False,
+    origins: Annotated[
+        list[str] | None,
+        typer.Option("--allow-origin", metavar="URL", help="Origin of pages served elsewhere that may connect."),
+    ] = None,
+    names: Annotated[
+        list[str] | None, typer.Option("--name", metavar="NAME", help="Host name by which clients know this machine.")
+    ] = None,
+    json: JsonOption = False,
+) -> None:
+    """Serve a page, REST, the state of all runs and rosbridge on one port, until it is stopped."""
+    from throwcollect.serve.catalogue import Catalogue
+    from throwcollect.serve.instances import Instances
+    from throwcollect.serve.server import Tls
+    from throwcollect.serve.server import serve as serve_all
+
+    if (certificate is None) != (key is None):
+        raise ConfigError("--tls-cert and --tls-key: should be given together")
+    if host not in _LOOPBACK and certificate is None and not in_the_clear:
+        raise ConfigError(
+            f"--host {host}: whoever is on that network could read the token as it goes by",
+            hint="--tls-cert and --tls-key, or --in-the-clear if the network is trusted; ssh -L needs neither",
+        )
+    tls = None if certificate is None or key is None else Tls(certificate, key)
+
+    def tell(address: Address, code: str) -> None:
+        if json:
+            typer.echo(jsonlib.dumps({"url": address.url, "page": address.page(code), "pid": address.pid}))
+        else:
+            typer.echo(f"open {address.page(code)}")
+            typer.echo(f"from another machine: {_tunnel(address)}", err=True)
+
+    serve_all(
+        Instances(Catalogue.read(catalogue or DEFAULT_CONFIG), datasets.absolute()),
+        host=host,
+        port=port,
+        tls=tls,
+        origins=frozenset(origins or ()),
+        names=frozenset(names or ()),
+        tell=tell,
+    )
+
+
+def _tunnel(address: Address) -> str:
+    """The command that brings the port to another machine."""
+    import socket
+
+    port = address.url.rpartition(":")[2]
+    return f"ssh -L {port}:127.0.0.1:{port} {socket.gethostname()}"

@@ -1,0 +1,198 @@
+"""Runs that begin in a process of their own: it makes the plan, too, so whoever asks for one need not wait for that.
+
+Such a run has a record from its first moment. Whatever its preparation fails of is written there, as all else is.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import IO, Literal, cast
+
+from pydantic import TypeAdapter
+
+from throwcollect.config.loader import dump_yaml, load, load_locating_errors
+from throwcollect.config.schema import Config
+from throwcollect.dataset.directory import config_path
+from throwcollect.errors import ConfigError, Interrupted, Problem, ThrowcollectError, WorkerError
+from throwcollect.files import open_log, write_file
+from throwcollect.runs.choice import choose
+from throwcollect.runs.onlooker import Onlooker
+from throwcollect.runs.preparation import Request, prepare_run
+from throwcollect.runs.prepared_run import PreparedRun
+from throwcollect.runs.record import Failure, Origin, Record
+from throwcollect.runs.records import OpenRun, Records, Run
+from throwcollect.runtimes.node_logs import NodeLogs
+from throwcollect.runtimes.nodes import LAUNCHER
+from throwcollect.runtimes.registry import get_runtime
+from throwcollect.side_by_side import count_cores
+
+
+@dataclass(frozen=True)
+class Order:
+    """What a run is to be made from.
+
+    Attributes:
+        config: Absolute path of the configuration's file.
+        overrides: What replaces keys of it: ``key=value`` pairs, as ``--set`` takes them.
+        output: Absolute path of the dataset's directory; unused by a run that collects none.
+    """
+
+    config: Path
+    overrides: tuple[str, ...]
+    output: Path
+
+
+_ORDERS = TypeAdapter(Order)
+
+
+def begin_run(
+    config: Path,
+    *,
+    overrides: Sequence[str],
+    output: Path,
+    run: str,
+    origin: Origin,
+    kind: Literal["collection", "session"] = "collection",
+) -> Run:
+    """Begin a run in a process of its own, which outlives this one; come back as soon as the run has a record.
+
+    Args:
+        config: The configuration's file.
+        overrides: What replaces keys of it: ``key=value`` pairs, as ``--set`` takes them.
+        output: Directory of the dataset, new or empty; unused by a run that collects none.
+        run: Id of the run.
+        origin: What was asked for.
+        kind: Whether it collects a dataset, or has simulations for clients alone.
+
+    Raises:
+        ConflictError: If there is a run of that id.
+        ConfigError: If the configuration cannot be used.
+        WorkerError: If the process cannot be started.
+    """
+    read = load(config, overrides)
+    if kind == "session":
+        _check_session(read)
+    records = Records()
+    opened = records.new(read.name, run=run)
+    try:
+        place = opened.directory / "data" if kind == "session" else output.absolute()
+        # The log of what happens before there is a directory of the dataset, which has to be empty until then.
+        logs = opened.directory / "logs"
+        logs.mkdir(exist_ok=True)
+        process = _start_process(opened, logs)
+        opened.write(
+            Record(
+                run=run,
+                name=read.name,
+                runtime="",
+                directory=str(place),
+                volume=None,
+                logs=str(logs),
+                domain_id=read.run.domain_id,
+                started=datetime.now(timezone.utc),
+                launcher=process.pid,
+                simulations=read.run.simulations,
+                begun_in=os.getcwd(),
+                kind=kind,
+                origin=origin,
+            )
+        )
+        # It waits for this, so that the record is there before it changes it.
+        with cast(IO[bytes], process.stdin) as order:
+            order.write(_ORDERS.dump_json(Order(config.absolute(), tuple(overrides), output.absolute())))
+    except (ThrowcollectError, OSError) as error:
+        opened.forget()
+        if isinstance(error, OSError):
+            raise WorkerError(f"run {run} cannot be begun: {error}") from error
+        raise
+    opened.close()
+    return records.get(run)
+
+
+def _start_process(run: OpenRun, logs: Path) -> subprocess.Popen[bytes]:
+    words = [sys.executable, "-m", "throwcollect", "begin", run.run, "--lock", str(run.lock)]
+    with open(open_log(NodeLogs(logs).path(LAUNCHER)), "ab") as log:
+        return subprocess.Popen(
+            words,
+            stdin=subprocess.PIPE,
+            stdout=log,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+            pass_fds=[run.lock],
+        )
+
+
+def carry_out(run: str, lock: int, order: bytes, *, onlooker: Onlooker, interruptions: Callable[[], int]) -> None:
+    """Prepare and launch a run in the process that `begin_run` has started.
+
+    Args:
+        run: Id of the run.
+        lock: Descriptor of its locked file, which this process has inherited.
+        order: What it is to be made from.
+        onlooker: Is told what goes on.
+        interruptions: How often somebody has asked to stop.
+
+    Raises:
+        ThrowcollectError: What it failed of; that is in its record, too.
+    """
+    records = Records()
+    opened = records.inherit(run, lock)
+    made_from = _ORDERS.validate_json(order)
+    try:
+        prepare = _prepare_session if opened.record.kind == "session" else _prepare_collection
+        prepared = prepare(records, opened, made_from, onlooker)
+        if interruptions():
+            raise Interrupted("stopped before any node was started")
+    except ThrowcollectError as error:
+        opened.update(ended=datetime.now(timezone.utc), exit_code=error.exit_code, failure=Failure.of(error))
+        raise
+    with prepared:
+        prepared.launch(interruptions=interruptions)
+
+
+def _prepare_collection(records: Records, run: OpenRun, order: Order, onlooker: Onlooker) -> PreparedRun:
+    record = run.record
+    with load_locating_errors(order.config, order.overrides) as config:
+        request = Request(
+            config,
+            order.config.parent,
+            order.output,
+            record.started,
+            resumed=False,
+            processes=count_cores(),
+            ahead=True,
+            origin=record.origin,
+        )
+        return prepare_run(records, request, None, onlooker, run=run)
+
+
+def _prepare_session(records: Records, run: OpenRun, order: Order, onlooker: Onlooker) -> PreparedRun:
+    with load_locating_errors(order.config, order.overrides) as config:
+        _check_session(config)
+        directory = run.directory / "data"
+        directory.mkdir(exist_ok=True)
+        write_file(config_path(directory), dump_yaml(config).encode())
+        choice = choose(config, say=onlooker.say, warn=onlooker.warn)
+        simulations = choice.runtime.simulations(config)
+        run.update(runtime=choice.name, middleware=choice.middleware, simulations=simulations)
+        # A dry run, as that of a collection.
+        choice.runtime.host(run.record.place(run.key), config, warn=onlooker.warn).close()
+        return PreparedRun(records, run, config, directory, onlooker=onlooker, runtime=choice.runtime)
+
+
+def _check_session(config: Config) -> None:
+    """Refuse what has no nodes that a client could talk to.
+
+    Raises:
+        ConfigError: If all is to happen in one process.
+    """
+    if config.run.runtime != "auto" and not get_runtime(config.run.runtime).can_be_scaled:
+        raise ConfigError(
+            [Problem(f"should have nodes for clients to talk to, got {config.run.runtime}", key="run.runtime")]
+        )

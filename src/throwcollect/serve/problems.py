@@ -1,0 +1,81 @@
+"""Errors as answers: a status, and all facts as `application/problem+json` (RFC 9457)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import JSONResponse
+from starlette.exceptions import HTTPException
+
+from throwcollect.errors import (
+    ConfigError,
+    ConflictError,
+    DatasetError,
+    NotFoundError,
+    ThrowcollectError,
+    WorkerError,
+)
+from throwcollect.extras import MissingExtraError
+
+_STATUS: tuple[tuple[type[ThrowcollectError], int], ...] = (
+    (NotFoundError, 404),
+    (ConflictError, 409),
+    (ConfigError, 422),
+    (MissingExtraError, 503),
+    (WorkerError, 503),
+    (DatasetError, 500),
+)
+"""Status of each kind of error; the first that fits counts."""
+
+
+class ProblemResponse(JSONResponse):
+    """A problem by RFC 9457."""
+
+    media_type = "application/problem+json"
+
+
+def problem(status: int, title: str, headers: dict[str, str] | None = None, **facts: Any) -> ProblemResponse:
+    """The answer that tells of a problem.
+
+    Args:
+        status: Status of HTTP.
+        title: Where and what.
+        headers: Headers besides.
+        facts: What else is known, such as ``hint``; those that are None are left out.
+    """
+    content = {"title": title, "status": status, **{key: value for key, value in facts.items() if value is not None}}
+    return ProblemResponse(content, status_code=status, headers=headers)
+
+
+def answer(error: ThrowcollectError) -> ProblemResponse:
+    """The answer that tells of one of the product's errors."""
+    status = next((status for kind, status in _STATUS if isinstance(error, kind)), 500)
+    problems = None
+    if isinstance(error, ConfigError):
+        problems = [{"message": each.message, "key": each.key, "line": each.line} for each in error.problems]
+    return problem(
+        status, error.message, expected=error.expected, evidence=error.evidence, hint=error.hint, problems=problems
+    )
+
+
+def add_handlers(app: FastAPI) -> None:
+    """Have an application answer with problems."""
+
+    async def own(_: Request, error: Exception) -> ProblemResponse:
+        return answer(error) if isinstance(error, ThrowcollectError) else problem(500, "internal error")
+
+    async def http(_: Request, error: Exception) -> ProblemResponse:
+        if isinstance(error, HTTPException):
+            return problem(error.status_code, str(error.detail), headers=dict(error.headers or {}))
+        return problem(500, "internal error")
+
+    async def request(_: Request, error: Exception) -> ProblemResponse:
+        found = error.errors() if isinstance(error, RequestValidationError) else []
+        problems = [{"key": ".".join(map(str, each["loc"])), "message": each["msg"]} for each in found]
+        return problem(422, "the request is not as it should be", problems=problems)
+
+    app.add_exception_handler(ThrowcollectError, own)
+    app.add_exception_handler(HTTPException, http)
+    app.add_exception_handler(RequestValidationError, request)

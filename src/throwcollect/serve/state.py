@@ -1,0 +1,153 @@
+"""The state of everything, always whole: what this machine remembers of its runs, and the catalogue."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Literal
+
+from pydantic import TypeAdapter
+
+from throwcollect.coordinator.progress import Progress
+from throwcollect.dataset.summary import Info
+from throwcollect.runs.records import Records, Run
+from throwcollect.runtimes.runtime import NodeState
+from throwcollect.serve.catalogue import Catalogue
+
+VERSION: Literal[1] = 1
+"""Version of the layout of the state."""
+
+Status = Literal["starting", "running", "ended", "died"]
+
+
+@dataclass(frozen=True)
+class ComponentState:
+    """A component.
+
+    Attributes:
+        name: Its name.
+        pretty_name: What people are shown.
+        kind: Whether its instances collect datasets, or have simulations for clients alone.
+        max_instances: How many instances may live at once.
+        instances: Ids of those that live.
+    """
+
+    name: str
+    pretty_name: str
+    kind: Literal["collection", "session"]
+    max_instances: int
+    instances: list[str]
+
+
+@dataclass(frozen=True)
+class InstanceState:
+    """A run of this machine, whoever began it.
+
+    Attributes:
+        id: Id of the run.
+        component: Name of the component that it is an instance of; None if a command or a program began it.
+        name: Name of the collection.
+        kind: Whether it collects a dataset, or has simulations for clients alone.
+        status: ``starting`` until all nodes run, ``running``, ``ended``, or ``died``: its launcher did before it ended.
+        started: When it was begun.
+        ended: When it ended; None before.
+        exit_code: Exit code of its launcher; None before it ended.
+        message: What it ended with, in words; empty if there was no error.
+        simulations: Number of simulations that are wanted.
+        nodes: Its nodes; none once it has ended.
+        progress: How far it has come; None before the first report, and without a coordinator.
+        dataset: Where the dataset is, in words; None if it collects none.
+        summary: What the dataset holds; None if it is not finished.
+        robots: Names of its simulations that run, each of which is the namespace of its topics.
+    """
+
+    id: str
+    component: str | None
+    name: str
+    kind: Literal["collection", "session"]
+    status: Status
+    started: datetime
+    ended: datetime | None
+    exit_code: int | None
+    message: str
+    simulations: int
+    nodes: list[NodeState]
+    progress: Progress | None
+    dataset: str | None
+    summary: Info | None
+    robots: list[str]
+
+
+@dataclass(frozen=True)
+class State:
+    """The state of everything.
+
+    Attributes:
+        components: The catalogue.
+        instances: All runs that this machine remembers, the latest first.
+        revision: Grows with each change, as long as the same process serves.
+        version: Version of this layout.
+    """
+
+    components: list[ComponentState]
+    instances: list[InstanceState]
+    revision: int = 0
+    version: Literal[1] = VERSION
+
+
+STATES: TypeAdapter[State] = TypeAdapter(State)
+
+
+def look(catalogue: Catalogue, records: Records) -> State:
+    """Look at everything.
+
+    Args:
+        catalogue: All components.
+        records: All runs.
+    """
+    instances = [describe(run) for run in reversed(records.all())]
+    living = [each for each in instances if each.status in ("starting", "running")]
+    components = [
+        ComponentState(
+            each.name,
+            each.pretty_name,
+            each.kind,
+            each.max_instances,
+            [instance.id for instance in living if instance.component == each.name],
+        )
+        for each in catalogue.components.values()
+    ]
+    return State(components, instances)
+
+
+def describe(run: Run) -> InstanceState:
+    """What is seen of a run."""
+    record = run.record
+    error = record.error if record.failure else None
+    robots = [node.name for node in record.nodes if node.name.startswith("sim_") and node.status == "running"]
+    return InstanceState(
+        id=run.id,
+        component=None if record.origin is None else record.origin.component,
+        name=record.name,
+        kind=record.kind,
+        status=_status(run),
+        started=record.started,
+        ended=record.ended,
+        exit_code=record.exit_code,
+        message=str(error or ""),
+        simulations=record.simulations,
+        nodes=list(record.nodes),
+        progress=record.progress,
+        dataset=run.place.dataset if record.kind == "collection" else None,
+        summary=record.summary,
+        robots=robots,
+    )
+
+
+def _status(run: Run) -> Status:
+    if run.status in ("ended", "abandoned"):
+        return "ended"
+    if run.status == "died":
+        return "died"
+    nodes = run.record.nodes
+    return "running" if nodes and all(node.status != "starting" for node in nodes) else "starting"

@@ -1,0 +1,68 @@
+"""Looks at the state several times a second for everybody who wants to hear of changes."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from dataclasses import replace
+
+from throwcollect.serve.state import STATES, State
+
+_LOOK_S = 0.2
+
+
+class StateWatch:
+    """Looks at the state as long as anybody listens, and tells all listeners of each change, always the whole state.
+
+    Args:
+        look: Looks at everything; called in another thread.
+    """
+
+    def __init__(self, look: Callable[[], State]) -> None:
+        self._look = look
+        self._state: State | None = None
+        self._revision = 0
+        self._changed = asyncio.Condition()
+        self._listeners = 0
+        self._looking: asyncio.Task[None] | None = None
+
+    async def current(self) -> State:
+        """The state by now."""
+        state = await asyncio.to_thread(self._look)
+        async with self._changed:
+            if self._state is None or state != replace(self._state, revision=0):
+                self._revision += 1
+                self._state = replace(state, revision=self._revision)
+                self._changed.notify_all()
+            return self._state
+
+    async def states(self) -> AsyncIterator[bytes]:
+        """The state as JSON, at first as it is and then after each change; one who is slow gets the latest alone."""
+        async with self._listening():
+            state = await self.current()
+            while True:
+                yield STATES.dump_json(state)
+                async with self._changed:
+                    seen = state.revision
+                    await self._changed.wait_for(lambda seen=seen: self._revision > seen)  # type: ignore[misc]
+                    if self._state is not None:
+                        state = self._state
+
+    @asynccontextmanager
+    async def _listening(self) -> AsyncIterator[None]:
+        self._listeners += 1
+        if self._looking is None:
+            self._looking = asyncio.create_task(self._keep_looking())
+        try:
+            yield
+        finally:
+            self._listeners -= 1
+            if not self._listeners and self._looking is not None:
+                self._looking.cancel()
+                self._looking = None
+
+    async def _keep_looking(self) -> None:
+        while True:
+            await asyncio.sleep(_LOOK_S)
+            await self.current()
