@@ -126,8 +126,15 @@ class Signer:
             ConfigError: If the environment names a key that cannot be read.
         """
         key = RunKey.of_environment()
-        if key is None:
-            return cls(b"")
+        return cls(b"") if key is None else cls.of_key(key)
+
+    @classmethod
+    def of_key(cls, key: RunKey) -> Signer:
+        """The signer of a run.
+
+        Raises:
+            ConfigError: If its key cannot be read.
+        """
         return cls(hashlib.sha256(_PURPOSE + _read(key.private_key)).digest())
 
     def sign(self, *parts: bytes | memoryview) -> str:

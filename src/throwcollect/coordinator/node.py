@@ -9,8 +9,9 @@ from collections.abc import Iterator
 
 from throwcollect.coordinator.collection import TrialCollection
 from throwcollect.coordinator.progress import Progress
-from throwcollect.coordinator.progress_topic import PROGRESS_QOS, PROGRESS_TOPIC
+from throwcollect.coordinator.showing import Showing
 from throwcollect.coordinator.simulation_client import EPISODE_TOPIC, SimulationClient
+from throwcollect.coordinator.topics import PROGRESS_QOS, PROGRESS_TOPIC
 from throwcollect.episode.message import Refusal, unpack
 from throwcollect.errors import DatasetError
 from throwcollect.ros import Node, graph_changes
@@ -52,6 +53,7 @@ class Coordinator(Node):
         # With a real-time factor a trial takes as long as onlookers were promised, so the simulation is not lost.
         slowed_s = config.sim.max_trial_s / (config.sim.real_time_factor or math.inf)
         self._patience_s = config.run.trial_timeout_s + slowed_s
+        self._showing = Showing(self)
         self._progress = self.create_publisher(String, PROGRESS_TOPIC, PROGRESS_QOS)
         self.create_timer(_DISCOVERY_PERIOD_S, self._discover)
         self.create_timer(_REPORT_PERIOD_S, self.report)
@@ -176,6 +178,7 @@ class Coordinator(Node):
             self._collection.refuse(namespace, trial, handed.reason)
         else:
             self._collection.take_in(namespace, handed, token)
+            self._showing.offer(namespace, message)
         self._lease(namespace)
 
     def _take_back(self, namespace: str, reason: str, *, refused: bool = False) -> None:

@@ -1,4 +1,4 @@
-"""What the coordinator tells about its progress; `progress_topic` carries it."""
+"""What the coordinator tells about its progress; `topics` carries it."""
 
 from __future__ import annotations
 

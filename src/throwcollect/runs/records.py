@@ -36,6 +36,7 @@ from throwcollect.run_key import RunKey
 from throwcollect.runs.record import VERSION, Record
 from throwcollect.runtimes.registry import get_runtime
 from throwcollect.runtimes.runtime import Place
+from throwcollect.units import NS_PER_S
 from throwcollect.wording import command
 
 STATE_VARIABLE = "THROWCOLLECT_STATE"
@@ -287,12 +288,17 @@ class Records:
             with suppress(ConfigError):
                 yield self.get(run)
 
+    def changed_ns(self, run: str) -> int:
+        """When the record of a run was written last, in nanoseconds of the file system's clock; 0 if it is gone."""
+        try:
+            return (self._runs / f"{run}.json").stat().st_mtime_ns
+        except OSError:
+            return 0
+
     def _age_s(self, run: str) -> float:
         """Time since the record of a run was written [s]; 0 if it is gone."""
-        try:
-            return time.time() - (self._runs / f"{run}.json").stat().st_mtime
-        except OSError:
-            return 0.0
+        changed_ns = self.changed_ns(run)
+        return time.time() - changed_ns / NS_PER_S if changed_ns else 0.0
 
     def lives(self, run: str) -> bool:
         """Whether the launcher of a run lives."""

@@ -9,7 +9,7 @@ from types import TracebackType
 
 from throwcollect import ros
 from throwcollect.coordinator.progress import Progress
-from throwcollect.coordinator.progress_topic import PROGRESS_QOS, PROGRESS_TOPIC
+from throwcollect.coordinator.topics import PROGRESS_QOS, PROGRESS_TOPIC
 from throwcollect.errors import ConfigError, ThrowcollectError
 from throwcollect.ros.connection import Connection
 from throwcollect.ros.endpoint import answers

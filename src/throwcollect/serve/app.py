@@ -4,23 +4,27 @@ from __future__ import annotations
 
 import asyncio
 import time
+from collections.abc import Awaitable, Callable
 from contextlib import aclosing
 from pathlib import Path
 from typing import Annotated, Any
 
 from fastapi import APIRouter, FastAPI, Query, Response, WebSocket
-from fastapi.responses import PlainTextResponse
+from fastapi.responses import FileResponse, PlainTextResponse
 from fastapi.staticfiles import StaticFiles
 from pydantic import BaseModel, ConfigDict, Field, JsonValue
 
+from throwcollect.errors import ThrowcollectError
 from throwcollect.runs.events import EVENTS
 from throwcollect.runs.record import Origin
-from throwcollect.runs.records import Records
 from throwcollect.runtimes.node_logs import NodeLogs
 from throwcollect.serve.access import Keys
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.problems import add_handlers, problem
-from throwcollect.serve.state import ComponentState, InstanceState, State, describe, look
+from throwcollect.serve.robot_files import description_of, find_mesh
+from throwcollect.serve.sockets import keep_telling
+from throwcollect.serve.state import ComponentState, InstanceState, Lookout, State, describe
+from throwcollect.serve.throws import ThrowWatch
 from throwcollect.serve.watching import StateWatch
 from throwcollect.version import __version__
 
@@ -67,10 +71,12 @@ def make_app(instances: Instances, keys: Keys) -> FastAPI:
     """
     app = FastAPI(title="throwcollect", version=__version__, openapi_url="/openapi.json", docs_url=None, redoc_url=None)
     add_handlers(app)
-    watch = StateWatch(lambda: look(instances.catalogue, Records()))
+    lookout = Lookout(instances.catalogue)
+    watch = StateWatch(lookout.look)
     app.include_router(_general(watch, keys), prefix=PREFIX)
     app.include_router(_components(watch), prefix=PREFIX)
-    app.include_router(_instances(instances), prefix=PREFIX)
+    app.include_router(_instances(instances, lookout), prefix=PREFIX)
+    app.include_router(_views(instances), prefix=PREFIX)
     app.mount("/", StaticFiles(directory=_PAGE, html=True))
     return app
 
@@ -105,23 +111,12 @@ def _general(watch: StateWatch, keys: Keys) -> APIRouter:
     async def states(socket: WebSocket) -> None:
         await socket.accept()
 
-        async def hear() -> None:
-            # Nothing is heeded; but without this, nobody would notice that the client has gone.
-            while (await socket.receive())["type"] != "websocket.disconnect":
-                pass
-
         async def tell() -> None:
             async with aclosing(watch.states()) as found:  # type: ignore[type-var]
                 async for text in found:
                     await socket.send_text(text.decode())
 
-        tasks = [asyncio.create_task(hear()), asyncio.create_task(tell())]
-        try:
-            await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
-        finally:
-            for task in tasks:
-                task.cancel()
-            await asyncio.gather(*tasks, return_exceptions=True)
+        await keep_telling(socket, tell)
 
     return router
 
@@ -143,13 +138,13 @@ def _components(watch: StateWatch) -> APIRouter:
     return router
 
 
-def _instances(instances: Instances) -> APIRouter:
+def _instances(instances: Instances, lookout: Lookout) -> APIRouter:
     router = APIRouter(prefix="/instances")
 
     @router.get("")
     def all_instances() -> list[InstanceState]:
         """All runs that this machine remembers, the latest first."""
-        return look(instances.catalogue, Records()).instances
+        return lookout.list_instances()
 
     @router.get("/{instance}")
     def one(instance: str) -> InstanceState:
@@ -200,6 +195,40 @@ def _instances(instances: Instances) -> APIRouter:
         return Response(path.read_bytes() if path.exists() else b"", media_type="application/x-ndjson")
 
     return router
+
+
+def _views(instances: Instances) -> APIRouter:
+    router = APIRouter()
+    watches: dict[str, ThrowWatch] = {}
+
+    @router.get("/instances/{instance}/urdf", response_class=Response)
+    def urdf(instance: str) -> Response:
+        """The robot of a run, with its tool, in URDF; meshes are ``package://`` URLs."""
+        return Response(description_of(instances.get(instance)), media_type="application/xml")
+
+    @router.get("/meshes/{package}/{path:path}", response_class=FileResponse)
+    def mesh(package: str, path: str) -> FileResponse:
+        """The file of a mesh."""
+        return FileResponse(find_mesh(package, path), headers={"Cache-Control": "private, max-age=86400"})
+
+    @router.websocket("/instances/{instance}/shown")
+    async def shown(socket: WebSocket, instance: str) -> None:
+        try:
+            run = await asyncio.to_thread(instances.get, instance)
+        except ThrowcollectError:
+            await socket.close(4404, f"no run {instance}")
+            return
+        await socket.accept()
+        watch = watches.setdefault(instance, ThrowWatch(run))
+        async with watch.throws() as next_throw:
+            await keep_telling(socket, lambda: _send_next(socket, next_throw))
+
+    return router
+
+
+async def _send_next(socket: WebSocket, next_throw: Callable[[], Awaitable[bytes]]) -> None:
+    while True:
+        await socket.send_bytes(await next_throw())
 
 
 def _names_in(logs: Path) -> list[str]:

@@ -10,6 +10,7 @@ from pydantic import TypeAdapter
 
 from throwcollect.coordinator.progress import Progress
 from throwcollect.dataset.summary import Info
+from throwcollect.errors import ConfigError
 from throwcollect.runs.records import Records, Run
 from throwcollect.runtimes.runtime import NodeState
 from throwcollect.serve.catalogue import Catalogue
@@ -17,7 +18,12 @@ from throwcollect.serve.catalogue import Catalogue
 VERSION: Literal[1] = 1
 """Version of the layout of the state."""
 
+_MOST_OVER = 100
+
 Status = Literal["starting", "running", "ended", "died"]
+
+
+_LIVING: tuple[Status, ...] = ("starting", "running")
 
 
 @dataclass(frozen=True)
@@ -84,7 +90,7 @@ class State:
 
     Attributes:
         components: The catalogue.
-        instances: All runs that this machine remembers, the latest first.
+        instances: Runs of this machine, the latest first: those that live, then the last 100 that are over.
         revision: Grows with each change, as long as the same process serves.
         version: Version of this layout.
     """
@@ -98,26 +104,51 @@ class State:
 STATES: TypeAdapter[State] = TypeAdapter(State)
 
 
-def look(catalogue: Catalogue, records: Records) -> State:
-    """Look at everything.
+class Lookout:
+    """Looks at everything; what has ended, and was not written since, is not read again.
 
     Args:
         catalogue: All components.
-        records: All runs.
     """
-    instances = [describe(run) for run in reversed(records.all())]
-    living = [each for each in instances if each.status in ("starting", "running")]
-    components = [
-        ComponentState(
-            each.name,
-            each.pretty_name,
-            each.kind,
-            each.max_instances,
-            [instance.id for instance in living if instance.component == each.name],
-        )
-        for each in catalogue.components.values()
-    ]
-    return State(components, instances)
+
+    def __init__(self, catalogue: Catalogue) -> None:
+        self._catalogue = catalogue
+        self._ended: dict[tuple[str, int], InstanceState] = {}
+
+    def look(self) -> State:
+        """The state by now: all runs that live, and the latest of those that are over."""
+        instances = self.list_instances()
+        living = [each for each in instances if each.status in _LIVING]
+        over = [each for each in instances if each.status not in _LIVING]
+        components = [
+            ComponentState(
+                each.name,
+                each.pretty_name,
+                each.kind,
+                each.max_instances,
+                [instance.id for instance in living if instance.component == each.name],
+            )
+            for each in self._catalogue.components.values()
+        ]
+        return State(components, [*living, *over[:_MOST_OVER]])
+
+    def list_instances(self) -> list[InstanceState]:
+        """All runs that this machine remembers, the latest first."""
+        records = Records()
+        known, self._ended = self._ended, {}
+        instances = []
+        for run in records.ids():
+            written = run, records.changed_ns(run)
+            if (found := known.get(written)) is None:
+                try:
+                    found = describe(records.get(run))
+                except ConfigError:
+                    # It was forgotten just now, or cannot be read, which `throwcollect ps` says.
+                    continue
+            instances.append(found)
+            if found.status == "ended":
+                self._ended[written] = found
+        return sorted(instances, key=lambda each: each.started, reverse=True)
 
 
 def describe(run: Run) -> InstanceState:

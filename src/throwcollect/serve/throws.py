@@ -1,0 +1,126 @@
+"""The newest throws of a run, as the page draws them: heard in the run's graph as long as anybody looks."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import struct
+import threading
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager
+
+from throwcollect.coordinator.topics import SHOWN_QOS, SHOWN_TOPIC
+from throwcollect.episode.message import Delivery, unpack
+from throwcollect.errors import ThrowcollectError
+from throwcollect.ros import Node
+from throwcollect.ros.msg import UInt8MultiArray
+from throwcollect.run_key import Signer
+from throwcollect.runs.records import Run
+from throwcollect.runtimes.run_listener import RunListener
+from throwcollect.units import NS_PER_S
+
+_SPIN_S = 0.2
+_FLOAT_BYTES = 4
+_LENGTH = struct.Struct("<I")
+_LANDING = ("landing_x_m", "landing_y_m", "landing_z_m")
+
+
+def encode_throw(delivery: Delivery) -> bytes:
+    """An episode as the page takes it.
+
+    Returns:
+        Length of a JSON header as uint32, the header, zero bytes up to a multiple of four, then float32: angles of the
+        joints [rad], shape ``(n_samples, n_joints)``, and the ball's centre in the world [m], shape ``(n_samples, 3)``;
+        all little-endian. The header has ``trial``, ``outcome``, ``joints``, ``samples``, ``rate_hz`` and ``landing``.
+
+    Raises:
+        DatasetError: If the episode is damaged.
+    """
+    episode = delivery.episode
+    samples = episode.samples()
+    result = json.loads(delivery.result)
+    spacing_ns = int(samples.stamps_ns[1] - samples.stamps_ns[0]) if len(samples) > 1 else NS_PER_S
+    landing = [result.get(key) for key in _LANDING]
+    header = {
+        "trial": episode.header.trial,
+        "outcome": result["outcome"],
+        "joints": episode.table.joints,
+        "samples": len(samples),
+        "rate_hz": NS_PER_S / spacing_ns,
+        "landing": None if None in landing else landing,
+    }
+    text = json.dumps(header).encode()
+    padding = b"\0" * (-(_LENGTH.size + len(text)) % _FLOAT_BYTES)
+    numbers = (samples.position, samples.ball_position)
+    return b"".join((_LENGTH.pack(len(text)), text, padding, *(part.astype("<f4").tobytes() for part in numbers)))
+
+
+class ThrowWatch:
+    """Hears the newest throws of one run in a thread of its own, while there are listeners.
+
+    Args:
+        run: The run.
+    """
+
+    def __init__(self, run: Run) -> None:
+        self._run = run
+        self._listeners: dict[asyncio.Queue[bytes], asyncio.AbstractEventLoop] = {}
+        self._thread: threading.Thread | None = None
+        self._wanted = threading.Event()
+        self._newest: bytes | None = None
+
+    @asynccontextmanager
+    async def throws(self) -> AsyncIterator[Callable[[], Awaitable[bytes]]]:
+        """Listen; what is given waits for the next throw, and misses those that come while nobody waits."""
+        queue: asyncio.Queue[bytes] = asyncio.Queue(maxsize=1)
+        self._listeners[queue] = asyncio.get_running_loop()
+        if self._newest is not None:
+            queue.put_nowait(self._newest)
+        if self._thread is None:
+            self._wanted.set()
+            self._thread = threading.Thread(target=self._listen, name=f"throws of {self._run.id}", daemon=True)
+            self._thread.start()
+        try:
+            yield queue.get
+        finally:
+            del self._listeners[queue]
+            if not self._listeners:
+                thread, self._thread = self._thread, None
+                self._wanted.clear()
+                if thread is not None:
+                    await asyncio.to_thread(thread.join)
+
+    def _listen(self) -> None:
+        run = self._run
+        run.record.middleware.joining.settle()
+        with RunListener(lambda _: None, on_connect=self._subscribe) as listener:
+            while self._wanted.is_set():
+                try:
+                    run = run.now()
+                    listener.spin(run.connection, _SPIN_S)
+                except ThrowcollectError:
+                    # The run has ended, and was forgotten; whoever looks on sees so in the state.
+                    self._wanted.wait(_SPIN_S)
+
+    def _subscribe(self, node: Node) -> None:
+        node.create_subscription(UInt8MultiArray, SHOWN_TOPIC, self._hear, SHOWN_QOS, raw=True)
+
+    def _hear(self, message: bytes) -> None:
+        try:
+            delivery = unpack(message, Signer.of_key(self._run.key))
+            if not isinstance(delivery, Delivery):
+                return
+            frame = encode_throw(delivery)
+        except ThrowcollectError:
+            # Somebody else has published something else there.
+            return
+        self._newest = frame
+        for queue, loop in list(self._listeners.items()):
+            loop.call_soon_threadsafe(_replace, queue, frame)
+
+
+def _replace(queue: asyncio.Queue[bytes], frame: bytes) -> None:
+    """Put the newest into a queue for one, whatever is in it."""
+    while not queue.empty():
+        queue.get_nowait()
+    queue.put_nowait(frame)
