@@ -80,6 +80,9 @@ def up(
     token_file: TokenOption = None,
     trials: TrialsOption = None,
     detach: DetachOption = False,
+    view: Annotated[
+        bool, typer.Option("--view", help="Print the address of a page on which the run is seen; starts a server.")
+    ] = False,
     json: JsonOption = False,
 ) -> None:
     """Collect a dataset: start the simulations, run all trials, write the files."""
@@ -104,6 +107,7 @@ def up(
             detach=detach,
             json=json,
             token_file=token_file,
+            view=view,
         )
     elif output is not None:
         raise ConfigError(f"--output {output}: should be left out with --resume, which names the directory")
@@ -237,7 +241,12 @@ def _go_on(
 
 
 def _collect(
-    prepare: Callable[[Any, Display], PreparedRun | None], *, detach: bool, json: bool, token_file: Path | None
+    prepare: Callable[[Any, Display], PreparedRun | None],
+    *,
+    detach: bool,
+    json: bool,
+    token_file: Path | None,
+    view: bool = False,
 ) -> bool:
     """Launch a run and print its summary or, detached, its id.
 
@@ -246,6 +255,7 @@ def _collect(
         detach: Whether to come back as soon as its nodes are started.
         json: Whether to print JSON.
         token_file: Where the token goes of a run that other machines may join; None to print it.
+        view: Whether to print the address of a page on which the run is seen.
 
     Returns:
         Whether there was anything to do.
@@ -264,6 +274,10 @@ def _collect(
             elif run.config.run.listen is not None:
                 # A secret, so it is not among what is said, which may be written down.
                 typer.echo(f"other machines join by: {command('join-run', run.token, '-n', 4)}", err=True)
+            if view:
+                from throwcollect.serve.finding import ensure_server, make_page_address
+
+                typer.echo(f"look inside: {make_page_address(ensure_server(), run.record.run)}", err=True)
             if not detach:
                 with Interruptions() as interruptions:
                     summary = run.collect(interruptions=lambda: interruptions.count)

@@ -33,7 +33,7 @@ def _add(*commands: Callable[..., None], panel: str | None = None, hidden: bool 
 
 _add(collect.up, collect.resume, collect.join_run, cluster.submit, collect.join)
 _add(runs.ps, runs.wait, runs.logs, runs.events, runs.scale, runs.stop, runs.down, panel="Runs")
-_add(serve.serve, panel="Runs")
+_add(serve.serve, serve.view, panel="Runs")
 _add(show.config, show.plan, show.doctor)
 _add(nodes.router, nodes.sim, nodes.coordinator, nodes.health, panel="Nodes, as `up` starts them")
 _add(collect.launch, collect.begin, nodes.simulate, hidden=True)

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import json as jsonlib
+import os
+import sys
+import webbrowser
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from throwcollect.cli.options import DEFAULT_CONFIG, JsonOption
+from throwcollect.cli.runs import RunOption
 from throwcollect.errors import ConfigError
 
 if TYPE_CHECKING:
-    from throwcollect.serve.server import Address
+    from throwcollect.serve.finding import Address
 
 _LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
@@ -27,7 +31,10 @@ def serve(
         ),
     ] = None,
     host: Annotated[str, typer.Option("--host", metavar="ADDRESS", help="Address to listen at.")] = "127.0.0.1",
-    port: Annotated[int, typer.Option("--port", min=0, max=65535, help="Port; 0 for any that is free.")] = 8080,
+    port: Annotated[
+        int | None,
+        typer.Option("--port", min=0, max=65535, help="Port; by default 8080, or any that is free if that is not."),
+    ] = None,
     datasets: Annotated[
         Path, typer.Option("--datasets", metavar="DIR", help="Where instances make their datasets.")
     ] = Path("datasets"),
@@ -70,7 +77,7 @@ def serve(
             typer.echo(f"from another machine: {_tunnel(address)}", err=True)
 
     serve_all(
-        Instances(Catalogue.read(catalogue or DEFAULT_CONFIG), datasets.absolute()),
+        Instances(Catalogue.read(catalogue) if catalogue else Catalogue.find(DEFAULT_CONFIG), datasets.absolute()),
         host=host,
         port=port,
         tls=tls,
@@ -78,6 +85,24 @@ def serve(
         names=frozenset(names or ()),
         tell=tell,
     )
+
+
+def view(run: RunOption = None, json: JsonOption = False) -> None:
+    """Print the address of a page on which runs are seen, and open it where there is a screen."""
+    from throwcollect.runs.records import Records
+    from throwcollect.runs.selection import to_watch
+    from throwcollect.serve.finding import ensure_server, make_page_address
+
+    shown = to_watch(Records(), run, say=lambda _: None).id if run is not None else None
+    address = ensure_server()
+    page = make_page_address(address, shown)
+    if json:
+        typer.echo(jsonlib.dumps({"url": address.url, "page": page}))
+        return
+    typer.echo(page)
+    typer.echo(f"from another machine: {_tunnel(address)}   and then the same address, which opens once", err=True)
+    if sys.stdout.isatty() and (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        webbrowser.open(page)
 
 
 def _tunnel(address: Address) -> str:

@@ -23,7 +23,7 @@ from throwcollect.errors import ConfigError, Interrupted, Problem, ThrowcollectE
 from throwcollect.files import open_log, write_file
 from throwcollect.runs.choice import choose
 from throwcollect.runs.onlooker import Onlooker
-from throwcollect.runs.preparation import Request, prepare_run
+from throwcollect.runs.preparation import Request, prepare_run, resume
 from throwcollect.runs.prepared_run import PreparedRun
 from throwcollect.runs.record import Failure, Origin, Record
 from throwcollect.runs.records import OpenRun, Records, Run
@@ -41,11 +41,13 @@ class Order:
         config: Absolute path of the configuration's file.
         overrides: What replaces keys of it: ``key=value`` pairs, as ``--set`` takes them.
         output: Absolute path of the dataset's directory; unused by a run that collects none.
+        resumed: Whether that holds a dataset, with which the run goes on.
     """
 
     config: Path
     overrides: tuple[str, ...]
     output: Path
+    resumed: bool = False
 
 
 _ORDERS = TypeAdapter(Order)
@@ -56,19 +58,21 @@ def begin_run(
     *,
     overrides: Sequence[str],
     output: Path,
-    run: str,
-    origin: Origin,
+    run: str | None = None,
+    origin: Origin | None = None,
     kind: Literal["collection", "session"] = "collection",
+    resumed: bool = False,
 ) -> Run:
     """Begin a run in a process of its own, which outlives this one; come back as soon as the run has a record.
 
     Args:
         config: The configuration's file.
         overrides: What replaces keys of it: ``key=value`` pairs, as ``--set`` takes them.
-        output: Directory of the dataset, new or empty; unused by a run that collects none.
-        run: Id of the run.
-        origin: What was asked for.
+        output: Directory of the dataset, new or empty unless it is resumed; unused by a run that collects none.
+        run: Id of the run; None for one that nobody has.
+        origin: What was asked for; None if no client did.
         kind: Whether it collects a dataset, or has simulations for clients alone.
+        resumed: Whether the directory holds a dataset, with which the run goes on.
 
     Raises:
         ConflictError: If there is a run of that id.
@@ -88,7 +92,7 @@ def begin_run(
         process = _start_process(opened, logs)
         opened.write(
             Record(
-                run=run,
+                run=opened.run,
                 name=read.name,
                 runtime="",
                 directory=str(place),
@@ -105,14 +109,15 @@ def begin_run(
         )
         # It waits for this, so that the record is there before it changes it.
         with cast(IO[bytes], process.stdin) as order:
-            order.write(_ORDERS.dump_json(Order(config.absolute(), tuple(overrides), output.absolute())))
+            made_from = Order(config.absolute(), tuple(overrides), output.absolute(), resumed)
+            order.write(_ORDERS.dump_json(made_from))
     except (ThrowcollectError, OSError) as error:
         opened.forget()
         if isinstance(error, OSError):
-            raise WorkerError(f"run {run} cannot be begun: {error}") from error
+            raise WorkerError(f"run {opened.run} cannot be begun: {error}") from error
         raise
     opened.close()
-    return records.get(run)
+    return records.get(opened.run)
 
 
 def _start_process(run: OpenRun, logs: Path) -> subprocess.Popen[bytes]:
@@ -147,6 +152,10 @@ def carry_out(run: str, lock: int, order: bytes, *, onlooker: Onlooker, interrup
     try:
         prepare = _prepare_session if opened.record.kind == "session" else _prepare_collection
         prepared = prepare(records, opened, made_from, onlooker)
+        if prepared is None:
+            opened.update(ended=datetime.now(timezone.utc), exit_code=0)
+            opened.close()
+            return
         if interruptions():
             raise Interrupted("stopped before any node was started")
     except ThrowcollectError as error:
@@ -156,8 +165,14 @@ def carry_out(run: str, lock: int, order: bytes, *, onlooker: Onlooker, interrup
         prepared.launch(interruptions=interruptions)
 
 
-def _prepare_collection(records: Records, run: OpenRun, order: Order, onlooker: Onlooker) -> PreparedRun:
+def _prepare_collection(records: Records, run: OpenRun, order: Order, onlooker: Onlooker) -> PreparedRun | None:
     record = run.record
+    if order.resumed:
+        prepared = resume(order.output, overrides=order.overrides, ahead=True, onlooker=onlooker, run=run)
+        if prepared is not None and prepared.record.run != run.run:
+            # Its containers had outlived their launcher, and go on as the run that they were.
+            run.forget()
+        return prepared
     with load_locating_errors(order.config, order.overrides) as config:
         request = Request(
             config,

@@ -7,7 +7,7 @@ import signal
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from throwcollect.errors import ConfigError, ThrowcollectError, WorkerError
 from throwcollect.ros.endpoint import answers
@@ -20,6 +20,7 @@ from throwcollect.wording import command
 
 if TYPE_CHECKING:
     from throwcollect import ros
+    from throwcollect.ros.msg import SetParametersResult
 
 _POLL_S = 0.05
 _STOP_S = 60.0
@@ -87,9 +88,9 @@ def down(named: str | Run | None, *, volumes: bool = False) -> tuple[str, list[s
     taken = records.take(run)
     if taken is None:
         raise WorkerError(f"run {run}: its launcher does not end", evidence=f"its pid is {record and record.launcher}")
-    lived_in = record.runtime if record is not None else held[run][0] if run in held else None
+    lived_in = record.runtime if record is not None else held[run][0] if run in held else ""
     try:
-        removed = [] if lived_in is None else get_runtime(lived_in).remove(run, volumes=volumes)
+        removed = get_runtime(lived_in).remove(run, volumes=volumes) if lived_in else []
     except ThrowcollectError:
         taken.close()
         raise
@@ -105,50 +106,69 @@ def scale(run: Run, simulations: int) -> None:
         WorkerError: If the launcher died, or does not answer.
     """
     record = require_living(run)
-    if not get_runtime(record.runtime).can_be_scaled:
+    if record.runtime and not get_runtime(record.runtime).can_be_scaled:
         raise ConfigError(f"run {run.id}: has one simulation, as all runs of the runtime {record.runtime} have")
+    record.middleware.joining.settle()
+    from throwcollect.runtimes.node_collection import SIMULATIONS
+
+    result = set_parameter(run, f"/{LAUNCHER}", SIMULATIONS, simulations)
+    if not result.successful:
+        raise ConfigError(f"run {run.id}: {result.reason}")
+
+
+def set_parameter(run: Run, node: str, name: str, value: float) -> SetParametersResult:
+    """Set a parameter of a node of a run.
+
+    Args:
+        run: The run.
+        node: Name of the node with its namespace.
+        name: Name of the parameter.
+        value: Its value.
+
+    Raises:
+        WorkerError: If the router or the node does not answer.
+    """
     connection = run.connection
     if connection is None or not answers(connection.endpoint, patience_s=_ANSWER_S):
-        raise _silent(run)
+        raise _silent(run, node)
     connection.middleware.joining.settle()
     from throwcollect import ros
 
     context = ros.Context()
     ros.init(context=context, connection=connection)
     try:
-        result = _set_simulations(context, simulations)
+        result = _set_parameter(context, node, name, value)
     finally:
         ros.shutdown(context=context)
     if result is None:
-        raise _silent(run)
-    if not result.successful:
-        raise ConfigError(f"run {run.id}: {result.reason}")
-
-
-def _set_simulations(context: ros.Context, simulations: int) -> Any:
-    """What the launcher answers, as rcl_interfaces/msg/SetParametersResult; None if it does not."""
-    from throwcollect import ros
-    from throwcollect.ros.srv import SetParameters
-    from throwcollect.runtimes.node_collection import SIMULATIONS
-
-    node = ros.Node(f"_throwcollect_{os.getpid()}", context=context)
-    executor = ros.SingleThreadedExecutor(context=context)
-    executor.add_node(node)
-    client = node.create_client(SetParameters, f"/{LAUNCHER}/set_parameters")
-    if not client.wait_for_service(_ANSWER_S):
-        return None
-    wanted = ros.Parameter(SIMULATIONS, value=simulations).to_parameter_msg()
-    future = client.call_async(SetParameters.Request(parameters=[wanted]))
-    executor.spin_until_future_complete(future, timeout_sec=_ANSWER_S)
-    result = future.result().results[0] if future.done() else None
-    node.destroy_node()
+        raise _silent(run, node)
     return result
 
 
-def _silent(run: Run) -> WorkerError:
+def _set_parameter(context: ros.Context, node: str, name: str, value: float) -> SetParametersResult | None:
+    """What the node answers; None if it does not."""
+    from throwcollect import ros
+    from throwcollect.ros.srv import SetParameters
+
+    asking = ros.Node(f"_throwcollect_{os.getpid()}", context=context)
+    executor = ros.SingleThreadedExecutor(context=context)
+    executor.add_node(asking)
+    client = asking.create_client(SetParameters, f"{node}/set_parameters")
+    if not client.wait_for_service(_ANSWER_S):
+        return None
+    wanted = ros.Parameter(name, value=value).to_parameter_msg()
+    future = client.call_async(SetParameters.Request(parameters=[wanted]))
+    executor.spin_until_future_complete(future, timeout_sec=_ANSWER_S)
+    result = future.result().results[0] if future.done() else None
+    asking.destroy_node()
+    return result
+
+
+def _silent(run: Run, node: str) -> WorkerError:
     endpoint = run.record.endpoint
+    who = "its launcher" if node == f"/{LAUNCHER}" else node
     return WorkerError(
-        f"run {run.id}: its launcher does not answer" + (f" over the router at {endpoint}" if endpoint else ""),
+        f"run {run.id}: {who} does not answer" + (f" over the router at {endpoint}" if endpoint else ""),
         hint="throwcollect events tells what became of its nodes",
     )
 

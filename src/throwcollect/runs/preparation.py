@@ -104,6 +104,7 @@ def resume(
     check: bool = False,
     ahead: bool = False,
     onlooker: Onlooker = SILENT,
+    run: OpenRun | None = None,
 ) -> PreparedRun | None:
     """Prepare to go on with the dataset that an earlier collection has left.
 
@@ -114,6 +115,7 @@ def resume(
         check: Whether the files of a finished dataset are compared byte for byte, and not only by their sizes.
         ahead: As `prepare` takes it.
         onlooker: Is told what goes on.
+        run: The run, if it has a record already; None for a new one.
 
     Returns:
         The run; None if every trial has ended, and nothing is left to do.
@@ -139,15 +141,16 @@ def resume(
             hint = f"{command('up', 'CONFIG', '--resume', directory)}, if the dataset's own file is damaged"
             raise ConfigError(error.problems, hint=error.hint if config else hint) from error
         records = Records()
-        if (run := _take_over(records, directory, read, onlooker)) is not None:
-            return run
+        if (left := _take_over(records, directory, read, onlooker)) is not None:
+            return left
         sweep_directory = directory if config is None else Path(config).parent
         plan = resume_plan(read, directory, sweep_directory=sweep_directory, check=check, say=onlooker.say)
         if finished(directory, plan):
             onlooker.say(f"{directory}: every trial has ended, nothing is left to do")
             return None
-        request = Request(read, sweep_directory, directory, started, resumed=True, ahead=ahead)
-        return prepare_run(records, request, plan, onlooker)
+        origin = None if run is None else run.record.origin
+        request = Request(read, sweep_directory, directory, started, resumed=True, ahead=ahead, origin=origin)
+        return prepare_run(records, request, plan, onlooker, run=run)
 
 
 def _take_over(records: Records, directory: Path, config: Config, onlooker: Onlooker) -> PreparedRun | None:

@@ -331,7 +331,7 @@ class Records:
 def _outlived(record: Record) -> bool:
     """Whether nodes of a run may be there whose launcher is not; so it is, if nobody knows its runtime here."""
     try:
-        return get_runtime(record.runtime).outlives_launcher
+        return bool(record.runtime) and get_runtime(record.runtime).outlives_launcher
     except ConfigError:
         return True
 

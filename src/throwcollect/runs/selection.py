@@ -151,7 +151,7 @@ def find_left_in(records: Records, directory: Path) -> Run | None:
         if run.status not in ("died", "abandoned"):
             continue
         try:
-            if get_runtime(run.record.runtime).is_left(run.id):
+            if run.record.runtime and get_runtime(run.record.runtime).is_left(run.id):
                 return run
         except WorkerError as error:
             raise WorkerError(

@@ -92,6 +92,15 @@ class Catalogue:
             raise NotFoundError(f"no component {name!r}", expected=f"one of {', '.join(self.components)}") from None
 
     @classmethod
+    def find(cls, path: Path) -> Catalogue:
+        """Read a catalogue if there is one; else runs can be looked at, and none can be begun.
+
+        Raises:
+            ConfigError: As `read`.
+        """
+        return cls.read(path) if path.exists() else cls({})
+
+    @classmethod
     def read(cls, path: Path) -> Catalogue:
         """Read a catalogue, or take a configuration of a collection for the only component.
 

@@ -7,8 +7,11 @@ from collections.abc import Awaitable, Callable
 
 from starlette.websockets import WebSocket
 
+NOT_FOUND = 4404
+"""Code with which a socket to what does not exist is closed."""
 
-async def keep_telling(socket: WebSocket, tell: Callable[[], Awaitable[None]]) -> None:
+
+async def keep_telling(socket: WebSocket, tell: Callable[[], Awaitable[object]]) -> None:
     """Tell a client something until it has gone, or there is nothing more to tell.
 
     Args:

@@ -1,0 +1,144 @@
+"""REST on collections: what they have collected, to be downloaded, and gone on with."""
+
+from __future__ import annotations
+
+import io
+import tarfile
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from fastapi import APIRouter
+from fastapi.responses import FileResponse, StreamingResponse
+from pydantic import BaseModel
+from starlette.background import BackgroundTask
+
+from throwcollect.dataset.directory import MANIFEST, THROWS, config_path
+from throwcollect.dataset.manifest import read_manifest
+from throwcollect.errors import ConflictError, NotFoundError
+from throwcollect.runs.background import begin_run
+from throwcollect.runs.records import Run
+from throwcollect.serve.instances import Instances
+from throwcollect.serve.state import InstanceState, describe
+from throwcollect.sweep.parquet_file import read_parquet
+
+_PIECE_BYTES = 1 << 20
+_LANDING = ("landing_x_m", "landing_y_m", "outcome", "trial")
+
+
+class DatasetFile(BaseModel):
+    """A file of a dataset."""
+
+    path: str
+    bytes: int
+    sha256: str
+
+
+def make_dataset_routes(instances: Instances) -> APIRouter:
+    """Routes on collections.
+
+    Args:
+        instances: All runs.
+    """
+    router = APIRouter(prefix="/collections/{instance}")
+
+    @router.post("/resume", status_code=202)
+    def resume(instance: str) -> InstanceState:
+        """Go on with a dataset whose collection has ended before its last trial, as a run of its own."""
+        run = _get_collection(instances, instance)
+        if run.status == "running":
+            raise ConflictError(f"run {run.id} is still running")
+        directory = run.place.directory
+        return describe(
+            begin_run(config_path(directory), overrides=(), output=directory, origin=run.record.origin, resumed=True)
+        )
+
+    @router.get("/files")
+    def files(instance: str) -> list[DatasetFile]:
+        """The files of a finished dataset, with their digests."""
+        directory = _find_finished(instances, instance)
+        return [DatasetFile(path=each.path, bytes=each.bytes, sha256=each.sha256) for each in read_manifest(directory)]
+
+    @router.get("/files/{path:path}", response_class=FileResponse)
+    def file(instance: str, path: str) -> FileResponse:
+        """A file of a finished dataset, or a part of it."""
+        directory = _find_finished(instances, instance)
+        if path not in _list_names(directory):
+            raise NotFoundError(f"run {instance}: its dataset has no file {path!r}")
+        return FileResponse(directory / path)
+
+    @router.get("/dataset.tar", response_class=StreamingResponse)
+    def archive(instance: str) -> StreamingResponse:
+        """A finished dataset as one file."""
+        directory = _find_finished(instances, instance)
+        name = f'attachment; filename="{instance}.tar"'
+        return StreamingResponse(
+            _archive(directory, instance), media_type="application/x-tar", headers={"Content-Disposition": name}
+        )
+
+    @router.get("/report", response_class=FileResponse)
+    def report(instance: str) -> FileResponse:
+        """The report on a finished dataset: one page with everything inside."""
+        from throwcollect.report.write import write_report
+
+        directory = _find_finished(instances, instance)
+        scratch = tempfile.TemporaryDirectory(prefix="throwcollect-report-")
+        page = Path(scratch.name) / f"{instance}.html"
+        try:
+            write_report(directory, page)
+        except BaseException:
+            scratch.cleanup()
+            raise
+        return FileResponse(page, filename=page.name, background=BackgroundTask(scratch.cleanup))
+
+    @router.get("/landings")
+    def landings(instance: str) -> list[tuple[float, float, str, int]]:
+        """Where the throws of a finished dataset came down: x and y [m], outcome and trial; none for other tasks."""
+        table = read_parquet(_find_finished(instances, instance) / THROWS)
+        if not set(_LANDING) <= set(table.column_names):
+            return []
+        rows: Any = zip(*(table[name].to_pylist() for name in _LANDING), strict=True)
+        return [row for row in rows if row[0] is not None]
+
+    return router
+
+
+def _get_collection(instances: Instances, instance: str) -> Run:
+    run = instances.get(instance)
+    if run.record.kind != "collection" or run.record.volume is not None:
+        raise NotFoundError(f"run {instance} has no dataset in a directory")
+    return run
+
+
+def _find_finished(instances: Instances, instance: str) -> Path:
+    """Directory of the finished dataset of a run.
+
+    Raises:
+        NotFoundError: If the run does not exist, or has none.
+        ConflictError: If it is not finished.
+    """
+    run = _get_collection(instances, instance)
+    directory = run.place.directory
+    if run.status == "running" or not (directory / MANIFEST).is_file():
+        raise ConflictError(f"run {instance}: its dataset is not finished")
+    return directory
+
+
+def _list_names(directory: Path) -> list[str]:
+    return [*(each.path for each in read_manifest(directory)), MANIFEST]
+
+
+def _archive(directory: Path, name: str) -> Iterator[bytes]:
+    """The bytes of a tar archive of a dataset; equal datasets give equal archives."""
+    for path in _list_names(directory):
+        with (directory / path).open("rb") as file:
+            entry = tarfile.TarInfo(f"{name}/{path}")
+            entry.size = file.seek(0, io.SEEK_END)
+            entry.mode = 0o644
+            file.seek(0)
+            yield entry.tobuf(tarfile.PAX_FORMAT)
+            while piece := file.read(_PIECE_BYTES):
+                yield piece
+            yield bytes(-entry.size % tarfile.BLOCKSIZE)
+    yield bytes(2 * tarfile.BLOCKSIZE)

@@ -1,0 +1,160 @@
+"""How programs of the same user find the server that lives, start one in the background, and get an address to open."""
+
+from __future__ import annotations
+
+import http.client
+import json
+import os
+import ssl
+import subprocess
+import sys
+import time
+from contextlib import closing, suppress
+from dataclasses import asdict, dataclass
+from http import HTTPStatus
+from pathlib import Path
+from urllib.parse import urlsplit
+
+from throwcollect.errors import WorkerError
+from throwcollect.files import open_log, write_secret
+from throwcollect.runs.records import state_directory
+
+_FILE = "serve.json"
+_LOG = "serve.log"
+_START_S = 20.0
+_ANSWER_S = 5.0
+_POLL_S = 0.05
+
+
+@dataclass(frozen=True)
+class Address:
+    """Where somebody serves, for programs of the same user.
+
+    Attributes:
+        url: Where, without a path.
+        token: Lets its owner do everything.
+        read_only_token: Lets its owner look.
+        pid: Process id.
+        certificate: Path of the certificate that it shows; None if it speaks in the clear.
+    """
+
+    url: str
+    token: str
+    read_only_token: str
+    pid: int
+    certificate: str | None = None
+
+    def page(self, code: str, run: str | None = None) -> str:
+        """The address of the page, with a one-time code in the part that is never sent.
+
+        Args:
+            code: The code.
+            run: Id of the run that the page is to show; None for all.
+        """
+        return f"{self.url}/#code={code}" + (f"&run={run}" if run else "")
+
+
+def publish(address: Address) -> None:
+    """Write down where this process serves.
+
+    Raises:
+        DatasetError: If the file cannot be written.
+        ConfigError: If runs cannot be remembered.
+    """
+    write_secret(_path(), json.dumps(asdict(address)).encode())
+
+
+def withdraw() -> None:
+    """Remove what `publish` has written, unless a successor has written there since."""
+    found = _read()
+    if found is not None and found.pid == os.getpid():
+        _path().unlink(missing_ok=True)
+
+
+def find_server() -> Address | None:
+    """Where somebody of this user serves by now; None if nobody answers.
+
+    Raises:
+        ConfigError: If runs cannot be remembered.
+    """
+    address = _read()
+    if address is None:
+        return None
+    try:
+        _ask(address, "GET", "/api/v1/health")
+    except (OSError, ValueError, http.client.HTTPException):
+        return None
+    return address
+
+
+def ensure_server() -> Address:
+    """Where somebody of this user serves; if nobody does, a server is started, which outlives this process.
+
+    Raises:
+        WorkerError: If it does not start.
+        ConfigError: If runs cannot be remembered.
+    """
+    if (address := find_server()) is not None:
+        return address
+    log = state_directory() / _LOG
+    words = [sys.executable, "-m", "throwcollect", "serve", "--json"]
+    with open(open_log(log), "ab") as output:
+        process = subprocess.Popen(
+            words, stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT, start_new_session=True
+        )
+    deadline = time.monotonic() + _START_S
+    while time.monotonic() < deadline and process.poll() is None:
+        address = _read()
+        if address is not None and address.pid == process.pid and find_server() is not None:
+            return address
+        time.sleep(_POLL_S)
+    said = ""
+    with suppress(OSError):
+        said = "\n".join(log.read_text(errors="replace").splitlines()[-5:])
+    raise WorkerError("no server starts", evidence=said or None, hint="throwcollect serve tells more")
+
+
+def make_page_address(address: Address, run: str | None = None) -> str:
+    """An address of the page that can be opened once, within ten minutes.
+
+    Args:
+        address: Where somebody serves.
+        run: Id of the run that the page is to show; None for all.
+
+    Raises:
+        WorkerError: If the server does not answer.
+    """
+    try:
+        return address.page(_ask(address, "POST", "/api/v1/codes")["code"], run)
+    except (OSError, ValueError, KeyError, http.client.HTTPException) as error:
+        raise WorkerError(f"{address.url}: the server does not answer: {error}") from error
+
+
+def _ask(address: Address, method: str, path: str) -> dict[str, str]:
+    parts = urlsplit(address.url)
+    host, port = parts.hostname or "", parts.port
+    if address.certificate is None:
+        connection = http.client.HTTPConnection(host, port, timeout=_ANSWER_S)
+    else:
+        # It is the very certificate that is expected, whatever names it was made for.
+        context = ssl.create_default_context(cafile=address.certificate)
+        context.check_hostname = False
+        connection = http.client.HTTPSConnection(host, port, timeout=_ANSWER_S, context=context)
+    with closing(connection):
+        connection.request(method, path, headers={"Authorization": f"Bearer {address.token}"})
+        answer = connection.getresponse()
+        content = json.loads(answer.read())
+    if answer.status >= HTTPStatus.BAD_REQUEST or not isinstance(content, dict):
+        raise ValueError(f"{path}: status {answer.status}")
+    return content
+
+
+def _path() -> Path:
+    return state_directory() / _FILE
+
+
+def _read() -> Address | None:
+    try:
+        return Address(**json.loads(_path().read_bytes()))
+    except (OSError, ValueError, TypeError):
+        return None

@@ -1,0 +1,128 @@
+"""REST on components and instances."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Query, Response
+from fastapi.responses import PlainTextResponse
+from pydantic import BaseModel, ConfigDict, Field, JsonValue
+
+from throwcollect.runs.events import EVENTS
+from throwcollect.runs.record import Origin
+from throwcollect.runtimes.node_logs import NodeLogs
+from throwcollect.serve.instances import Instances
+from throwcollect.serve.problems import problem
+from throwcollect.serve.state import ComponentState, InstanceState, Lookout, describe
+from throwcollect.serve.watching import StateWatch
+
+
+class Wish(BaseModel):
+    """What a client asks for: an instance of a component."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    component: str
+    simulations: int | None = Field(default=None, ge=1, le=256)
+    set: dict[str, JsonValue] = Field(default_factory=dict)
+
+
+class Scaling(BaseModel):
+    """Another number of simulations."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    simulations: int = Field(ge=0, le=256)
+
+
+def make_component_routes(watch: StateWatch) -> APIRouter:
+    """Routes on components.
+
+    Args:
+        watch: Looks at the state.
+    """
+    router = APIRouter(prefix="/components")
+
+    @router.get("")
+    async def components() -> list[ComponentState]:
+        """All components."""
+        return (await watch.current()).components
+
+    @router.get("/{name}", response_model=ComponentState)
+    async def component(name: str) -> Any:
+        """A component."""
+        found = [each for each in (await watch.current()).components if each.name == name]
+        return found[0] if found else problem(404, f"no component {name!r}")
+
+    return router
+
+
+def make_instance_routes(instances: Instances, lookout: Lookout) -> APIRouter:
+    """Routes on instances.
+
+    Args:
+        instances: All runs, and what can be done with them.
+        lookout: Looks at everything.
+    """
+    router = APIRouter(prefix="/instances")
+
+    @router.get("")
+    def all_instances() -> list[InstanceState]:
+        """All runs that this machine remembers, the latest first."""
+        return lookout.list_instances()
+
+    @router.get("/{instance}")
+    def one(instance: str) -> InstanceState:
+        """A run."""
+        return describe(instances.get(instance))
+
+    @router.put("/{instance}", status_code=202)
+    def put(instance: str, wish: Wish, response: Response) -> InstanceState:
+        """Begin an instance of a component; the same request again changes nothing."""
+        run, new = instances.put(instance, Origin(wish.component, wish.simulations, wish.set))
+        if not new:
+            response.status_code = 200
+        return describe(run)
+
+    @router.post("", status_code=202)
+    def post(wish: Wish, response: Response) -> InstanceState:
+        """Begin an instance of a component, with an id that is chosen here."""
+        made = f"{wish.component}-{time.time_ns() // 1_000_000:x}"
+        run, _ = instances.put(made, Origin(wish.component, wish.simulations, wish.set))
+        response.headers["Location"] = f"/api/v1/instances/{run.id}"
+        return describe(run)
+
+    @router.delete("/{instance}", status_code=202)
+    def delete(instance: str, force: bool = False) -> None:
+        """Stop a run: running trials are finished; by force, everything ends at once, and the run is forgotten."""
+        instances.stop(instance, force=force)
+
+    @router.patch("/{instance}", status_code=202)
+    def patch(instance: str, scaling: Scaling) -> InstanceState:
+        """Change the number of simulations of a run."""
+        return describe(instances.scale(instance, scaling.simulations))
+
+    @router.get("/{instance}/log/{node}", response_class=PlainTextResponse)
+    def log(instance: str, node: str, tail: Annotated[int, Query(ge=1, le=10_000)] = 200) -> Any:
+        """The last lines of what a node has printed."""
+        logs = Path(instances.get(instance).record.logs)
+        # Only what lies there is offered, so no name leads out of the directory.
+        path = NodeLogs(logs).path(node) if f"{node}.log" in _names_in(logs) else None
+        if path is None:
+            return problem(404, f"run {instance} has no log of {node!r}", expected=", ".join(_names_in(logs)) or None)
+        lines = path.read_text(encoding="utf-8", errors="replace").splitlines()[-tail:]
+        return PlainTextResponse("".join(f"{line}\n" for line in lines))
+
+    @router.get("/{instance}/events", response_class=Response)
+    def events(instance: str) -> Response:
+        """What has happened in a run, one event in JSON a line."""
+        path = Path(instances.get(instance).record.logs) / EVENTS
+        return Response(path.read_bytes() if path.exists() else b"", media_type="application/x-ndjson")
+
+    return router
+
+
+def _names_in(logs: Path) -> list[str]:
+    return sorted(path.name for path in logs.glob("*.log"))
