@@ -141,7 +141,8 @@ def resume(
             hint = f"{command('up', 'CONFIG', '--resume', directory)}, if the dataset's own file is damaged"
             raise ConfigError(error.problems, hint=error.hint if config else hint) from error
         records = Records()
-        if (left := _take_over(records, directory, read, onlooker)) is not None:
+        own = None if run is None else run.run
+        if (left := _take_over(records, directory, read, onlooker, own=own)) is not None:
             return left
         sweep_directory = directory if config is None else Path(config).parent
         plan = resume_plan(read, directory, sweep_directory=sweep_directory, check=check, say=onlooker.say)
@@ -153,18 +154,20 @@ def resume(
         return prepare_run(records, request, plan, onlooker, run=run)
 
 
-def _take_over(records: Records, directory: Path, config: Config, onlooker: Onlooker) -> PreparedRun | None:
+def _take_over(
+    records: Records, directory: Path, config: Config, onlooker: Onlooker, *, own: str | None = None
+) -> PreparedRun | None:
     """The run into a directory whose nodes go on without a launcher, with its own configuration; None if there is none.
 
     Raises:
         ConfigError: If it collects with another configuration, or somebody else takes it over.
     """
-    if (left := find_left_in(records, directory)) is None:
+    if (left := find_left_in(records, directory, own=own)) is None:
         return None
     from throwcollect.coordinator.prepare import make_self_contained
 
-    own = load(config_path(left.place.directory))
-    if own.without_run() != make_self_contained(config).without_run():
+    kept = load(config_path(left.place.directory))
+    if kept.without_run() != make_self_contained(config).without_run():
         raise ConfigError(
             f"{left.record.directory}: run {left.id} collects into it, with another configuration",
             hint=f"{command('down', '--run', left.id)} ends that run",
@@ -176,7 +179,7 @@ def _take_over(records: Records, directory: Path, config: Config, onlooker: Onlo
     run.update(ended=None, exit_code=None, failure=None, left=True)
     fate = "died" if left.status == "died" else "given up"
     onlooker.say(f"run {run.run}: its launcher had {fate}; it goes on where its containers are")
-    return PreparedRun(records, run, own, directory, onlooker=onlooker)
+    return PreparedRun(records, run, kept, directory, onlooker=onlooker)
 
 
 def prepare_run(

@@ -134,18 +134,21 @@ def _list(runs: Sequence[str]) -> str:
     return ", ".join(runs[:_MOST_LISTED]) + (f" and {more} more" if more > 0 else "")
 
 
-def find_left_in(records: Records, directory: Path) -> Run | None:
+def find_left_in(records: Records, directory: Path, *, own: str | None = None) -> Run | None:
     """The run that has no launcher any more while its nodes are left, and collect or have collected into a directory.
 
     Args:
         records: All runs.
         directory: Directory of a dataset.
+        own: Id of a run that is not meant, as this process prepares it.
 
     Raises:
         ConfigError: If a run whose launcher lives collects into it.
         WorkerError: If such a run may be left, which cannot be found out in time.
     """
     for run in _into(records, directory):
+        if run.id == own:
+            continue
         if run.status == "running":
             raise busy(run.record)
         if run.status not in ("died", "abandoned"):

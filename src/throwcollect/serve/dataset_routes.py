@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import os
 import tarfile
 import tempfile
 from collections.abc import Iterator
@@ -14,7 +15,7 @@ from fastapi.responses import FileResponse, StreamingResponse
 from pydantic import BaseModel
 from starlette.background import BackgroundTask
 
-from throwcollect.dataset.directory import MANIFEST, THROWS, config_path
+from throwcollect.dataset.directory import CARD, MANIFEST, PROVENANCE, THROWS, config_path
 from throwcollect.dataset.manifest import read_manifest
 from throwcollect.errors import ConflictError, NotFoundError
 from throwcollect.runs.background import begin_run
@@ -24,6 +25,8 @@ from throwcollect.serve.state import InstanceState, describe
 from throwcollect.sweep.parquet_file import read_parquet
 
 _PIECE_BYTES = 1 << 20
+_OWN_FILES = {CARD, PROVENANCE}
+"""Files that no manifest covers, as they say how and when a dataset was collected."""
 _LANDING = ("landing_x_m", "landing_y_m", "outcome", "trial")
 
 
@@ -126,7 +129,11 @@ def _find_finished(instances: Instances, instance: str) -> Path:
 
 
 def _list_names(directory: Path) -> list[str]:
-    return [*(each.path for each in read_manifest(directory)), MANIFEST]
+    return [
+        *(each.path for each in read_manifest(directory)),
+        MANIFEST,
+        *sorted(_OWN_FILES & set(os.listdir(directory))),
+    ]
 
 
 def _archive(directory: Path, name: str) -> Iterator[bytes]:
