@@ -288,7 +288,7 @@ class Records:
             with suppress(ConfigError):
                 yield self.get(run)
 
-    def changed_ns(self, run: str) -> int:
+    def read_change_ns(self, run: str) -> int:
         """When the record of a run was written last, in nanoseconds of the file system's clock; 0 if it is gone."""
         try:
             return (self._runs / f"{run}.json").stat().st_mtime_ns
@@ -297,7 +297,7 @@ class Records:
 
     def _age_s(self, run: str) -> float:
         """Time since the record of a run was written [s]; 0 if it is gone."""
-        changed_ns = self.changed_ns(run)
+        changed_ns = self.read_change_ns(run)
         return time.time() - changed_ns / NS_PER_S if changed_ns else 0.0
 
     def lives(self, run: str) -> bool:

@@ -49,9 +49,7 @@ def make_dataset_routes(instances: Instances) -> APIRouter:
     @router.post("/resume", status_code=202)
     def resume(instance: str) -> InstanceState:
         """Go on with a dataset whose collection has ended before its last trial, as a run of its own."""
-        run = _get_collection(instances, instance)
-        if run.status == "running":
-            raise ConflictError(f"run {run.id} is still running")
+        run = _require_ended(_get_collection(instances, instance))
         directory = run.place.directory
         return describe(
             begin_run(config_path(directory), overrides=(), output=directory, origin=run.record.origin, resumed=True)
@@ -66,10 +64,7 @@ def make_dataset_routes(instances: Instances) -> APIRouter:
     @router.get("/files/{path:path}", response_class=FileResponse)
     def file(instance: str, path: str) -> FileResponse:
         """A file of a finished dataset, or a part of it."""
-        directory = _find_finished(instances, instance)
-        if path not in _list_names(directory):
-            raise NotFoundError(f"run {instance}: its dataset has no file {path!r}")
-        return FileResponse(directory / path)
+        return FileResponse(_find_file(_find_finished(instances, instance), path))
 
     @router.get("/dataset.tar", response_class=StreamingResponse)
     def archive(instance: str) -> StreamingResponse:
@@ -112,6 +107,28 @@ def _get_collection(instances: Instances, instance: str) -> Run:
     if run.record.kind != "collection" or run.record.volume is not None:
         raise NotFoundError(f"run {instance} has no dataset in a directory")
     return run
+
+
+def _require_ended(run: Run) -> Run:
+    """The run, if it has ended.
+
+    Raises:
+        ConflictError: If it has not.
+    """
+    if run.status == "running":
+        raise ConflictError(f"run {run.id} is still running")
+    return run
+
+
+def _find_file(directory: Path, path: str) -> Path:
+    """A file of a dataset.
+
+    Raises:
+        NotFoundError: If the dataset has none of that name.
+    """
+    if path not in _list_names(directory):
+        raise NotFoundError(f"{directory}: the dataset has no file {path!r}")
+    return directory / path
 
 
 def _find_finished(instances: Instances, instance: str) -> Path:

@@ -138,7 +138,7 @@ class Lookout:
         known, self._ended = self._ended, {}
         instances = []
         for run in records.ids():
-            written = run, records.changed_ns(run)
+            written = run, records.read_change_ns(run)
             if (found := known.get(written)) is None:
                 try:
                     found = describe(records.get(run))
