@@ -3,8 +3,8 @@
 from pathlib import Path
 
 import pytest
-
 from tests.unit.serve.conftest import CONFIG
+
 from throwcollect.errors import ConfigError, NotFoundError
 from throwcollect.serve.catalogue import Catalogue
 
@@ -25,7 +25,12 @@ def test_components_are_read(directory: Path) -> None:
     text = "components:\n  a: {config: small.yaml, pretty_name: Throws of A, max_instances: 3}\n  b: {session: small.yaml}\n"
     catalogue = Catalogue.read(write(directory, text))
     a, b = catalogue.get("a"), catalogue.get("b")
-    assert (a.kind, a.pretty_name, a.max_instances, a.config) == ("collection", "Throws of A", 3, directory / "small.yaml")
+    assert (a.kind, a.pretty_name, a.max_instances, a.config) == (
+        "collection",
+        "Throws of A",
+        3,
+        directory / "small.yaml",
+    )
     assert (b.kind, b.pretty_name, b.max_instances) == ("session", "b", 1)
     with pytest.raises(NotFoundError, match="no component 'c'") as error:
         catalogue.get("c")
@@ -56,13 +61,19 @@ def test_without_a_catalogue_nothing_can_be_begun(directory: Path) -> None:
         ("components:\n  a:\n    config: small.yaml\n    image: ubuntu\n", ":4: components.a.image: unknown key"),
         ("components:\n  a:\n    config: small.yaml\n    max_instance: 2\n", "did you mean 'max_instances'"),
         ("components:\n  a:\n    config: small.yaml\n    max_instances: 0\n", ":4: components.a.max_instances: should"),
-        ("components:\n  a:\n    config: small.yaml\n    max_instances: true\n", ":4: components.a.max_instances: should"),
+        (
+            "components:\n  a:\n    config: small.yaml\n    max_instances: true\n",
+            ":4: components.a.max_instances: should",
+        ),
         ("components:\n  a:\n    config: 7\n", ":3: components.a.config: should"),
         ("components:\n  ../a: {config: small.yaml}\n", "should be at most 63 of a-z, 0-9, - and _, got '../a'"),
         ("components:\n  A: {config: small.yaml}\n", ":2: components.A"),
         ("components:\n  -rf: {config: small.yaml}\n", "got '-rf'"),
         ("components:\n  a: {config: small.yaml}\nmore: 1\n", ":3: more: unknown key"),
-        ("components:\n  a: {config: small.yaml}\n  a: {config: small.yaml}\n", ":3: components.a: the key is here twice"),
+        (
+            "components:\n  a: {config: small.yaml}\n  a: {config: small.yaml}\n",
+            ":3: components.a: the key is here twice",
+        ),
         ("components:\n  a:\n    config: none.yaml\n", ":3: components.a.config: names a file with errors"),
         ("components: [a]\n", ":1: components: should"),
         ("components: {a: \n", "not valid YAML"),
