@@ -28,6 +28,9 @@ _LANDING = ("landing_x_m", "landing_y_m", "landing_z_m")
 def encode_throw(delivery: Delivery) -> bytes:
     """An episode as the page takes it.
 
+    Args:
+        delivery: The episode, with what came of the trial.
+
     Returns:
         Length of a JSON header as uint32, the header, zero bytes up to a multiple of four, then float32: angles of the
         joints [rad], shape ``(n_samples, n_joints)``, and the ball's centre in the world [m], shape ``(n_samples, 3)``;
@@ -111,7 +114,7 @@ class ThrowWatch:
     def _hear(self, message: bytes) -> None:
         try:
             delivery = unpack(message, Signer.of_key(self._run.key))
-            if not isinstance(delivery, Delivery):
+            if not isinstance(delivery, Delivery) or not delivery.result:
                 return
             frame = encode_throw(delivery)
         except ThrowcollectError:
