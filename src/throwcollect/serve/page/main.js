@@ -120,6 +120,7 @@ class Page {
       this.tell("");
     }
     this.watching.put(instance);
+    get("map-box").hidden = instance?.kind !== "collection";
     const names = this.#names(instance);
     setChoices(get("alone"), [["", "all"], ...names.map((name) => [name, name])]);
     this.#show();

@@ -8,8 +8,9 @@ import URDFLoader from "./vendor/urdf-loader/src/URDFLoader.js";
 import { coarsen } from "./coarse.js";
 
 const PACKAGE = "package://";
-/** Vertices that are nearer to one another than this share of a mesh's size become one where robots are many. */
-const CELL_SHARE = 1 / 24;
+/** Edges of the cubes by which meshes are coarsened, as shares of a mesh's size: the first that gives few triangles. */
+const SHARES = [1 / 32, 1 / 24, 1 / 16, 1 / 12];
+const FEW_TRIANGLES = 1200;
 
 /** Geometries with fewer triangles, by those with all; and back. Clones of meshes share their geometries. */
 const COARSE = new WeakMap();
@@ -21,9 +22,12 @@ function coarsenAll(whole) {
     if (!part.isMesh) return;
     part.geometry.computeBoundingBox();
     const size = part.geometry.boundingBox.getSize(new Vector3());
-    const cell = Math.max(size.x, size.y, size.z) * CELL_SHARE;
-    if (!(cell > 0)) return;
-    const coarse = coarsen(part.geometry, cell);
+    let coarse = part.geometry;
+    for (const share of SHARES) {
+      const edge = Math.max(size.x, size.y, size.z) * share;
+      if (edge > 0 && (coarse.index ?? coarse.getAttribute("position")).count > 3 * FEW_TRIANGLES) coarse = coarsen(coarse, edge);
+    }
+    if (coarse === part.geometry) return;
     COARSE.set(part.geometry, coarse);
     FINE.set(coarse, part.geometry);
   });

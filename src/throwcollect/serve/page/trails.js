@@ -8,7 +8,7 @@ import { colorOf } from "./outcomes.js";
 const KEPT = 12;
 const SEGMENTS = 48;
 const SIDES = 5;
-const RADIUS_M = 0.006;
+const RADIUS_M = 0.008;
 const MARK_RADIUS_M = 0.035;
 
 /** @typedef {import("./throws.js").Throw} Throw */
@@ -47,7 +47,7 @@ export class Trails {
     this.#trails.push({ shown, tube, mark });
     while (this.#trails.length > KEPT) this.#drop(this.#trails.shift());
     this.#trails.forEach((trail, i) => {
-      trail.tube.material.opacity = i === this.#trails.length - 1 ? 1 : 0.15 + (0.5 * i) / KEPT;
+      trail.tube.material.opacity = i === this.#trails.length - 1 ? 1 : 0.3 + (0.4 * i) / KEPT;
       trail.tube.geometry.setDrawRange(0, Infinity);
       if (trail.mark) trail.mark.visible = true;
     });
