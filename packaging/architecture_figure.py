@@ -18,7 +18,7 @@ FIGURE = ROOT / "docs" / "architecture.svg"
 PLACES: dict[str, tuple[float, int, str]] = {
     "cli": (2.6, 0, "commands, exit codes"),
     "cluster": (0.3, 1, "Slurm: many machines"),
-    "serve": (-0.9, 1, "page, REST, rosbridge"),
+    "serve": (1.5, 1, "page, REST, rosbridge"),
     "runs": (0.3, 2, "prepare, follow, stop"),
     "simulator": (1.5, 2, "throws for Python"),
     "runtimes": (0.3, 3, "where nodes live"),

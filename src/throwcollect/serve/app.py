@@ -14,7 +14,7 @@ from pydantic import BaseModel
 
 from throwcollect.serve.access import Keys
 from throwcollect.serve.dataset_routes import make_dataset_routes
-from throwcollect.serve.instance_routes import make_component_routes, make_instance_routes
+from throwcollect.serve.instance_routes import make_component_routes, make_instance_routes, make_log_routes
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.live import LiveHolds
 from throwcollect.serve.problems import add_handlers, problem
@@ -69,6 +69,7 @@ def make_app(instances: Instances, keys: Keys) -> FastAPI:
     app.include_router(_general(watch, keys), prefix=PREFIX)
     app.include_router(make_component_routes(watch), prefix=PREFIX)
     app.include_router(make_instance_routes(instances, lookout), prefix=PREFIX)
+    app.include_router(make_log_routes(instances), prefix=PREFIX)
     app.include_router(make_dataset_routes(instances), prefix=PREFIX)
     app.include_router(make_view_routes(instances, holds), prefix=PREFIX)
     app.mount("/", StaticFiles(directory=_PAGE, html=True))

@@ -93,11 +93,7 @@ def make_dataset_routes(instances: Instances) -> APIRouter:
     @router.get("/landings")
     def landings(instance: str) -> list[tuple[float, float, str, int]]:
         """Where the throws of a finished dataset came down: x and y [m], outcome and trial; none for other tasks."""
-        table = read_parquet(_find_finished(instances, instance) / THROWS)
-        if not set(_LANDING) <= set(table.column_names):
-            return []
-        rows: Any = zip(*(table[name].to_pylist() for name in _LANDING), strict=True)
-        return [row for row in rows if row[0] is not None]
+        return _read_landings(_find_finished(instances, instance))
 
     return router
 
@@ -151,6 +147,14 @@ def _list_names(directory: Path) -> list[str]:
         MANIFEST,
         *sorted(_OWN_FILES & set(os.listdir(directory))),
     ]
+
+
+def _read_landings(directory: Path) -> list[tuple[float, float, str, int]]:
+    table = read_parquet(directory / THROWS)
+    if not set(_LANDING) <= set(table.column_names):
+        return []
+    rows: Any = zip(*(table[name].to_pylist() for name in _LANDING), strict=True)
+    return [row for row in rows if row[0] is not None]
 
 
 def _archive(directory: Path, name: str) -> Iterator[bytes]:

@@ -104,6 +104,17 @@ def make_instance_routes(instances: Instances, lookout: Lookout) -> APIRouter:
         """Change the number of simulations of a run."""
         return describe(instances.scale(instance, scaling.simulations))
 
+    return router
+
+
+def make_log_routes(instances: Instances) -> APIRouter:
+    """Routes on what nodes have printed, and what has happened.
+
+    Args:
+        instances: All runs.
+    """
+    router = APIRouter(prefix="/instances")
+
     @router.get("/{instance}/log/{node}", response_class=PlainTextResponse)
     def log(instance: str, node: str, tail: Annotated[int, Query(ge=1, le=10_000)] = 200) -> Any:
         """The last lines of what a node has printed."""

@@ -98,4 +98,4 @@ def _let_go(run: Run, simulation: str) -> None:
 
 
 def _set_speed(run: Run, simulation: str, factor: float) -> None:
-    set_parameter(run, f"/{simulation}/{simulation}", _PARAMETER, factor)
+    set_parameter(run, [f"/{simulation}/{simulation}"], _PARAMETER, factor)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Awaitable, Callable
 
-from fastapi import APIRouter, Response, WebSocket
+from fastapi import APIRouter, Request, Response, WebSocket
 from fastapi.responses import FileResponse
 
 from throwcollect.errors import ThrowcollectError
@@ -14,6 +14,8 @@ from throwcollect.serve.live import LiveHolds
 from throwcollect.serve.robot_files import description_of, find_mesh
 from throwcollect.serve.sockets import NOT_FOUND, keep_telling
 from throwcollect.serve.throws import ThrowWatch
+
+_XML = {"requestBody": {"required": True, "content": {"application/xml": {"schema": {"type": "string"}}}}}
 
 
 def make_view_routes(instances: Instances, holds: LiveHolds) -> APIRouter:
@@ -30,6 +32,17 @@ def make_view_routes(instances: Instances, holds: LiveHolds) -> APIRouter:
     def urdf(instance: str) -> Response:
         """The robot of a run, with its tool, in URDF; meshes are ``package://`` URLs."""
         return Response(description_of(instances.get(instance)), media_type="application/xml")
+
+    @router.put("/instances/{instance}/urdf", status_code=202, openapi_extra=_XML)
+    async def show(instance: str, request: Request) -> None:
+        """Have viewers draw another description, which may differ in what is seen."""
+        urdf = (await request.body()).decode(errors="replace")
+        await asyncio.to_thread(instances.show, instance, urdf)
+
+    @router.delete("/instances/{instance}/urdf", status_code=202)
+    def show_own(instance: str) -> None:
+        """Have viewers draw the description of the configuration again."""
+        instances.show(instance, None)
 
     @router.get("/meshes/{package}/{path:path}", response_class=FileResponse)
     def mesh(package: str, path: str) -> FileResponse:
