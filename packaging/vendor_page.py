@@ -1,7 +1,8 @@
 """Fetches the libraries of the page from npm, and notes what they are to be.
 
-`python packaging/vendor_page.py` writes `src/throwcollect/serve/page/vendor` anew. Browsers find modules by path alone where
-no inline script may map names to paths, so names are replaced by paths; nothing else is changed.
+`python packaging/vendor_page.py` writes `src/throwcollect/serve/page/vendor` anew. Browsers find modules by path alone
+where no inline script may map names to paths, so names are replaced by paths; nothing else is changed. The package of
+urdf-loader lacks its licence, which is Apache-2.0 by its README: `LICENSE` there is that text.
 """
 
 from __future__ import annotations
@@ -39,7 +40,6 @@ _FILES = {
 
 def main() -> None:
     """Fetch all of it, and write the sums."""
-    lines = []
     with tempfile.TemporaryDirectory() as directory:
         for package, files in _FILES.items():
             _pack(package, Path(directory))
@@ -52,7 +52,8 @@ def main() -> None:
                     path = VENDOR / name / file
                     path.parent.mkdir(parents=True, exist_ok=True)
                     path.write_bytes(_with_paths(member.read(), path))
-                    lines.append(f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.relative_to(VENDOR)}\n")
+    files = sorted(path for path in VENDOR.rglob("*") if path.is_file() and path.name != SUMS)
+    lines = [f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.relative_to(VENDOR)}\n" for path in files]
     (VENDOR / SUMS).write_text("".join(lines))
 
 

@@ -86,12 +86,22 @@ export class Connection {
 
   /**
    * Open a socket, and again whenever it is lost, later each time.
-   * @param {string} path
+   * @param {string} path below the interface
    * @param {SocketEvents} events
    * @returns {Socket}
    */
   open(path, events) {
-    return new Socket(this.token, path, events);
+    return new Socket(this.token, PREFIX + path, events);
+  }
+
+  /**
+   * Open a socket of rosbridge, which lies beside the interface.
+   * @param {string} run id of the run
+   * @param {SocketEvents} events
+   * @returns {Socket}
+   */
+  openRosbridge(run, events) {
+    return new Socket(this.token, `/rosbridge/${encodeURIComponent(run)}`, events);
   }
 }
 
@@ -116,7 +126,7 @@ export class Socket {
    */
   constructor(token, path, events) {
     this.token = token;
-    this.url = `${location.origin.replace(/^http/, "ws")}${PREFIX}${path}`;
+    this.url = `${location.origin.replace(/^http/, "ws")}${path}`;
     this.events = events;
     this.#connect();
   }

@@ -23,8 +23,8 @@ export class Plots {
     get("plot-simulation").addEventListener("change", () => this.#offer());
     get("plot-field").addEventListener("change", () => this.#offer());
     get("plot-name").addEventListener("change", () => this.#bind());
-    get("plot-dialog").addEventListener("close", ({ target }) => {
-      if (target.returnValue === "add" && get("plot-simulation").value) this.#add();
+    get("plot-dialog").firstElementChild.addEventListener("submit", ({ submitter }) => {
+      if (submitter.value === "add" && get("plot-simulation").value) this.#add();
     });
   }
 
@@ -52,9 +52,7 @@ export class Plots {
     const { shown } = this.view;
     setChoices(get("plot-simulation"), shown.map((name) => [name, name]));
     this.#offer();
-    const dialog = get("plot-dialog");
-    dialog.returnValue = "";
-    dialog.showModal();
+    get("plot-dialog").showModal();
   }
 
   #robot() {

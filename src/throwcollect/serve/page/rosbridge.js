@@ -16,7 +16,7 @@ export class Rosbridge {
    * @param {{opened?: () => void, lost?: () => void}} events
    */
   constructor(connection, run, events = {}) {
-    this.#socket = connection.open(`/rosbridge/${encodeURIComponent(run)}`, {
+    this.#socket = connection.openRosbridge(run, {
       opened: () => {
         this.#open = true;
         for (const [topic, { type }] of this.#topics) this.#ask(topic, type);

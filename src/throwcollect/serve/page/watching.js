@@ -129,7 +129,7 @@ export class Watching {
     }
     if (instance.summary && !this.#hasAll) {
       this.#hasAll = true;
-      const landings = await this.#ask(`${run}/landings`, (response) => response.json());
+      const landings = await this.#ask(`/collections/${encodeURIComponent(id)}/landings`, (response) => response.json());
       if (landings !== null && this.id === id) this.map.put(landings);
     }
   }
