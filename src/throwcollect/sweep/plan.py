@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import compress
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +15,12 @@ from throwcollect.config.schema import Config
 from throwcollect.config.values import reason_not_sweepable, with_values
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError, PlanError, Problem
 from throwcollect.files import write_file
-from throwcollect.sweep.digest import config_digest, trial_digests
+from throwcollect.sweep.digest import config_digest, is_digest, trial_digests
 from throwcollect.sweep.parquet_file import encode_table, read_parquet
 from throwcollect.sweep.points import Points
 from throwcollect.sweep.samplers import draw_points
 from throwcollect.sweep.slice import Slice
+from throwcollect.sweep.trials import DIGEST_BYTES, Trial, Trials
 from throwcollect.wording import blank_numbers, format_count
 
 _FORMAT = "1"
@@ -26,6 +28,7 @@ _FORMAT_KEY = b"throwcollect.plan_format"
 _CONFIG_KEY = b"throwcollect.config_digest"
 _SLICE_KEY = b"throwcollect.slice"
 _MOST_REASONS = 5
+_ROWS_AT_ONCE = 1 << 16
 
 ROUND_TRIALS = 64
 """Number of trials in a round, by which a plan grows."""
@@ -34,25 +37,6 @@ FIRST_TRIALS = 2 * ROUND_TRIALS
 
 Check = Callable[[Config], str | None]
 """Says of the configuration of a trial why it cannot be run, or None when it can."""
-
-
-@dataclass(frozen=True)
-class Trial:
-    """One numbered point of the sweep.
-
-    Attributes:
-        number: From 0.
-        values: Value of each swept dotted key, in the key's unit.
-        seed: Seed for anything random in the trial, from the root seed and the number; fits uint64.
-        digest: SHA-256 in hex over everything that determines the trial's samples.
-        refused: Why the trial is not run, or None.
-    """
-
-    number: int
-    values: Mapping[str, float]
-    seed: int
-    digest: str
-    refused: str | None = None
 
 
 @dataclass(frozen=True)
@@ -66,13 +50,13 @@ class Plan:
     """
 
     config: Config
-    trials: tuple[Trial, ...]
+    trials: Trials
     slice: Slice | None = None
 
     @property
     def keys(self) -> tuple[str, ...]:
         """Swept dotted keys."""
-        return tuple(self.trials[0].values)
+        return self.trials.keys
 
     def trial(self, number: int) -> Trial:
         """The trial of a number.
@@ -80,7 +64,7 @@ class Plan:
         Raises:
             IndexError: If the plan has no such trial.
         """
-        index = number - self.trials[0].number
+        index = number - self.trials.first
         if index < 0:
             raise IndexError(number)
         return self.trials[index]
@@ -98,19 +82,6 @@ class Plan:
         """Configuration of one trial."""
         return with_values(self.config, trial.values)
 
-    def refuse(self, reasons: Sequence[str | None]) -> Plan:
-        """This plan with trials refused.
-
-        Args:
-            reasons: Why each trial is not run, in order; None for those that are.
-
-        Raises:
-            PlanError: If every trial is refused.
-        """
-        _check_some_left([reason for reason in reasons if reason is not None], len(self.trials))
-        pairs = zip(self.trials, reasons, strict=True)
-        return replace(self, trials=tuple(replace(trial, refused=reason) for trial, reason in pairs))
-
     def write(self, path: Path) -> None:
         """Write the plan as a Parquet file, whole or not at all.
 
@@ -127,12 +98,13 @@ class Plan:
         """
         from throwcollect.sweep.arrow_column import make_table
 
+        trials = self.trials
         columns: list[Any] = [
-            [trial.number for trial in self.trials],
-            [trial.digest for trial in self.trials],
-            [trial.seed for trial in self.trials],
-            [trial.refused for trial in self.trials],
-            *([trial.values[key] for trial in self.trials] for key in self.keys),
+            np.arange(trials.first, trials.numbers.stop),
+            np.frombuffer(trials.digests.tobytes().hex().encode(), f"S{2 * DIGEST_BYTES}"),
+            trials.seeds,
+            [trials.refused.get(number) for number in trials.numbers],
+            *trials.values.T,
         ]
         metadata = {_FORMAT_KEY: _FORMAT, _CONFIG_KEY: config_digest(self.config)}
         if self.slice is not None:
@@ -178,11 +150,7 @@ class Plan:
         elif slice is not None:
             wanted = slice.trials_of(table.num_rows, trials_per_shard=config.record.trials_per_shard)
             first, rows = wanted.start, table.slice(wanted.start, len(wanted))
-        numbers, digests, seeds, refused, *values = (column.to_pylist() for column in rows.columns)
-        if numbers != list(range(first, first + len(numbers))):
-            raise DatasetError("the trials are not numbered from 0 without gaps", path=path)
-        trials = zip(numbers, zip(*values, strict=True), seeds, digests, refused, strict=True)
-        return cls(config, tuple(Trial(n, dict(zip(keys, row, strict=True)), *rest) for n, row, *rest in trials), slice)
+        return cls(config, _trials_of(rows, keys, first, path), slice)
 
 
 def make_plan(config: Config, *, check: Check | None = None, directory: Path | None = None) -> Plan:
@@ -198,28 +166,39 @@ def make_plan(config: Config, *, check: Check | None = None, directory: Path | N
         PlanError: If the sweep has no point, or every trial is refused.
         ConfigError: If the file of the sampler `list` cannot be used.
     """
-    points = draw_points(config, directory=directory or Path())
-    if config.grows:
-        points = points.first(FIRST_TRIALS)
-    trials = tuple(make_trials(config, points, check=check))
-    return Plan(config, trials).refuse([trial.refused for trial in trials])
+    trials = make_trials(config, draw_first_points(config, directory=directory or Path()))
+    if check is not None:
+        trials = trials.refuse([refusal(with_values(config, trial.values), check) for trial in trials])
+    check_some_left(trials)
+    return Plan(config, trials)
 
 
-def make_trials(config: Config, points: Points, *, check: Check | None = None, first: int = 0) -> Iterator[Trial]:
-    """The trials of points, one by one, as each is checked.
+def draw_first_points(config: Config, *, directory: Path) -> Points:
+    """The points of all trials that are known before anything runs; of a plan that grows, of its first two rounds.
+
+    Args:
+        config: Configuration with the sweep.
+        directory: Directory at which a relative `sweep.file` starts.
+
+    Raises:
+        PlanError: If the sweep has no point.
+        ConfigError: If the file of the sampler `list` cannot be used.
+    """
+    points = draw_points(config, directory=directory)
+    return points.first(FIRST_TRIALS) if config.grows else points
+
+
+def make_trials(config: Config, points: Points, *, first: int = 0) -> Trials:
+    """The trials of points, none of which is refused.
 
     Args:
         config: Configuration that the trials vary.
         points: Their values.
-        check: Says of the configuration of a trial why it cannot be run.
         first: Number of the first one.
     """
-    seeds = [_seed(config.seed, number) for number in range(first, first + len(points.values))]
-    rows = zip(points.values.tolist(), seeds, trial_digests(config, points, seeds), strict=True)
-    for number, (row, seed, digest) in enumerate(rows, first):
-        values = dict(zip(points.keys, row, strict=True))
-        refused = refusal(with_values(config, values), check) if check else None
-        yield Trial(number, values, seed, digest, refused)
+    count = len(points.values)
+    seeds = np.fromiter((_seed(config.seed, number) for number in range(first, first + count)), np.uint64, count)
+    return Trials(points.keys, points.values, seeds, trial_digests(config, points, seeds), first=first)
 
 
 def _seed(root: int, number: int) -> int:
@@ -239,17 +218,55 @@ def refusal(config: Config, check: Check) -> str | None:
         return str(error)
 
 
-def _check_some_left(reasons: list[str], trials: int) -> None:
-    if len(reasons) < trials:
+def check_some_left(trials: Trials) -> None:
+    """Make sure that a plan has something to run.
+
+    Raises:
+        PlanError: If every trial is refused.
+    """
+    reasons = list(trials.refused.values())
+    if len(reasons) < len(trials):
         return
     # Reasons that differ only in their numbers are one; the first of them speaks for all.
     kinds = [blank_numbers(reason) for reason in reasons]
     examples = dict(zip(reversed(kinds), reversed(reasons), strict=True))
     listed = [f"{count} × {examples[kind]}" for kind, count in Counter(kinds).most_common(_MOST_REASONS)]
     raise PlanError(
-        [Problem(f"{format_count(trials, 'trial')}, all refused: {'; '.join(listed)}", key="sweep")],
+        [Problem(f"{format_count(len(trials), 'trial')}, all refused: {'; '.join(listed)}", key="sweep")],
         hint="sweep over smaller ranges or slower motions, or change task.start and task.end",
     )
+
+
+def _trials_of(rows: Any, keys: tuple[str, ...], first: int, path: Path) -> Trials:
+    """The trials of rows of a plan's table.
+
+    Args:
+        rows: The rows.
+        keys: Swept dotted keys.
+        first: Number of the first trial.
+        path: The file, for messages.
+
+    Raises:
+        DatasetError: If their numbers have gaps, or a digest is none.
+    """
+    from throwcollect.sweep.arrow_column import read_numbers
+
+    count = len(rows)
+    if not np.array_equal(read_numbers(rows["trial"]), np.arange(first, first + count)):
+        raise DatasetError("the trials are not numbered from 0 without gaps", path=path)
+    digests = np.empty((count, DIGEST_BYTES), np.uint8)
+    for start in range(0, count, _ROWS_AT_ONCE):
+        texts = rows["digest"].slice(start, _ROWS_AT_ONCE).to_pylist()
+        if wrong := [number for number, text in enumerate(texts, first + start) if not is_digest(text)]:
+            raise DatasetError("is damaged: has a digest that is no SHA-256", path=path, place=f"trial {wrong[0]}")
+        read = np.frombuffer(bytes.fromhex("".join(texts)), np.uint8)
+        digests[start : start + len(texts)] = read.reshape(-1, DIGEST_BYTES)
+    values = np.empty((count, len(keys)))
+    for column, key in zip(values.T, keys, strict=True):
+        column[:] = read_numbers(rows[key])
+    numbers = compress(range(first, first + count), rows["refused"].is_valid().to_pylist())
+    refused = dict(zip(numbers, rows["refused"].drop_null().to_pylist(), strict=True))
+    return Trials(keys, values, read_numbers(rows["seed"]), digests, first=first, refused=refused)
 
 
 def _schema(keys: Sequence[str]) -> Any:

@@ -14,8 +14,9 @@ import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
+from throwcollect.dataset.creation import create
 from throwcollect.dataset.verify import verify
-from throwcollect.dataset.writer import DatasetWriter, create
+from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.errors import DatasetError
 from throwcollect.sweep.plan import Plan
 from throwcollect.tasks.throw.outcome import ThrowResult
