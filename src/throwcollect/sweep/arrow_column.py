@@ -49,17 +49,14 @@ def _make_array_column(values: NDArray[Any], kind: pa.DataType) -> pa.Array:
     return pa.Array.from_buffers(kind, len(values), [None, *map(pa.py_buffer, parts)], null_count=0)
 
 
-def read_numbers(column: pa.ChunkedArray) -> NDArray[Any]:
-    """The numbers of a column of which nothing is null, ``(n_rows,)``.
+def read_numbers(column: pa.Array) -> NDArray[Any]:
+    """The numbers of a column of which nothing is null, ``(n_rows,)``; not to be written to.
 
     Args:
         column: Of ``int64``, ``uint64`` or ``float64``.
     """
     dtype = np.dtype(_CODES[column.type])
-    chunks = [
-        np.frombuffer(each.buffers()[1], dtype, len(each), 8 * each.offset) for each in column.chunks if len(each)
-    ]
-    return np.concatenate([np.empty(0, dtype), *chunks])
+    return np.frombuffer(column.buffers()[1], dtype, len(column), dtype.itemsize * column.offset)
 
 
 def make_table(columns: Sequence[Sequence[Any] | NDArray[Any]], schema: pa.Schema) -> pa.Table:

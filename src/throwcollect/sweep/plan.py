@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import compress
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +15,7 @@ from throwcollect.config.values import reason_not_sweepable, with_values
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError, PlanError, Problem
 from throwcollect.files import write_file
 from throwcollect.sweep.digest import config_digest, is_digest, trial_digests
-from throwcollect.sweep.parquet_file import encode_table, read_parquet
+from throwcollect.sweep.parquet_file import encode_table, open_parquet
 from throwcollect.sweep.points import Points
 from throwcollect.sweep.samplers import draw_points
 from throwcollect.sweep.slice import Slice
@@ -29,6 +28,7 @@ _CONFIG_KEY = b"throwcollect.config_digest"
 _SLICE_KEY = b"throwcollect.slice"
 _MOST_REASONS = 5
 _ROWS_AT_ONCE = 1 << 16
+_MISNUMBERED = "the trials are not numbered from 0 without gaps"
 
 ROUND_TRIALS = 64
 """Number of trials in a round, by which a plan grows."""
@@ -126,31 +126,32 @@ class Plan:
             ForeignPlanError: If it is the plan of another configuration.
             ConfigError: If the plan has fewer shards than there are slices.
         """
-        table = read_parquet(path)
-        metadata = table.schema.metadata or {}
-        keys = tuple(table.column_names[4:])
-        found = metadata.get(_FORMAT_KEY, b"none").decode(errors="replace")
-        if found != _FORMAT or not table.schema.equals(_schema(keys)) or not table.num_rows:
-            raise DatasetError(
-                "not a plan that this version reads",
-                path=path,
-                expected=f"plan format {_FORMAT}",
-                evidence=f"got {found}",
-            )
-        if metadata.get(_CONFIG_KEY, b"") != config_digest(config).encode():
-            raise ForeignPlanError("the plan belongs to another configuration", path=path)
-        for key in keys:
-            if reason := reason_not_sweepable(config, key):
-                raise DatasetError(f"is damaged: column {key!r}: {reason}", path=path)
+        with open_parquet(path) as file:
+            metadata = file.schema_arrow.metadata or {}
+            keys = tuple(file.schema_arrow.names[4:])
+            found = metadata.get(_FORMAT_KEY, b"none").decode(errors="replace")
+            if found != _FORMAT or not file.schema_arrow.equals(_schema(keys)) or not file.metadata.num_rows:
+                raise DatasetError(
+                    "not a plan that this version reads",
+                    path=path,
+                    expected=f"plan format {_FORMAT}",
+                    evidence=f"got {found}",
+                )
+            if metadata.get(_CONFIG_KEY, b"") != config_digest(config).encode():
+                raise ForeignPlanError("the plan belongs to another configuration", path=path)
+            for key in keys:
+                if reason := reason_not_sweepable(config, key):
+                    raise DatasetError(f"is damaged: column {key!r}: {reason}", path=path)
+            trials = _read_trials(file, keys, path)
         stored = metadata.get(_SLICE_KEY)
-        first, rows = 0, table
         if stored is not None:
-            # Its first trial has any number.
-            first, slice = table["trial"][0].as_py(), Slice.parse(stored.decode())
+            slice = Slice.parse(stored.decode())
+        elif trials.first:
+            raise DatasetError(_MISNUMBERED, path=path)
         elif slice is not None:
-            wanted = slice.trials_of(table.num_rows, trials_per_shard=config.record.trials_per_shard)
-            first, rows = wanted.start, table.slice(wanted.start, len(wanted))
-        return cls(config, _trials_of(rows, keys, first, path), slice)
+            wanted = slice.trials_of(len(trials), trials_per_shard=config.record.trials_per_shard)
+            trials = trials[wanted.start : wanted.stop]
+        return cls(config, trials, slice)
 
 
 def make_plan(config: Config, *, check: Check | None = None, directory: Path | None = None) -> Plan:
@@ -237,36 +238,52 @@ def check_some_left(trials: Trials) -> None:
     )
 
 
-def _trials_of(rows: Any, keys: tuple[str, ...], first: int, path: Path) -> Trials:
-    """The trials of rows of a plan's table.
+def _read_trials(file: Any, keys: tuple[str, ...], path: Path) -> Trials:
+    """The trials of a plan's file, some after the other, as Arrow's memory for all of them is several times theirs.
 
     Args:
-        rows: The rows.
+        file: The open file.
         keys: Swept dotted keys.
-        first: Number of the first trial.
-        path: The file, for messages.
+        path: Its path, for messages.
 
     Raises:
-        DatasetError: If their numbers have gaps, or a digest is none.
+        DatasetError: If the numbers have gaps, or a digest is none.
     """
+    trials: Trials | None = None
+    for rows in file.iter_batches(_ROWS_AT_ONCE):
+        rows.validate(full=True)
+        first = rows["trial"][0].as_py()
+        more = _trials_of(rows, keys, first, path)
+        if trials is None:
+            trials = more
+        elif first != trials.numbers.stop:
+            raise DatasetError(_MISNUMBERED, path=path)
+        else:
+            trials.extend(more)
+    if trials is None:
+        raise DatasetError("is damaged: has no rows", path=path)
+    return trials
+
+
+def _trials_of(rows: Any, keys: tuple[str, ...], first: int, path: Path) -> Trials:
     from throwcollect.sweep.arrow_column import read_numbers
 
-    count = len(rows)
-    if not np.array_equal(read_numbers(rows["trial"]), np.arange(first, first + count)):
-        raise DatasetError("the trials are not numbered from 0 without gaps", path=path)
-    digests = np.empty((count, DIGEST_BYTES), np.uint8)
-    for start in range(0, count, _ROWS_AT_ONCE):
-        texts = rows["digest"].slice(start, _ROWS_AT_ONCE).to_pylist()
-        if wrong := [number for number, text in enumerate(texts, first + start) if not is_digest(text)]:
-            raise DatasetError("is damaged: has a digest that is no SHA-256", path=path, place=f"trial {wrong[0]}")
-        read = np.frombuffer(bytes.fromhex("".join(texts)), np.uint8)
-        digests[start : start + len(texts)] = read.reshape(-1, DIGEST_BYTES)
-    values = np.empty((count, len(keys)))
-    for column, key in zip(values.T, keys, strict=True):
-        column[:] = read_numbers(rows[key])
-    numbers = compress(range(first, first + count), rows["refused"].is_valid().to_pylist())
-    refused = dict(zip(numbers, rows["refused"].drop_null().to_pylist(), strict=True))
-    return Trials(keys, values, read_numbers(rows["seed"]), digests, first=first, refused=refused)
+    numbers = np.arange(first, first + len(rows))
+    if not np.array_equal(read_numbers(rows["trial"]), numbers):
+        raise DatasetError(_MISNUMBERED, path=path)
+    digests = rows["digest"].to_pylist()
+    if wrong := [number for number, digest in enumerate(digests, first) if not is_digest(digest)]:
+        raise DatasetError("is damaged: has a digest that is no SHA-256", path=path, place=f"trial {wrong[0]}")
+    values = np.column_stack([np.empty((len(rows), 0)), *(read_numbers(rows[key]) for key in keys)])
+    reasons = enumerate(rows["refused"].to_pylist(), first)
+    return Trials(
+        keys,
+        values,
+        read_numbers(rows["seed"]),
+        np.frombuffer(bytes.fromhex("".join(digests)), np.uint8).reshape(-1, DIGEST_BYTES),
+        first=first,
+        refused={number: reason for number, reason in reasons if reason is not None},
+    )
 
 
 def _schema(keys: Sequence[str]) -> Any:
