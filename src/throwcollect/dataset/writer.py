@@ -46,6 +46,7 @@ from throwcollect.files import remove, write_file
 from throwcollect.robots.description import full_description
 from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.points import Points
+from throwcollect.sweep.round_file import append_round
 from throwcollect.sweep.trials import Trials
 from throwcollect.tasks.result import Result
 from throwcollect.tasks.task import task_of
@@ -131,6 +132,7 @@ class DatasetWriter:
             held.enter_context(hold_together(directory))
             journal = held.enter_context(Journal(directory))
             plan = Plan.read(directory / PLAN, load(config_path(directory)))
+            plan.take_in_rounds(directory / PLAN)
             writer = cls(directory, plan, journal=journal, growing=plan.config.grows)
             writer._held = held.pop_all()
         return writer
@@ -182,8 +184,8 @@ class DatasetWriter:
         Raises:
             DatasetError: If the plan cannot be written.
         """
+        append_round(self._directory / PLAN, trials)
         self.plan.trials.extend(trials)
-        self.plan.write(self._directory / PLAN)
         self.note("planned", trials=len(self.plan.trials))
         self._expect(trials)
 
@@ -191,9 +193,10 @@ class DatasetWriter:
         """No trial will be added any more.
 
         Raises:
-            DatasetError: If a shard that is now complete cannot be written.
+            DatasetError: If the plan, or a shard that is now complete, cannot be written.
         """
         self._growing = False
+        self.plan.take_in_rounds(self._directory / PLAN)
         for number in list(self._shards):
             self._finish_shard_if_complete(number)
 

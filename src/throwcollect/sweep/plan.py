@@ -13,10 +13,11 @@ import numpy as np
 from throwcollect.config.schema import Config
 from throwcollect.config.values import reason_not_sweepable, with_values
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError, PlanError, Problem
-from throwcollect.files import write_file
+from throwcollect.files import is_there, remove, write_file
 from throwcollect.sweep.digest import config_digest, is_digest, trial_digests
 from throwcollect.sweep.parquet_file import encode_table, open_parquet
 from throwcollect.sweep.points import Points
+from throwcollect.sweep.round_file import read_rounds, rounds_path
 from throwcollect.sweep.samplers import draw_points
 from throwcollect.sweep.slice import Slice
 from throwcollect.sweep.trials import DIGEST_BYTES, Trial, Trials
@@ -83,12 +84,22 @@ class Plan:
         return with_values(self.config, trial.values)
 
     def write(self, path: Path) -> None:
-        """Write the plan as a Parquet file, whole or not at all.
+        """Write the plan as a Parquet file, whole or not at all; rounds that lay beside it are in it then.
 
         Raises:
             DatasetError: If the file cannot be written.
         """
         write_file(path, self.encode())
+        remove(rounds_path(path))
+
+    def take_in_rounds(self, path: Path) -> None:
+        """Write the plan as a whole if rounds lie beside its file, as its trials have these.
+
+        Raises:
+            DatasetError: If the file cannot be written.
+        """
+        if is_there(rounds_path(path)):
+            self.write(path)
 
     def encode(self) -> bytes:
         """Bytes of the plan's Parquet file; equal plans give equal bytes.
@@ -117,7 +128,7 @@ class Plan:
         """Read a plan that was written for a configuration.
 
         Args:
-            path: File that `write` wrote.
+            path: File that `write` wrote; rounds that were added since lie beside it.
             config: The configuration; its section `run` may differ.
             slice: Which slice of the plan that the file holds is wanted; None for all that it holds.
 
@@ -145,10 +156,11 @@ class Plan:
             trials = _read_trials(file, keys, path)
         stored = metadata.get(_SLICE_KEY)
         if stored is not None:
-            slice = Slice.parse(stored.decode())
-        elif trials.first:
+            return cls(config, trials, Slice.parse(stored.decode()))
+        if trials.first:
             raise DatasetError(_MISNUMBERED, path=path)
-        elif slice is not None:
+        read_rounds(path, trials)
+        if slice is not None:
             wanted = slice.trials_of(len(trials), trials_per_shard=config.record.trials_per_shard)
             trials = trials[wanted.start : wanted.stop]
         return cls(config, trials, slice)

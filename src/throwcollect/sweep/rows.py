@@ -33,5 +33,6 @@ class Rows(Generic[_Element]):
             room = np.empty((max(count, 2 * self._count), *self._room.shape[1:]), self._room.dtype)
             room[: self._count] = self.all
             self._room = room
-        self._room[self._count : count] = rows
+        if count > self._count:
+            self._room[self._count : count] = rows
         self._count = count
