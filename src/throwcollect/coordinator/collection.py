@@ -25,7 +25,6 @@ from throwcollect.dataset.inspect import info, loss
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.episode.message import Delivery, Episode
 from throwcollect.errors import DatasetError, Interrupted, WorkerError
-from throwcollect.sweep.plan import Trial
 from throwcollect.tasks.result import Result
 from throwcollect.tasks.task import task_of
 from throwcollect.wording import command, format_count
@@ -57,8 +56,7 @@ class TrialCollection:
         self.warn: Callable[[str], object] = lambda _: None
         self.on_change: Callable[[], None] = lambda: None
         self._config = writer.plan.config
-        self._trials: dict[int, Trial] = {trial.number: trial for trial in writer.plan.trials if trial.refused is None}
-        self._leases = Leases(self._trials, retries=self._config.run.retries)
+        self._leases = Leases(writer.plan.trials.numbers_to_run, retries=self._config.run.retries)
         self._growth = Growth(writer.plan) if self._config.grows else None
         self._names: dict[str, str] = {}
         self._acceptance = Acceptance(self._config)
@@ -185,7 +183,7 @@ class TrialCollection:
 
     def values_of(self, trial: int) -> Mapping[str, float]:
         """What a trial replaces of the configuration, by dotted key."""
-        return self._trials[trial].values
+        return self.writer.plan.trial(trial).values
 
     def take_in(self, simulation: str, delivery: Delivery, token: str = "") -> None:
         """Take an episode in, to be written by `write_one`; one that is not as it was asked for goes back.
@@ -200,7 +198,7 @@ class TrialCollection:
         try:
             result = self._columns.from_json(self._outcome_names, delivery.result)
             plan = self.writer.plan
-            reason = self._acceptance.find_difference(delivery.conditions, plan, self._trials[trial], token=token)
+            reason = self._acceptance.find_difference(delivery.conditions, plan, plan.trial(trial), token=token)
         except DatasetError as error:
             reason = error.message
         if reason is not None:
@@ -340,9 +338,7 @@ class TrialCollection:
         trials = None if self._draining else growth.step()
         if trials:
             self.writer.extend(trials)
-            fresh = {trial.number: trial for trial in trials if trial.refused is None}
-            self._trials |= fresh
-            self._leases.add(fresh)
+            self._leases.add(trials.numbers_to_run)
             self.on_change()
         return trials is not None
 

@@ -12,15 +12,16 @@ from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
 from throwcollect.config.values import with_values
+from throwcollect.dataset.creation import create
 from throwcollect.dataset.directory import TRIALS
-from throwcollect.dataset.writer import create
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.robots.feasibility import Feasibility
 from throwcollect.side_by_side import work_side_by_side
-from throwcollect.sweep.plan import Check, Plan, make_plan, refusal
+from throwcollect.sweep.plan import Check, Plan, check_some_left, draw_first_points, make_trials, refusal
 from throwcollect.sweep.point_file import read_points
 from throwcollect.sweep.points import Points
 from throwcollect.sweep.rounds import Rounds
+from throwcollect.sweep.trials import Trials
 from throwcollect.tasks.task import task_of
 
 _MANY_TRIALS = 500
@@ -45,36 +46,37 @@ def draw_plan(config: Config, *, directory: Path, processes: int = 1, say: Say =
         ConfigError: If the sweep cannot be drawn, or no trial is left.
         WorkerError: If a process that checks trials is killed.
     """
-    plan = make_plan(config, directory=directory)
-    keys, count = plan.keys, len(plan.trials)
-    values = np.array([[trial.values[key] for key in keys] for trial in plan.trials])
-    pieces = [values[first : first + _TRIALS_A_PIECE] for first in range(0, count, _TRIALS_A_PIECE)]
+    points = draw_first_points(config, directory=directory)
+    count = len(points.values)
+    pieces = [(first, points.values[first : first + _TRIALS_A_PIECE]) for first in range(0, count, _TRIALS_A_PIECE)]
     found = work_side_by_side(
         pieces,
-        _find_refusals,
-        (config, keys),
+        _make_checked_trials,
+        (config, points.keys),
         processes=processes if count >= _MANY_TRIALS else 1,
         doing="checks trials",
     )
-    reasons: list[str | None] = []
+    trials = next(found)
     told = time.monotonic()
     for piece in found:
-        reasons += piece
+        trials.extend(piece)
         if time.monotonic() >= told + _TELL_EVERY_S:
             told = time.monotonic()
-            say(f"plan: {len(reasons)} of {count} trials checked")
-    return plan.refuse(reasons)
+            say(f"plan: {len(trials)} of {count} trials checked")
+    check_some_left(trials)
+    return Plan(config, trials)
 
 
-def _find_refusals(config: Config, keys: tuple[str, ...]) -> Callable[[NDArray[np.float64]], list[str | None]]:
-    """Make what says of trials, by rows of their values, why they cannot be run; None of those that can."""
+def _make_checked_trials(config: Config, keys: tuple[str, ...]) -> Callable[[tuple[int, NDArray[np.float64]]], Trials]:
+    """Make what makes trials of the number of the first one and their values, refused where they cannot be run."""
     check = feasibility_check(config)
 
-    def find(rows: NDArray[np.float64]) -> list[str | None]:
-        trials = (dict(zip(keys, row, strict=True)) for row in rows.tolist())
-        return [refusal(with_values(config, values), check) for values in trials]
+    def make(piece: tuple[int, NDArray[np.float64]]) -> Trials:
+        first, values = piece
+        trials = make_trials(config, Points(keys, values), first=first)
+        return trials.refuse([refusal(with_values(config, trial.values), check) for trial in trials])
 
-    return find
+    return make
 
 
 def feasibility_check(config: Config) -> Check:

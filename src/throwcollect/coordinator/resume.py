@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection
 from dataclasses import replace
 from pathlib import Path
+
+import numpy as np
 
 from throwcollect.config.loader import dump_yaml, load, load_locating_errors
 from throwcollect.config.problems import quote
@@ -19,7 +21,7 @@ from throwcollect.dataset.throws_table import read_throws
 from throwcollect.dataset.verify_tables import find_wrong_trials
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError, Problem
 from throwcollect.files import check_regular, is_there, remove, write_file
-from throwcollect.sweep.plan import Plan, Trial
+from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.point_file import encode_points
 from throwcollect.tasks.result import LOST
 from throwcollect.wording import command
@@ -221,14 +223,15 @@ def _extend(directory: Path, old: Plan | None, new: Plan) -> Plan:
             expected=f"{len(old.trials)} or more",
             hint="throwcollect dataset sample takes some of them into a new dataset",
         )
-    if _identities(old.trials[:count]) != _identities(new.trials[:count]):
+    before, after = old.trials[:count], new.trials[:count]
+    if not np.array_equal(before.digests, after.digests) or before.refused.keys() != after.refused.keys():
         raise ConfigError(
             [Problem(f"the sampler {new.config.sweep.sampler} draws other trials when there are more", key="trials")],
             expected=f"{len(old.trials)}, as {directory} was begun with",
             hint="sobol and uniform go on where they ended; or merge datasets: throwcollect dataset merge",
         )
-    return replace(new, trials=(*new.trials, *old.trials[count:]))
-
-
-def _identities(trials: Sequence[Trial]) -> list[tuple[str, bool]]:
-    return [(trial.digest, trial.refused is None) for trial in trials]
+    if count < len(old.trials):
+        trials = new.trials[:]
+        trials.extend(old.trials[count:])
+        new = replace(new, trials=trials)
+    return new

@@ -12,7 +12,7 @@ from typing import Any
 
 from throwcollect.config.schema import Config
 from throwcollect.dataset.bag import FileSummary, bag_information, read_bag_metadata
-from throwcollect.dataset.digest import combine_digests, is_digest
+from throwcollect.dataset.digest import combine_digests
 from throwcollect.dataset.directory import CARD, FORMAT, METADATA, SHARD_SUFFIX, THROWS
 from throwcollect.dataset.findings import Finding
 from throwcollect.dataset.verify_episode import EpisodeCheck
@@ -23,6 +23,7 @@ from throwcollect.dataset.verify_tables import Tables, check_tables, shard_of
 from throwcollect.errors import DatasetError
 from throwcollect.robots.description import is_available as robot_is_available
 from throwcollect.side_by_side import work_side_by_side
+from throwcollect.sweep.digest import is_digest
 
 _MANY_EPISODES = 1000
 """From here on, checking files side by side is worth the start of processes."""
@@ -130,7 +131,7 @@ def _trials_by_file(directory: Path, tables: Tables) -> dict[str, list[int]] | N
     if tables.plan is None or tables.rows is None:
         return None
     names, expected = _list_shards(directory), dict[str, list[int]]()
-    refused = {trial.number for trial in tables.plan.trials if trial.refused is not None}
+    refused = tables.plan.trials.refused
     for trial in sorted({*range(len(tables.plan.trials)), *tables.rows}):
         name, row = shard_of(tables.plan, trial), tables.rows.get(trial)
         # A trial whose row is missing most likely has an episode.

@@ -59,7 +59,7 @@ def _describe_unchecked(dataset: Dataset, replay: int | None) -> str:
     else:
         more = command("dataset", "verify", dataset.directory, "--replay", _SUGGESTED)
         told = f"not checked: whether the simulation gives the same throws again ({more})"
-    run = sum(trial.refused is None for trial in dataset.plan.trials)
+    run = len(dataset.plan.trials) - len(dataset.plan.trials.refused)
     if run > CHECKED_AGAIN and is_available(dataset.config):
         told += f"; whether the robot can do them was checked of {CHECKED_AGAIN} of {run} trials"
     return told
