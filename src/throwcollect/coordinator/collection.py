@@ -32,6 +32,7 @@ from throwcollect.wording import command, format_count
 _RATE_WINDOW_S = 10.0
 """Throws per second are averaged over this time."""
 _SYNC_EVERY_S = 1.0
+_TELL_EVERY_S = 2.0
 """Real time of collecting that a power cut may cost."""
 
 
@@ -72,12 +73,13 @@ class TrialCollection:
         self._synced_at = time.monotonic()
 
     @classmethod
-    def open(cls, directory: Path, *, say: Callable[[str], object]) -> TrialCollection:
+    def open(cls, directory: Path, *, say: Callable[[str], object], processes: int = 1) -> TrialCollection:
         """Open a dataset to collect into, and count what an earlier collection has left there as done.
 
         Args:
             directory: Directory of the dataset, as `prepare` or `resume` left it.
-            say: Is told how much was there.
+            say: Is told how much was there, and before that how far the search has come, if it takes long.
+            processes: As `DatasetWriter.recover` takes it.
 
         Raises:
             DatasetError: If the directory holds no plan, or another process collects into it.
@@ -85,7 +87,17 @@ class TrialCollection:
         """
         writer = DatasetWriter.open(directory)
         there: list[tuple[int, Result]] = []
-        if found := writer.recover(lambda trial, result: there.append((trial, result))):
+        told = time.monotonic()
+
+        def tell(trial: int, result: Result) -> None:
+            nonlocal told
+            # Episodes come file by file, so these are all of some files.
+            if there and time.monotonic() >= told + _TELL_EVERY_S:
+                told = time.monotonic()
+                say(f"has found {format_count(len(there), 'episode')} of an earlier collection so far")
+            there.append((trial, result))
+
+        if found := writer.recover(tell, processes=processes):
             say(f"keeps {format_count(found, 'episode')} of an earlier collection")
         collection = cls(writer)
         for trial, result in there:

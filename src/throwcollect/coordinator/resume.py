@@ -14,7 +14,7 @@ from throwcollect.config.schema import Config
 from throwcollect.config.values import differences
 from throwcollect.coordinator.prepare import draw_plan, make_self_contained, prepare, read_listed_points
 from throwcollect.dataset.completeness import find_damage, is_as_written
-from throwcollect.dataset.directory import CONFIG, METADATA, PLAN, SOURCES, TRIALS, config_path
+from throwcollect.dataset.directory import CONFIG, METADATA, PLAN, SHARD_SUFFIX, SOURCES, TRIALS, config_path
 from throwcollect.dataset.lock import hold_alone
 from throwcollect.dataset.recovery import remove_unfinished
 from throwcollect.dataset.throws_table import read_throws
@@ -29,6 +29,8 @@ from throwcollect.wording import command
 Say = Callable[[str], None]
 
 _MAY_GROW = ("trials", "until")
+_MUCH_BYTES = 50_000_000
+"""A core takes a second to look through so much."""
 
 
 def begun(directory: Path) -> bool:
@@ -48,7 +50,7 @@ def resume(
         directory: Directory of the dataset.
         sweep_directory: Where a relative `sweep.file` is looked for, should the plan be made anew.
         check: Whether the files of a finished dataset are compared byte for byte, and not only by their sizes.
-        say: Told what of a finished dataset is missing or damaged.
+        say: Told what of a finished dataset is missing or damaged, and what the coordinator has to look through.
 
     Raises:
         ConfigError: If the configuration is another one, or has fewer trials, or other ones.
@@ -71,7 +73,9 @@ def resume(
             # It is drawn again; one that grew with the results cannot be, and stays if its trials are what they were.
             old = None
         remove_unfinished(directory)
-        return _write(config, directory, sweep_directory, stored, old, damaged)
+        plan = _write(config, directory, sweep_directory, stored, old, damaged)
+        _announce_search(directory, say)
+        return plan
 
 
 def prepare_or_resume(path: Path, directory: Path) -> Plan:
@@ -120,6 +124,15 @@ def _write(
     if replanned or PLAN in damaged:
         plan.write(directory / PLAN)
     return plan
+
+
+def _announce_search(directory: Path, say: Say) -> None:
+    """Say how much an earlier collection has left, if looking through it takes long."""
+    if is_there(directory / METADATA):
+        return
+    size = sum(path.lstat().st_size for path in directory.glob(f"*{SHARD_SUFFIX}*"))
+    if size >= _MUCH_BYTES:
+        say(f"{directory}: looks through {size / 1e6:.0f} MB of recordings first; whole episodes stay")
 
 
 def _find_damaged(directory: Path, plan: Plan | None, *, check: bool, say: Say) -> frozenset[str]:

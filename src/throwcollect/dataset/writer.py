@@ -36,7 +36,7 @@ from throwcollect.dataset.journal import Event, Journal, was_open
 from throwcollect.dataset.lock import hold_together
 from throwcollect.dataset.manifest import FileEntry
 from throwcollect.dataset.provenance import Provenance, write_provenance
-from throwcollect.dataset.recovery import recover_shard, remove_unfinished
+from throwcollect.dataset.recovery import find_left, recover_shard, remove_unfinished
 from throwcollect.dataset.shard import FinishedShard, OpenShard
 from throwcollect.dataset.throws_table import Place, Row, ThrowsTable
 from throwcollect.episode.channels import Channels
@@ -137,28 +137,30 @@ class DatasetWriter:
             writer._held = held.pop_all()
         return writer
 
-    def recover(self, tell: Tell | None = None) -> int:
+    def recover(self, tell: Tell | None = None, *, processes: int = 1) -> int:
         """Take in what earlier writers have left: every episode that is whole stays, everything else is removed.
 
-        This makes a finished dataset an unfinished one, even if all its trials have ended; `finish` writes the same
-        files again.
+        A finished dataset is an unfinished one then, even if all its trials have ended; `finish` writes the same files.
 
         Args:
             tell: Called for each trial that has an episode, in order of shards.
+            processes: How many processes may look through the recordings of a large dataset, as `find_left` takes it.
 
         Returns:
             Number of episodes.
 
         Raises:
             DatasetError: If files cannot be read or written.
+            WorkerError: If a process that looks through recordings is killed.
         """
         remove_unfinished(self._directory)
         for name in (METADATA, MANIFEST, THROWS):
             remove(self._directory / name)
         found = 0
-        for number in sorted(self._unfinished):
-            shard = self._shard(number)
-            recovered = recover_shard(shard, self.plan, self._channels, keep=self._settled(number))
+        shards = {number: self._shard(number) for number in sorted(self._unfinished)}
+        all_left = find_left(shards, self.plan, self._channels, settled=self._settled, processes=processes)
+        for (number, shard), left in zip(shards.items(), all_left, strict=True):
+            recovered = recover_shard(shard, left)
             for each in recovered.episodes:
                 place = Place(shard.path.name, -1, each.samples, each.digest)
                 self._rows[number][each.trial] = self._row(each.trial, each.result, place)

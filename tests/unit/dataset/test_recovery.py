@@ -18,6 +18,7 @@ from throwcollect.dataset.creation import create
 from throwcollect.dataset.verify import verify
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.errors import DatasetError
+from throwcollect.side_by_side import work_side_by_side
 from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.round_file import append_round
 from throwcollect.tasks.throw.outcome import ThrowResult
@@ -149,6 +150,33 @@ def test_a_collection_killed_at_any_instant_goes_on_to_the_same_files(
         shutil.rmtree(directory)
         call, died = call + 1, killed.died
     assert call > 40
+
+
+def test_several_processes_keep_the_same_episodes(
+    trials: Trials, expected: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    directory = tmp_path / "dataset"
+    create(directory, trials.plan)
+    begun = DatasetWriter.open(directory)
+    for trial in [1, 0, 3]:
+        trials.append(begun, trial)
+    abandon(begun)
+    monkeypatch.setattr("throwcollect.dataset.recovery._MANY_EPISODES", 1)
+    there: dict[int, ThrowResult] = {}
+    asked = []
+
+    def ask(pieces: Any, *others: Any, processes: int, **named: Any) -> Any:
+        asked.append(processes)
+        return work_side_by_side(pieces, *others, processes=processes, **named)
+
+    monkeypatch.setattr("throwcollect.dataset.recovery.work_side_by_side", ask)
+    writer = DatasetWriter.open(directory)
+    assert writer.recover(there.__setitem__, processes=2) == 3
+    abandon(writer)
+    assert asked == [2]
+    assert there == {trial: trials.results[trial] for trial in [0, 1, 3]}
+    assert trials.go_on(directory) == {0, 1, 3}
+    assert files_of(directory) == expected
 
 
 @settings(
