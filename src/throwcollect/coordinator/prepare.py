@@ -28,6 +28,8 @@ from throwcollect.tasks.task import task_of
 _MANY_TRIALS = 500
 """From here on, checking trials side by side is worth the start of processes."""
 _TRIALS_A_PIECE = 100
+_MOST_PIECES = 10_000
+"""To hand over many more takes a minute, in which nothing is found and Ctrl-C has to wait."""
 _TELL_EVERY_S = 10.0
 _LEAST_BYTES = 40
 """Of a trial in the file of a plan: its digest and its seed, which nothing compresses."""
@@ -55,7 +57,8 @@ def draw_plan(config: Config, *, directory: Path, processes: int = 1, say: Say =
 def _check_trials(config: Config, points: Points, *, processes: int, say: Say) -> Plan:
     """The plan of points, in which trials are refused that the robot cannot do; as `draw_plan`."""
     count = len(points.values)
-    pieces = [(first, points.values[first : first + _TRIALS_A_PIECE]) for first in range(0, count, _TRIALS_A_PIECE)]
+    size = max(_TRIALS_A_PIECE, count // _MOST_PIECES)
+    pieces = [(first, points.values[first : first + size]) for first in range(0, count, size)]
     found = work_side_by_side(
         pieces,
         _make_checked_trials,
