@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -27,7 +28,11 @@ from throwcollect.tasks.task import task_of
 _MANY_TRIALS = 500
 """From here on, checking trials side by side is worth the start of processes."""
 _TRIALS_A_PIECE = 100
+_MOST_PIECES = 10_000
+"""To hand over many more takes a minute, in which nothing is found and Ctrl-C has to wait."""
 _TELL_EVERY_S = 10.0
+_LEAST_BYTES = 40
+"""Of a trial in the file of a plan: its digest and its seed, which nothing compresses."""
 
 Say = Callable[[str], object]
 
@@ -46,9 +51,14 @@ def draw_plan(config: Config, *, directory: Path, processes: int = 1, say: Say =
         ConfigError: If the sweep cannot be drawn, or no trial is left.
         WorkerError: If a process that checks trials is killed.
     """
-    points = draw_first_points(config, directory=directory)
+    return _check_trials(config, draw_first_points(config, directory=directory), processes=processes, say=say)
+
+
+def _check_trials(config: Config, points: Points, *, processes: int, say: Say) -> Plan:
+    """The plan of points, in which trials are refused that the robot cannot do; as `draw_plan`."""
     count = len(points.values)
-    pieces = [(first, points.values[first : first + _TRIALS_A_PIECE]) for first in range(0, count, _TRIALS_A_PIECE)]
+    size = max(_TRIALS_A_PIECE, count // _MOST_PIECES)
+    pieces = [(first, points.values[first : first + size]) for first in range(0, count, size)]
     found = work_side_by_side(
         pieces,
         _make_checked_trials,
@@ -119,6 +129,22 @@ def read_listed_points(config: Config, *, directory: Path) -> Points | None:
     return None if config.sweep.file is None else read_points(directory / config.sweep.file, config)
 
 
+def _check_room(directory: Path, trials: int) -> None:
+    """Make sure, before trials are checked for hours, that the disk is not too small for their plan at any rate.
+
+    Raises:
+        ConfigError: If it is.
+    """
+    there = next((each for each in (directory, *directory.absolute().parents) if each.is_dir()), None)
+    least, free = trials * _LEAST_BYTES, None if there is None else shutil.disk_usage(there).free
+    if free is not None and free < least:
+        sizes = f"takes {least / 1e6:.1f} MB or more, and {free / 1e6:.1f} MB are free"
+        raise ConfigError(
+            f"{directory}: a plan of {trials} trials {sizes}",
+            hint="free space on that disk, or choose another one with --output",
+        )
+
+
 def prepare(
     config: Config, directory: Path, *, sweep_directory: Path, processes: int = 1, say: Say = lambda _: None
 ) -> Plan:
@@ -135,7 +161,9 @@ def prepare(
         ConfigError: If the sweep or the directory cannot be used; nothing is left behind then.
         WorkerError: If a process that checks trials is killed.
     """
-    plan = draw_plan(config, directory=sweep_directory, processes=processes, say=say)
+    points = draw_first_points(config, directory=sweep_directory)
+    _check_room(directory, len(points.values))
+    plan = _check_trials(config, points, processes=processes, say=say)
     plan = replace(plan, config=make_self_contained(config))
     try:
         create(directory, plan, listed=read_listed_points(config, directory=sweep_directory))
