@@ -18,6 +18,7 @@ FIGURE = ROOT / "docs" / "architecture.svg"
 PLACES: dict[str, tuple[float, int, str]] = {
     "cli": (2.6, 0, "commands, exit codes"),
     "cluster": (0.3, 1, "Slurm: many machines"),
+    "serve": (3.0, 1, "browsers and programs"),
     "runs": (0.3, 2, "prepare, follow, stop"),
     "simulator": (1.5, 2, "throws for Python"),
     "runtimes": (0.3, 3, "where nodes live"),
