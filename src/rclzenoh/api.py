@@ -21,7 +21,7 @@ from rclzenoh.interfaces import deserialize as deserialize_message
 from rclzenoh.interfaces import get_action, get_message, get_service
 from rclzenoh.interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
 from rclzenoh.node import Node
-from rclzenoh.parameter import Parameter
+from rclzenoh.parameter import Parameter, parameter_value_to_python
 from rclzenoh.publisher import Publisher
 from rclzenoh.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclzenoh.task import Future
@@ -59,6 +59,7 @@ __all__ = [
     "get_service",
     "graph_changes",
     "let_callbacks_wait",
+    "parameter_value_to_python",
     "pass_on_log",
     "provide_time",
     "shutdown",

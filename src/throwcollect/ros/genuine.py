@@ -31,7 +31,7 @@ from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedE
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.logging import get_logger
 from rclpy.node import Node
-from rclpy.parameter import Parameter
+from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
@@ -289,6 +289,7 @@ __all__ = [
     "init",
     "joins_protected",
     "let_callbacks_wait",
+    "parameter_value_to_python",
     "pass_on_log",
     "provide_time",
     "shutdown",

@@ -101,7 +101,7 @@ def _field_types(message_class: Any) -> Mapping[str, str]:
 
 
 @cache
-def _array_parts(kind: str) -> tuple[str, int | None, int | None] | None:
+def array_parts(kind: str) -> tuple[str, int | None, int | None] | None:
     """Type of the elements of an array, their largest number, and their number; None if it is no array."""
     found = _ARRAY.fullmatch(kind)
     if found is None:
@@ -111,12 +111,12 @@ def _array_parts(kind: str) -> tuple[str, int | None, int | None] | None:
 
 
 def _element(kind: str) -> str:
-    parts = _array_parts(kind)
+    parts = array_parts(kind)
     return parts[0] if parts else ""
 
 
 def _convert(kind: str, value: object, path: str, current: Any = None) -> Any:
-    if parts := _array_parts(kind):
+    if parts := array_parts(kind):
         element, most, length = parts
         if element in _DTYPES:
             found: Any = _numbers(element, value, current)
@@ -186,4 +186,4 @@ def _check_numbers(kind: str, values: list[Any]) -> list[Any]:
 
 
 def _is_message(kind: str) -> bool:
-    return "/" in kind and _array_parts(kind) is None
+    return "/" in kind and array_parts(kind) is None

@@ -2,6 +2,7 @@
 
 from throwcollect.serve.rosbridge.bridge import Bridge
 from throwcollect.serve.rosbridge.client import Client
+from throwcollect.serve.rosbridge.file_server import find_packages
 from throwcollect.serve.rosbridge.websocket import attend
 
-__all__ = ["Bridge", "Client", "attend"]
+__all__ = ["Bridge", "Client", "attend", "find_packages"]

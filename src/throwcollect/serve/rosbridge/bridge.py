@@ -7,14 +7,17 @@ import itertools
 import logging
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from pathlib import Path
 from queue import Empty, SimpleQueue
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from throwcollect.errors import ThrowcollectError
 from throwcollect.ros.endpoint import answers
 from throwcollect.serve.rosbridge.client import Client
 from throwcollect.serve.rosbridge.codec import Frame
+from throwcollect.serve.rosbridge.file_server import FileServer
 from throwcollect.serve.rosbridge.session import Session
 
 if TYPE_CHECKING:
@@ -34,9 +37,14 @@ class Bridge:
 
     Args:
         connection: The way into the run; None while its router has no address, until `move` tells it.
+        packages: Directories of the packages of the robot's description, by name; `find_packages` finds them.
+
+    Attributes:
+        files: What gives clients files of these packages.
     """
 
-    def __init__(self, connection: Connection | None) -> None:
+    def __init__(self, connection: Connection | None, packages: Mapping[str, Path] = MappingProxyType({})) -> None:
+        self.files = FileServer(packages)
         self._connection = connection
         self._session: Session | None = None
         self._joined: Connection | None = None
@@ -127,22 +135,25 @@ class Bridge:
         self._leave()
 
     def _spin(self, session: Session, seconds: float) -> None:
-        try:
-            session.executor.spin_once(timeout_sec=seconds)
-        except Exception:
-            # Whatever becomes of one callback, the others go on.
-            _logger.exception("a callback of the bridge failed")
+        self._attempt(lambda: session.executor.spin_once(timeout_sec=seconds))
 
     def _do_next(self, seconds: float = 0.0) -> None:
         try:
             action = self._work.get(timeout=seconds) if seconds else self._work.get_nowait()
         except Empty:
             return
-        action()
+        self._attempt(action)
+
+    def _attempt(self, action: Callable[[], None]) -> None:
+        try:
+            action()
+        except Exception:
+            # Whatever becomes of one thing, the others go on.
+            _logger.exception("the bridge could not do something")
 
     def _call_timers(self) -> None:
         while self._timers and self._timers[0][0] <= time.monotonic():
-            heapq.heappop(self._timers)[2]()
+            self._attempt(heapq.heappop(self._timers)[2])
 
     def _look(self) -> None:
         """Join the run if its router answers, and notice when it does not any more."""

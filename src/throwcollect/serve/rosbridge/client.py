@@ -10,12 +10,21 @@ from typing import Protocol
 
 from throwcollect.errors import ConfigError, ThrowcollectError
 from throwcollect.serve.rosbridge.codec import Frame, cbor_bytes, fragments, json_text, read_frame
+from throwcollect.serve.rosbridge.file_server import GET_FILE, FileServer
+from throwcollect.serve.rosbridge.goals import Goal, Goals
+from throwcollect.serve.rosbridge.offered_actions import OfferedActions
+from throwcollect.serve.rosbridge.offered_services import OfferedServices
 from throwcollect.serve.rosbridge.peer import Level, Part
+from throwcollect.serve.rosbridge.publishers import Publishers
+from throwcollect.serve.rosbridge.questions import Questions
+from throwcollect.serve.rosbridge.reassembly import Reassembly
 from throwcollect.serve.rosbridge.request import Form, Request, RequestId, sentence
-from throwcollect.serve.rosbridge.rosapi import Rosapi
-from throwcollect.serve.rosbridge.service_calls import Call, ServiceCalls
+from throwcollect.serve.rosbridge.rosapi import SET_PARAMETER, Answer, Rosapi
+from throwcollect.serve.rosbridge.service_calls import Call, call_node
 from throwcollect.serve.rosbridge.session import Session
 from throwcollect.serve.rosbridge.subscriptions import Subscriptions
+
+Operation = Callable[[Request], None]
 
 _logger = logging.getLogger(__name__)
 
@@ -33,6 +42,10 @@ class Host(Protocol):
     @property
     def is_connected(self) -> bool:
         """Whether it has one."""
+
+    @property
+    def files(self) -> FileServer:
+        """Files of the robot."""
 
     def later(self, seconds: float, action: Callable[[], None]) -> None:
         """Have something done after a time [s], in the bridge's thread."""
@@ -60,15 +73,37 @@ class Client:
         self._frames: deque[Frame] = deque()
         self._level = "error"
         self._is_closed = False
-        self._rosapi = Rosapi(self)
-        self._subscriptions = Subscriptions(self)
-        self._calls = ServiceCalls(self)
-        self._parts: tuple[Part, ...] = (self._subscriptions, self._calls)
-        self._operations: Mapping[str, Callable[[Request], None]] = {
-            "set_level": self._set_level,
-            "subscribe": self._subscriptions.subscribe,
-            "unsubscribe": self._subscriptions.unsubscribe,
+        self._questions = Questions(self)
+        self._goals = Goals(self)
+        subscriptions, publishers = Subscriptions(self), Publishers(self)
+        services, actions = OfferedServices(self), OfferedActions(self)
+        self._parts: tuple[Part, ...] = (subscriptions, publishers, services, actions, self._questions, self._goals)
+        self._reassembly = Reassembly()
+        rosapi = Rosapi(self, self._questions).answers
+        self._answers: Mapping[str, Answer] = {**rosapi, GET_FILE: host.files.answer}
+        self._looking: Mapping[str, Operation] = {
+            "subscribe": subscriptions.subscribe,
+            "unsubscribe": subscriptions.unsubscribe,
             "call_service": self._call_service,
+            "fragment": self._take_part,
+            "set_level": self._set_level,
+            "status": self._take_status,
+            "auth": self._authenticate,
+        }
+        self._acting: Mapping[str, Operation] = {
+            "advertise": publishers.advertise,
+            "unadvertise": publishers.unadvertise,
+            "publish": publishers.publish,
+            "advertise_service": services.advertise,
+            "unadvertise_service": services.unadvertise,
+            "service_response": services.respond,
+            "send_action_goal": self._send_goal,
+            "cancel_action_goal": self._goals.cancel,
+            "advertise_action": actions.advertise,
+            "unadvertise_action": actions.unadvertise,
+            "action_feedback": actions.tell,
+            "action_result": actions.end,
+            "action_status": actions.settle,
         }
 
     @property
@@ -105,7 +140,8 @@ class Client:
         """Have everything again, in a new session."""
         for part in self._parts:
             part.restore()
-        self.say("error", "the router of the run is back")
+        if self._level != "none":
+            self.answer({"op": "status", "level": "info", "msg": "the router of the run is back"}, Form())
         self.work_off()
 
     def later(self, seconds: float, action: Callable[[], None]) -> None:
@@ -145,9 +181,11 @@ class Client:
         try:
             request = read_frame(frame)
             number = request.id
-            operation = self._operations.get(request.op)
+            operation = self._looking.get(request.op) or self._acting.get(request.op)
             if operation is None:
-                raise ConfigError(f"no operation {request.op}", expected=", ".join(self._operations))
+                raise ConfigError(f"no operation {request.op}", expected=", ".join([*self._looking, *self._acting]))
+            if request.op in self._acting and request.op != "send_action_goal":
+                self._require_writing(request.op)
             operation(request)
         except ThrowcollectError as error:
             self.say("error", sentence(error), number)
@@ -165,10 +203,46 @@ class Client:
     def _call_service(self, request: Request) -> None:
         call = Call(self, request)
         try:
-            answer = self._rosapi.answers.get(call.given.lstrip("/"))
-            if answer is not None:
-                answer(call)
+            call.form = request.form()
+            name = call.given.lstrip("/")
+            if name not in self._answers or name == SET_PARAMETER:
+                self._require_writing(call.given)
+            if name in self._answers:
+                self._answers[name](call)
             else:
-                self._calls.call(call, request)
+                call_node(self, self._questions, call, request)
         except ThrowcollectError as error:
             call.fail(sentence(error))
+
+    def _send_goal(self, request: Request) -> None:
+        goal = Goal(self, request)
+        try:
+            self._require_writing(request.op)
+            self._goals.send(goal, request)
+        except ThrowcollectError as error:
+            goal.fail(sentence(error))
+
+    def _require_writing(self, what: str) -> None:
+        """Refuse what changes something to a client that may only look.
+
+        Raises:
+            ConfigError: If it is such a client.
+        """
+        if self._read_only:
+            raise ConfigError(f"{what}: this client may only look", expected="the token of those who may act")
+
+    def _take_part(self, request: Request) -> None:
+        frame = self._reassembly.add(request)
+        if frame is not None:
+            self._handle(frame)
+
+    def _take_status(self, request: Request) -> None:
+        _logger.info("a client says: %s", request.text_or("msg", ""))
+
+    def _authenticate(self, request: Request) -> None:
+        """Refuse the way of ROS 1 to say who one is.
+
+        Raises:
+            ConfigError: Always.
+        """
+        raise ConfigError(f"{request.op}: nobody has to say who he is here", expected="the token in the address")

@@ -32,20 +32,17 @@ _LONGEST = 200
 """Characters of a name that cannot be right; it is told in messages."""
 
 
-class Request:
-    """One operation of the protocol.
+class Fields:
+    """Fields by name, as a client gives them.
 
-    Attributes:
-        op: Which one.
-        id: What the client calls it by, as it gave it; None if it did not.
+    Args:
+        fields: The fields.
+        what: What they belong to; messages begin with it.
     """
 
-    def __init__(self, fields: Mapping[Any, Any]) -> None:
+    def __init__(self, fields: Mapping[Any, Any], what: str) -> None:
         self._fields = fields
-        given = fields.get("id")
-        self.id: RequestId = given if isinstance(given, str | int) else None
-        self.op = ""
-        self.op = self.text("op")
+        self._what = what
 
     def text(self, name: str) -> str:
         """A field that has to be there.
@@ -109,6 +106,32 @@ class Request:
         """A field as it is; None if it was left out."""
         return self._fields.get(name)
 
+    def _wrong(self, name: str, what: str, value: object) -> ConfigError:
+        got = "nothing" if value is None else f"{value!r:.80}"
+        return ConfigError(f"{self._what}: {name} should be {what}, got {got}")
+
+
+class Request(Fields):
+    """One operation of the protocol.
+
+    Args:
+        fields: Its fields.
+
+    Attributes:
+        op: Which operation.
+        id: What the client calls it by.
+
+    Raises:
+        ConfigError: If it does not say which operation.
+    """
+
+    def __init__(self, fields: Mapping[Any, Any]) -> None:
+        super().__init__(fields, "frame")
+        self.op = self.text("op")
+        self._what = self.op
+        given = fields.get("id")
+        self.id: RequestId = given if isinstance(given, str | int) else None
+
     def form(self) -> Form:
         """How messages are sent that leave because of this.
 
@@ -119,10 +142,6 @@ class Request:
         if compression not in COMPRESSIONS:
             raise ConfigError(f"{self.op}: no compression {compression}", expected="none, cbor or cbor-raw")
         return Form(compression, self.natural_or("fragment_size", 0))
-
-    def _wrong(self, name: str, what: str, value: object) -> ConfigError:
-        got = "nothing" if value is None else f"{value!r:.80}"
-        return ConfigError(f"{self.op or 'request'}: {name} should be {what}, got {got}")
 
 
 def sentence(error: ThrowcollectError) -> str:

@@ -1,24 +1,19 @@
-"""Services that a client calls: those of nodes, and those that the bridge answers itself."""
+"""Calls of services by a client: how they are answered, and those of services that nodes have."""
 
 from __future__ import annotations
 
-import time
-from functools import partial
+from collections.abc import Mapping
 from typing import Any
 
+from throwcollect import ros
 from throwcollect.errors import ConfigError
-from throwcollect.ros.names import absolute_name, full_name
+from throwcollect.ros.names import absolute_name, find_interface, full_name
 from throwcollect.ros.values import fill
 from throwcollect.serve.rosbridge.codec import cbor_values, json_values
 from throwcollect.serve.rosbridge.guarded import refuse_secrets
 from throwcollect.serve.rosbridge.peer import Peer
-from throwcollect.serve.rosbridge.request import Request
-
-_READY_S = 5.0
-_POLL_S = 0.02
-_WATCH_S = 1.0
-_MOST = 1000
-"""Calls of one client that wait for an answer."""
+from throwcollect.serve.rosbridge.questions import Questions
+from throwcollect.serve.rosbridge.request import Fields, Form, Request
 
 
 class Call:
@@ -30,24 +25,24 @@ class Call:
 
     Attributes:
         given: Name of the service as the client has it.
-        arguments: Fields of the service's request.
+        arguments: Fields of the service's request, by name or in their order.
+        form: How the answer is sent.
 
     Raises:
-        ConfigError: If the request is malformed.
+        ConfigError: If the request does not say which service.
     """
 
     def __init__(self, client: Peer, request: Request) -> None:
         self._client = client
         self._id = request.id
-        self._form = request.form()
         self.given = request.text("service")
         self.arguments: Any = request.any("args")
-        self.is_open = True
+        self.form = Form()
 
     @property
-    def is_binary(self) -> bool:
-        """Whether the answer is CBOR."""
-        return self._form.compression != "none"
+    def fields(self) -> Fields:
+        """Fields of the service's request, by name."""
+        return Fields(self.arguments if isinstance(self.arguments, Mapping) else {}, self.given)
 
     def reply(self, values: object) -> None:
         """Answer with the fields of the response."""
@@ -58,98 +53,36 @@ class Call:
         self._answer(why, done=False)
 
     def _answer(self, values: object, *, done: bool) -> None:
-        if self.is_open:
-            self.is_open = False
-            fields = {"op": "service_response", "id": self._id, "service": self.given, "values": values, "result": done}
-            self._client.answer(fields, self._form)
+        fields = {"op": "service_response", "id": self._id, "service": self.given, "values": values, "result": done}
+        self._client.answer(fields, self.form)
 
 
-class ServiceCalls:
-    """The calls of services of nodes that one client has under way.
+def call_node(client: Peer, questions: Questions, call: Call, request: Request) -> None:
+    """Call a service that a node has.
 
     Args:
-        client: The client.
+        client: Who calls.
+        questions: What of the client waits for answers of nodes.
+        call: What is to be answered.
+        request: What the client asks.
+
+    Raises:
+        ConfigError: If there is no such service, or it cannot be called like this.
     """
+    service = absolute_name(call.given)
+    refuse_secrets(service, call.arguments)
+    there = dict(client.session.node.get_service_names_and_types()).get(service, [])
+    if not there:
+        raise ConfigError(f"nobody offers a service {service}")
+    wanted = full_name("srv", request.text_or("type", ""))
+    type_name = wanted if wanted in there else there[0]
+    message = find_interface("srv", ros.get_service, type_name).Request()
+    _fill_arguments(message, call.arguments)
 
-    def __init__(self, client: Peer) -> None:
-        self._client = client
-        self._open: list[Call] = []
+    def reply(response: Any) -> None:
+        call.reply(json_values(response) if call.form.compression == "none" else cbor_values(response))
 
-    def call(self, call: Call, request: Request) -> None:
-        """Call a service of a node.
-
-        Args:
-            call: What is to be answered.
-            request: What the client asks.
-
-        Raises:
-            ConfigError: If there is no such service, or it cannot be called like this.
-        """
-        service = absolute_name(call.given)
-        refuse_secrets(service, call.arguments)
-        if len(self._open) >= _MOST:
-            raise ConfigError(f"{service}: {_MOST} calls wait for an answer already")
-        timeout_s = request.seconds_or("timeout", float("inf"))
-        session = self._client.session
-        client = session.service_client(service, self._type_of(service, request.text_or("type", "")))
-        message = client.srv_type.Request()
-        _fill_arguments(message, call.arguments)
-        self._open.append(call)
-        self._send_when_ready(call, client, message, time.monotonic() + min(_READY_S, timeout_s))
-        if timeout_s < float("inf"):
-            self._client.later(timeout_s, partial(self._end, call, f"{service}: no answer within {timeout_s:g} s"))
-
-    def lose(self) -> None:
-        """Know that the session is gone, and all that it had."""
-        for call in list(self._open):
-            self._end(call, f"{call.given}: the router of the run has gone")
-
-    def restore(self) -> None:
-        """Have everything again: calls are not made anew."""
-
-    def close(self) -> None:
-        """Wait for no answer any more."""
-        for call in self._open:
-            call.is_open = False
-        self._open.clear()
-
-    def _type_of(self, service: str, wanted: str) -> str:
-        there = dict(self._client.session.node.get_service_names_and_types()).get(service, [])
-        if not there:
-            raise ConfigError(f"nobody offers a service {service}")
-        name = full_name("srv", wanted)
-        return name if name in there else there[0]
-
-    def _send_when_ready(self, call: Call, client: Any, message: Any, deadline: float) -> None:
-        if not call.is_open:
-            return
-        if client.service_is_ready():
-            client.call_async(message).add_done_callback(partial(self._finish, call))
-            self._watch(call, client)
-        elif time.monotonic() < deadline:
-            self._client.later(_POLL_S, partial(self._send_when_ready, call, client, message, deadline))
-        else:
-            self._end(call, f"{call.given}: nobody offers the service any more")
-
-    def _watch(self, call: Call, client: Any) -> None:
-        """Give a call up whose service has gone."""
-        if not call.is_open:
-            return
-        if client.service_is_ready():
-            self._client.later(_WATCH_S, partial(self._watch, call, client))
-        else:
-            self._end(call, f"{call.given}: the service has gone and has not answered")
-
-    def _finish(self, call: Call, future: Any) -> None:
-        if call.is_open:
-            response = future.result()
-            self._open.remove(call)
-            call.reply(cbor_values(response) if call.is_binary else json_values(response))
-
-    def _end(self, call: Call, why: str) -> None:
-        if call.is_open:
-            self._open.remove(call)
-            call.fail(why)
+    questions.ask(service, type_name, message, reply, call.fail, request.seconds_or("timeout", float("inf")))
 
 
 def _fill_arguments(message: Any, arguments: object) -> None:

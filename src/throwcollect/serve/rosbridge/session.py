@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +13,9 @@ from throwcollect.serve.rosbridge.feed import Feed, Listener
 
 if TYPE_CHECKING:
     from throwcollect.ros.connection import Connection
+
+
+_numbers = itertools.count()
 
 
 class Session:
@@ -33,7 +37,7 @@ class Session:
         self._context = ros.Context()
         ros.init(context=self._context, connection=connection)
         self.node = ros.Node(
-            f"_throwcollect_bridge_{os.getpid()}",
+            f"_throwcollect_bridge_{os.getpid()}_{next(_numbers)}",
             context=self._context,
             enable_rosout=False,
             start_parameter_services=False,
@@ -105,6 +109,14 @@ class Session:
         if key not in self._clients:
             self._clients[key] = self.node.create_client(find_interface("srv", ros.get_service, type_name), service)
         return self._clients[key]
+
+    def is_offered_by_others(self, service: str) -> bool:
+        """Whether another node than that of the bridge offers a service, given by its absolute name."""
+        return any(
+            service in dict(self.node.get_service_names_and_types_by_node(*other))
+            for other in self.node.get_node_names_and_namespaces()
+            if other[0] != self.node.get_name()
+        )
 
     def look_around(self) -> None:
         """Hear topics as their publishers offer them by now."""

@@ -12,9 +12,8 @@ from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 from throwcollect.serve.rosbridge.bridge import Bridge
 from throwcollect.serve.rosbridge.client import Client
 from throwcollect.serve.rosbridge.codec import Frame, json_text
+from throwcollect.serve.rosbridge.reassembly import LONGEST_FRAME
 
-LONGEST_FRAME = 10 * 2**20
-"""Bytes of a frame that a client may send."""
 MOST_FRAMES = 1000
 MOST_BYTES = 32 * 2**20
 """What waits for a client that reads slowly; more than either, and the oldest is dropped."""

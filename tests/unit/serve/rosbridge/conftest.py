@@ -35,8 +35,13 @@ class Party:
 
     def __init__(self, bridge: Bridge, *, read_only: bool = False) -> None:
         self.frames: list[str | bytes] = []
-        self.client = bridge.attach(self.frames.append, read_only=read_only)
+        self.times: list[float] = []
+        self.client = bridge.attach(self._take, read_only=read_only)
         self._taken = 0
+
+    def _take(self, frame: str | bytes) -> None:
+        self.times.append(time.monotonic())
+        self.frames.append(frame)
 
     def ask(self, **fields: Any) -> None:
         self.client.receive(json.dumps(fields))
