@@ -11,12 +11,16 @@ from typing import Any
 
 import cbor2
 import pytest
+import uvicorn
+from starlette.applications import Starlette
+from starlette.routing import WebSocketRoute
+from starlette.websockets import WebSocket
 
 from throwcollect.ros import Context, ExternalShutdownException, Node, SingleThreadedExecutor, init
 from throwcollect.ros.connection import Connection
 from throwcollect.ros.router import router
 from throwcollect.run_key import RunKey
-from throwcollect.serve.rosbridge import Bridge
+from throwcollect.serve.rosbridge import Bridge, attend
 
 PATIENCE_S = 30.0
 
@@ -61,7 +65,7 @@ class Party:
 
         return wait_for(find, f"{wanted} in {self.got()[self._taken :]}")
 
-    def call(self, service: str, **arguments: Any) -> Any:
+    def call(self, service: str, /, **arguments: Any) -> Any:
         """Fields of the response of a service; or why it failed."""
         self.ask(op="call_service", id=f"call {service}", service=service, args=arguments)
         return self.next(op="service_response", id=f"call {service}")["values"]
@@ -78,6 +82,31 @@ def bridge(connection: Connection) -> Iterator[Bridge]:
     bridge = Bridge(connection)
     yield bridge
     bridge.close()
+
+
+@pytest.fixture(autouse=True)
+def _nothing_fails(caplog: pytest.LogCaptureFixture) -> Iterator[None]:
+    """What goes wrong in a bridge ends neither it nor a test, but is logged."""
+    yield
+    assert [each.exc_info for each in caplog.records if each.name.startswith("throwcollect.serve")] == []
+
+
+@pytest.fixture(scope="session")
+def url(bridge: Bridge) -> Iterator[str]:
+    """Where the bridge is, over WebSockets."""
+
+    async def route(websocket: WebSocket) -> None:
+        await attend(websocket, bridge)
+
+    app = Starlette(routes=[WebSocketRoute("/", route)])
+    config = uvicorn.Config(app, port=0, log_level="warning", lifespan="off", ws_per_message_deflate=False)
+    server = uvicorn.Server(config)
+    thread = threading.Thread(target=server.run, daemon=True)
+    thread.start()
+    wait_for(lambda: server.started)
+    yield f"ws://127.0.0.1:{server.servers[0].sockets[0].getsockname()[1]}/"
+    server.should_exit = True
+    thread.join()
 
 
 @pytest.fixture

@@ -2,39 +2,21 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
-import threading
-from collections.abc import Iterator
 from typing import Any
 
 import pytest
-import uvicorn
-from starlette.applications import Starlette
-from starlette.routing import WebSocketRoute
-from starlette.websockets import WebSocket
 from tests.unit.serve.rosbridge.conftest import wait_for
+from websockets.exceptions import ConnectionClosedError
 from websockets.sync.client import connect
 
 from throwcollect.ros import Node, get_message, get_service
-from throwcollect.serve.rosbridge import Bridge, attend
+from throwcollect.serve.rosbridge import websocket
+from throwcollect.serve.rosbridge.websocket import Outbox
 
 String: Any = get_message("std_msgs/msg/String")
 Trigger: Any = get_service("std_srvs/srv/Trigger")
-
-
-@pytest.fixture(scope="module")
-def url(bridge: Bridge) -> Iterator[str]:
-    async def route(websocket: WebSocket) -> None:
-        await attend(websocket, bridge)
-
-    app = Starlette(routes=[WebSocketRoute("/", route)])
-    server = uvicorn.Server(uvicorn.Config(app, port=0, log_level="warning", lifespan="off"))
-    thread = threading.Thread(target=server.run, daemon=True)
-    thread.start()
-    wait_for(lambda: server.started)
-    yield f"ws://127.0.0.1:{server.servers[0].sockets[0].getsockname()[1]}/"
-    server.should_exit = True
-    thread.join()
 
 
 def test_topics_are_listed_heard_and_services_called(url: str, node: Node) -> None:
@@ -69,3 +51,53 @@ def test_topics_are_listed_heard_and_services_called(url: str, node: Node) -> No
         assert json.loads(socket.recv()) == {"op": "publish", "topic": "words", "msg": {"data": "hello"}}
     wait_for(lambda: not publisher.get_subscription_count(), "who has left hears nothing any more")
     node.destroy_service(service)
+
+
+def test_a_frame_that_is_too_long_ends_the_connection(url: str) -> None:
+    with connect(url) as socket:
+        socket.send(json.dumps({"op": "nothing"}))
+        assert json.loads(socket.recv())["op"] == "status"
+        socket.send("ä" * (6 * 2**20))
+        with pytest.raises(ConnectionClosedError, match="1009"):
+            socket.recv()
+
+
+def test_who_does_not_read_loses_the_oldest_frames_and_holds_up_nobody(url: str, node: Node) -> None:
+    publisher = node.create_publisher(String, "/many", 10)
+    subscribe = json.dumps({"op": "subscribe", "topic": "/many", "type": "std_msgs/String"})
+    with connect(url, max_queue=1) as slow, connect(url) as quick:
+        for each in (slow, quick):
+            each.send(subscribe)
+        wait_for(publisher.get_subscription_count)
+        # More than the buffers of the connection hold.
+        for number in range(100):
+            publisher.publish(String(data=f"{number} " + "x" * 500_000))
+            assert json.loads(quick.recv())["msg"]["data"].startswith(f"{number} ")
+        publisher.publish(String(data="last"))
+        assert json.loads(quick.recv())["msg"]["data"] == "last"
+        told: list[Any] = []
+        while not told or told[-1].get("msg") != {"data": "last"}:
+            told.append(json.loads(slow.recv()))
+        assert len(told) < 100
+        statuses = [each["msg"] for each in told if each["op"] == "status"]
+        assert len(statuses) == 1
+        assert "the oldest are dropped" in statuses[0]
+
+
+def test_what_waits_to_be_sent_is_bounded_in_number_and_in_bytes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(websocket, "MOST_FRAMES", 10)
+    monkeypatch.setattr(websocket, "MOST_BYTES", 1200)
+
+    async def left_of(frames: list[str]) -> list[str]:
+        outbox = Outbox(asyncio.get_running_loop())
+        for frame in [*frames, "end"]:
+            outbox.put(frame)
+        found: list[str] = []
+        while found[-1:] != ["end"]:
+            found.append(str(await outbox.take()))
+        return [frame for frame in found if "the oldest are dropped" not in frame]
+
+    numbers = [f"{number:04}" for number in range(30)]
+    assert asyncio.run(left_of(numbers)) == [*numbers[-9:], "end"]
+    long = [f"{number:0300}" for number in range(5)]
+    assert asyncio.run(left_of(long)) == [*long[-3:], "end"]
