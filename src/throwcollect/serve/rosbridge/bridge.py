@@ -28,6 +28,8 @@ _logger = logging.getLogger(__name__)
 _LOOK_S = 1.0
 """Time between two looks at the router and at what publishers offer."""
 _RETRY_S = 0.2
+_MISSES = 2
+"""Looks at the router in a row without an answer by which it has gone: a busy machine may let one of them wait."""
 
 
 class Bridge:
@@ -55,6 +57,7 @@ class Bridge:
         self._lock = threading.Lock()
         self._closing = threading.Event()
         self._looked_at = 0.0
+        self._misses = 0
         self._thread = threading.Thread(target=self._run, name="rosbridge", daemon=True)
         self._thread.start()
 
@@ -164,7 +167,8 @@ class Bridge:
         self._looked_at = now
         wanted = self._connection
         there = wanted is not None and answers(wanted.endpoint)
-        if self._session is not None and (not there or wanted != self._joined):
+        self._misses = 0 if there else self._misses + 1
+        if self._session is not None and (self._misses >= _MISSES or wanted != self._joined):
             for client in self._clients:
                 client.lose()
             self._leave()

@@ -15,9 +15,11 @@ import uvicorn
 from starlette.applications import Starlette
 from starlette.routing import WebSocketRoute
 from starlette.websockets import WebSocket
+from tests.integration.robot import FOUND_BY_OTHERS_S, ON_DDS, discovery_server
 
 from throwcollect.ros import Context, ExternalShutdownException, Node, SingleThreadedExecutor, init
 from throwcollect.ros.connection import Connection
+from throwcollect.ros.middleware import Middleware
 from throwcollect.ros.router import router
 from throwcollect.run_key import RunKey
 from throwcollect.serve.rosbridge import Bridge, attend
@@ -32,6 +34,14 @@ def wait_for(condition: Callable[[], Any], what: str = "") -> Any:
         assert time.monotonic() < deadline, f"did not happen: {what}"
         time.sleep(0.002)
     return found
+
+
+def wait_for_listener(publisher: Any) -> None:
+    """Wait until somebody listens to a publisher, and knows of it."""
+    wait_for(publisher.get_subscription_count, f"somebody listens to {publisher.topic_name}")
+    if ON_DDS:
+        # Each side finds the other, and cannot know when the other has found it.
+        time.sleep(FOUND_BY_OTHERS_S)
 
 
 class Party:
@@ -73,8 +83,9 @@ class Party:
 
 @pytest.fixture(scope="session")
 def connection() -> Iterator[Connection]:
-    with router("tcp/127.0.0.1:0") as endpoint:
-        yield Connection(endpoint, RunKey(Path("/no/key")))
+    middleware = Middleware.of_process()
+    with discovery_server() if ON_DDS else router("tcp/127.0.0.1:0") as endpoint:
+        yield Connection(endpoint, RunKey(Path("/no/key")), middleware=middleware)
 
 
 @pytest.fixture(scope="session")

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.unit.serve.rosbridge.conftest import Party, wait_for
+from tests.unit.serve.rosbridge.conftest import Party, wait_for, wait_for_listener
 
 from throwcollect.ros import Context, Node, SingleThreadedExecutor, get_message, init
 from throwcollect.ros.connection import Connection
@@ -54,7 +54,7 @@ class Talker:
         self.publisher = self.node.create_publisher(String, "/words", 10)
 
     def say(self, text: str) -> None:
-        wait_for(self.publisher.get_subscription_count, "the bridge listens")
+        wait_for_listener(self.publisher)
         self.publisher.publish(String(data=text))
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import cbor2
 import numpy as np
 import pytest
-from tests.unit.serve.rosbridge.conftest import Party, wait_for
+from tests.unit.serve.rosbridge.conftest import Party, wait_for, wait_for_listener
 
 from rclzenoh.interfaces import serialize
 from throwcollect.ros import DurabilityPolicy, Node, QoSProfile, get_message
@@ -30,7 +30,7 @@ def words(node: Node, topic: str = "/words") -> Callable[..., None]:
     publisher = node.create_publisher(String, topic, 10)
 
     def say(*texts: str) -> None:
-        wait_for(publisher.get_subscription_count, f"somebody listens to {topic}")
+        wait_for_listener(publisher)
         for text in texts:
             publisher.publish(String(data=text))
 
@@ -145,7 +145,7 @@ def test_messages_come_as_cbor_with_typed_arrays_or_as_they_are(party: Party, no
     message = JointState(name=["a", "b"], position=[1.5, math.nan])
     for compression in ("cbor", "cbor-raw"):
         party.ask(op="subscribe", topic="/states", type="sensor_msgs/JointState", compression=compression)
-        wait_for(publisher.get_subscription_count)
+        wait_for_listener(publisher)
         publisher.publish(message)
         found = party.next(op="publish")["msg"]
         if compression == "cbor":

@@ -7,7 +7,7 @@ import json
 from typing import Any
 
 import pytest
-from tests.unit.serve.rosbridge.conftest import wait_for
+from tests.unit.serve.rosbridge.conftest import wait_for, wait_for_listener
 from websockets.exceptions import ConnectionClosedError
 from websockets.sync.client import connect
 
@@ -46,7 +46,7 @@ def test_topics_are_listed_heard_and_services_called(url: str, node: Node) -> No
             "result": True,
         }
         socket.send(json.dumps({"op": "subscribe", "topic": "words"}))
-        wait_for(publisher.get_subscription_count)
+        wait_for_listener(publisher)
         publisher.publish(String(data="hello"))
         assert json.loads(socket.recv()) == {"op": "publish", "topic": "words", "msg": {"data": "hello"}}
     wait_for(lambda: not publisher.get_subscription_count(), "who has left hears nothing any more")
@@ -68,7 +68,7 @@ def test_who_does_not_read_loses_the_oldest_frames_and_holds_up_nobody(url: str,
     with connect(url, max_queue=1) as slow, connect(url) as quick:
         for each in (slow, quick):
             each.send(subscribe)
-        wait_for(publisher.get_subscription_count)
+        wait_for_listener(publisher)
         # More than the buffers of the connection hold.
         for number in range(100):
             publisher.publish(String(data=f"{number} " + "x" * 500_000))
