@@ -13,6 +13,7 @@ from queue import Empty, SimpleQueue
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
+from throwcollect import ros
 from throwcollect.errors import ThrowcollectError
 from throwcollect.ros.endpoint import answers
 from throwcollect.serve.rosbridge.client import Client
@@ -124,7 +125,7 @@ class Bridge:
 
     def _run(self) -> None:
         while not self._closing.is_set():
-            self._look()
+            self._attempt(self._look)
             self._call_timers()
             wait_s = min(self._timers[0][0] - time.monotonic(), _LOOK_S) if self._timers else _LOOK_S
             if self._session is not None:
@@ -138,7 +139,11 @@ class Bridge:
         self._leave()
 
     def _spin(self, session: Session, seconds: float) -> None:
-        self._attempt(lambda: session.executor.spin_once(timeout_sec=seconds))
+        try:
+            self._attempt(lambda: session.executor.spin_once(timeout_sec=seconds))
+        except ros.ExternalShutdownException:
+            # Somebody has ended all contexts of this process.
+            self._lose()
 
     def _do_next(self, seconds: float = 0.0) -> None:
         try:
@@ -150,6 +155,8 @@ class Bridge:
     def _attempt(self, action: Callable[[], None]) -> None:
         try:
             action()
+        except ros.ExternalShutdownException:
+            raise
         except Exception:
             # Whatever becomes of one thing, the others go on.
             _logger.exception("the bridge could not do something")
@@ -169,9 +176,7 @@ class Bridge:
         there = wanted is not None and answers(wanted.endpoint)
         self._misses = 0 if there else self._misses + 1
         if self._session is not None and (self._misses >= _MISSES or wanted != self._joined):
-            for client in self._clients:
-                client.lose()
-            self._leave()
+            self._lose()
         if self._session is None and wanted is not None and there:
             self._join(wanted)
         if self._session is not None:
@@ -191,12 +196,17 @@ class Bridge:
         while not self._work.empty():
             self._do_next()
 
+    def _lose(self) -> None:
+        for client in self._clients:
+            client.lose()
+        self._leave()
+
     def _leave(self) -> None:
         with self._lock:
             session, self._session = self._session, None
         self._joined = None
         if session is not None:
-            session.close()
+            self._attempt(session.close)
 
 
 def _nothing() -> None:

@@ -51,9 +51,11 @@ class Session:
 
     def close(self) -> None:
         """Leave the graph."""
-        self.executor.shutdown()
-        self.node.destroy_node()
-        ros.shutdown(context=self._context)
+        try:
+            self.executor.shutdown()
+            self.node.destroy_node()
+        finally:
+            ros.shutdown(context=self._context)
 
     def type_of(self, topic: str, wanted: str) -> str:
         """Full name of the type of a topic.
