@@ -88,8 +88,11 @@ def _plain(value: Any, kind: str, numbers: Numbers) -> Any:
     if isinstance(value, bytes):
         return value[0] if kind == "octet" else list(value)
     if isinstance(value, Sequence) and not isinstance(value, str):
-        if _element(kind) == "octet":
+        element = _element(kind)
+        if element == "octet":
             return numbers(np.frombuffer(b"".join(value), np.uint8), "octet")
+        if element and "/" not in element:
+            return list(value)
         return [plain(each, numbers) for each in value]
     return plain(value, numbers) if "/" in kind else value
 

@@ -80,6 +80,8 @@ def test_what_a_client_has_and_asks_for_survives_the_router(routers: Routers) ->
     bridge.move(moved)
     assert party.next(op="status")["msg"] == "the router of the run is back"
     assert "/slow" in party.next(id="waits")["values"]["services"]
+    party.ask(**goal, id="another")
+    assert party.next(op="send_action_goal")["action"] == "/act"
     talker = Talker(moved)
     talker.say("again")
     assert party.next(op="publish")["msg"] == {"data": "again"}

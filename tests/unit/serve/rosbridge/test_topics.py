@@ -6,6 +6,7 @@ import json
 import math
 import time
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any
 
 import cbor2
@@ -15,7 +16,8 @@ from tests.unit.serve.rosbridge.conftest import Party, wait_for, wait_for_listen
 
 from rclzenoh.interfaces import serialize
 from throwcollect.ros import DurabilityPolicy, Node, QoSProfile, get_message
-from throwcollect.serve.rosbridge import Bridge
+from throwcollect.serve.rosbridge import Bridge, subscriptions
+from throwcollect.serve.rosbridge.subscriptions import Pace, Wish
 
 String: Any = get_message("std_msgs/msg/String")
 JointState: Any = get_message("sensor_msgs/msg/JointState")
@@ -121,12 +123,24 @@ def test_the_lowest_throttle_and_the_longest_queue_of_a_client_count(party: Part
     assert data(party)[before:] in ([], ["i"])
 
 
-def test_what_waits_in_a_queue_comes_at_even_times(party: Party, node: Node) -> None:
-    say = words(node)
-    party.ask(op="subscribe", topic="/words", type="std_msgs/String", throttle_rate=30, queue_length=100)
-    say(*map(str, range(20)))
-    wait_for(lambda: len(party.times) == 20)
-    assert party.times[-1] - party.times[0] == pytest.approx(19 * 0.03, rel=0.3)
+def test_what_waits_in_a_queue_comes_at_even_times_however_late_each_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = 100.0
+    monkeypatch.setattr(subscriptions, "time", SimpleNamespace(monotonic=lambda: now))
+    waiting: list[tuple[float, Callable[[], None]]] = []
+    sent: list[tuple[Any, float]] = []
+    pace = Pace(
+        lambda sample: sent.append((sample, now)), lambda seconds, action: waiting.append((now + seconds, action))
+    )
+    pace.change(Wish(throttle_s=0.03, queue_length=100))
+    samples: list[Any] = list(range(20))
+    for sample in samples:
+        pace.offer(sample)
+    while waiting:
+        due, action = waiting.pop()
+        now = due + 0.005
+        action()
+    assert [sample for sample, _ in sent] == samples
+    assert [time_s for _, time_s in sent[1:]] == pytest.approx([100.005 + 0.03 * number for number in range(1, 20)])
 
 
 def test_a_message_comes_in_parts_that_are_no_longer_than_wanted(party: Party, node: Node) -> None:
