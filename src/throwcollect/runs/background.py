@@ -6,6 +6,7 @@ Such a run has a record from its first moment. Whatever its preparation fails of
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
@@ -21,6 +22,7 @@ from throwcollect.config.schema import Config
 from throwcollect.dataset.directory import config_path
 from throwcollect.errors import ConfigError, Interrupted, Problem, ThrowcollectError, WorkerError
 from throwcollect.files import open_log, write_file
+from throwcollect.interruption import stop_signals
 from throwcollect.runs.choice import choose
 from throwcollect.runs.onlooker import Onlooker
 from throwcollect.runs.preparation import Request, prepare_run, resume
@@ -84,6 +86,7 @@ def begin_run(
         _check_session(read)
     records = Records()
     opened = records.new(read.name, run=run)
+    process: subprocess.Popen[bytes] | None = None
     try:
         place = opened.directory / "data" if kind == "session" else output.absolute()
         # The log of what happens before there is a directory of the dataset, which has to be empty until then.
@@ -112,6 +115,9 @@ def begin_run(
             made_from = Order(config.absolute(), tuple(overrides), output.absolute(), resumed)
             order.write(_ORDERS.dump_json(made_from))
     except (ThrowcollectError, OSError) as error:
+        if process is not None:
+            process.kill()
+            process.wait()
         opened.forget()
         if isinstance(error, OSError):
             raise WorkerError(f"run {opened.run} cannot be begun: {error}") from error
@@ -122,15 +128,20 @@ def begin_run(
 
 def _start_process(run: OpenRun, logs: Path) -> subprocess.Popen[bytes]:
     words = [sys.executable, "-m", "throwcollect", "begin", run.run, "--lock", str(run.lock)]
-    with open(open_log(NodeLogs(logs).path(LAUNCHER)), "ab") as log:
-        return subprocess.Popen(
-            words,
-            stdin=subprocess.PIPE,
-            stdout=log,
-            stderr=subprocess.STDOUT,
-            start_new_session=True,
-            pass_fds=[run.lock],
-        )
+    # Until it can heed a signal that asks it to stop, which takes it a second, the signal waits.
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, stop_signals())
+    try:
+        with open(open_log(NodeLogs(logs).path(LAUNCHER)), "ab") as log:
+            return subprocess.Popen(
+                words,
+                stdin=subprocess.PIPE,
+                stdout=log,
+                stderr=subprocess.STDOUT,
+                start_new_session=True,
+                pass_fds=[run.lock],
+            )
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def carry_out(run: str, lock: int, order: bytes, *, onlooker: Onlooker, interruptions: Callable[[], int]) -> None:
@@ -141,11 +152,12 @@ def carry_out(run: str, lock: int, order: bytes, *, onlooker: Onlooker, interrup
         lock: Descriptor of its locked file, which this process has inherited.
         order: What it is to be made from.
         onlooker: Is told what goes on.
-        interruptions: How often somebody has asked to stop.
+        interruptions: How often somebody has asked to stop; from now on, signals that do so arrive.
 
     Raises:
         ThrowcollectError: What it failed of; that is in its record, too.
     """
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, stop_signals())
     records = Records()
     opened = records.inherit(run, lock)
     made_from = _ORDERS.validate_json(order)

@@ -70,7 +70,7 @@ def launch(
         run.record.middleware.joining.settle()
         host = (runtime or get_runtime(run.record.runtime)).host(place, config, warn=onlooker.warn)
         with hold_together(place.directory):
-            run.update(launcher=os.getpid(), nodes=(), endpoint=None)
+            run.update(launcher=os.getpid(), nodes=(), endpoint=None, stopping=False)
             info = host.collect(session)
             summary = None if info is None else Summary(**vars(info), open=config.run.open)
         lost = None if summary is None else loss(summary.outcomes, hint=place.way_on)
@@ -113,6 +113,8 @@ class _Session:
     def event(self, event: RunEvent, **details: Any) -> None:
         """Something that happened to the run."""
         self._write(lambda: self._events.run_event(event, **details))
+        if event == "stopping":
+            self._write(lambda: self._run.update(stopping=True))
 
     def take_over(self, states: Sequence[NodeState]) -> None:
         """Nodes of which a launcher before this one has written."""

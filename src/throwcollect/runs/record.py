@@ -108,6 +108,7 @@ class Record:
         middleware: What carries the messages of its nodes.
         kind: Whether it collects a dataset, or has simulations for clients alone.
         origin: What a client asked for; None if a command or a program began the run.
+        stopping: Whether it ends because somebody has asked for that; running trials are finished.
         version: Version of this layout.
     """
 
@@ -133,6 +134,7 @@ class Record:
     middleware: Middleware = _EMBEDDED
     kind: Literal["collection", "session"] = "collection"
     origin: Origin | None = None
+    stopping: bool = False
     version: Literal[1] = VERSION
 
     def place(self, key: RunKey) -> Place:

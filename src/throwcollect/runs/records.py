@@ -288,17 +288,17 @@ class Records:
             with suppress(ConfigError):
                 yield self.get(run)
 
-    def read_change_ns(self, run: str) -> int:
-        """When the record of a run was written last, in nanoseconds of the file system's clock; 0 if it is gone."""
+    def read_change_ns(self, run: str) -> int | None:
+        """When the record of a run was written last, in nanoseconds of the file system's clock; None if it is gone."""
         try:
             return (self._runs / f"{run}.json").stat().st_mtime_ns
         except OSError:
-            return 0
+            return None
 
     def _age_s(self, run: str) -> float:
         """Time since the record of a run was written [s]; 0 if it is gone."""
         changed_ns = self.read_change_ns(run)
-        return time.time() - changed_ns / NS_PER_S if changed_ns else 0.0
+        return 0.0 if changed_ns is None else time.time() - changed_ns / NS_PER_S
 
     def lives(self, run: str) -> bool:
         """Whether the launcher of a run lives."""

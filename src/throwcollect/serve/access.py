@@ -14,7 +14,7 @@ from collections.abc import Awaitable, Callable, MutableMapping
 from dataclasses import dataclass, field
 from http import HTTPStatus
 from typing import Any
-from urllib.parse import parse_qs
+from urllib.parse import parse_qs, quote
 
 from throwcollect.serve.problems import problem
 
@@ -24,6 +24,12 @@ Send = Callable[[MutableMapping[str, Any]], Awaitable[None]]
 
 _MOST_BODY = 1_000_000
 """Bytes of a request's body."""
+_TOO_LONG = 413, f"a body may have {_MOST_BODY} bytes"
+MAY_ONLY_LOOK = 403, "this token may only look"
+"""Status and sentence for whoever asks for a change with the token that does not allow any."""
+_GROUPS = {True: "full", False: "read-only", None: "anybody"}
+"""Who asks, in lines that are written down."""
+_PLAIN = "/-_.~{}:@!$&'()*+,;="
 _CODE_S = 600.0
 """Time for which a one-time code can be exchanged."""
 _SUBPROTOCOL = "bearer."
@@ -97,34 +103,39 @@ class Access:
             return
         headers = {name.decode("latin-1"): value.decode("latin-1") for name, value in scope["headers"]}
         refusal, may_change = self._judge(scope, headers)
-        scope.setdefault("state", {})["may_change"] = may_change
-        answer = _Answer(scope, send)
+        scope.setdefault("state", {})["may_change"] = bool(may_change)
+        answer = _Answer(scope, send, _GROUPS[may_change])
         if refusal is not None:
-            status, title = refusal
-            await _refuse(scope, receive, answer, status, title)
+            await _refuse(scope, receive, answer, *refusal)
         elif scope["type"] == "http":
-            await self._app(scope, _limit(receive), answer)
+            body = _Body(receive)
+            try:
+                await self._app(scope, body.receive, body.unless_too_long(answer))
+            finally:
+                if body.is_too_long:
+                    await _refuse(scope, receive, answer, *_TOO_LONG)
         else:
             await self._app(scope, receive, answer)
-        _AUDIT.info("%s %s %s %s", *answer.described, "full" if may_change else "read-only")
 
-    def _judge(self, scope: Scope, headers: dict[str, str]) -> tuple[tuple[int, str] | None, bool]:
-        """Why somebody is refused, as status and sentence, None if not; and whether they may change anything."""
+    def _judge(self, scope: Scope, headers: dict[str, str]) -> tuple[tuple[int, str] | None, bool | None]:
+        """Why somebody is refused, as status and sentence, None if not; and whether they may change anything.
+
+        The latter is None if it is not known who it is.
+        """
         if headers.get("host", "") not in self._hosts:
-            return (421, "this server is not known by that name"), False
+            return (421, "this server is not known by that name"), None
         if "origin" in headers and headers["origin"] not in self._origins:
-            return (403, "pages of another origin may not connect"), False
+            return (403, "pages of another origin may not connect"), None
+        length = headers.get("content-length", "0")
+        too_long = None if length.isdecimal() and int(length) <= _MOST_BODY else _TOO_LONG
         if scope["type"] == "http" and _is_public(scope["path"]):
-            return None, False
+            return too_long, None
         may_change = self._keys.may_change(_token(scope, headers))
         if may_change is None:
-            return (401, "a token is missing, or it is not ours"), False
+            return (401, "a token is missing, or it is not ours"), None
         if not may_change and scope["type"] == "http" and scope["method"] not in ("GET", "HEAD"):
-            return (403, "this token may only look"), False
-        length = headers.get("content-length", "0")
-        if not length.isdecimal() or int(length) > _MOST_BODY:
-            return (413, f"a body may have {_MOST_BODY} bytes"), may_change
-        return None, may_change
+            return MAY_ONLY_LOOK, False
+        return too_long, may_change
 
 
 def _is_public(path: str) -> bool:
@@ -146,17 +157,32 @@ def _token(scope: Scope, headers: dict[str, str]) -> str:
     return str(parse_qs(scope["query_string"].decode("latin-1")).get("token", [""])[0])
 
 
-def _limit(receive: Receive) -> Receive:
-    """What receives a body, and breaks off if that is too long, whatever its header says."""
-    left = _MOST_BODY
+class _Body:
+    """Receives a body, and breaks off if that is too long, whatever its header says.
 
-    async def receive_some() -> MutableMapping[str, Any]:
-        nonlocal left
-        message = await receive()
-        left -= len(message.get("body", b""))
-        return message if left >= 0 else {"type": "http.disconnect"}
+    Attributes:
+        is_too_long: Whether it has done so.
+    """
 
-    return receive_some
+    def __init__(self, receive: Receive) -> None:
+        self.is_too_long = False
+        self._receive = receive
+        self._left = _MOST_BODY
+
+    async def receive(self) -> MutableMapping[str, Any]:
+        message = await self._receive()
+        self._left -= len(message.get("body", b""))
+        self.is_too_long = self._left < 0
+        return {"type": "http.disconnect"} if self.is_too_long else message
+
+    def unless_too_long(self, send: Send) -> Send:
+        """What sends an answer, unless one is to be sent in its place."""
+
+        async def send_some(message: MutableMapping[str, Any]) -> None:
+            if not self.is_too_long:
+                await send(message)
+
+        return send_some
 
 
 async def _refuse(scope: Scope, receive: Receive, send: Any, status: int, title: str) -> None:
@@ -173,27 +199,31 @@ async def _refuse(scope: Scope, receive: Receive, send: Any, status: int, title:
 
 
 class _Answer:
-    """Sends what an application answers, with the headers that all answers have, and notes the status."""
+    """Sends what an application answers, with the headers that all answers have, and writes down that it did."""
 
-    def __init__(self, scope: Scope, send: Send) -> None:
+    def __init__(self, scope: Scope, send: Send, group: str) -> None:
         self._send = send
         self._scope = scope
-        self._status = 0
+        self._group = group
+        self._is_noted = False
         self._protocol = next((p for p in scope.get("subprotocols", ()) if p.startswith(_SUBPROTOCOL)), None)
 
     async def __call__(self, message: MutableMapping[str, Any]) -> None:
         if message["type"] in ("http.response.start", "websocket.http.response.start"):
-            self._status = message["status"]
+            self._note(message["status"])
             message = {**message, "headers": [*message.get("headers", ()), *_HEADERS]}
         elif message["type"] == "websocket.accept":
-            self._status = int(HTTPStatus.SWITCHING_PROTOCOLS)
+            self._note(HTTPStatus.SWITCHING_PROTOCOLS)
             # A browser closes the socket if none of its protocols is taken.
             message = {**message, "subprotocol": message.get("subprotocol") or self._protocol}
-        elif message["type"] == "websocket.close" and not self._status:
-            self._status = int(HTTPStatus.FORBIDDEN)
+        elif message["type"] == "websocket.close":
+            self._note(HTTPStatus.FORBIDDEN)
         await self._send(message)
 
-    @property
-    def described(self) -> tuple[str, str, int]:
-        """Method, path without what follows it, which may hold a token, and status."""
-        return self._scope.get("method", "SOCKET"), self._scope["path"], self._status
+    def _note(self, status: int) -> None:
+        if self._is_noted:
+            return
+        self._is_noted = True
+        # Without what follows the path, which may hold a token; and in one line, whatever is in it.
+        path = quote(self._scope["path"], safe=_PLAIN)
+        _AUDIT.info("%s %s %d %s", self._scope.get("method", "SOCKET"), path, status, self._group)

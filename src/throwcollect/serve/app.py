@@ -16,7 +16,7 @@ from throwcollect.serve.access import Keys
 from throwcollect.serve.dataset_routes import make_dataset_routes
 from throwcollect.serve.instance_routes import make_component_routes, make_instance_routes, make_log_routes
 from throwcollect.serve.instances import Instances
-from throwcollect.serve.live import LiveHolds
+from throwcollect.serve.live import keep_letting_go
 from throwcollect.serve.problems import add_handlers, problem
 from throwcollect.serve.sockets import keep_telling
 from throwcollect.serve.state import Lookout, State
@@ -47,11 +47,10 @@ def make_app(instances: Instances, keys: Keys) -> FastAPI:
         instances: All runs, and what can be done with them.
         keys: What lets somebody in.
     """
-    holds = LiveHolds()
 
     @asynccontextmanager
     async def let_go(_: FastAPI) -> AsyncIterator[None]:
-        letting_go = asyncio.create_task(holds.let_go_of_left())
+        letting_go = asyncio.create_task(keep_letting_go())
         yield
         letting_go.cancel()
 
@@ -71,7 +70,7 @@ def make_app(instances: Instances, keys: Keys) -> FastAPI:
     app.include_router(make_instance_routes(instances, lookout), prefix=PREFIX)
     app.include_router(make_log_routes(instances), prefix=PREFIX)
     app.include_router(make_dataset_routes(instances), prefix=PREFIX)
-    app.include_router(make_view_routes(instances, holds), prefix=PREFIX)
+    app.include_router(make_view_routes(instances), prefix=PREFIX)
     app.mount("/", StaticFiles(directory=_PAGE, html=True))
     return app
 

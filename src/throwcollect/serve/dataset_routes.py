@@ -15,10 +15,10 @@ from fastapi.responses import FileResponse, StreamingResponse
 from pydantic import BaseModel
 from starlette.background import BackgroundTask
 
-from throwcollect.dataset.directory import CARD, MANIFEST, PROVENANCE, THROWS, config_path
-from throwcollect.dataset.manifest import read_manifest
+from throwcollect.dataset.directory import CARD, MANIFEST, PROVENANCE, THROWS
+from throwcollect.dataset.manifest import read_manifest, size_of_file
 from throwcollect.errors import ConflictError, NotFoundError
-from throwcollect.runs.background import begin_run
+from throwcollect.files import check_regular, open_regular
 from throwcollect.runs.records import Run
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.state import InstanceState, describe
@@ -49,11 +49,7 @@ def make_dataset_routes(instances: Instances) -> APIRouter:
     @router.post("/resume", status_code=202)
     def resume(instance: str) -> InstanceState:
         """Go on with a dataset whose collection has ended before its last trial, as a run of its own."""
-        run = _require_ended(_get_collection(instances, instance))
-        directory = run.place.directory
-        return describe(
-            begin_run(config_path(directory), overrides=(), output=directory, origin=run.record.origin, resumed=True)
-        )
+        return describe(instances.resume(instance))
 
     @router.get("/files")
     def files(instance: str) -> list[DatasetFile]:
@@ -70,6 +66,9 @@ def make_dataset_routes(instances: Instances) -> APIRouter:
     def archive(instance: str) -> StreamingResponse:
         """A finished dataset as one file."""
         directory = _find_finished(instances, instance)
+        for path in _list_names(directory):
+            # Once bytes are on their way, there is no answer any more that could say what is wrong.
+            size_of_file(directory / path)
         name = f'attachment; filename="{instance}.tar"'
         return StreamingResponse(
             _archive(directory, instance), media_type="application/x-tar", headers={"Content-Disposition": name}
@@ -105,25 +104,16 @@ def _get_collection(instances: Instances, instance: str) -> Run:
     return run
 
 
-def _require_ended(run: Run) -> Run:
-    """The run, if it has ended.
-
-    Raises:
-        ConflictError: If it has not.
-    """
-    if run.status == "running":
-        raise ConflictError(f"run {run.id} is still running")
-    return run
-
-
 def _find_file(directory: Path, path: str) -> Path:
     """A file of a dataset.
 
     Raises:
         NotFoundError: If the dataset has none of that name.
+        DatasetError: If that name leads elsewhere.
     """
-    if path not in _list_names(directory):
+    if path not in _list_names(directory) or not (directory / path).exists():
         raise NotFoundError(f"{directory}: the dataset has no file {path!r}")
+    check_regular(directory / path)
     return directory / path
 
 
@@ -160,13 +150,15 @@ def _read_landings(directory: Path) -> list[tuple[float, float, str, int]]:
 def _archive(directory: Path, name: str) -> Iterator[bytes]:
     """The bytes of a tar archive of a dataset; equal datasets give equal archives."""
     for path in _list_names(directory):
-        with (directory / path).open("rb") as file:
+        with open(open_regular(directory / path), "rb") as file:
             entry = tarfile.TarInfo(f"{name}/{path}")
             entry.size = file.seek(0, io.SEEK_END)
             entry.mode = 0o644
             file.seek(0)
             yield entry.tobuf(tarfile.PAX_FORMAT)
-            while piece := file.read(_PIECE_BYTES):
+            left = entry.size
+            while piece := file.read(min(left, _PIECE_BYTES)):
+                left -= len(piece)
                 yield piece
             yield bytes(-entry.size % tarfile.BLOCKSIZE)
     yield bytes(2 * tarfile.BLOCKSIZE)

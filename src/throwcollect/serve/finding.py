@@ -2,24 +2,30 @@
 
 from __future__ import annotations
 
+import fcntl
 import http.client
 import json
 import os
 import ssl
 import subprocess
 import sys
+import threading
 import time
-from contextlib import closing, suppress
+from collections.abc import Iterator
+from contextlib import closing, contextmanager, suppress
 from dataclasses import asdict, dataclass
 from http import HTTPStatus
 from pathlib import Path
 from urllib.parse import urlsplit
 
-from throwcollect.errors import WorkerError
+from pydantic import TypeAdapter
+
+from throwcollect.errors import DatasetError, WorkerError
 from throwcollect.files import open_log, write_secret
 from throwcollect.runs.records import state_directory
 
 _FILE = "serve.json"
+_LOCK = "serve.lock"
 _LOG = "serve.log"
 _START_S = 20.0
 _ANSWER_S = 5.0
@@ -54,21 +60,46 @@ class Address:
         return f"{self.url}/#code={code}" + (f"&run={run}" if run else "")
 
 
-def publish(address: Address) -> None:
-    """Write down where this process serves.
+@contextmanager
+def publish(address: Address) -> Iterator[None]:
+    """Have programs of this user find this process, as long as the block lasts.
+
+    If another server is to be found already, this one is as soon as that has ended.
+
+    Args:
+        address: Where this process serves.
 
     Raises:
         DatasetError: If the file cannot be written.
+        WorkerError: If its lock cannot be had.
         ConfigError: If runs cannot be remembered.
     """
-    write_secret(_path(), json.dumps(asdict(address)).encode())
+    path = _path()
+    try:
+        lock = os.open(path.with_name(_LOCK), os.O_RDWR | os.O_CREAT, 0o600)
+    except OSError as error:
+        raise WorkerError(f"{path}: nobody would find this server: {error.strerror}") from error
+    text = json.dumps(asdict(address)).encode()
 
+    def wait() -> None:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        # The disk may be full by now; this server can do without.
+        with suppress(DatasetError):
+            write_secret(path, text)
 
-def withdraw() -> None:
-    """Remove what `publish` has written, unless a successor has written there since."""
-    found = _read()
-    if found is not None and found.pid == os.getpid():
-        _path().unlink(missing_ok=True)
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        # The lock goes with the process that has it, however that ends.
+        threading.Thread(target=wait, name="next to be found", daemon=True).start()
+    else:
+        write_secret(path, text)
+    try:
+        yield
+    finally:
+        found = _read()
+        if found == address:
+            path.unlink(missing_ok=True)
 
 
 def find_server() -> Address | None:
@@ -78,7 +109,8 @@ def find_server() -> Address | None:
         ConfigError: If runs cannot be remembered.
     """
     address = _read()
-    if address is None:
+    # Nobody else's process, which may have got its port or its pid since, has the lock.
+    if address is None or not _is_locked():
         return None
     try:
         _ask(address, "GET", "/api/v1/health")
@@ -104,10 +136,13 @@ def ensure_server() -> Address:
         )
     deadline = time.monotonic() + _START_S
     while time.monotonic() < deadline and process.poll() is None:
-        address = _read()
-        if address is not None and address.pid == process.pid and find_server() is not None:
+        if (address := find_server()) is not None:
+            if address.pid != process.pid:
+                # Somebody else was faster.
+                process.terminate()
             return address
         time.sleep(_POLL_S)
+    process.terminate()
     said = ""
     with suppress(OSError):
         said = "\n".join(log.read_text(errors="replace").splitlines()[-5:])
@@ -139,6 +174,8 @@ def _ask(address: Address, method: str, path: str) -> dict[str, str]:
         # It is the very certificate that is expected, whatever names it was made for.
         context = ssl.create_default_context(cafile=address.certificate)
         context.check_hostname = False
+        # Whoever has signed it need not be known here.
+        context.verify_flags |= ssl.VERIFY_X509_PARTIAL_CHAIN
         connection = http.client.HTTPSConnection(host, port, timeout=_ANSWER_S, context=context)
     with closing(connection):
         connection.request(method, path, headers={"Authorization": f"Bearer {address.token}"})
@@ -149,12 +186,30 @@ def _ask(address: Address, method: str, path: str) -> dict[str, str]:
     return content
 
 
+_ADDRESS = TypeAdapter(Address)
+
+
 def _path() -> Path:
     return state_directory() / _FILE
 
 
+def _is_locked() -> bool:
+    """Whether a server lives that is to be found."""
+    try:
+        lock = os.open(_path().with_name(_LOCK), os.O_RDONLY)
+    except OSError:
+        return False
+    try:
+        fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    finally:
+        os.close(lock)
+    return False
+
+
 def _read() -> Address | None:
     try:
-        return Address(**json.loads(_path().read_bytes()))
-    except (OSError, ValueError, TypeError):
+        return _ADDRESS.validate_json(_path().read_bytes())
+    except (OSError, ValueError):
         return None

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import time
+from collections import deque
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,6 +13,7 @@ from fastapi import APIRouter, Query, Response
 from fastapi.responses import PlainTextResponse
 from pydantic import BaseModel, ConfigDict, Field, JsonValue
 
+from throwcollect.files import open_log
 from throwcollect.runs.events import EVENTS
 from throwcollect.runs.record import Origin
 from throwcollect.runtimes.node_logs import NodeLogs
@@ -118,22 +122,23 @@ def make_log_routes(instances: Instances) -> APIRouter:
     @router.get("/{instance}/log/{node}", response_class=PlainTextResponse)
     def log(instance: str, node: str, tail: Annotated[int, Query(ge=1, le=10_000)] = 200) -> Any:
         """The last lines of what a node has printed."""
-        logs = Path(instances.get(instance).record.logs)
         # Only what lies there is offered, so no name leads out of the directory.
-        path = NodeLogs(logs).path(node) if f"{node}.log" in _names_in(logs) else None
-        if path is None:
-            return problem(404, f"run {instance} has no log of {node!r}", expected=", ".join(_names_in(logs)) or None)
-        lines = path.read_text(encoding="utf-8", errors="replace").splitlines()[-tail:]
-        return PlainTextResponse("".join(f"{line}\n" for line in lines))
+        files = NodeLogs(Path(instances.get(instance).record.logs)).files()
+        try:
+            with open(open_log(files[node], os.O_RDONLY), encoding="utf-8", errors="replace") as file:
+                return PlainTextResponse("".join(deque(file, tail)))
+        except (KeyError, OSError):
+            known = f"one of {', '.join(files)}" if files else None
+            return problem(404, f"run {instance} has no log of {node!r}", expected=known)
 
     @router.get("/{instance}/events", response_class=Response)
     def events(instance: str) -> Response:
         """What has happened in a run, one event in JSON a line."""
         path = Path(instances.get(instance).record.logs) / EVENTS
-        return Response(path.read_bytes() if path.exists() else b"", media_type="application/x-ndjson")
+        text = b""
+        # There are none before the first.
+        with suppress(OSError), open(open_log(path, os.O_RDONLY), "rb") as file:
+            text = file.read()
+        return Response(text, media_type="application/x-ndjson")
 
     return router
-
-
-def _names_in(logs: Path) -> list[str]:
-    return sorted(path.name for path in logs.glob("*.log"))

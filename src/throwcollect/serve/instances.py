@@ -2,24 +2,34 @@
 
 from __future__ import annotations
 
+import fcntl
 import json
+import os
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from throwcollect.errors import ConfigError, ConflictError, NotFoundError, Problem
+from pydantic import JsonValue
+
+from throwcollect.dataset.directory import config_path
+from throwcollect.errors import ConfigError, ConflictError, NotFoundError, Problem, WorkerError
 from throwcollect.robots.appearance import check_appearance
 from throwcollect.runs import control
 from throwcollect.runs.background import begin_run
 from throwcollect.runs.record import Origin
-from throwcollect.runs.records import Records, Run
+from throwcollect.runs.records import Records, Run, state_directory
 from throwcollect.runs.selection import require_living
-from throwcollect.serve.catalogue import NAME, Catalogue
+from throwcollect.serve.catalogue import NAME, Catalogue, Component
+from throwcollect.serve.live import find_node
 from throwcollect.serve.robot_files import description_of
 from throwcollect.serve.state import simulations_of
 
-_KEPT = ("run", "containers", "cluster")
-"""Sections of a configuration that are the operator's alone."""
+_KEPT = ("run", "containers", "cluster", "sweep.file")
+"""Keys of a configuration that are the operator's alone: what they name is of this machine."""
+_KEY = r"[A-Za-z0-9_-]+(\.[A-Za-z0-9_-]+)*"
+_LOCK = "instances.lock"
 
 
 @dataclass(frozen=True)
@@ -39,10 +49,17 @@ class Instances:
 
         Raises:
             NotFoundError: If there is none.
-            ConfigError: If its record cannot be read.
+            ConflictError: If its record cannot be read.
         """
-        _check_id(instance)
-        return Records().get(instance)
+        # Ids name files.
+        if not re.fullmatch(r"(?!\.)[A-Za-z0-9_.-]{1,80}", instance):
+            raise NotFoundError(f"no run {instance!r}", expected="at most 80 of letters, digits, -, _ and .")
+        try:
+            return Records().get(instance)
+        except NotFoundError:
+            raise
+        except ConfigError as error:
+            raise ConflictError(error.problems, hint=error.hint) from error
 
     def put(self, instance: str, origin: Origin) -> tuple[Run, bool]:
         """Begin an instance, unless it has been begun by the same request already.
@@ -56,39 +73,72 @@ class Instances:
 
         Raises:
             NotFoundError: If there is no such component.
-            ConflictError: If there is another run of that id, or as many instances as there may be.
+            ConflictError: If there is another run of that id, or as many instances live as may.
             ConfigError: If the configuration cannot be used.
             WorkerError: If it cannot be begun.
         """
         component = self.catalogue.get(origin.component)
-        _check_id(instance)
+        if not re.fullmatch(NAME, instance):
+            raise ConfigError(f"no instance can have the id {instance!r}", expected="at most 63 of a-z, 0-9, - and _")
         overrides = _overrides(origin)
-        try:
-            found = Records().get(instance)
-        except NotFoundError:
-            pass
-        else:
-            if found.record.origin == origin:
-                return found, False
-            raise ConflictError(f"there is an instance {instance} already, of another request")
+        with _one_at_a_time():
+            try:
+                found = self.get(instance)
+            except NotFoundError:
+                pass
+            else:
+                if found.record.origin == origin:
+                    return found, False
+                raise ConflictError(f"there is an instance {instance} already, of another request")
+            self._check_room(component)
+            run = begin_run(
+                component.config,
+                overrides=overrides,
+                output=self.datasets / instance,
+                run=instance,
+                origin=origin,
+                kind=component.kind,
+            )
+        return run, True
+
+    def resume(self, instance: str) -> Run:
+        """Go on with the dataset of a run that has ended, as a run of its own.
+
+        Raises:
+            NotFoundError: If there is no such run.
+            ConflictError: If it lives, has no dataset to go on with, or as many instances live as may.
+            ConfigError: If the configuration cannot be used.
+            WorkerError: If it cannot be begun.
+        """
+        run = self.get(instance)
+        origin = run.record.origin
+        config = config_path(run.place.directory)
+        with _one_at_a_time():
+            if run.now().status == "running":
+                raise ConflictError(f"run {run.id} is still running")
+            if run.record.kind != "collection" or run.record.volume is not None or not config.is_file():
+                raise ConflictError(f"run {run.id} has no dataset in a directory to go on with")
+            if origin is not None and origin.component in self.catalogue.components:
+                self._check_room(self.catalogue.get(origin.component))
+            return begin_run(config, overrides=(), output=run.place.directory, origin=origin, resumed=True)
+
+    def _check_room(self, component: Component) -> None:
+        """Refuse one more instance, if as many live as may.
+
+        Raises:
+            ConflictError: If so.
+        """
         living = [run for run in Records().all() if _is_instance(run, component.name) and run.status == "running"]
         if len(living) >= component.max_instances:
             raise ConflictError(
                 f"component {component.name}: {len(living)} instances live, as many as max_instances allows",
                 hint=f"stop one of {', '.join(run.id for run in living)}",
             )
-        run = begin_run(
-            component.config,
-            overrides=overrides,
-            output=self.datasets / instance,
-            run=instance,
-            origin=origin,
-            kind=component.kind,
-        )
-        return run, True
 
     def stop(self, instance: str, *, force: bool = False) -> None:
         """Have an instance drain and end, without waiting for that; by force, at once, and forget it.
+
+        Whoever asks once more does not hurry it.
 
         Raises:
             NotFoundError: If there is no such run.
@@ -98,7 +148,7 @@ class Instances:
         run = self.get(instance)
         if force:
             control.down(run)
-        else:
+        elif not (run.lives and run.record.stopping):
             control.stop(run, keep_on=lambda: False)
 
     def scale(self, instance: str, simulations: int) -> Run:
@@ -132,7 +182,7 @@ class Instances:
         if urdf is not None:
             check_appearance(own, urdf)
         record = require_living(run)
-        nodes = [f"/{name}/{name}" for name in simulations_of(record)]
+        nodes = [find_node(run, name) for name in simulations_of(record)]
         if not nodes:
             raise ConflictError(f"run {run.id}: no simulation runs")
         for result in control.set_parameter(run, nodes, "robot_description", urdf or own):
@@ -144,14 +194,24 @@ def _is_instance(run: Run, component: str) -> bool:
     return run.record.origin is not None and run.record.origin.component == component
 
 
-def _check_id(instance: str) -> None:
-    """Refuse ids that no run can have, as they name files.
+@contextmanager
+def _one_at_a_time() -> Iterator[None]:
+    """Keep all others who begin instances waiting, so that nobody begins one too many; servers may be several.
 
     Raises:
-        NotFoundError: If it is none.
+        ConfigError: If runs cannot be remembered.
+        WorkerError: If the lock cannot be had.
     """
-    if not re.fullmatch(rf"(?!\.)[A-Za-z0-9_.-]{{1,80}}|{NAME}", instance):
-        raise NotFoundError(f"no run {instance!r}", expected="at most 80 of letters, digits, -, _ and .")
+    path = state_directory() / _LOCK
+    try:
+        lock = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
+    except OSError as error:
+        raise WorkerError(f"{path}: no instance can be begun: {error.strerror}") from error
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(lock)
 
 
 def _overrides(origin: Origin) -> list[str]:
@@ -161,9 +221,17 @@ def _overrides(origin: Origin) -> list[str]:
         ConfigError: If a key is the operator's alone.
     """
     problems = [
-        Problem("is the operator's alone; a request may not set it", key=key)
-        for key in origin.changes
-        if key.split(".")[0] in _KEPT
+        *(
+            Problem("should be a dotted key, of letters, digits, - and _", key=key)
+            for key in origin.changes
+            if not re.fullmatch(_KEY, key)
+        ),
+        *(
+            Problem("is the operator's alone; a request may not set it", key=kept)
+            for key, value in origin.changes.items()
+            for kept in _KEPT
+            if _sets(key, value, kept)
+        ),
     ]
     if problems:
         raise ConfigError(problems)
@@ -171,3 +239,13 @@ def _overrides(origin: Origin) -> list[str]:
     if origin.simulations is not None:
         overrides.append(f"run.simulations={origin.simulations}")
     return overrides
+
+
+def _sets(key: str, value: JsonValue, kept: str) -> bool:
+    """Whether a change of a key changes another one, too: that itself, one below it, or one in what it is set to."""
+    if key == kept or key.startswith(f"{kept}."):
+        return True
+    first, _, rest = kept.partition(".")
+    if not rest or not isinstance(value, dict):
+        return False
+    return key == first and any(_sets(each, inner, rest) for each, inner in value.items())

@@ -1,101 +1,156 @@
 """Simulations that are slowed down to real time as long as somebody watches them live.
 
-Each is noted in a file beside the key of its run, so whoever serves after a server that was killed lets go of it.
+Whoever watches one shares the lock of a file beside the key of its run. The lock goes with its process, so any server
+sees at the file which simulations nobody watches any more, be it that the watchers' server was killed.
 """
 
 from __future__ import annotations
 
 import asyncio
+import fcntl
+import os
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 from throwcollect.config.loader import load
 from throwcollect.dataset.directory import config_path
-from throwcollect.errors import NotFoundError, ThrowcollectError
+from throwcollect.errors import ConfigError, NotFoundError, ThrowcollectError, WorkerError
 from throwcollect.runs.control import set_parameter
 from throwcollect.runs.records import Records, Run
 
 _PARAMETER = "sim.real_time_factor"
 _REAL_TIME, _FULL_SPEED = 1.0, 0.0
+_SWEEP_S = 10.0
+_DIRECTORY = "live"
 
 
-@dataclass
+@dataclass(frozen=True)
 class Hold:
     """One watcher of one simulation.
 
     Attributes:
         run: The run.
         simulation: Name of the simulation.
-        holds: Where it is counted.
+        lock: Descriptor of the file whose lock is shared.
     """
 
     run: Run
     simulation: str
-    holds: LiveHolds
+    lock: int
 
-    async def let_go(self) -> None:
-        """Leave; the last one gives the simulation its speed back."""
-        await self.holds.let_go(self)
+    def let_go(self) -> None:
+        """Leave; the last one gives the simulation the speed back that its configuration asks for."""
+        _leave(self.run, self.simulation, self.lock)
 
 
-@dataclass
-class LiveHolds:
-    """Counts the watchers of each simulation."""
+def take(run: Run, simulation: str) -> Hold:
+    """Slow a simulation down to real time.
 
-    _watchers: dict[tuple[str, str], int] = field(default_factory=dict)
-    _changing: asyncio.Lock = field(default_factory=asyncio.Lock)
+    Args:
+        run: The run.
+        simulation: Name of the simulation.
 
-    async def take(self, run: Run, simulation: str) -> Hold:
-        """Slow a simulation down to real time, unless somebody watches it already.
+    Raises:
+        NotFoundError: If the run has no such simulation that runs.
+        WorkerError: If that does not answer, or does not do so.
+        ConfigError: If the run's key cannot be read.
+    """
+    if not _runs(run, simulation):
+        raise NotFoundError(f"run {run.id}: no simulation {simulation!r} runs")
+    try:
+        lock = _share(_note(run, simulation))
+    except OSError as error:
+        raise WorkerError(f"run {run.id}: {simulation} cannot be slowed down: {error}") from error
+    try:
+        _set_speed(run, simulation, _REAL_TIME)
+    except ThrowcollectError:
+        # It may do so yet; the file says that somebody has to let go of it.
+        os.close(lock)
+        raise
+    return Hold(run, simulation, lock)
 
-        Args:
-            run: The run.
-            simulation: Name of the simulation.
 
-        Raises:
-            NotFoundError: If the run has no such simulation that runs.
-            WorkerError: If that does not answer.
-        """
-        if not any(node.name == simulation and node.status == "running" for node in run.record.nodes):
-            raise NotFoundError(f"run {run.id}: no simulation {simulation!r} runs")
-        key = run.id, simulation
-        async with self._changing:
-            if not self._watchers.get(key):
-                _note(run, simulation).parent.mkdir(exist_ok=True)
-                _note(run, simulation).touch()
-                await asyncio.to_thread(_set_speed, run, simulation, _REAL_TIME)
-            self._watchers[key] = self._watchers.get(key, 0) + 1
-        return Hold(run, simulation, self)
+async def keep_letting_go() -> None:
+    """Let go again and again of simulations that nobody watches any more, as when a server was killed."""
+    while True:
+        await asyncio.to_thread(let_go_of_left)
+        await asyncio.sleep(_SWEEP_S)
 
-    async def let_go(self, hold: Hold) -> None:
-        """Take a watcher off; without one, the simulation is as fast as its configuration says."""
-        key = hold.run.id, hold.simulation
-        async with self._changing:
-            self._watchers[key] -= 1
-            if not self._watchers[key]:
-                del self._watchers[key]
-                await asyncio.to_thread(_let_go, hold.run, hold.simulation)
 
-    async def let_go_of_left(self) -> None:
-        """Let go of simulations that a server which was killed has slowed down."""
-        for run in await asyncio.to_thread(lambda: Records().all()):
-            if run.status == "running" and _note(run, "").is_dir():
-                for note in list(_note(run, "").iterdir()):
-                    await asyncio.to_thread(_let_go, run, note.name)
+def let_go_of_left() -> None:
+    """Let go of simulations that nobody watches any more."""
+    # Where records cannot be read for a while, the next attempt may find what is left.
+    with suppress(ThrowcollectError, OSError):
+        for run in Records().all():
+            for note in sorted(_note(run, "").glob("*")) if run.status == "running" else ():
+                with suppress(FileNotFoundError):
+                    _leave(run, note.name, os.open(note, os.O_RDWR))
 
 
 def _note(run: Run, simulation: str) -> Path:
-    return run.key.directory.parent / "live" / simulation
+    return run.key.directory.parent / _DIRECTORY / simulation
 
 
-def _let_go(run: Run, simulation: str) -> None:
-    # A run that is over, or a simulation that is gone, needs nothing any more.
-    with suppress(ThrowcollectError):
-        factor = load(config_path(run.place.directory)).sim.real_time_factor or _FULL_SPEED
-        _set_speed(run.now(), simulation, factor)
-    _note(run, simulation).unlink(missing_ok=True)
+def _share(path: Path) -> int:
+    """Descriptor of a file whose lock is shared."""
+    path.parent.mkdir(exist_ok=True)
+    while True:
+        lock = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
+        fcntl.flock(lock, fcntl.LOCK_SH)
+        with suppress(FileNotFoundError):
+            if os.path.samestat(os.fstat(lock), path.stat()):
+                return lock
+        # The last one who left has removed it meanwhile.
+        os.close(lock)
 
 
-def _set_speed(run: Run, simulation: str, factor: float) -> None:
-    set_parameter(run, [f"/{simulation}/{simulation}"], _PARAMETER, factor)
+def _leave(run: Run, simulation: str, lock: int) -> None:
+    """Close the file of a simulation; without others who share its lock, the simulation gets its speed back."""
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return
+    else:
+        try:
+            now = run.now()
+            if _runs(now, simulation):
+                _set_speed(now, simulation, None)
+        except ConfigError:
+            # The run was forgotten, so there is nothing left that could be slow.
+            pass
+        except WorkerError:
+            # It may be busy just now: the file stays, and says that somebody has to try again.
+            return
+        _note(run, simulation).unlink(missing_ok=True)
+    finally:
+        os.close(lock)
+
+
+def _runs(run: Run, simulation: str) -> bool:
+    nodes = run.record.nodes if run.status == "running" else ()
+    return any(node.name == simulation and node.status == "running" for node in nodes)
+
+
+def _set_speed(run: Run, simulation: str, factor: float | None) -> None:
+    """Have a simulation keep to a real-time factor; None for that of its configuration.
+
+    Raises:
+        ConfigError: If the run's configuration or key cannot be read.
+        WorkerError: If the simulation does not do so.
+    """
+    config = load(config_path(run.place.directory))
+    wanted = (config.sim.real_time_factor or _FULL_SPEED) if factor is None else factor
+    (result,) = set_parameter(run, [find_node(run, simulation)], _PARAMETER, wanted)
+    if not result.successful:
+        raise WorkerError(f"run {run.id}: {simulation} cannot change its speed: {result.reason}")
+
+
+def find_node(run: Run, simulation: str) -> str:
+    """Name of the node of a simulation, with its namespace.
+
+    Raises:
+        ConfigError: If the run's configuration cannot be read.
+    """
+    config = load(config_path(run.place.directory))
+    return f"/{simulation}" if config.run.root_namespace else f"/{simulation}/{simulation}"

@@ -66,6 +66,9 @@ def add_handlers(app: FastAPI) -> None:
     async def own(_: Request, error: Exception) -> ProblemResponse:
         return answer(error) if isinstance(error, ThrowcollectError) else problem(500, "internal error")
 
+    async def unexpected(_: Request, __: Exception) -> ProblemResponse:
+        return problem(500, "internal error", hint="the log of the server says where; please report it")
+
     async def http(_: Request, error: Exception) -> ProblemResponse:
         if isinstance(error, HTTPException):
             return problem(error.status_code, str(error.detail), headers=dict(error.headers or {}))
@@ -78,4 +81,5 @@ def add_handlers(app: FastAPI) -> None:
 
     app.add_exception_handler(ThrowcollectError, own)
     app.add_exception_handler(HTTPException, http)
+    app.add_exception_handler(Exception, unexpected)
     app.add_exception_handler(RequestValidationError, request)

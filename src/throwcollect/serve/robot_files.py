@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 
@@ -42,12 +43,14 @@ def find_mesh(package: str, path: str) -> Path:
     Raises:
         NotFoundError: If no robot has such a package, or it has no such file.
     """
-    for share in _shares():
-        root = (share / package).resolve()
-        file = (root / path).resolve()
-        # Neither dots nor links lead out of the package.
-        if root.parent == share and file.is_relative_to(root) and file.is_file():
-            return file
+    # What no file can be called.
+    with suppress(OSError, ValueError):
+        for share in _shares():
+            root = (share / package).resolve()
+            file = (root / path).resolve()
+            # Neither dots nor links lead out of the package.
+            if root.parent == share and file.is_relative_to(root) and file.is_file():
+                return file
     raise NotFoundError(f"no mesh package://{package}/{path}")
 
 

@@ -6,22 +6,26 @@ import contextlib
 import logging
 import os
 import socket
+import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from types import FrameType
 
 import uvicorn
 
 from throwcollect.errors import ConfigError
 from throwcollect.serve.access import Access, Keys
 from throwcollect.serve.app import make_app
-from throwcollect.serve.finding import Address, publish, withdraw
+from throwcollect.serve.finding import Address, publish
 from throwcollect.serve.instances import Instances
 
 PORT = 8080
 """Where to serve if nobody says otherwise, and it is free."""
 _MOST_FRAME = 10_000_000
 _MOST_CLIENTS = 256
+_END_S = 2.5
+"""Time in which it ends when it is told to."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +58,7 @@ def serve(
         tell: Is told once where it serves, and a one-time code, when it can be reached.
 
     Raises:
-        ConfigError: If the port is taken.
+        ConfigError: If the port is taken, or the certificate or its key cannot be used.
     """
     keys = Keys()
     with _listen(host, PORT if port is None else port, otherwise_any=port is None) as listener:
@@ -75,20 +79,58 @@ def serve(
             ws="websockets-sansio",
             ws_max_size=_MOST_FRAME,
             limit_concurrency=_MOST_CLIENTS,
-            timeout_graceful_shutdown=2,
+            timeout_graceful_shutdown=1,
+            # Who asks, and how, is seen from the connection alone.
+            proxy_headers=False,
             ssl_certfile=None if tls is None else tls.certificate,
             ssl_keyfile=None if tls is None else tls.key,
             server_header=False,
         )
-        logging.getLogger("throwcollect.serve").setLevel(logging.INFO)
-        publish(address)
-        try:
+        _load(config)
+        _write_lines()
+        with publish(address):
             tell(address, keys.new_code())
             # The signal that ends it is raised once more afterwards; it is how a server ends, and no error.
             with contextlib.suppress(KeyboardInterrupt):
-                uvicorn.Server(config).run(sockets=[listener])
-        finally:
-            withdraw()
+                _Server(config).run(sockets=[listener])
+
+
+class _Server(uvicorn.Server):
+    """A server that ends soon after it is told to, whatever still goes on in its threads.
+
+    Nothing there has to be finished: whoever serves next finds out what is left to be done.
+    """
+
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+        if not self.should_exit:
+            timer = threading.Timer(_END_S, os._exit, (0,))
+            timer.daemon = True
+            timer.start()
+        super().handle_exit(sig, frame)
+
+
+def _load(config: uvicorn.Config) -> None:
+    """Read what the server needs besides.
+
+    Raises:
+        ConfigError: If its certificate or key cannot be used.
+    """
+    try:
+        config.load()
+    except OSError as error:
+        raise ConfigError(
+            f"--tls-cert {config.ssl_certfile} --tls-key {config.ssl_keyfile}: cannot be used: {error}",
+            expected="a certificate and its key without a password, both in PEM",
+        ) from error
+
+
+def _write_lines() -> None:
+    """Have a line written for each request."""
+    lines = logging.StreamHandler()
+    lines.setFormatter(logging.Formatter("%(asctime)s %(message)s"))
+    logger = logging.getLogger("throwcollect.serve")
+    logger.setLevel(logging.INFO)
+    logger.addHandler(lines)
 
 
 @contextlib.contextmanager

@@ -58,6 +58,7 @@ class InstanceState:
         status: ``starting`` until all nodes run, ``running``, ``ended``, or ``died``: its launcher did before it ended.
         started: When it was begun.
         ended: When it ended; None before.
+        stopping: Whether it ends because somebody has asked for that; running trials are finished.
         exit_code: Exit code of its launcher; None before it ended.
         message: What it ended with, in words; empty if there was no error.
         simulations: Number of simulations that are wanted.
@@ -75,6 +76,7 @@ class InstanceState:
     status: Status
     started: datetime
     ended: datetime | None
+    stopping: bool
     exit_code: int | None
     message: str
     simulations: int
@@ -114,7 +116,7 @@ class Lookout:
 
     def __init__(self, catalogue: Catalogue) -> None:
         self._catalogue = catalogue
-        self._ended: dict[tuple[str, int], InstanceState] = {}
+        self._ended: dict[tuple[str, int | None], InstanceState] = {}
 
     def look(self) -> State:
         """The state by now: all runs that live, and the latest of those that are over."""
@@ -136,7 +138,7 @@ class Lookout:
     def list_instances(self) -> list[InstanceState]:
         """All runs that this machine remembers, the latest first."""
         records = Records()
-        known, self._ended = self._ended, {}
+        known, ended = self._ended, {}
         instances = []
         for run in records.ids():
             written = run, records.read_change_ns(run)
@@ -148,7 +150,8 @@ class Lookout:
                     continue
             instances.append(found)
             if found.status == "ended":
-                self._ended[written] = found
+                ended[written] = found
+        self._ended = ended
         return sorted(instances, key=lambda each: each.started, reverse=True)
 
 
@@ -164,6 +167,7 @@ def describe(run: Run) -> InstanceState:
         status=_status(run),
         started=record.started,
         ended=record.ended,
+        stopping=record.stopping and run.status == "running",
         exit_code=record.exit_code,
         message=str(error or ""),
         simulations=record.simulations,

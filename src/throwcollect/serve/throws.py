@@ -65,42 +65,45 @@ class ThrowWatch:
     def __init__(self, run: Run) -> None:
         self._run = run
         self._listeners: dict[asyncio.Queue[bytes], asyncio.AbstractEventLoop] = {}
-        self._thread: threading.Thread | None = None
-        self._wanted = threading.Event()
+        self._unwanted = threading.Event()
         self._newest: bytes | None = None
 
     @asynccontextmanager
     async def throws(self) -> AsyncIterator[Callable[[], Awaitable[bytes]]]:
         """Listen; what is given waits for the next throw, and misses those that come while nobody waits."""
         queue: asyncio.Queue[bytes] = asyncio.Queue(maxsize=1)
+        if not self._listeners:
+            # Each thread has a word of its own by which it ends: one that does so slowly does not take the next one's.
+            self._unwanted = threading.Event()
+            name = f"throws of {self._run.id}"
+            threading.Thread(target=self._listen, args=(self._unwanted,), name=name, daemon=True).start()
         self._listeners[queue] = asyncio.get_running_loop()
         if self._newest is not None:
             queue.put_nowait(self._newest)
-        if self._thread is None:
-            self._wanted.set()
-            self._thread = threading.Thread(target=self._listen, name=f"throws of {self._run.id}", daemon=True)
-            self._thread.start()
         try:
             yield queue.get
         finally:
             del self._listeners[queue]
             if not self._listeners:
-                thread, self._thread = self._thread, None
-                self._wanted.clear()
-                if thread is not None:
-                    await asyncio.to_thread(thread.join)
+                self._unwanted.set()
 
-    def _listen(self) -> None:
+    @property
+    def is_idle(self) -> bool:
+        """Whether nobody listens."""
+        return not self._listeners
+
+    def _listen(self, unwanted: threading.Event) -> None:
         run = self._run
-        run.record.middleware.joining.settle()
         with RunListener(lambda _: None, on_connect=self._subscribe) as listener:
-            while self._wanted.is_set():
+            while not unwanted.is_set():
                 try:
                     run = run.now()
+                    if run.connection is not None:
+                        run.record.middleware.joining.settle()
                     listener.spin(run.connection, _SPIN_S)
                 except ThrowcollectError:
-                    # The run has ended, and was forgotten; whoever looks on sees so in the state.
-                    self._wanted.wait(_SPIN_S)
+                    # The run has ended, and was forgotten, or cannot be joined; whoever looks on sees so in the state.
+                    unwanted.wait(_SPIN_S)
 
     def _subscribe(self, node: Node) -> None:
         node.create_subscription(UInt8MultiArray, SHOWN_TOPIC, self._hear, SHOWN_QOS, raw=True)

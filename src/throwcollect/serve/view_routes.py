@@ -8,22 +8,22 @@ from collections.abc import Awaitable, Callable
 from fastapi import APIRouter, Request, Response, WebSocket
 from fastapi.responses import FileResponse
 
-from throwcollect.errors import ThrowcollectError
+from throwcollect.errors import NotFoundError, ThrowcollectError
+from throwcollect.serve.access import MAY_ONLY_LOOK
 from throwcollect.serve.instances import Instances
-from throwcollect.serve.live import LiveHolds
+from throwcollect.serve.live import take
 from throwcollect.serve.robot_files import description_of, find_mesh
-from throwcollect.serve.sockets import NOT_FOUND, keep_telling
+from throwcollect.serve.sockets import FAILED, MAY_NOT, NOT_FOUND, keep_telling, refuse
 from throwcollect.serve.throws import ThrowWatch
 
 _XML = {"requestBody": {"required": True, "content": {"application/xml": {"schema": {"type": "string"}}}}}
 
 
-def make_view_routes(instances: Instances, holds: LiveHolds) -> APIRouter:
+def make_view_routes(instances: Instances) -> APIRouter:
     """Routes on what the page draws.
 
     Args:
         instances: All runs.
-        holds: Simulations that are slowed down to be watched.
     """
     router = APIRouter()
     watches: dict[str, ThrowWatch] = {}
@@ -54,26 +54,33 @@ def make_view_routes(instances: Instances, holds: LiveHolds) -> APIRouter:
         try:
             run = await asyncio.to_thread(instances.get, instance)
         except ThrowcollectError:
-            await socket.close(NOT_FOUND, f"no run {instance}")
+            await refuse(socket, NOT_FOUND, f"no run {instance}")
             return
         await socket.accept()
         watch = watches.setdefault(instance, ThrowWatch(run))
-        async with watch.throws() as next_throw:
-            await keep_telling(socket, lambda: _send_next(socket, next_throw))
+        try:
+            async with watch.throws() as next_throw:
+                await keep_telling(socket, lambda: _send_next(socket, next_throw))
+        finally:
+            # The next run of this id has other throws.
+            if watch.is_idle and watches.get(instance) is watch:
+                del watches[instance]
 
     @router.websocket("/instances/{instance}/live/{simulation}")
     async def live(socket: WebSocket, instance: str, simulation: str) -> None:
+        if not socket.state.may_change:
+            await refuse(socket, MAY_NOT, MAY_ONLY_LOOK[1])
+            return
         try:
-            run = await asyncio.to_thread(instances.get, instance)
-            hold = await holds.take(run, simulation)
+            hold = await asyncio.to_thread(lambda: take(instances.get(instance), simulation))
         except ThrowcollectError as error:
-            await socket.close(NOT_FOUND, error.message[:120])
+            await refuse(socket, NOT_FOUND if isinstance(error, NotFoundError) else FAILED, error.message)
             return
         try:
             await socket.accept()
             await keep_telling(socket, asyncio.Event().wait)
         finally:
-            await hold.let_go()
+            await asyncio.to_thread(hold.let_go)
 
     return router
 

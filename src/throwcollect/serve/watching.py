@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from dataclasses import replace
 
+from throwcollect.errors import ThrowcollectError
 from throwcollect.serve.state import STATES, State
 
 _LOOK_S = 0.2
@@ -24,12 +25,22 @@ class StateWatch:
         self._state: State | None = None
         self._revision = 0
         self._changed = asyncio.Condition()
+        self._one_look = asyncio.Lock()
         self._listeners = 0
         self._looking: asyncio.Task[None] | None = None
 
     async def current(self) -> State:
-        """The state by now."""
-        state = await asyncio.to_thread(self._look)
+        """The state by now.
+
+        Raises:
+            ConfigError: If runs cannot be remembered.
+        """
+        # One after the other, so that nobody tells what was seen before something that has been told.
+        async with self._one_look:
+            state = await asyncio.to_thread(self._look)
+            return await self._take(state)
+
+    async def _take(self, state: State) -> State:
         async with self._changed:
             if self._state is None or state != replace(self._state, revision=0):
                 self._revision += 1
@@ -65,4 +76,6 @@ class StateWatch:
     async def _keep_looking(self) -> None:
         while True:
             await asyncio.sleep(_LOOK_S)
-            await self.current()
+            # Where records cannot be read for a while, as on a full disk, there is nothing new to tell.
+            with suppress(ThrowcollectError, OSError):
+                await self.current()

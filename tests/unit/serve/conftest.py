@@ -1,0 +1,106 @@
+"""A server without a process: records in a directory of the test, and runs that nobody launches."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import Any
+
+import pytest
+from starlette.testclient import TestClient, WebSocketTestSession
+
+from throwcollect.runs.record import Record
+from throwcollect.runs.records import STATE_VARIABLE, OpenRun, Records
+from throwcollect.serve.access import Access, Keys
+from throwcollect.serve.app import make_app
+from throwcollect.serve.catalogue import Catalogue
+from throwcollect.serve.instances import Instances
+
+HOST = "127.0.0.1:8080"
+CONFIG = "name: small\ntrials: 3\ntask: {name: throw}\n"
+
+
+@pytest.fixture(autouse=True)
+def state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Where runs are remembered."""
+    monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "state"))
+    return tmp_path / "state"
+
+
+@dataclass
+class Served:
+    """An application, its keys, and what it is about."""
+
+    app: Access
+    keys: Keys
+    instances: Instances
+
+    def client(self, token: str | None = None, *, fails: bool = True) -> TestClient:
+        """A client with a token; by default, that which may do everything."""
+        headers = {"Authorization": f"Bearer {self.keys.full if token is None else token}"} if token != "" else {}
+        return TestClient(self.app, base_url=f"http://{HOST}", headers=headers, raise_server_exceptions=fails)
+
+    def socket(self, path: str, token: str = "", **options: Any) -> WebSocketTestSession:
+        """A socket, which a context opens; without a token by default."""
+        return self.client(token).websocket_connect(f"ws://{HOST}{path}", **options)
+
+
+@pytest.fixture
+def catalogue(tmp_path: Path) -> Catalogue:
+    (tmp_path / "small.yaml").write_text(CONFIG)
+    path = tmp_path / "catalogue.yaml"
+    path.write_text("components:\n  throws: {config: small.yaml, max_instances: 2}\n  talos: {session: small.yaml}\n")
+    return Catalogue.read(path)
+
+
+@pytest.fixture
+def served(catalogue: Catalogue, tmp_path: Path) -> Served:
+    keys = Keys()
+    instances = Instances(catalogue, tmp_path / "datasets")
+    return Served(Access(make_app(instances, keys), keys, frozenset({HOST})), keys, instances)
+
+
+@pytest.fixture
+def client(served: Served) -> TestClient:
+    # It is not entered, as what goes on besides requests is none of most tests' business.
+    return served.client()
+
+
+Remember = Callable[..., OpenRun]
+
+
+@pytest.fixture
+def remember(tmp_path: Path) -> Iterator[Remember]:
+    """Makes records; a run that `lives` is one whose lock this process holds."""
+    opened: list[OpenRun] = []
+
+    def make(name: str = "small-0001", *, lives: bool = True, **fields: Any) -> OpenRun:
+        run = Records().new("small", run=name)
+        values = {
+            "name": "small",
+            "runtime": "local",
+            "directory": str(tmp_path / "datasets" / name),
+            "volume": None,
+            "logs": str(tmp_path / "datasets" / name / "logs"),
+            "domain_id": 0,
+            "started": datetime.now(timezone.utc),
+            "launcher": 2**22,
+            "simulations": 2,
+        }
+        run.write(Record(run=run.run, **{**values, **fields}))
+        if lives:
+            opened.append(run)
+        else:
+            run.close()
+        return run
+
+    yield make
+    for run in opened:
+        run.close()
+
+
+def ended(**fields: Any) -> dict[str, Any]:
+    """Fields of a run that has ended."""
+    return {"lives": False, "ended": datetime.now(timezone.utc), "exit_code": 0, **fields}

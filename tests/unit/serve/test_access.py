@@ -1,0 +1,229 @@
+"""Who is let in, and who is not: one test for each way of trying."""
+
+import logging
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from starlette.testclient import TestClient, WebSocketDenialResponse
+from starlette.websockets import WebSocketDisconnect
+from tests.unit.serve.conftest import HOST, Served
+
+from throwcollect.serve import access
+from throwcollect.serve.access import Keys
+
+STATE = "/api/v1/state"
+
+
+def problem_of(answer: Any, status: int) -> str:
+    assert answer.status_code == status, answer.text
+    assert answer.headers["content-type"] == "application/problem+json"
+    assert answer.json()["status"] == status
+    return str(answer.json()["title"])
+
+
+@pytest.mark.parametrize("token", ["", "wrong", "wröng"])
+def test_nobody_without_a_token_gets_anything(served: Served, token: str) -> None:
+    client = served.client("")
+    headers = {"Authorization": f"Bearer {token}".encode("latin-1")} if token else {}
+    for path in (STATE, "/api/v1/instances", "/openapi.json", "/api/v1/nothing", "/%61pi/v1/state"):
+        answer = client.get(path, headers=headers)
+        assert "token" in problem_of(answer, 401)
+        assert answer.headers["www-authenticate"] == "Bearer"
+
+
+def test_a_token_in_the_address_counts_for_sockets_alone(served: Served) -> None:
+    client = served.client("")
+    assert client.get(f"{STATE}?token={served.keys.full}").status_code == 401
+    with served.socket(f"{STATE}?token={served.keys.full}") as socket:
+        assert socket.receive_json()["version"] == 1
+
+
+def test_anybody_may_have_the_page_and_know_that_it_serves(served: Served) -> None:
+    client = served.client("")
+    assert client.get("/api/v1/health").json()["status"] == "ok"
+    assert "html" in client.get("/").headers["content-type"]
+    for path in ("/../access.py", "/%2e%2e/access.py", "/..%2faccess.py", "/nothing", "/%00", "/" + 300 * "a"):
+        assert client.get(path).status_code == 404, path
+
+
+def test_every_answer_forbids_what_a_page_does_not_need(served: Served) -> None:
+    for answer in (served.client().get("/"), served.client().get(STATE), served.client("").get(STATE)):
+        assert "default-src 'self'" in answer.headers["content-security-policy"]
+        assert "frame-ancestors 'none'" in answer.headers["content-security-policy"]
+        assert answer.headers["x-content-type-options"] == "nosniff"
+        assert not [name for name in answer.headers if name.startswith("access-control") or name == "set-cookie"]
+
+
+def test_who_may_only_look_changes_nothing(served: Served) -> None:
+    client = served.client(served.keys.read_only)
+    assert client.get(STATE).status_code == 200
+    for method, path, content in (
+        ("PUT", "instances/a", {"component": "throws"}),
+        ("POST", "instances", {"component": "throws"}),
+        ("PATCH", "instances/a", {"simulations": 1}),
+        ("DELETE", "instances/a", None),
+        ("POST", "collections/a/resume", None),
+        ("POST", "codes", None),
+    ):
+        answer = client.request(method, f"/api/v1/{path}", json=content)
+        assert problem_of(answer, 403) == "this token may only look"
+
+
+def test_who_may_only_look_slows_no_simulation_down(served: Served) -> None:
+    path = "/api/v1/instances/a/live/sim_0"
+    with served.socket(path, served.keys.read_only) as socket, pytest.raises(WebSocketDisconnect) as end:
+        socket.receive_text()
+    assert (end.value.code, end.value.reason) == (4403, "this token may only look")
+
+
+def test_pages_of_others_get_nothing(served: Served) -> None:
+    client = served.client()
+    for origin in ("http://evil.example", "null", f"http://{HOST}.evil.example", "http://127.0.0.1"):
+        for path in (STATE, "/", "/api/v1/health", "/api/v1/exchange"):
+            assert "origin" in problem_of(client.get(path, headers={"Origin": origin}), 403)
+
+
+def test_our_own_page_may_connect(served: Served) -> None:
+    assert served.client().get(STATE, headers={"Origin": f"http://{HOST}"}).status_code == 200
+
+
+def test_a_name_that_is_not_ours_gets_nothing(served: Served) -> None:
+    client = served.client()
+    for host in ("evil.example", "evil.example:8080", "127.0.0.1", "127.0.0.1:80", ""):
+        for path in (STATE, "/", "/api/v1/health"):
+            assert "name" in problem_of(client.get(path, headers={"Host": host}), 421)
+
+
+def parts(size: int) -> Iterator[bytes]:
+    """A body in pieces, whose length no header tells."""
+    for _ in range(size // 1000):
+        yield 1000 * b" "
+
+
+@pytest.mark.parametrize("path", ["/api/v1/instances", "/api/v1/exchange"])
+@pytest.mark.parametrize("with_length", [True, False])
+def test_a_body_that_is_too_long_is_not_taken(served: Served, path: str, with_length: bool) -> None:
+    content = 1_001_000 * b" " if with_length else parts(1_001_000)
+    answer = served.client().post(path, content=content, headers={"Content-Type": "application/json"})
+    assert problem_of(answer, 413) == "a body may have 1000000 bytes"
+
+
+@pytest.mark.parametrize("with_length", [True, False])
+def test_a_body_of_the_largest_size_is_read(served: Served, with_length: bool) -> None:
+    content = 1_000_000 * b" " if with_length else parts(1_000_000)
+    answer = served.client().post("/api/v1/instances", content=content, headers={"Content-Type": "application/json"})
+    assert answer.status_code == 422
+
+
+def test_a_length_that_is_none_is_refused(served: Served) -> None:
+    client = served.client()
+    for length in ("-1", "1e3", "0x10", ""):
+        assert problem_of(client.get(STATE, headers={"Content-Length": length}), 413)
+
+
+def test_a_socket_without_a_token_is_not_opened(served: Served) -> None:
+    for path in (STATE, "/api/v1/instances/a/shown", "/api/v1/instances/a/live/sim_0", "/nothing", "/"):
+        for query in ("", "?token=wrong", "?token="):
+            with pytest.raises(WebSocketDenialResponse) as refused, served.socket(path + query):
+                pass
+            assert refused.value.status_code == 401
+
+
+@pytest.mark.parametrize(("headers", "status"), [({"Origin": "http://evil.example"}, 403), ({"Host": "evil"}, 421)])
+def test_a_socket_of_somebody_else_is_not_opened(served: Served, headers: dict[str, str], status: int) -> None:
+    with (
+        pytest.raises(WebSocketDenialResponse) as refused,
+        served.socket(STATE, served.keys.full, headers=headers),
+    ):
+        pass
+    assert refused.value.status_code == status
+
+
+@pytest.mark.parametrize("way", ["header", "subprotocol", "query"])
+def test_a_socket_with_a_token_is_opened(served: Served, way: str) -> None:
+    token = served.keys.read_only
+    protocols = ["other", f"bearer.{token}"] if way == "subprotocol" else None
+    query = f"?token={token}" if way == "query" else ""
+    with served.socket(STATE + query, token if way == "header" else "", subprotocols=protocols) as socket:
+        assert socket.receive_json()["revision"] == 1
+        # A browser closes the socket if none of its protocols is taken.
+        assert socket.accepted_subprotocol == (f"bearer.{token}" if way == "subprotocol" else None)
+
+
+def exchange(client: TestClient, code: str) -> Any:
+    return client.post("/api/v1/exchange", json={"code": code})
+
+
+def test_a_code_is_exchanged_once(served: Served) -> None:
+    code = served.client().post("/api/v1/codes").json()["code"]
+    anybody = served.client("")
+    assert exchange(anybody, code).json() == {"token": served.keys.full}
+    answer = exchange(anybody, code)
+    assert "exchanged already" in problem_of(answer, 403)
+    assert answer.json()["hint"] == "throwcollect view"
+    assert exchange(anybody, "guessed").status_code == 403
+
+
+def test_a_code_lasts_ten_minutes(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = 1000.0
+    monkeypatch.setattr(access.time, "monotonic", lambda: now)
+    keys = Keys()
+    late, early = keys.new_code(), keys.new_code()
+    now += 599
+    assert keys.exchange(early) == keys.full
+    now += 2
+    assert keys.exchange(late) is None
+
+
+def test_codes_that_nobody_exchanged_are_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = 1000.0
+    monkeypatch.setattr(access.time, "monotonic", lambda: now)
+    keys = Keys()
+    for _ in range(5):
+        keys.new_code()
+        now += 601
+    assert len(keys._codes) == 1
+
+
+def test_each_request_leaves_a_line_without_what_follows_the_path(
+    served: Served, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level(logging.INFO, "throwcollect.serve")
+    full, read_only = served.keys.full, served.keys.read_only
+    served.client().get("/api/v1/health?token=abc")
+    served.client().get(STATE)
+    served.client(read_only).post("/api/v1/codes")
+    served.client("").get(STATE)
+    with served.socket(f"{STATE}?token={read_only}"):
+        # It is written when the socket is opened, as it may be open for days.
+        assert caplog.messages[-1] == "SOCKET /api/v1/state 101 read-only"
+    with pytest.raises(WebSocketDenialResponse), served.socket(f"{STATE}?token=guessed"):
+        pass
+    served.client().get("/api/v1/a%0AGET%20/api/v1/forged%20200%20full")
+    assert caplog.messages == [
+        "GET /api/v1/health 200 anybody",
+        "GET /api/v1/state 200 full",
+        "POST /api/v1/codes 403 read-only",
+        "GET /api/v1/state 401 anybody",
+        "SOCKET /api/v1/state 101 read-only",
+        "SOCKET /api/v1/state 401 anybody",
+        "GET /api/v1/a%0AGET%20/api/v1/forged%20200%20full 404 full",
+    ]
+    assert not [line for line in caplog.messages if full in line or read_only in line]
+
+
+def test_what_fails_unexpectedly_leaves_a_line_and_a_problem(
+    served: Served, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    caplog.set_level(logging.INFO, "throwcollect.serve")
+
+    def fail(*_: object) -> None:
+        raise RuntimeError("secret")
+
+    monkeypatch.setattr("throwcollect.serve.instance_routes.describe", fail)
+    monkeypatch.setattr(type(served.instances), "get", fail)
+    answer = served.client(fails=False).get("/api/v1/instances/a")
+    assert problem_of(answer, 500) == "internal error"
+    assert "secret" not in answer.text
+    assert caplog.messages[0] == "GET /api/v1/instances/a 500 full"
