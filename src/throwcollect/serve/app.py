@@ -13,11 +13,13 @@ from fastapi.staticfiles import StaticFiles
 from pydantic import BaseModel
 
 from throwcollect.serve.access import Keys
+from throwcollect.serve.bridges import Bridges
 from throwcollect.serve.dataset_routes import make_dataset_routes
 from throwcollect.serve.instance_routes import make_component_routes, make_instance_routes, make_log_routes
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.live import keep_letting_go
 from throwcollect.serve.problems import add_handlers, problem
+from throwcollect.serve.rosbridge_routes import make_rosbridge_routes
 from throwcollect.serve.sockets import keep_telling
 from throwcollect.serve.state import Lookout, State
 from throwcollect.serve.view_routes import make_view_routes
@@ -71,6 +73,7 @@ def make_app(instances: Instances, keys: Keys) -> FastAPI:
     app.include_router(make_log_routes(instances), prefix=PREFIX)
     app.include_router(make_dataset_routes(instances), prefix=PREFIX)
     app.include_router(make_view_routes(instances), prefix=PREFIX)
+    app.include_router(make_rosbridge_routes(instances, Bridges()))
     app.mount("/", StaticFiles(directory=_PAGE, html=True))
     return app
 

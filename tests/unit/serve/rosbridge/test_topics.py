@@ -65,6 +65,12 @@ def test_a_topic_that_turns_out_to_be_latched_is_heard_from_its_beginning(party:
     publisher = node.create_publisher(String, "/later", LATCHED)
     publisher.publish(String(data="at once"))
     assert party.next(op="publish")["msg"] == {"data": "at once"}
+    wait_for(
+        lambda: (
+            [each.qos_profile.durability for each in node.get_subscriptions_info_by_topic("/later")]
+            == [DurabilityPolicy.TRANSIENT_LOCAL]
+        )
+    )
 
 
 @pytest.mark.parametrize(
