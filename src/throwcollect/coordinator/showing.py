@@ -5,7 +5,7 @@ Nobody but the coordinator may subscribe to the episodes themselves: a simulatio
 
 from __future__ import annotations
 
-from throwcollect.coordinator.topics import SHOWN_QOS, shown_topic
+from throwcollect.coordinator.topics import SHOWN_QOS, make_shown_topic
 from throwcollect.ros import Node, Publisher
 from throwcollect.ros.msg import UInt8MultiArray
 
@@ -34,7 +34,7 @@ class Showing:
             message: Serialised message of the episode.
         """
         if namespace not in self._publishers:
-            topic = shown_topic(namespace)
+            topic = make_shown_topic(namespace)
             self._publishers[namespace] = self._node.create_publisher(UInt8MultiArray, topic, SHOWN_QOS)
         if namespace in self._watched:
             # A simulation whose episode is replaced keeps its turn; one that was shown goes to the end of the line.

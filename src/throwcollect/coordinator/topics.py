@@ -13,7 +13,7 @@ SHOWN_QOS = ros.QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 """Whoever is slow misses some, and holds nobody up."""
 
 
-def shown_topic(namespace: str) -> str:
+def make_shown_topic(namespace: str) -> str:
     """Topic of the newest episode of a simulation, as it arrived: a std_msgs/UInt8MultiArray.
 
     Args:

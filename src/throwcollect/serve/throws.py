@@ -10,7 +10,7 @@ from collections.abc import AsyncIterator, Awaitable, Callable, Iterable
 from contextlib import asynccontextmanager
 from functools import partial
 
-from throwcollect.coordinator.topics import SHOWN_QOS, shown_topic
+from throwcollect.coordinator.topics import SHOWN_QOS, make_shown_topic
 from throwcollect.episode.message import Delivery, unpack
 from throwcollect.errors import ThrowcollectError
 from throwcollect.ros import Node
@@ -154,7 +154,7 @@ class _Subscriptions:
         for name in set(simulations) - self._heard:
             self._heard.add(name)
             hear = partial(self._hear, name)
-            self._node.create_subscription(UInt8MultiArray, shown_topic(f"/{name}"), hear, SHOWN_QOS, raw=True)
+            self._node.create_subscription(UInt8MultiArray, make_shown_topic(f"/{name}"), hear, SHOWN_QOS, raw=True)
 
 
 def _replace(queue: asyncio.Queue[bytes], frame: bytes) -> None:
