@@ -22,7 +22,7 @@ from throwcollect.serve.problems import add_handlers, problem
 from throwcollect.serve.rosbridge_routes import make_rosbridge_routes
 from throwcollect.serve.sockets import keep_telling
 from throwcollect.serve.state import Lookout, State
-from throwcollect.serve.view_routes import make_view_routes
+from throwcollect.serve.view_routes import make_description_routes, make_view_routes
 from throwcollect.serve.watching import StateWatch
 from throwcollect.version import __version__
 
@@ -72,6 +72,7 @@ def make_app(instances: Instances, keys: Keys) -> FastAPI:
     app.include_router(make_instance_routes(instances, lookout), prefix=PREFIX)
     app.include_router(make_log_routes(instances), prefix=PREFIX)
     app.include_router(make_dataset_routes(instances), prefix=PREFIX)
+    app.include_router(make_description_routes(instances), prefix=PREFIX)
     app.include_router(make_view_routes(instances), prefix=PREFIX)
     app.include_router(make_rosbridge_routes(instances, Bridges()))
     app.mount("/", StaticFiles(directory=_PAGE, html=True))

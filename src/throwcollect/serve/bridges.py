@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Mapping
+from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
-from pathlib import Path
 
-from throwcollect.config.loader import load
-from throwcollect.dataset.directory import config_path
 from throwcollect.errors import ConflictError, ThrowcollectError
-from throwcollect.robots.description import robot_of
 from throwcollect.ros.connection import Connection
 from throwcollect.runs.records import Run
-from throwcollect.serve.rosbridge import Bridge, find_packages
+from throwcollect.serve.rosbridge import Bridge
 
 _MOST_CLIENTS = 16
 _LOOK_S = 0.5
@@ -42,13 +38,12 @@ class Bridges:
 
         Raises:
             ConflictError: If as many clients as there may be are connected, to all runs together.
-            ConfigError: If the files of the robot cannot be found.
         """
         if sum(each.clients for each in self._shared.values()) >= _MOST_CLIENTS:
             raise ConflictError(f"{_MOST_CLIENTS} clients are connected by rosbridge, as many as there may be")
         if (shared := self._shared.get(run.id)) is None:
             run.record.middleware.joining.settle()
-            bridge = Bridge(run.connection, await asyncio.to_thread(_find_packages, run))
+            bridge = Bridge(run.connection)
             shared = self._shared[run.id] = _Shared(bridge, asyncio.create_task(_follow(run, bridge)))
         shared.clients += 1
         try:
@@ -59,12 +54,6 @@ class Bridges:
                 del self._shared[run.id]
                 shared.following.cancel()
                 await asyncio.to_thread(shared.bridge.close)
-
-
-def _find_packages(run: Run) -> Mapping[str, Path]:
-    """Packages of the robot of a run; none while it has no configuration yet."""
-    path = config_path(run.place.directory)
-    return find_packages(robot_of(load(path))) if path.is_file() else {}
 
 
 async def _follow(run: Run, bridge: Bridge) -> None:

@@ -19,14 +19,13 @@ from throwcollect.serve.throws import ThrowWatch
 _XML = {"requestBody": {"required": True, "content": {"application/xml": {"schema": {"type": "string"}}}}}
 
 
-def make_view_routes(instances: Instances) -> APIRouter:
-    """Routes on what the page draws.
+def make_description_routes(instances: Instances) -> APIRouter:
+    """Routes on what the robot of a run looks like.
 
     Args:
-        instances: All runs.
+        instances: All runs, and what can be done with them.
     """
     router = APIRouter()
-    watches: dict[str, ThrowWatch] = {}
 
     @router.get("/instances/{instance}/urdf", response_class=Response)
     def urdf(instance: str) -> Response:
@@ -43,6 +42,18 @@ def make_view_routes(instances: Instances) -> APIRouter:
     def show_own(instance: str) -> None:
         """Have viewers draw the description of the configuration again."""
         instances.show(instance, None)
+
+    return router
+
+
+def make_view_routes(instances: Instances) -> APIRouter:
+    """Routes on what the page draws.
+
+    Args:
+        instances: All runs.
+    """
+    router = APIRouter()
+    watches: dict[str, ThrowWatch] = {}
 
     @router.get("/meshes/{package}/{path:path}", response_class=FileResponse)
     def mesh(package: str, path: str) -> FileResponse:

@@ -2,7 +2,6 @@
 
 from throwcollect.serve.rosbridge.bridge import Bridge
 from throwcollect.serve.rosbridge.client import Client
-from throwcollect.serve.rosbridge.file_server import find_packages
 from throwcollect.serve.rosbridge.websocket import attend
 
-__all__ = ["Bridge", "Client", "attend", "find_packages"]
+__all__ = ["Bridge", "Client", "attend"]

@@ -7,15 +7,15 @@ import itertools
 import logging
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from queue import Empty, SimpleQueue
-from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from throwcollect import ros
 from throwcollect.errors import ThrowcollectError
 from throwcollect.ros.endpoint import answers
+from throwcollect.serve.robot_files import find_mesh
 from throwcollect.serve.rosbridge.client import Client
 from throwcollect.serve.rosbridge.codec import Frame
 from throwcollect.serve.rosbridge.file_server import FileServer
@@ -40,14 +40,14 @@ class Bridge:
 
     Args:
         connection: The way into the run; None while its router has no address, until `move` tells it.
-        packages: Directories of the packages of the robot's description, by name; `find_packages` finds them.
+        find: Finds the files that clients name as ``package://NAME/PATH``, by these two.
 
     Attributes:
-        files: What gives clients files of these packages.
+        files: What gives clients such files.
     """
 
-    def __init__(self, connection: Connection | None, packages: Mapping[str, Path] = MappingProxyType({})) -> None:
-        self.files = FileServer(packages)
+    def __init__(self, connection: Connection | None, find: Callable[[str, str], Path] = find_mesh) -> None:
+        self.files = FileServer(find)
         self._connection = connection
         self._session: Session | None = None
         self._joined: Connection | None = None

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import base64
-import re
-from collections.abc import Mapping
-from pathlib import Path, PurePosixPath
+from collections.abc import Callable
+from pathlib import Path
 
 from throwcollect.errors import ConfigError
-from throwcollect.robots.robot import Robot
 from throwcollect.serve.rosbridge.service_calls import Call
 
 GET_FILE = "file_server/get_file"
@@ -18,40 +16,21 @@ _PACKAGE = "package://"
 _LARGEST = 64 * 2**20
 
 
-def find_packages(robot: Robot) -> Mapping[str, Path]:
-    """Find the packages that the description of a robot names.
-
-    Args:
-        robot: The robot.
-
-    Returns:
-        Directory of each package, by its name.
-
-    Raises:
-        ConfigError: If the description is not installed, or cannot be read.
-    """
-    try:
-        text = robot.urdf_path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{robot.urdf_path}: cannot be read: {error}") from error
-    return {name: robot.share() / name for name in set(re.findall(rf"{_PACKAGE}([\w.-]+)/", text))}
-
-
 class FileServer:
     """Files of packages, for those who name them as ``package://NAME/PATH``.
 
     Args:
-        packages: Directory of each package, by its name.
+        find: Finds a file by the name of its package and its path there; raises `NotFoundError` if there is none.
     """
 
-    def __init__(self, packages: Mapping[str, Path]) -> None:
-        self._packages = packages
+    def __init__(self, find: Callable[[str, str], Path]) -> None:
+        self._find = find
 
     def answer(self, call: Call) -> None:
         """Answer with the bytes of a file.
 
         Raises:
-            ConfigError: If there is no such file in a package of the robot.
+            ConfigError: If there is no such file in a package of a robot.
         """
         data = self._read(call.fields.text("name"))
         call.reply({"value": base64.b64encode(data).decode() if call.form.compression == "none" else data})
@@ -63,14 +42,12 @@ class FileServer:
             ConfigError: If it lies elsewhere, is not there, or too large.
         """
         name, _, rest = url.removeprefix(_PACKAGE).partition("/")
-        package = self._packages.get(name) if url.startswith(_PACKAGE) else None
-        if package is None or ".." in PurePosixPath(rest).parts:
-            known = ", ".join(f"{_PACKAGE}{each}/..." for each in sorted(self._packages))
-            raise ConfigError(f"{url}: not a file of the robot's description", expected=known or "a robot with meshes")
+        if not url.startswith(_PACKAGE):
+            raise ConfigError(f"{url}: not a file of a robot's description", expected=f"{_PACKAGE}NAME/PATH")
+        path = self._find(name, rest)
         try:
-            path = (package / rest).resolve(strict=True)
-            if not (path.is_relative_to(package.resolve()) and path.is_file() and path.stat().st_size <= _LARGEST):
-                raise ConfigError(f"{url}: no file of that package, or larger than {_LARGEST >> 20} MiB")
+            if path.stat().st_size > _LARGEST:
+                raise ConfigError(f"{url}: is larger than {_LARGEST >> 20} MiB")
             return path.read_bytes()
-        except (OSError, ValueError) as error:
+        except OSError as error:
             raise ConfigError(f"{url}: cannot be read: {error}") from error

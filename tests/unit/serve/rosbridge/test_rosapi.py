@@ -16,7 +16,8 @@ from rclzenoh.interfaces import message_definition
 from throwcollect.robots.talos import TALOS
 from throwcollect.ros import ActionServer, Node, Parameter, SetParametersResult, get_action, get_message, get_service
 from throwcollect.ros.connection import Connection
-from throwcollect.serve.rosbridge import Bridge, find_packages
+from throwcollect.serve import robot_files
+from throwcollect.serve.rosbridge import Bridge
 
 FJT: Any = get_action("control_msgs/action/FollowJointTrajectory")
 JointState: Any = get_message("sensor_msgs/msg/JointState")
@@ -161,7 +162,7 @@ def test_what_cannot_be_told_is_answered_with_a_sentence(
 
 @pytest.fixture(scope="module")
 def mesh_bridge(connection: Connection) -> Iterator[Bridge]:
-    bridge = Bridge(connection, find_packages(TALOS))
+    bridge = Bridge(connection)
     yield bridge
     bridge.close()
 
@@ -225,12 +226,16 @@ def test_who_may_only_look_changes_nothing(reader: Party, asked: Any) -> None:
     assert told["op"] in ("status", "service_response", "action_result")
 
 
-def test_links_that_lead_out_of_a_package_are_not_followed(connection: Connection, tmp_path: Path) -> None:
+def test_links_that_lead_out_of_a_package_are_not_followed(
+    reader: Party, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     package = tmp_path / "robot"
     package.mkdir()
     (tmp_path / "secret").write_text("key")
     (package / "mesh.stl").symlink_to(tmp_path / "secret")
-    bridge = Bridge(connection, {"robot": package})
-    party = Party(bridge)
-    assert "no file of that package" in party.call("file_server/get_file", name="package://robot/mesh.stl")
-    bridge.close()
+    (package / "own.stl").write_text("own")
+    monkeypatch.setattr(robot_files, "_find_packages", lambda: {"robot": package})
+    found = reader.call("/file_server/get_file", name="package://robot/own.stl")
+    assert base64.b64decode(found["value"]) == b"own"
+    reader.ask(op="call_service", id="l", service="/file_server/get_file", args={"name": "package://robot/mesh.stl"})
+    assert "no mesh" in reader.next(id="l")["values"]
