@@ -66,8 +66,8 @@ export class LandingMap {
     }
     const [x0, x1] = range(placed.map(([x]) => x));
     const [y0, y1] = range(placed.map(([, y]) => y));
-    const which = this.#isWhole ? "all landings" : "landings of the throws that were shown";
-    const text = `${placed.length} ${which}; ${x0.toFixed(2)} to ${x1.toFixed(2)} m before the robot, `
+    const which = this.#isWhole ? `All ${placed.length} landings` : `${placed.length} landings of throws that were shown`;
+    const text = `${which}: ${x0.toFixed(2)} to ${x1.toFixed(2)} m before the robot, `
       + `${y0.toFixed(2)} to ${y1.toFixed(2)} m to its left.`;
     setText(get("map-text"), text);
   }

@@ -94,6 +94,8 @@ class Page {
     } catch (error) {
       if (!(error instanceof Problem) || error.status !== 401) return;
       this.socket.close();
+      this.watching.put(undefined);
+      this.live.put(undefined, "");
       keepToken(null);
       signIn("The server does not know this token: it has been started anew.");
     }
@@ -120,6 +122,7 @@ class Page {
       this.tell("");
     }
     this.watching.put(instance);
+    if (instance && !lives(instance) && this.view.shown.length) this.tell(`${instance.id} has ended; its last throws are replayed`);
     get("map-box").hidden = instance?.kind !== "collection";
     const names = this.#names(instance);
     setChoices(get("alone"), [["", "all"], ...names.map((name) => [name, name])]);

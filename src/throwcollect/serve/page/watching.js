@@ -11,7 +11,6 @@ export class Watching {
   #socket = null;
   #urdf = null;
   #hasAll = false;
-  #turn = 0;
 
   /**
    * @param {object} parts
@@ -112,8 +111,6 @@ export class Watching {
   }
 
   #receive(newest) {
-    const { robots } = this.instance;
-    newest.simulation ??= robots[this.#turn++ % robots.length];
     this.playback.put(newest);
     this.map.add(newest);
   }
