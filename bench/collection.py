@@ -12,7 +12,7 @@ import docker
 import psutil
 
 from throwcollect.coordinator.progress import Progress
-from throwcollect.dataset.writer import create
+from throwcollect.dataset.creation import create
 from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
 from throwcollect.runtimes.docker.containers import DockerNodes

@@ -24,11 +24,11 @@ import pyarrow as pa
 from throwcollect.cluster.submit import submit
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
+from throwcollect.dataset.creation import create
 from throwcollect.dataset.directory import MANIFEST, PLAN, THROWS, shard_name
 from throwcollect.dataset.join import join
 from throwcollect.dataset.manifest import entry_of, manifest_text, read_manifest
 from throwcollect.dataset.slice_directory import slice_directory
-from throwcollect.dataset.writer import create
 from throwcollect.runs.preparation import prepare
 from throwcollect.sweep.parquet_file import encode_table, read_parquet
 from throwcollect.sweep.plan import Plan, make_plan

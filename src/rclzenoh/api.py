@@ -16,11 +16,12 @@ from rclzenoh.context import Context, shutdown
 from rclzenoh.context import init as init
 from rclzenoh.exceptions import ExternalShutdownException, NameValidationException
 from rclzenoh.executors import Executor, SingleThreadedExecutor
-from rclzenoh.extensions import graph_changes, pass_on_log, provide_time, spin_some
+from rclzenoh.extensions import graph_changes, let_callbacks_wait, pass_on_log, provide_time, spin_some
+from rclzenoh.interfaces import deserialize as deserialize_message
 from rclzenoh.interfaces import get_action, get_message, get_service
 from rclzenoh.interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
 from rclzenoh.node import Node
-from rclzenoh.parameter import Parameter
+from rclzenoh.parameter import Parameter, parameter_value_to_python
 from rclzenoh.publisher import Publisher
 from rclzenoh.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclzenoh.task import Future
@@ -49,6 +50,7 @@ __all__ = [
     "SetParametersResult",
     "SingleThreadedExecutor",
     "Time",
+    "deserialize_message",
     "get_action",
     "get_action_client_names_and_types_by_node",
     "get_action_names_and_types",
@@ -56,6 +58,8 @@ __all__ = [
     "get_message",
     "get_service",
     "graph_changes",
+    "let_callbacks_wait",
+    "parameter_value_to_python",
     "pass_on_log",
     "provide_time",
     "shutdown",

@@ -14,6 +14,10 @@ def graph_changes(node: Node) -> int:
     return node.context.graph.changes
 
 
+def let_callbacks_wait(_node: Node) -> None:
+    """Have a node go on with other callbacks while one, a coroutine, waits: here all nodes do."""
+
+
 def pass_on_log(node: Node, record: logging.LogRecord) -> None:
     """Log what was logged by Python's own logging, under a node's name and with the place that it came from."""
     place = (record.pathname, record.funcName or "", record.lineno)

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from functools import reduce
+from itertools import repeat
 from operator import add
 
 import numpy as np
@@ -19,8 +20,9 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
-def _each(function: Callable[[float], float], values: Array) -> Array:
-    return np.fromiter(map(function, values.ravel().tolist()), np.float64, values.size).reshape(values.shape)
+def _each(function: Callable[..., float], values: Array, *others: Iterable[float]) -> Array:
+    each = map(function, values.ravel().tolist(), *others)
+    return np.fromiter(each, np.float64, values.size).reshape(values.shape)
 
 
 def exp(values: Array) -> Array:
@@ -48,7 +50,7 @@ def power(bases: Array, exponent: float) -> Array:
         ValueError: If a base is negative, or 0 where the exponent is.
         OverflowError: If a result is too large.
     """
-    return _each(lambda base: math.pow(base, exponent), bases)
+    return _each(math.pow, bases, repeat(exponent))
 
 
 def sin(angles: Array) -> Array:

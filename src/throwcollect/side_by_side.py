@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import os
 import signal
+import threading
+import warnings
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from functools import cache, partial
 from typing import Any, TypeVar
 
@@ -27,10 +30,27 @@ def work_side_by_side(
     *,
     processes: int,
     doing: str,
+    fork: bool = False,
 ) -> Iterator[_Found]:
+    """Do what `working_side_by_side` does, from when the first result is asked for to when the last one is had."""
+    with working_side_by_side(pieces, begin, arguments, processes=processes, doing=doing, fork=fork) as found:
+        yield from found
+
+
+@contextmanager
+def working_side_by_side(
+    pieces: Sequence[_Piece],
+    begin: Callable[..., Callable[[_Piece], _Found]],
+    arguments: tuple[Any, ...],
+    *,
+    processes: int,
+    doing: str,
+    fork: bool = False,
+) -> Iterator[Iterator[_Found]]:
     """Do pieces of work in several processes, which import the program that calls this, as `multiprocessing` does.
 
-    Whatever ends this one, Ctrl-C too, ends the others at once.
+    They begin at once, and this one may do something else meanwhile. Whatever ends it or the block, Ctrl-C too, ends
+    them at once.
 
     Args:
         pieces: The pieces; each is sent to a process.
@@ -38,9 +58,11 @@ def work_side_by_side(
         arguments: What `begin` is called with.
         processes: How many processes there are at most; 1 is this process alone.
         doing: What a process does, for messages: ``checks trials``.
+        fork: Whether processes are forked off this one, with all that it has imported and read, if it has one thread of
+            Python. The libraries that they use must not mind that: the ones with threads of their own are not used.
 
     Yields:
-        What came of each piece, in order.
+        Gives what came of each piece, in order.
 
     Raises:
         WorkerError: If a process is killed.
@@ -53,20 +75,23 @@ def work_side_by_side(
 
     processes = min(processes, len(pieces))
     if processes <= 1:
-        yield from map(begin(*arguments), pieces)
+        yield _do_here(pieces, begin, arguments)
         return
     others = set(multiprocessing.active_children())
-    # New interpreters, as a process that was forked off might hold what threads of this one had locked.
-    context = multiprocessing.get_context("spawn")
+    # New interpreters otherwise, as a process that was forked off might wait for what threads of this one had locked.
+    context = multiprocessing.get_context("fork" if fork and threading.active_count() == 1 else "spawn")
     pool = ProcessPoolExecutor(processes, context, _begin, (partial(begin, *arguments), os.getpid()))
     try:
         # Ctrl-C is for this process, which ends those that start here with the signal blocked.
         unblocked = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT,))
         try:
-            found = pool.map(_work, pieces)
+            with warnings.catch_warnings():
+                # Arrow and BLAS have threads, which are not used by those that are forked. Python warns from 3.12 on.
+                warnings.filterwarnings("ignore", "This process .* is multi-threaded", DeprecationWarning)
+                found = pool.map(_work, pieces)
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, unblocked)
-        yield from found
+        yield found
     except BrokenProcessPool as error:
         raise WorkerError(
             f"a process that {doing} was killed", hint="the kernel's log may say why: memory may be short"
@@ -75,6 +100,12 @@ def work_side_by_side(
         for process in set(multiprocessing.active_children()) - others:
             process.kill()
         pool.shutdown(cancel_futures=True)
+
+
+def _do_here(
+    pieces: Sequence[_Piece], begin: Callable[..., Callable[[_Piece], _Found]], arguments: tuple[Any, ...]
+) -> Iterator[_Found]:
+    yield from map(begin(*arguments), pieces)
 
 
 _make: list[Callable[[], Callable[[Any], Any]]] = []

@@ -25,8 +25,9 @@ from throwcollect.extras import require
 from throwcollect.files import StrPath
 from throwcollect.replay.throw import Replayer
 from throwcollect.side_by_side import work_side_by_side
-from throwcollect.sweep.plan import Trial, make_trials
+from throwcollect.sweep.plan import make_trials, refusal
 from throwcollect.sweep.points import Points
+from throwcollect.sweep.trials import Trial
 
 # Whoever takes the name hears what is missing, and not who simulates with it later.
 require("pinocchio")
@@ -97,9 +98,10 @@ class Simulator:
         if trial < 0:
             raise ConfigError(f"trial {trial}: there is no such trial", expected="a number from 0")
         points = Points(tuple(point), np.array([list(point.values())], np.float64).reshape(1, len(point)))
-        (planned,) = make_trials(self.config, points, check=self._check, first=trial)
-        if planned.refused is not None:
-            raise PlanError([Problem(planned.refused)], hint="a collection would leave this trial out, as refused")
+        (planned,) = make_trials(self.config, points, first=trial)
+        refused = refusal(with_values(self.config, point), self._check)
+        if refused is not None:
+            raise PlanError([Problem(refused)], hint="a collection would leave this trial out, as refused")
         return self._throw(planned)
 
     def throw_many(self, points: Iterable[Point], *, processes: int = 1) -> Iterator[Throw]:

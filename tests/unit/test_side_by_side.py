@@ -13,7 +13,7 @@ from collections.abc import Callable
 import pytest
 
 from throwcollect.errors import ConfigError, WorkerError
-from throwcollect.side_by_side import work_side_by_side
+from throwcollect.side_by_side import work_side_by_side, working_side_by_side
 
 ASLEEP = """
 import time
@@ -21,13 +21,43 @@ from test_side_by_side import begin_sleep
 from throwcollect.side_by_side import work_side_by_side
 
 if __name__ == "__main__":
-    for piece in work_side_by_side(range(3), begin_sleep, (), processes=2, doing="sleeps"):
+    for piece in work_side_by_side(range(3), begin_sleep, (), processes=2, doing="sleeps", fork={fork}):
         print(piece, flush=True)
 """
+FORKED = """
+import os
+import threading
+import time
+import test_side_by_side
+from throwcollect.errors import WorkerError
+from throwcollect.side_by_side import work_side_by_side
+
+test_side_by_side.READ.append("read before")
+for _ in range(2):
+    found = list(work_side_by_side(range(4), test_side_by_side.begin_look, (), processes=2, doing="looks", fork=True))
+    print([read for read, _ in found], os.getpid() in {process for _, process in found})
+    threading.Thread(target=time.sleep, args=[600], daemon=True).start()
+"""
+DEAD = """
+from test_side_by_side import begin_death
+from throwcollect.errors import WorkerError
+from throwcollect.side_by_side import work_side_by_side
+
+try:
+    list(work_side_by_side(range(40), begin_death, (), processes=2, doing="counts", fork=True))
+except WorkerError as error:
+    print(error.message)
+"""
+READ: list[str] = []
+"""What a process has read; another one has it only if it is forked off."""
 
 
 def begin(factor: int) -> Callable[[int], tuple[int, int]]:
     return lambda piece: (factor * piece, os.getpid())
+
+
+def begin_look() -> Callable[[int], tuple[list[str], int]]:
+    return lambda _: (READ, os.getpid())
 
 
 def begin_badly() -> Callable[[int], int]:
@@ -72,18 +102,45 @@ def test_a_process_that_is_killed_is_named() -> None:
         list(work_side_by_side(range(40), begin_death, (), processes=2, doing="counts"))
 
 
+def test_results_are_given_after_something_else_was_done() -> None:
+    with working_side_by_side(range(4), begin, (3,), processes=2, doing="counts") as found:
+        processes = {process.pid for process in multiprocessing.active_children()}
+        assert {process for _, process in found} <= processes
+    assert multiprocessing.active_children() == []
+
+
+def test_processes_are_forked_off_one_without_other_threads_of_python() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", FORKED], capture_output=True, text=True, env=find_tests(), timeout=60, check=False
+    )
+    have, have_not = [["read before"]] * 4, [[]] * 4
+    assert (done.stdout, done.stderr) == (f"{have} False\n{have_not} False\n", "")
+
+
+def test_a_process_that_was_forked_off_and_is_killed_is_named() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", DEAD], capture_output=True, text=True, env=find_tests(), timeout=60, check=False
+    )
+    assert (done.stdout, done.stderr) == ("a process that counts was killed\n", "")
+
+
+def find_tests() -> dict[str, str]:
+    """The environment of a process that can import this module."""
+    paths = os.pathsep.join([os.path.dirname(__file__), *filter(None, [os.environ.get("PYTHONPATH")])])
+    return {**os.environ, "PYTHONPATH": paths}
+
+
+@pytest.mark.parametrize("fork", [False, True])
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
-def test_the_end_of_the_one_that_asked_ends_all_at_once(how: signal.Signals) -> None:
-    here = os.path.dirname(__file__)
-    paths = os.pathsep.join([here, *filter(None, [os.environ.get("PYTHONPATH")])])
+def test_the_end_of_the_one_that_asked_ends_all_at_once(how: signal.Signals, fork: bool) -> None:
     # A group of its own, as Ctrl-C reaches all processes of a terminal.
     with subprocess.Popen(
-        [sys.executable, "-c", ASLEEP],
+        [sys.executable, "-c", ASLEEP.format(fork=fork)],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
-        env={**os.environ, "PYTHONPATH": paths},
+        env=find_tests(),
     ) as asking:
         assert asking.stdout is not None
         assert asking.stderr is not None

@@ -122,16 +122,51 @@ def message_definition(name: str) -> str:
     """Definition text of a message and all messages it consists of, as rosbag2 stores it (``ros2msg``).
 
     Args:
-        name: Full name, such as ``sensor_msgs/msg/JointState``.
+        name: Full name, such as ``sensor_msgs/msg/JointState``, or that of a part of a service or action.
 
     Returns:
         The message's definition, then those of its dependencies, each after a line of 80 ``=`` and ``MSG: <name>``.
+        Parts of services and actions that stand in it have their full names.
 
     Raises:
         ValueError: If no such message is known.
     """
     _require(name)
-    return _STORE.generate_msgdef(name, ros_version=2)[0]
+    if not _has_parts(name):
+        return _STORE.generate_msgdef(name, ros_version=2)[0]
+    texts: dict[str, str] = {}
+    _add_texts(name, texts)
+    own = texts.pop(name)
+    return own + "".join(f"{_RULE}MSG: {_short_name(each)}\n{text}" for each, text in texts.items())
+
+
+_RULE = "=" * 80 + "\n"
+
+
+def _has_parts(name: str) -> bool:
+    """Whether parts of a service or action are among the fields of a structure; rosbags knows no text for those."""
+    return any(field.nested and "/msg/" not in field.type for field in structure(name).fields)
+
+
+def _add_texts(name: str, texts: dict[str, str]) -> None:
+    """Add the definitions of a structure, and of what it consists of, that are not there yet."""
+    if _has_parts(name):
+        texts[name] = "".join(f"{_write_type(field)} {field.name}\n" for field in structure(name).fields)
+    else:
+        texts[name] = message_definition(name).split(_RULE)[0]
+    for field in structure(name).fields:
+        if field.nested and field.type not in texts:
+            _add_texts(field.type, texts)
+
+
+def _write_type(field: Field) -> str:
+    """Type of a field of a structure that generators derive: they have neither bounded strings nor fixed arrays."""
+    bound = "" if field.bound is None else f"<={field.bound}"
+    return _short_name(field.type) + (f"[{bound}]" if field.sequence else "")
+
+
+def _short_name(name: str) -> str:
+    return name.replace("/msg/", "/")
 
 
 def _field(name: str, description: tuple[Nodetype, Any], default: Default | None) -> Field:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json as jsonlib
-from collections import Counter
 from functools import partial
 from pathlib import Path
 from typing import Annotated
@@ -85,8 +84,8 @@ def plan(
         numbers = [f"{trial.values[key]:.6g}".rjust(len(key)) for key in found.keys]
         note = f"  refused: {trial.refused}" if trial.refused else ""
         typer.echo("  ".join([str(trial.number).rjust(len("trial")), *numbers]) + note)
-    refused = Counter(trial.refused for trial in found.trials if trial.refused)
-    typer.echo(f"{format_count(len(found.trials), 'trial')}, {refused.total()} refused{more_trials(found)}", err=True)
+    planned, refused = format_count(len(found.trials), "trial"), len(found.trials.refused)
+    typer.echo(f"{planned}, {refused} refused{more_trials(found)}", err=True)
 
 
 def doctor(json: JsonOption = False) -> None:

@@ -20,6 +20,7 @@ from throwcollect.dataset.journal import read_journal
 from throwcollect.dataset.slice_directory import find_finished, slice_directory
 from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError, WorkerError
 from throwcollect.sweep.parquet_file import read_parquet
+from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.slice import Slice
 from throwcollect.wording import command, format_count, join_names
 
@@ -56,7 +57,7 @@ class ClusterRun:
     @cached_property
     def trials(self) -> int:
         """Number of trials of the plan."""
-        return len(read_parquet(self.directory / PLAN))
+        return len(Plan.read(self.directory / PLAN, self.config).trials)
 
     @property
     def simulations_per_task(self) -> int:

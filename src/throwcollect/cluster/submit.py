@@ -241,7 +241,7 @@ def _freeze(config: Config, directory: Path, sweep_directory: Path, say: Say) ->
         say(f"takes the plan in {directory}")
         return
     plan = prepare(config, directory, sweep_directory=sweep_directory, processes=count_cores(), say=say)
-    refused = sum(trial.refused is not None for trial in plan.trials)
+    refused = len(plan.trials.refused)
     note = f", {refused} refused by calculation" if refused else ""
     say(f"plan: {format_count(len(plan.trials), 'trial')}{note}; dataset: {directory}")
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from throwcollect.build import build_digest
 from throwcollect.config.schema import Config
 from throwcollect.errors import DatasetError
-from throwcollect.sweep.plan import Plan, Trial
+from throwcollect.sweep.plan import Plan
+from throwcollect.sweep.trials import Trial
 from throwcollect.tasks.task import task_of
 from throwcollect.trial.conditions import Conditions, Settings, conditions_from_json
 

@@ -25,7 +25,6 @@ from throwcollect.dataset.inspect import info, loss
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.episode.message import Delivery, Episode
 from throwcollect.errors import DatasetError, Interrupted, WorkerError
-from throwcollect.sweep.plan import Trial
 from throwcollect.tasks.result import Result
 from throwcollect.tasks.task import task_of
 from throwcollect.wording import command, format_count
@@ -33,6 +32,7 @@ from throwcollect.wording import command, format_count
 _RATE_WINDOW_S = 10.0
 """Throws per second are averaged over this time."""
 _SYNC_EVERY_S = 1.0
+_TELL_EVERY_S = 2.0
 """Real time of collecting that a power cut may cost."""
 
 
@@ -57,8 +57,7 @@ class TrialCollection:
         self.warn: Callable[[str], object] = lambda _: None
         self.on_change: Callable[[], None] = lambda: None
         self._config = writer.plan.config
-        self._trials: dict[int, Trial] = {trial.number: trial for trial in writer.plan.trials if trial.refused is None}
-        self._leases = Leases(self._trials, retries=self._config.run.retries)
+        self._leases = Leases(writer.plan.trials.numbers_to_run, retries=self._config.run.retries)
         self._growth = Growth(writer.plan) if self._config.grows else None
         self._names: dict[str, str] = {}
         self._acceptance = Acceptance(self._config)
@@ -74,12 +73,13 @@ class TrialCollection:
         self._synced_at = time.monotonic()
 
     @classmethod
-    def open(cls, directory: Path, *, say: Callable[[str], object]) -> TrialCollection:
+    def open(cls, directory: Path, *, say: Callable[[str], object], processes: int = 1) -> TrialCollection:
         """Open a dataset to collect into, and count what an earlier collection has left there as done.
 
         Args:
             directory: Directory of the dataset, as `prepare` or `resume` left it.
-            say: Is told how much was there.
+            say: Is told how much was there, and before that how far the search has come, if it takes long.
+            processes: As `DatasetWriter.recover` takes it.
 
         Raises:
             DatasetError: If the directory holds no plan, or another process collects into it.
@@ -87,7 +87,17 @@ class TrialCollection:
         """
         writer = DatasetWriter.open(directory)
         there: list[tuple[int, Result]] = []
-        if found := writer.recover(lambda trial, result: there.append((trial, result))):
+        told = time.monotonic()
+
+        def tell(trial: int, result: Result) -> None:
+            nonlocal told
+            # Episodes come file by file, so these are all of some files.
+            if there and time.monotonic() >= told + _TELL_EVERY_S:
+                told = time.monotonic()
+                say(f"has found {format_count(len(there), 'episode')} of an earlier collection so far")
+            there.append((trial, result))
+
+        if found := writer.recover(tell, processes=processes):
             say(f"keeps {format_count(found, 'episode')} of an earlier collection")
         collection = cls(writer)
         for trial, result in there:
@@ -185,7 +195,7 @@ class TrialCollection:
 
     def values_of(self, trial: int) -> Mapping[str, float]:
         """What a trial replaces of the configuration, by dotted key."""
-        return self._trials[trial].values
+        return self.writer.plan.trial(trial).values
 
     def take_in(self, simulation: str, delivery: Delivery, token: str = "") -> None:
         """Take an episode in, to be written by `write_one`; one that is not as it was asked for goes back.
@@ -200,7 +210,7 @@ class TrialCollection:
         try:
             result = self._columns.from_json(self._outcome_names, delivery.result)
             plan = self.writer.plan
-            reason = self._acceptance.find_difference(delivery.conditions, plan, self._trials[trial], token=token)
+            reason = self._acceptance.find_difference(delivery.conditions, plan, plan.trial(trial), token=token)
         except DatasetError as error:
             reason = error.message
         if reason is not None:
@@ -340,9 +350,7 @@ class TrialCollection:
         trials = None if self._draining else growth.step()
         if trials:
             self.writer.extend(trials)
-            fresh = {trial.number: trial for trial in trials if trial.refused is None}
-            self._trials |= fresh
-            self._leases.add(fresh)
+            self._leases.add(trials.numbers_to_run)
             self.on_change()
         return trials is not None
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
+from throwcollect.config.values import with_values
 from throwcollect.coordinator.prepare import feasibility_check
-from throwcollect.sweep.plan import Check, Plan, Trial, make_trials
+from throwcollect.sweep.plan import Check, Plan, make_trials, refusal
 from throwcollect.sweep.rounds import Rounds
+from throwcollect.sweep.trials import Trials
 from throwcollect.tasks.result import Result
 
 
@@ -25,8 +25,8 @@ class Growth:
         self._rounds = Rounds(plan.config)
         self._rounds.add(plan.trials)
         self._check: Check | None = None
-        self._coming: Iterator[Trial] | None = None
-        self._checked: list[Trial] = []
+        self._coming: Trials | None = None
+        self._reasons: list[str | None] = []
 
     @property
     def over(self) -> bool:
@@ -42,7 +42,7 @@ class Growth:
         """Take in what came of a trial."""
         self._rounds.tell(trial, result)
 
-    def step(self) -> tuple[Trial, ...] | None:
+    def step(self) -> Trials | tuple[()] | None:
         """Do the next piece of work, of some milliseconds: draw a round, or check one of its trials.
 
         Returns:
@@ -53,14 +53,14 @@ class Growth:
                 return None
             points = self._rounds.draw()
             if points is not None:
-                self._check = self._check or feasibility_check(self._config)
-                self._coming = make_trials(self._config, points, check=self._check, first=self._rounds.planned)
+                self._coming = make_trials(self._config, points, first=self._rounds.planned)
             return ()
-        trial = next(self._coming, None)
-        if trial is not None:
-            self._checked.append(trial)
+        if len(self._reasons) < len(self._coming):
+            self._check = self._check or feasibility_check(self._config)
+            trial = self._coming[len(self._reasons)]
+            self._reasons.append(refusal(with_values(self._config, trial.values), self._check))
             return ()
-        trials = tuple(self._checked)
-        self._coming, self._checked = None, []
+        trials = self._coming.refuse(self._reasons)
+        self._coming, self._reasons = None, []
         self._rounds.add(trials)
         return trials

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Collection, Iterable
 
 _MOST_IN_A_ROW = 3
@@ -26,7 +25,11 @@ class Leases:
     """
 
     def __init__(self, trials: Iterable[int], *, retries: int) -> None:
-        self._fresh = deque(sorted(set(trials)))
+        self._fresh = bytearray()
+        """Of each number, whether it is that of a trial that nobody has held yet; there may be millions."""
+        self._next = 0
+        """No trial below this one is fresh."""
+        self._waiting_fresh = 0
         self._returned: list[int] = []
         self._retries = retries
         self._held: dict[str, list[int]] = {}
@@ -35,9 +38,10 @@ class Leases:
         """Trials that a simulation has refused since it could do one, with the reasons."""
         self._wrong_refusals: dict[str, int] = {}
         """Number of trials that each simulation has refused and another one could do."""
-        self._total = len(self._fresh)
+        self._total = 0
         self._ended = 0
         self._completed = 0
+        self.add(trials)
 
     @property
     def total(self) -> int:
@@ -57,7 +61,7 @@ class Leases:
     @property
     def waiting(self) -> int:
         """Number of trials that no simulation holds, and that are to be done."""
-        return len(self._fresh) + len(self._returned)
+        return self._waiting_fresh + len(self._returned)
 
     @property
     def finished(self) -> bool:
@@ -77,10 +81,12 @@ class Leases:
         return self._refusals[min(simulations)][-1][1]
 
     def add(self, trials: Iterable[int]) -> None:
-        """Take in further trials, with numbers above those that are there."""
-        fresh = sorted(set(trials))
-        self._fresh.extend(fresh)
-        self._total += len(fresh)
+        """Take in further trials, with numbers above those that were handed out."""
+        for trial in trials:
+            self._fresh.extend(bytes(max(0, trial + 1 - len(self._fresh))))
+            self._waiting_fresh += not self._fresh[trial]
+            self._total += not self._fresh[trial]
+            self._fresh[trial] = True
 
     def find_held(self, simulation: str) -> tuple[int, ...]:
         """The trials that a simulation holds, in their order."""
@@ -102,8 +108,9 @@ class Leases:
         trial = next((trial for trial in sorted(self._returned) if self._may_try(simulation, trial, rivals)), None)
         if trial is not None:
             self._returned.remove(trial)
-        elif self._fresh:
-            trial = self._fresh.popleft()
+        elif self._waiting_fresh:
+            trial = self._next = self._fresh.index(True, self._next)
+            self._take_fresh(trial)
         else:
             return None
         self._held.setdefault(simulation, []).append(trial)
@@ -115,7 +122,9 @@ class Leases:
         Raises:
             ValueError: If it does not wait to be handed out.
         """
-        self._fresh.remove(trial)
+        if not self._fresh[trial]:
+            raise ValueError(trial)
+        self._take_fresh(trial)
         self._ended += 1
 
     def complete(self, simulation: str, trial: int) -> None:
@@ -180,6 +189,10 @@ class Leases:
     def _may_try(self, simulation: str, trial: int, rivals: Collection[str]) -> bool:
         failed = {name for name, _ in self._failures.get(trial, ())}
         return simulation not in failed or failed.issuperset(rivals)
+
+    def _take_fresh(self, trial: int) -> None:
+        self._fresh[trial] = False
+        self._waiting_fresh -= 1
 
     def _drop(self, simulation: str, trial: int) -> None:
         held = self._held.get(simulation, [])

@@ -14,6 +14,7 @@ from throwcollect.coordinator.node import Coordinator
 from throwcollect.heartbeat import Heartbeat
 from throwcollect.interruption import stop_signals
 from throwcollect.ros.self_check import check_answers
+from throwcollect.side_by_side import count_cores
 
 _IDLE_S = 0.05
 _TELL_EVERY_S = 10.0
@@ -36,7 +37,7 @@ def run(directory: Path) -> None:
         Interrupted: If a signal ended the collection before its last trial.
     """
     # The dataset is opened before there is a node: a large one takes its time, in which nobody would get an answer.
-    with TrialCollection.open(directory, say=_say) as collection:
+    with TrialCollection.open(directory, say=_say, processes=count_cores()) as collection:
         ros.init()
         if not ros.joins_protected():
             collection.writer.note("exposed")

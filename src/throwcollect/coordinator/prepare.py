@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -12,21 +13,26 @@ from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
 from throwcollect.config.values import with_values
+from throwcollect.dataset.creation import create
 from throwcollect.dataset.directory import TRIALS
-from throwcollect.dataset.writer import create
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.robots.feasibility import Feasibility
 from throwcollect.side_by_side import work_side_by_side
-from throwcollect.sweep.plan import Check, Plan, make_plan, refusal
+from throwcollect.sweep.plan import Check, Plan, check_some_left, draw_first_points, make_trials, refusal
 from throwcollect.sweep.point_file import read_points
 from throwcollect.sweep.points import Points
 from throwcollect.sweep.rounds import Rounds
+from throwcollect.sweep.trials import Trials
 from throwcollect.tasks.task import task_of
 
 _MANY_TRIALS = 500
 """From here on, checking trials side by side is worth the start of processes."""
 _TRIALS_A_PIECE = 100
+_MOST_PIECES = 10_000
+"""To hand over many more takes a minute, in which nothing is found and Ctrl-C has to wait."""
 _TELL_EVERY_S = 10.0
+_LEAST_BYTES = 40
+"""Of a trial in the file of a plan: its digest and its seed, which nothing compresses."""
 
 Say = Callable[[str], object]
 
@@ -45,36 +51,42 @@ def draw_plan(config: Config, *, directory: Path, processes: int = 1, say: Say =
         ConfigError: If the sweep cannot be drawn, or no trial is left.
         WorkerError: If a process that checks trials is killed.
     """
-    plan = make_plan(config, directory=directory)
-    keys, count = plan.keys, len(plan.trials)
-    values = np.array([[trial.values[key] for key in keys] for trial in plan.trials])
-    pieces = [values[first : first + _TRIALS_A_PIECE] for first in range(0, count, _TRIALS_A_PIECE)]
+    return _check_trials(config, draw_first_points(config, directory=directory), processes=processes, say=say)
+
+
+def _check_trials(config: Config, points: Points, *, processes: int, say: Say) -> Plan:
+    """The plan of points, in which trials are refused that the robot cannot do; as `draw_plan`."""
+    count = len(points.values)
+    size = max(_TRIALS_A_PIECE, count // _MOST_PIECES)
+    pieces = [(first, points.values[first : first + size]) for first in range(0, count, size)]
     found = work_side_by_side(
         pieces,
-        _find_refusals,
-        (config, keys),
+        _make_checked_trials,
+        (config, points.keys),
         processes=processes if count >= _MANY_TRIALS else 1,
         doing="checks trials",
     )
-    reasons: list[str | None] = []
+    trials = next(found)
     told = time.monotonic()
     for piece in found:
-        reasons += piece
+        trials.extend(piece)
         if time.monotonic() >= told + _TELL_EVERY_S:
             told = time.monotonic()
-            say(f"plan: {len(reasons)} of {count} trials checked")
-    return plan.refuse(reasons)
+            say(f"plan: {len(trials)} of {count} trials checked")
+    check_some_left(trials)
+    return Plan(config, trials)
 
 
-def _find_refusals(config: Config, keys: tuple[str, ...]) -> Callable[[NDArray[np.float64]], list[str | None]]:
-    """Make what says of trials, by rows of their values, why they cannot be run; None of those that can."""
+def _make_checked_trials(config: Config, keys: tuple[str, ...]) -> Callable[[tuple[int, NDArray[np.float64]]], Trials]:
+    """Make what makes trials of the number of the first one and their values, refused where they cannot be run."""
     check = feasibility_check(config)
 
-    def find(rows: NDArray[np.float64]) -> list[str | None]:
-        trials = (dict(zip(keys, row, strict=True)) for row in rows.tolist())
-        return [refusal(with_values(config, values), check) for values in trials]
+    def make(piece: tuple[int, NDArray[np.float64]]) -> Trials:
+        first, values = piece
+        trials = make_trials(config, Points(keys, values), first=first)
+        return trials.refuse([refusal(with_values(config, trial.values), check) for trial in trials])
 
-    return find
+    return make
 
 
 def feasibility_check(config: Config) -> Check:
@@ -117,6 +129,22 @@ def read_listed_points(config: Config, *, directory: Path) -> Points | None:
     return None if config.sweep.file is None else read_points(directory / config.sweep.file, config)
 
 
+def _check_room(directory: Path, trials: int) -> None:
+    """Make sure, before trials are checked for hours, that the disk is not too small for their plan at any rate.
+
+    Raises:
+        ConfigError: If it is.
+    """
+    there = next((each for each in (directory, *directory.absolute().parents) if each.is_dir()), None)
+    least, free = trials * _LEAST_BYTES, None if there is None else shutil.disk_usage(there).free
+    if free is not None and free < least:
+        sizes = f"takes {least / 1e6:.1f} MB or more, and {free / 1e6:.1f} MB are free"
+        raise ConfigError(
+            f"{directory}: a plan of {trials} trials {sizes}",
+            hint="free space on that disk, or choose another one with --output",
+        )
+
+
 def prepare(
     config: Config, directory: Path, *, sweep_directory: Path, processes: int = 1, say: Say = lambda _: None
 ) -> Plan:
@@ -133,7 +161,9 @@ def prepare(
         ConfigError: If the sweep or the directory cannot be used; nothing is left behind then.
         WorkerError: If a process that checks trials is killed.
     """
-    plan = draw_plan(config, directory=sweep_directory, processes=processes, say=say)
+    points = draw_first_points(config, directory=sweep_directory)
+    _check_room(directory, len(points.values))
+    plan = _check_trials(config, points, processes=processes, say=say)
     plan = replace(plan, config=make_self_contained(config))
     try:
         create(directory, plan, listed=read_listed_points(config, directory=sweep_directory))

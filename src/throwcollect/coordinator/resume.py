@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection
 from dataclasses import replace
 from pathlib import Path
+
+import numpy as np
 
 from throwcollect.config.loader import dump_yaml, load, load_locating_errors
 from throwcollect.config.problems import quote
@@ -12,14 +14,14 @@ from throwcollect.config.schema import Config
 from throwcollect.config.values import differences
 from throwcollect.coordinator.prepare import draw_plan, make_self_contained, prepare, read_listed_points
 from throwcollect.dataset.completeness import find_damage, is_as_written
-from throwcollect.dataset.directory import CONFIG, METADATA, PLAN, SOURCES, TRIALS, config_path
+from throwcollect.dataset.directory import CONFIG, METADATA, PLAN, SHARD_SUFFIX, SOURCES, TRIALS, config_path
 from throwcollect.dataset.lock import hold_alone
 from throwcollect.dataset.recovery import remove_unfinished
 from throwcollect.dataset.throws_table import read_throws
 from throwcollect.dataset.verify_tables import find_wrong_trials
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError, Problem
 from throwcollect.files import check_regular, is_there, remove, write_file
-from throwcollect.sweep.plan import Plan, Trial
+from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.point_file import encode_points
 from throwcollect.tasks.result import LOST
 from throwcollect.wording import command
@@ -27,6 +29,8 @@ from throwcollect.wording import command
 Say = Callable[[str], None]
 
 _MAY_GROW = ("trials", "until")
+_MUCH_BYTES = 50_000_000
+"""A core takes a second to look through so much."""
 
 
 def begun(directory: Path) -> bool:
@@ -46,7 +50,7 @@ def resume(
         directory: Directory of the dataset.
         sweep_directory: Where a relative `sweep.file` is looked for, should the plan be made anew.
         check: Whether the files of a finished dataset are compared byte for byte, and not only by their sizes.
-        say: Told what of a finished dataset is missing or damaged.
+        say: Told what of a finished dataset is missing or damaged, and what the coordinator has to look through.
 
     Raises:
         ConfigError: If the configuration is another one, or has fewer trials, or other ones.
@@ -69,7 +73,9 @@ def resume(
             # It is drawn again; one that grew with the results cannot be, and stays if its trials are what they were.
             old = None
         remove_unfinished(directory)
-        return _write(config, directory, sweep_directory, stored, old, damaged)
+        plan = _write(config, directory, sweep_directory, stored, old, damaged)
+        _announce_search(directory, say)
+        return plan
 
 
 def prepare_or_resume(path: Path, directory: Path) -> Plan:
@@ -118,6 +124,15 @@ def _write(
     if replanned or PLAN in damaged:
         plan.write(directory / PLAN)
     return plan
+
+
+def _announce_search(directory: Path, say: Say) -> None:
+    """Say how much an earlier collection has left, if looking through it takes long."""
+    if is_there(directory / METADATA):
+        return
+    size = sum(path.lstat().st_size for path in directory.glob(f"*{SHARD_SUFFIX}*"))
+    if size >= _MUCH_BYTES:
+        say(f"{directory}: looks through {size / 1e6:.0f} MB of recordings first; whole episodes stay")
 
 
 def _find_damaged(directory: Path, plan: Plan | None, *, check: bool, say: Say) -> frozenset[str]:
@@ -221,14 +236,15 @@ def _extend(directory: Path, old: Plan | None, new: Plan) -> Plan:
             expected=f"{len(old.trials)} or more",
             hint="throwcollect dataset sample takes some of them into a new dataset",
         )
-    if _identities(old.trials[:count]) != _identities(new.trials[:count]):
+    before, after = old.trials[:count], new.trials[:count]
+    if not np.array_equal(before.digests, after.digests) or before.refused.keys() != after.refused.keys():
         raise ConfigError(
             [Problem(f"the sampler {new.config.sweep.sampler} draws other trials when there are more", key="trials")],
             expected=f"{len(old.trials)}, as {directory} was begun with",
             hint="sobol and uniform go on where they ended; or merge datasets: throwcollect dataset merge",
         )
-    return replace(new, trials=(*new.trials, *old.trials[count:]))
-
-
-def _identities(trials: Sequence[Trial]) -> list[tuple[str, bool]]:
-    return [(trial.digest, trial.refused is None) for trial in trials]
+    if count < len(old.trials):
+        trials = new.trials[:]
+        trials.extend(old.trials[count:])
+        new = replace(new, trials=trials)
+    return new

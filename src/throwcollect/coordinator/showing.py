@@ -5,24 +5,25 @@ Nobody but the coordinator may subscribe to the episodes themselves: a simulatio
 
 from __future__ import annotations
 
-from throwcollect.coordinator.topics import SHOWN_QOS, SHOWN_TOPIC
-from throwcollect.ros import Node
+from throwcollect.coordinator.topics import SHOWN_QOS, make_shown_topic
+from throwcollect.ros import Node, Publisher
 from throwcollect.ros.msg import UInt8MultiArray
 
 _PERIOD_S = 1.0
 
 
 class Showing:
-    """Publishes the newest episode of one simulation after the other.
+    """Publishes the newest episode of one simulation after the other, each on the topic of its simulation.
 
     Args:
         node: The coordinator.
     """
 
     def __init__(self, node: Node) -> None:
-        self._publisher = node.create_publisher(UInt8MultiArray, SHOWN_TOPIC, SHOWN_QOS)
+        self._node = node
+        self._publishers: dict[str, Publisher] = {}
         self._newest: dict[str, bytes] = {}
-        self._is_watched = False
+        self._watched: set[str] = set()
         node.create_timer(_PERIOD_S, self._show)
 
     def offer(self, namespace: str, message: bytes) -> None:
@@ -32,13 +33,16 @@ class Showing:
             namespace: Namespace of the simulation.
             message: Serialised message of the episode.
         """
-        if self._is_watched:
+        if namespace not in self._publishers:
+            topic = make_shown_topic(namespace)
+            self._publishers[namespace] = self._node.create_publisher(UInt8MultiArray, topic, SHOWN_QOS)
+        if namespace in self._watched:
             # A simulation whose episode is replaced keeps its turn; one that was shown goes to the end of the line.
             self._newest[namespace] = message
 
     def _show(self) -> None:
-        self._is_watched = self._publisher.get_subscription_count() > 0
-        if not self._is_watched:
-            self._newest.clear()
-        elif self._newest:
-            self._publisher.publish(self._newest.pop(next(iter(self._newest))))
+        self._watched = {each for each, publisher in self._publishers.items() if publisher.get_subscription_count()}
+        self._newest = {each: message for each, message in self._newest.items() if each in self._watched}
+        if self._newest:
+            namespace = next(iter(self._newest))
+            self._publishers[namespace].publish(self._newest.pop(namespace))

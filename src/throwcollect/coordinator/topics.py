@@ -9,7 +9,14 @@ PROGRESS_TOPIC = "/coordinator/progress"
 """The progress: a std_msgs/String of JSON."""
 PROGRESS_QOS = ros.QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
-SHOWN_TOPIC = "/coordinator/shown"
-"""The newest episode of one simulation after the other, as it arrived: a std_msgs/UInt8MultiArray, once a second."""
 SHOWN_QOS = ros.QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 """Whoever is slow misses some, and holds nobody up."""
+
+
+def make_shown_topic(namespace: str) -> str:
+    """Topic of the newest episode of a simulation, as it arrived: a std_msgs/UInt8MultiArray.
+
+    Args:
+        namespace: Namespace of the simulation, with its slash.
+    """
+    return f"/coordinator/shown{namespace}"

@@ -3,15 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-import re
 from collections.abc import Iterable
-
-_DIGEST = re.compile(r"[0-9a-f]{64}")
-
-
-def is_digest(value: object) -> bool:
-    """Whether a value is a digest in hexadecimal."""
-    return isinstance(value, str) and bool(_DIGEST.fullmatch(value))
 
 
 def combine_digests(digests: Iterable[str]) -> str:

@@ -102,12 +102,12 @@ def _take(directory: Path, part: Plan, slice: Slice, writer: DatasetWriter) -> N
         )
     throws = read_throws(place, part)
     per_shard = part.config.record.trials_per_shard
-    for first in range(part.trials[0].number, part.trials[-1].number + 1, per_shard):
+    for first in part.trials.numbers[::per_shard]:
         number = first // per_shard
         name = shard_name(part.config.name, number)
         entry = entries.get(name)
         summary = None if entry is None else _move(place / name, directory / name, entry)
-        writer.take_shard(number, summary, entry, throws.slice(first - part.trials[0].number, per_shard))
+        writer.take_shard(number, summary, entry, throws.slice(first - part.trials.first, per_shard))
 
 
 def _move(source: Path, target: Path, entry: FileEntry) -> FileSummary:

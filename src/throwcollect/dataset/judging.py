@@ -8,16 +8,18 @@ from throwcollect.config.schema import Config
 from throwcollect.episode.message import Episode
 from throwcollect.errors import DatasetError
 from throwcollect.robots.description import robot_of
+from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.tasks.result import Result
 from throwcollect.tasks.task import task_of
 
 
-def judge_episode(config: Config, episode: Episode) -> Result:
+def judge_episode(config: Config, episode: Episode, trajectory: JointTrajectory | None = None) -> Result:
     """What came of a trial.
 
     Args:
         config: Configuration of the trial.
         episode: Its episode.
+        trajectory: What its controllers were sent; None if it has yet to be worked out.
 
     Raises:
         DatasetError: If the episode is damaged, or another robot's.
@@ -26,5 +28,7 @@ def judge_episode(config: Config, episode: Episode) -> Result:
     if (np.diff(samples.stamps_ns) <= 0).any():
         raise DatasetError("chunk: the stamps do not increase")
     task = task_of(config)
-    result: Result = task.judge(samples, episode.header, task.trajectory())
+    if trajectory is None:
+        trajectory = task.trajectory()
+    result: Result = task.judge(samples, episode.header, trajectory)
     return result

@@ -16,10 +16,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from throwcollect.dataset.digest import is_digest
 from throwcollect.dataset.directory import CONFIG, MANIFEST, METADATA, PLAN, SHARD_SUFFIX, SOURCES, THROWS, TRIALS
 from throwcollect.errors import DatasetError
 from throwcollect.files import open_regular, read_text, unreadable
+from throwcollect.sweep.digest import is_digest
 from throwcollect.wording import command
 
 _PROFILE = "data-package"

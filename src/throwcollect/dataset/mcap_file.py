@@ -15,7 +15,6 @@ from isal.isal_zlib import crc32
 from mcap import records
 
 from throwcollect.dataset.bag import FileSummary, bag_information, to_yaml
-from throwcollect.dataset.manifest import FileEntry, RunningHash
 from throwcollect.dataset.mcap_contents import FileContents, Run, declarations
 from throwcollect.episode.channels import Channel, Channels
 from throwcollect.episode.chunk import Chunk, encode_message_index, encode_records
@@ -72,7 +71,6 @@ class McapFile:
         self._write = write
         self.size = 0
         self._crc = 0
-        self._hash = RunningHash()
         self._channels = channels
         self._contents = FileContents(*declarations(channels.all))
         opening = encode_records(records.Header(PROFILE, LIBRARY), *self._contents.schemas, *self._contents.channels)
@@ -103,18 +101,9 @@ class McapFile:
         self._put(self._contents.section(self.size) + MAGIC)
         return summary
 
-    def entry(self, name: str) -> FileEntry:
-        """What the manifest says of the file.
-
-        Args:
-            name: Name of the file.
-        """
-        return FileEntry(name, self.size, self._hash.hexdigest())
-
     def _put(self, data: bytes) -> None:
         self._write(data)
         self._crc = crc32(data, self._crc)
-        self._hash.update(data)
         self.size += len(data)
 
 

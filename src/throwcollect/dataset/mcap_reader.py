@@ -9,6 +9,7 @@ import struct
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple, Protocol, TypeVar
 
@@ -18,7 +19,7 @@ from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
 
 from throwcollect.dataset.mcap_contents import Run
-from throwcollect.dataset.mcap_file import EPISODE, MAGIC, SENSORS_SHA256
+from throwcollect.dataset.mcap_file import EPISODE, MAGIC, SENSORS_SHA256, episode_run
 from throwcollect.episode.chunk import CHUNK_HEADER_BYTES, CHUNK_MARK, CHUNK_MARK_OFFSET, Chunk
 from throwcollect.episode.message import Episode, make_episode
 from throwcollect.errors import DatasetError
@@ -95,11 +96,13 @@ class StoredEpisode:
         episode: The episode.
         chunks: Its chunks, the state chunk first.
         facts: The Metadata record at its end.
+        said_digest: Its digest as that record has it; None if it has none.
     """
 
     episode: Episode
     chunks: tuple[StoredChunk, ...]
     facts: Record
+    said_digest: str | None
 
     @property
     def offset(self) -> int:
@@ -112,17 +115,30 @@ class StoredEpisode:
         return self.facts.end
 
     @classmethod
-    def of(cls, chunks: Sequence[StoredChunk], facts: Record) -> StoredEpisode:
+    def of(cls, chunks: Sequence[StoredChunk], facts: Record, said: Mapping[str, str]) -> StoredEpisode:
         """The episode of chunks and of the metadata that follow them.
+
+        Args:
+            chunks: The chunks.
+            facts: The record of the metadata.
+            said: What it says.
 
         Raises:
             DatasetError: If the metadata are not those of an episode with so many chunks; the contents of the chunks
                 are not looked at.
         """
-        said = facts.parse(records.Metadata).metadata
         hashes = [said.get("records_sha256", ""), *said.get(SENSORS_SHA256, "").split()]
         episode = make_episode(said.get("header", ""), hashes, [Chunk.parse(each.record.data) for each in chunks])
-        return cls(episode, tuple(chunks), facts)
+        return cls(episode, tuple(chunks), facts, said.get("digest"))
+
+    @cached_property
+    def intact_run(self) -> Run:
+        """Its records as they are written for the episode, whether or not they lie there like that.
+
+        Raises:
+            DatasetError: If a chunk is damaged.
+        """
+        return episode_run(self.episode)
 
     def run(self) -> Run:
         """Its records as they lie there, whether or not they fit each other."""
@@ -137,7 +153,7 @@ class StoredEpisode:
             DatasetError: If a chunk is damaged, or what is said of it or of the header is not so.
         """
         self.episode.check_records()
-        if self.facts.parse(records.Metadata).metadata.get("digest") != self.episode.digest:
+        if self.said_digest != self.episode.digest:
             place, expected = f"byte {self.facts.offset}", self.episode.digest
             raise DatasetError("the digest is not that of the header", place=place, expected=expected)
 
@@ -235,11 +251,12 @@ class McapContents:
             record = following
         if not chunks:
             raise DatasetError(f"a {record.kind} where the chunk of an episode should be", place=f"byte {offset}")
-        if record.opcode != Opcode.METADATA or record.parse(records.Metadata).name != EPISODE:
+        metadata = record.parse(records.Metadata) if record.opcode == Opcode.METADATA else None
+        if metadata is None or metadata.name != EPISODE:
             place = f"byte {record.offset}"
             raise DatasetError(f"a {record.kind} where the metadata of an episode should be", place=place)
         try:
-            return StoredEpisode.of(chunks, record)
+            return StoredEpisode.of(chunks, record, metadata.metadata)
         except DatasetError as error:
             raise error.locate(place=f"byte {offset}") from error
 

@@ -30,7 +30,8 @@ from throwcollect.episode.channels import Channels
 from throwcollect.errors import DatasetError
 from throwcollect.files import read_text, write_file
 from throwcollect.robots.description import full_description
-from throwcollect.sweep.plan import Plan, Trial
+from throwcollect.sweep.plan import Plan
+from throwcollect.sweep.trials import Trial
 from throwcollect.tasks.result import LOST
 from throwcollect.tasks.task import Task, task_of
 from throwcollect.wording import command
@@ -110,7 +111,7 @@ def _rebuild(directory: Path) -> Rebuilt:
         )
     earlier = read_earlier_rows(directory, plan)
     recordings = _Recordings(plan)
-    for name in dict.fromkeys(shard_of(plan, trial.number) for trial in plan.trials):
+    for name in dict.fromkeys(shard_of(plan, number) for number in plan.trials.numbers):
         if (directory / name).exists():
             if findings := recordings.read(directory / name):
                 raise DatasetError(str(findings[0]), path=directory, hint=repair)

@@ -8,22 +8,25 @@ be appended as if nothing had happened.
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from throwcollect.dataset.directory import CARD, CONFIG, MANIFEST, METADATA, PLAN, PROVENANCE, SOURCES, THROWS, TRIALS
 from throwcollect.dataset.judging import judge_episode
 from throwcollect.dataset.mcap_contents import Run
-from throwcollect.dataset.mcap_file import episode_run
 from throwcollect.dataset.mcap_reader import map_file
 from throwcollect.dataset.scan import scan_whole
 from throwcollect.dataset.shard import FinishedShard, OpenShard, write_in_order
 from throwcollect.episode.channels import Channels
 from throwcollect.errors import DatasetError
 from throwcollect.files import is_there, remove, unwritable
+from throwcollect.side_by_side import work_side_by_side
 from throwcollect.sweep.plan import Plan
 from throwcollect.tasks.result import Result
+
+_MANY_EPISODES = 1000
+"""From here on, looking through files side by side is worth the start of processes."""
 
 
 @dataclass(frozen=True)
@@ -65,6 +68,32 @@ class _Found:
     run: Run
 
 
+@dataclass(frozen=True)
+class LeftOfShard:
+    """Episodes of a shard that are as they would be if they were collected again, by trial.
+
+    Attributes:
+        final: Those in its final file.
+        begun: Those in the file that it is filled in; not looked for if the final file stays.
+        finished: The final file, if it is, byte for byte, what its episodes call for and has all that are wanted.
+    """
+
+    final: Mapping[int, _Found]
+    begun: Mapping[int, _Found]
+    finished: FinishedShard | None
+
+
+@dataclass(frozen=True)
+class _Piece:
+    """A shard to be looked through: its files, its trials, those that are waited for, and whether it may be whole."""
+
+    path: Path
+    part: Path
+    plan: Plan
+    wanted: frozenset[int]
+    keep: bool
+
+
 def remove_unfinished(directory: Path) -> None:
     """Remove what is left of files beside the recordings whose writer was killed; the files themselves stay.
 
@@ -77,27 +106,76 @@ def remove_unfinished(directory: Path) -> None:
     remove(directory / f"{PLAN}.part")
 
 
-def recover_shard(shard: OpenShard, plan: Plan, channels: Channels, *, keep: bool) -> RecoveredShard:
+def find_left(
+    shards: Mapping[int, OpenShard],
+    plan: Plan,
+    channels: Channels,
+    *,
+    settled: Callable[[int], bool],
+    processes: int = 1,
+) -> Iterator[LeftOfShard]:
+    """Look for what is left of shards, in several of them at a time if there is much to look through.
+
+    Args:
+        shards: By number; each waits for all its trials. Nothing is changed.
+        plan: Their trials.
+        channels: What is recorded.
+        settled: Whether no trial will be added to the shard of a number, so that its final file may stay if it has an
+            episode of each.
+        processes: How many processes may look; more than one import the program that calls this, as those of
+            `multiprocessing` do.
+
+    Yields:
+        What is left of each, in order.
+
+    Raises:
+        DatasetError: If files cannot be read.
+        WorkerError: If a process that looks is killed.
+    """
+    first = plan.trials[0].number
+    pieces = []
+    for number, shard in shards.items():
+        wanted = frozenset(shard.missing)
+        # Every process gets the trials that it needs, and not a whole plan.
+        trials = plan.trials[min(wanted, default=first) - first : max(wanted, default=first) - first + 1]
+        pieces.append(_Piece(shard.path, shard.part, Plan(plan.config, trials), wanted, settled(number)))
+    there = [piece for piece in pieces if is_there(piece.path) or is_there(piece.part)]
+    if sum(len(piece.wanted) for piece in there) < _MANY_EPISODES:
+        processes = 1
+    found = work_side_by_side(
+        there, _look_with, (channels,), processes=processes, doing="looks through recordings", fork=True
+    )
+    for piece in pieces:
+        yield next(found) if piece in there else LeftOfShard({}, {}, None)
+
+
+def _look_with(channels: Channels) -> Callable[[_Piece], LeftOfShard]:
+    def look(piece: _Piece) -> LeftOfShard:
+        final = _find_episodes(piece.path, piece.plan, channels, piece.wanted)
+        if piece.keep and final and final.keys() == piece.wanted:
+            finished = _check_finished(piece.path, channels, final)
+            if finished is not None:
+                return LeftOfShard(final, {}, finished)
+        return LeftOfShard(final, _find_episodes(piece.part, piece.plan, channels, piece.wanted), None)
+
+    return look
+
+
+def recover_shard(shard: OpenShard, left: LeftOfShard) -> RecoveredShard:
     """Take in what is left of a shard.
 
     Args:
         shard: Waits for all its trials; those whose episodes are there are not missing any more when this returns.
-        plan: Its trials.
-        channels: What is recorded.
-        keep: Whether the final file may stay if it has an episode of every trial that the shard waits for.
+        left: What is left of it.
 
     Raises:
         DatasetError: If files cannot be read or written.
     """
     remove(shard.path.with_name(f"{shard.path.name}.new"))
-    wanted = frozenset(shard.missing)
-    final = _find_episodes(shard.path, plan, channels, wanted)
-    if keep and final and final.keys() == wanted:
-        finished = _check_finished(shard.path, channels, final)
-        if finished is not None:
-            remove(shard.part)
-            return RecoveredShard(_sort(final.values()), finished)
-    begun = _find_episodes(shard.part, plan, channels, wanted)
+    final, begun = dict(left.final), dict(left.begun)
+    if left.finished is not None:
+        remove(shard.part)
+        return RecoveredShard(_sort(final.values()), left.finished)
     if final and not begun:
         try:
             os.replace(shard.path, shard.part)
@@ -130,7 +208,7 @@ def _find_episodes(path: Path, plan: Plan, channels: Channels, wanted: Collectio
             continue
         if channels.fit(episode.channels()) and episode.header.start_ns == plan.config.trial_start_ns(trial):
             recovered = RecoveredEpisode(trial, episode.header.samples, episode.digest, result)
-            found[trial] = _Found(recovered, each.stored.offset, replace(episode_run(episode), data=b""))
+            found[trial] = _Found(recovered, each.stored.offset, replace(each.stored.intact_run, data=b""))
     return found
 
 

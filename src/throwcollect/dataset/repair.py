@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -185,11 +185,8 @@ def _plan_of_table(path: Path, config: Config) -> Plan:
     ):
         raise DatasetError("not the table of this configuration, or not of all trials in order", path=path)
     points = Points(keys, np.array([[row[key] for key in keys] for row in rows]))
-    trials = zip(make_trials(config, points), rows, strict=True)
-    return Plan(
-        config,
-        tuple(replace(trial, refused=row["reason"] if row["outcome"] == REFUSED else None) for trial, row in trials),
-    )
+    reasons = [row["reason"] if row["outcome"] == REFUSED else None for row in rows]
+    return Plan(config, make_trials(config, points).refuse(reasons))
 
 
 @dataclass

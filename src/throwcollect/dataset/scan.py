@@ -15,7 +15,7 @@ from pathlib import Path
 
 from mcap import records
 
-from throwcollect.dataset.mcap_file import EPISODE, SENSORS_SHA256, episode_run
+from throwcollect.dataset.mcap_file import EPISODE, SENSORS_SHA256
 from throwcollect.dataset.mcap_reader import MOST_CHUNKS, McapContents, Record, StoredChunk, StoredEpisode, map_file
 from throwcollect.episode.chunk import MOST_RATIO, RECORD_PREFIX_BYTES, Chunk
 from throwcollect.errors import DatasetError
@@ -105,7 +105,7 @@ def _find(contents: McapContents, first: Record, facts: int) -> Found | None:
         return Found(stored, readable, None, intact=False)
     try:
         stored.check_whole()
-        intact = contents.slice(stored.offset, stored.end) == episode_run(stored.episode).data
+        intact = contents.slice(stored.offset, stored.end) == stored.intact_run.data
     except DatasetError as error:
         return Found(stored, readable, error, intact=False)
     return Found(stored, readable, None, intact)
@@ -118,10 +118,10 @@ def _gather(contents: McapContents, first: Record, facts: Record) -> StoredEpiso
         DatasetError: If they do not belong together.
     """
     chunks = [StoredChunk(first, {})]
-    said = facts.parse(records.Metadata).metadata.get(SENSORS_SHA256, "")
-    for _ in said.split()[:MOST_CHUNKS]:
+    said = facts.parse(records.Metadata).metadata
+    for _ in said.get(SENSORS_SHA256, "").split()[:MOST_CHUNKS]:
         offset = contents.next_chunk(chunks[-1].record.end)
         if not 0 <= offset < facts.offset:
             break
         chunks.append(StoredChunk(contents.record(offset), {}))
-    return StoredEpisode.of(chunks, facts)
+    return StoredEpisode.of(chunks, facts, said)

@@ -16,7 +16,7 @@ from operator import itemgetter
 from pathlib import Path
 
 from throwcollect.dataset.bag import FileSummary
-from throwcollect.dataset.manifest import FileEntry
+from throwcollect.dataset.manifest import FileEntry, RunningHash
 from throwcollect.dataset.mcap_contents import Run
 from throwcollect.dataset.mcap_file import McapFile, episode_run
 from throwcollect.episode.channels import Channels
@@ -57,13 +57,20 @@ def write_in_order(
         read: Gives the bytes of that other file from an offset on, so many.
         name: Name of the file.
     """
+    sha256 = RunningHash()
+
+    def put(data: bytes) -> None:
+        write(data)
+        sha256.update(data)
+
     _, first = runs[min(runs)]
-    file = McapFile(write, channels, start_ns=first.start_ns)
+    file = McapFile(put, channels, start_ns=first.start_ns)
     offsets = {}
     for trial, (offset, run) in sorted(runs.items(), key=itemgetter(0)):
         offsets[trial] = file.size
         file.append(replace(run, data=read(offset, run.length)))
-    return FinishedShard(file.finish(name), offsets, file.entry(name))
+    summary = file.finish(name)
+    return FinishedShard(summary, offsets, FileEntry(name, file.size, sha256.hexdigest()))
 
 
 class OpenShard:

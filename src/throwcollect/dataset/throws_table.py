@@ -14,7 +14,8 @@ from throwcollect.dataset.directory import THROWS
 from throwcollect.errors import DatasetError
 from throwcollect.sweep.arrow_column import make_table
 from throwcollect.sweep.parquet_file import read_parquet
-from throwcollect.sweep.plan import Plan, Trial
+from throwcollect.sweep.plan import Plan
+from throwcollect.sweep.trials import Trial
 from throwcollect.tasks.columns import ball_columns, join_ball
 from throwcollect.tasks.measures import BallState
 from throwcollect.tasks.result import Result
@@ -160,6 +161,6 @@ def read_throws(directory: Path, plan: Plan) -> pa.Table:
     """
     path = directory / THROWS
     table = read_throws_table(path, plan)
-    if table["trial"].to_pylist() != [trial.number for trial in plan.trials]:
+    if table["trial"].to_pylist() != list(plan.trials.numbers):
         raise DatasetError(f"its rows are not the {len(plan.trials)} trials of the plan in order", path=path)
     return table

@@ -6,13 +6,15 @@ A file that cannot be read is reported, and everything that does not depend on i
 from __future__ import annotations
 
 import reprlib
+import time
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from throwcollect.config.schema import Config
 from throwcollect.dataset.bag import FileSummary, bag_information, read_bag_metadata
-from throwcollect.dataset.digest import combine_digests, is_digest
+from throwcollect.dataset.digest import combine_digests
 from throwcollect.dataset.directory import CARD, FORMAT, METADATA, SHARD_SUFFIX, THROWS
 from throwcollect.dataset.findings import Finding
 from throwcollect.dataset.verify_episode import EpisodeCheck
@@ -22,10 +24,13 @@ from throwcollect.dataset.verify_shard import ShardReport, check_shard
 from throwcollect.dataset.verify_tables import Tables, check_tables, shard_of
 from throwcollect.errors import DatasetError
 from throwcollect.robots.description import is_available as robot_is_available
-from throwcollect.side_by_side import work_side_by_side
+from throwcollect.side_by_side import working_side_by_side
+from throwcollect.sweep.digest import is_digest
+from throwcollect.wording import format_count
 
 _MANY_EPISODES = 1000
 """From here on, checking files side by side is worth the start of processes."""
+_TELL_EVERY_S = 2.0
 _UNFINISHED = (".part", ".new")
 _short = reprlib.Repr()
 """Values from a file may be as large and as deep as they like."""
@@ -33,7 +38,13 @@ _short.maxstring = _short.maxother = 120
 _short.maxlevel = _short.maxdict = _short.maxlist = 3
 
 
-def verify(directory: Path, *, check_of: CheckOf | None = None, processes: int = 1) -> list[Finding]:
+def verify(
+    directory: Path,
+    *,
+    check_of: CheckOf | None = None,
+    processes: int = 1,
+    say: Callable[[str], object] = lambda _: None,
+) -> list[Finding]:
     """Check a dataset.
 
     Checked are: every promised file against the manifest; the configuration and the plan against each other, and the
@@ -47,6 +58,7 @@ def verify(directory: Path, *, check_of: CheckOf | None = None, processes: int =
         check_of: Makes the check that says which trials the plan refuses; None leaves refusals as they are.
         processes: How many processes may check the recordings of a large dataset; more than one import the program that
             calls this, as those of `multiprocessing` do.
+        say: Is told how far the check of a large dataset has come.
 
     Returns:
         What is wrong, file by file; empty when nothing is.
@@ -63,10 +75,11 @@ def verify(directory: Path, *, check_of: CheckOf | None = None, processes: int =
             raise
         findings.append(Finding.of(METADATA, error))
     tables = check_tables(directory)
-    findings += find_manifest_problems(directory, tables.config.name if tables.config else None)
-    findings += tables.findings
-    findings += _plan_findings(directory, tables, check_of)
-    checks = _check_shards(directory, tables, processes)
+    with _checking_shards(directory, tables, processes, say) as reports:
+        findings += find_manifest_problems(directory, tables.config.name if tables.config else None)
+        findings += tables.findings
+        findings += _plan_findings(directory, tables, check_of)
+        checks = dict(reports)
     findings += [finding for check in checks.values() for finding in check.findings]
     if bag is not None:
         findings += _find_bag_problems(bag, checks)
@@ -95,21 +108,37 @@ def _plan_findings(directory: Path, tables: Tables, check_of: CheckOf | None) ->
         yield from find_refusal_problems(tables.plan, tables.doubtful, check_of)
 
 
-def _check_shards(directory: Path, tables: Tables, processes: int) -> dict[str, ShardReport]:
-    """Check the files that rows name; all that are there if there are no rows."""
+@contextmanager
+def _checking_shards(
+    directory: Path, tables: Tables, processes: int, say: Callable[[str], object]
+) -> Iterator[Iterator[tuple[str, ShardReport]]]:
+    """Have the files checked that rows name; all that are there if there are no rows."""
     expected = _trials_by_file(directory, tables)
     names = sorted(_list_shards(directory) if expected is None else expected)
-    if expected is None or sum(map(len, expected.values())) < _MANY_EPISODES:
-        processes = 1
-    if processes == 1:
-        check = _file_check(directory, tables)
-        return {name: check(name) for name in names}
-    reports = work_side_by_side(names, _read_and_check, (directory,), processes=processes, doing="checks recordings")
-    return dict(zip(names, reports, strict=True))
+    many = expected is not None and sum(map(len, expected.values())) >= _MANY_EPISODES
+    if many:
+        say(f"checks {format_count(len(names), 'recording')}")
+    with working_side_by_side(
+        names,
+        _file_check,
+        (directory, tables),
+        processes=processes if many else 1,
+        doing="checks recordings",
+        fork=True,
+    ) as reports:
+        yield _tell(zip(names, reports, strict=True), len(names), say if many else lambda _: None)
 
 
-def _read_and_check(directory: Path) -> Callable[[str], ShardReport]:
-    return _file_check(directory, check_tables(directory))
+def _tell(
+    reports: Iterator[tuple[str, ShardReport]], count: int, say: Callable[[str], object]
+) -> Iterator[tuple[str, ShardReport]]:
+    """The same, with word of how far it has come."""
+    told = time.monotonic()
+    for number, report in enumerate(reports, start=1):
+        yield report
+        if number < count and time.monotonic() >= told + _TELL_EVERY_S:
+            told = time.monotonic()
+            say(f"{number} of {format_count(count, 'recording')} checked")
 
 
 def _file_check(directory: Path, tables: Tables) -> Callable[[str], ShardReport]:
@@ -130,7 +159,7 @@ def _trials_by_file(directory: Path, tables: Tables) -> dict[str, list[int]] | N
     if tables.plan is None or tables.rows is None:
         return None
     names, expected = _list_shards(directory), dict[str, list[int]]()
-    refused = {trial.number for trial in tables.plan.trials if trial.refused is not None}
+    refused = tables.plan.trials.refused
     for trial in sorted({*range(len(tables.plan.trials)), *tables.rows}):
         name, row = shard_of(tables.plan, trial), tables.rows.get(trial)
         # A trial whose row is missing most likely has an episode.

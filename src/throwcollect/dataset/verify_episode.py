@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from throwcollect.config.schema import Config
 from throwcollect.dataset.judging import judge_episode
-from throwcollect.dataset.mcap_contents import Run
-from throwcollect.dataset.mcap_file import episode_run
 from throwcollect.dataset.mcap_reader import StoredEpisode
 from throwcollect.dataset.recorded_trial import RecordedTrial
 from throwcollect.dataset.throws_table import Place, Row, ThrowsTable
@@ -33,6 +32,19 @@ _MOST_NAMED = 3
 """Differing columns of a row that are named; the others are counted."""
 
 
+class _TrialsOf:
+    """What the trials of a plan are simulated with, worked out once for all checks of an episode.
+
+    Attributes:
+        config: Gives the configuration of a trial, by its number.
+        trajectory: Gives what its controllers are sent.
+    """
+
+    def __init__(self, plan: Plan) -> None:
+        self.config = lru_cache(maxsize=1)(lambda number: plan.config_of(plan.trial(number)))
+        self.trajectory = lru_cache(maxsize=1)(lambda number: task_of(self.config(number)).trajectory())
+
+
 class EpisodeCheck:
     """Checks the episodes of one dataset.
 
@@ -48,6 +60,7 @@ class EpisodeCheck:
         self, plan: Plan | None, rows: Mapping[int, Row], *, doubtful: Collection[int] = (), robot: bool = True
     ) -> None:
         self._plan = plan
+        self._trials = _TrialsOf(plan) if plan else None
         self._rows = rows
         self._doubtful = doubtful
         self._table = ThrowsTable.of(plan) if plan else None
@@ -68,7 +81,7 @@ class EpisodeCheck:
         """
         episode = stored.episode
         try:
-            yield from _find_record_problems(stored, episode_run(episode))
+            yield from _find_record_problems(stored)
         except DatasetError as error:
             yield str(error)
             return
@@ -92,12 +105,13 @@ class EpisodeCheck:
         Raises:
             DatasetError: If the episode is damaged, or the plan is not known.
         """
-        if self._plan is None or self._table is None:
+        if self._plan is None or self._trials is None or self._table is None:
             raise DatasetError("no plan says which trial it is")
         episode = stored.episode
-        trial = self._plan.trial(episode.header.trial)
+        number = episode.header.trial
         place = Place(shard, stored.offset, episode.header.samples, episode.digest)
-        return self._table.row(trial, judge_episode(self._plan.config_of(trial), episode), place)
+        result = judge_episode(self._trials.config(number), episode, self._trials.trajectory(number))
+        return self._table.row(self._plan.trial(number), result, place)
 
     def find_content_problems(self, episode: Episode, channels: Channels | None) -> Iterator[str]:
         """Everything that is wrong with an episode wherever it lies.
@@ -122,13 +136,13 @@ class EpisodeCheck:
             return
         if channels is not None:
             yield from _find_message_problems(episode, channels)
-        if self._plan is None or episode.header.trial in self._doubtful:
+        if self._plan is None or self._trials is None or episode.header.trial in self._doubtful:
             return
         if episode.header.trial >= len(self._plan.trials):
             yield f"the plan has {format_count(len(self._plan.trials), 'trial')}"
             return
         try:
-            config = self._plan.config_of(self._plan.trial(episode.header.trial))
+            config = self._trials.config(episode.header.trial)
         except ConfigError as error:
             yield f"the plan has values that cannot be: {error}"
             return
@@ -137,14 +151,14 @@ class EpisodeCheck:
 
     def _find_physics_problems(self, episode: Episode) -> Iterator[str]:
         """What the simulation cannot have recorded."""
-        if self._plan is None or episode.header.trial in self._doubtful:
+        if self._trials is None or episode.header.trial in self._doubtful:
             return
-        config = self._plan.config_of(self._plan.trial(episode.header.trial))
+        config = self._trials.config(episode.header.trial)
         samples = episode.samples()
         if infinite := list(find_infinite_columns(samples)):
             yield from infinite
             return
-        trial = RecordedTrial(samples, episode.header, config, task_of(config).trajectory())
+        trial = RecordedTrial(samples, episode.header, config, self._trials.trajectory(episode.header.trial))
         # Numbers of a forger may be as large as they like.
         with np.errstate(all="ignore"):
             problems = list(find_header_problems(trial, self._bodies))
@@ -183,8 +197,9 @@ def _find_message_problems(episode: Episode, channels: Channels) -> Iterator[str
                     yield f"stamps of {topic.name} ({name.removesuffix('.sec')}) differ from the times of its records"
 
 
-def _find_record_problems(stored: StoredEpisode, run: Run) -> Iterator[str]:
+def _find_record_problems(stored: StoredEpisode) -> Iterator[str]:
     """Differences between the records around chunks and what the contents of these call for."""
+    run = stored.intact_run
     for chunk, expected in zip(stored.chunks, run.chunk_indexes, strict=True):
         first = expected.chunk_start_offset + expected.chunk_length
         indexes = b"".join(record.data for record in chunk.indexes.values())

@@ -79,8 +79,8 @@ def find_refusal_problems(plan: Plan, doubtful: Collection[int], check_of: Check
         doubtful: Trials whose values are not known.
         check_of: Makes the check that the plan was made with.
     """
-    refused = [trial.number for trial in plan.trials if trial.refused is not None]
-    others = [trial.number for trial in plan.trials if trial.refused is None]
+    refused = plan.trials.refused
+    others = [number for number in plan.trials.numbers if number not in refused]
     chosen = np.random.default_rng(plan.config.seed).permutation(len(others))[:CHECKED_AGAIN]
     check = check_of(plan.config)
     for number in sorted({*refused, *(others[index] for index in chosen)} - set(doubtful)):
@@ -110,7 +110,7 @@ def _draw(directory: Path, plan: Plan) -> _Drawing:
     """
     if plan.config.sweep.file is not None:
         # The list lies beside the plan and is compared with it there.
-        return _Drawing(np.array([list(trial.values.values()) for trial in plan.trials]), None)
+        return _Drawing(plan.trials.values, None)
     points = _of_keys(draw_points(plan.config, directory=directory), plan)
     count, there = len(points.values), len(plan.trials)
     return _Drawing(

@@ -94,8 +94,7 @@ def _find_list_problems(directory: Path, plan: Plan) -> Iterator[Finding]:
     except ConfigError as error:
         yield Finding(TRIALS, "", error.problems[0].message)
         return
-    drawn = [dict(zip(points.keys, row, strict=True)) for row in points.values.tolist()]
-    if drawn != [dict(trial.values) for trial in plan.trials]:
+    if points.keys != plan.keys or not np.array_equal(points.values, plan.trials.values):
         yield Finding(TRIALS, "", f"begins with other points than those of {PLAN}")
 
 
@@ -105,9 +104,10 @@ def find_wrong_trials(plan: Plan) -> dict[int, str]:
     Args:
         plan: The plan.
     """
-    values = np.array([list(trial.values.values()) for trial in plan.trials], float).reshape(len(plan.trials), -1)
-    digests = trial_digests(plan.config, Points(plan.keys, values), [trial.seed for trial in plan.trials])
-    return {trial.number: digest for trial, digest in zip(plan.trials, digests, strict=True) if trial.digest != digest}
+    trials = plan.trials
+    digests = trial_digests(plan.config, Points(plan.keys, trials.values), trials.seeds)
+    wrong = np.flatnonzero((digests != trials.digests).any(axis=1)).tolist()
+    return {trials.first + row: digests[row].tobytes().hex() for row in wrong}
 
 
 def _find_row_problems(plan: Plan, rows: list[Row]) -> Iterator[Finding]:

@@ -8,8 +8,9 @@ what is there (see `recovery`) and goes on.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from contextlib import ExitStack, suppress
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -18,6 +19,7 @@ import pyarrow as pa
 from throwcollect.config.loader import dump_yaml, load
 from throwcollect.config.schema import Config
 from throwcollect.dataset.bag import FileSummary
+from throwcollect.dataset.creation import create
 from throwcollect.dataset.data_card import data_card
 from throwcollect.dataset.description import write_description
 from throwcollect.dataset.directory import (
@@ -27,86 +29,31 @@ from throwcollect.dataset.directory import (
     METADATA,
     PLAN,
     THROWS,
-    TRIALS,
     config_path,
     shard_name,
 )
 from throwcollect.dataset.journal import Event, Journal, was_open
-from throwcollect.dataset.lock import hold_alone, hold_together
+from throwcollect.dataset.lock import hold_together
 from throwcollect.dataset.manifest import FileEntry
 from throwcollect.dataset.provenance import Provenance, write_provenance
-from throwcollect.dataset.recovery import recover_shard, remove_unfinished
+from throwcollect.dataset.recovery import find_left, recover_shard, remove_unfinished
 from throwcollect.dataset.shard import FinishedShard, OpenShard
 from throwcollect.dataset.throws_table import Place, Row, ThrowsTable
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.message import Episode
-from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.errors import DatasetError
 from throwcollect.files import remove, write_file
 from throwcollect.robots.description import full_description
-from throwcollect.sweep.plan import Plan, Trial
-from throwcollect.sweep.point_file import encode_points
+from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.points import Points
+from throwcollect.sweep.round_file import append_round
+from throwcollect.sweep.trials import Trials
 from throwcollect.tasks.result import Result
 from throwcollect.tasks.task import task_of
-from throwcollect.wording import command, format_count
+from throwcollect.wording import format_count
 
 Tell = Callable[[int, Result], None]
 """Receives the number of a trial and its result."""
-
-
-def create(directory: Path, plan: Plan, *, listed: Points | None = None) -> None:
-    """Write the directory of a dataset of which no trial has run yet.
-
-    Args:
-        directory: Must not exist, or be empty.
-        plan: The trials and their configuration.
-        listed: Points that the sampler of the configuration is to find in ``trials.parquet``; None if it does not.
-
-    Raises:
-        ConfigError: If the directory holds files already, or cannot be made.
-        DatasetError: If the files cannot be written; nothing is left behind then.
-    """
-    try:
-        made = not directory.exists()
-        directory.mkdir(parents=True, exist_ok=True)
-    except (OSError, RecursionError) as error:
-        raise _unusable(directory, error) from error
-    with hold_alone(directory, needed=False):
-        _fill(directory, plan, listed, made=made)
-
-
-def _fill(directory: Path, plan: Plan, listed: Points | None, *, made: bool) -> None:
-    try:
-        taken = sorted(path.name for path in directory.iterdir())
-    except OSError as error:
-        raise _unusable(directory, error) from error
-    if taken:
-        begun = PLAN in taken or CONFIG in taken
-        raise ConfigError(
-            f"{directory}: holds {', '.join(taken[:3])}{' and more' if taken[3:] else ''}",
-            expected="a directory that is new or empty",
-            hint="choose another one with --output" + (f", or go on: {command('resume', directory)}" if begun else ""),
-        )
-    with ExitStack() as undo:
-        undo.callback(_clear, directory, remove=made)
-        write_file(directory / CONFIG, dump_yaml(plan.config).encode())
-        if listed is not None:
-            write_file(directory / TRIALS, encode_points(listed))
-        plan.write(directory / PLAN)
-        undo.pop_all()
-
-
-def _unusable(directory: Path, error: OSError | RecursionError) -> ConfigError:
-    reason = error.strerror if isinstance(error, OSError) else "it has too many levels"
-    return ConfigError(f"{directory}: cannot be used as directory of a dataset: {reason}")
-
-
-def _clear(directory: Path, *, remove: bool) -> None:
-    with suppress(OSError):
-        for path in directory.iterdir():
-            path.unlink()
-        if remove:
-            directory.rmdir()
 
 
 class _Finished(NamedTuple):
@@ -145,17 +92,23 @@ class DatasetWriter:
         self._config: Config = plan.config
         self._journal = journal
         self._growing = growing
+        if growing:
+            # Trials will be added to it, and the one that was given is somebody else's.
+            self.plan = replace(plan, trials=plan.trials[:])
         self._channels = channels or Channels(self._config, full_description(self._config))
         self._table = ThrowsTable.of(plan)
+        self._unfinished: set[int] = set()
         self._shards: dict[int, OpenShard] = {}
+        """Those of the unfinished shards of which an episode or a loss is there."""
         self._rows: dict[int, dict[int, Row]] = {}
+        """Rows of their trials that have ended."""
         self._finished: dict[int, _Finished] = {}
         self._held = ExitStack()
-        self._expect(plan.trials)
+        self._expect(self.plan.trials)
 
     @classmethod
     def create(cls, directory: Path, plan: Plan, *, listed: Points | None = None) -> DatasetWriter:
-        """Create a dataset and open it; see the function `create`.
+        """Create a dataset and open it; see `creation.create`.
 
         Raises:
             ConfigError: If the directory holds files already, or cannot be made.
@@ -179,31 +132,35 @@ class DatasetWriter:
             held.enter_context(hold_together(directory))
             journal = held.enter_context(Journal(directory))
             plan = Plan.read(directory / PLAN, load(config_path(directory)))
+            plan.take_in_rounds(directory / PLAN)
             writer = cls(directory, plan, journal=journal, growing=plan.config.grows)
             writer._held = held.pop_all()
         return writer
 
-    def recover(self, tell: Tell | None = None) -> int:
+    def recover(self, tell: Tell | None = None, *, processes: int = 1) -> int:
         """Take in what earlier writers have left: every episode that is whole stays, everything else is removed.
 
-        This makes a finished dataset an unfinished one, even if all its trials have ended; `finish` writes the same
-        files again.
+        A finished dataset is an unfinished one then, even if all its trials have ended; `finish` writes the same files.
 
         Args:
             tell: Called for each trial that has an episode, in order of shards.
+            processes: How many processes may look through the recordings of a large dataset, as `find_left` takes it.
 
         Returns:
             Number of episodes.
 
         Raises:
             DatasetError: If files cannot be read or written.
+            WorkerError: If a process that looks through recordings is killed.
         """
         remove_unfinished(self._directory)
         for name in (METADATA, MANIFEST, THROWS):
             remove(self._directory / name)
         found = 0
-        for number, shard in list(self._shards.items()):
-            recovered = recover_shard(shard, self.plan, self._channels, keep=self._settled(number))
+        shards = {number: self._shard(number) for number in sorted(self._unfinished)}
+        all_left = find_left(shards, self.plan, self._channels, settled=self._settled, processes=processes)
+        for (number, shard), left in zip(shards.items(), all_left, strict=True):
+            recovered = recover_shard(shard, left)
             for each in recovered.episodes:
                 place = Place(shard.path.name, -1, each.samples, each.digest)
                 self._rows[number][each.trial] = self._row(each.trial, each.result, place)
@@ -212,13 +169,15 @@ class DatasetWriter:
             found += len(recovered.episodes)
             if recovered.finished is not None:
                 self._close_shard(number, recovered.finished)
-            else:
+            elif recovered.episodes or not shard.missing:
                 self._finish_shard_if_complete(number)
+            else:
+                del self._shards[number], self._rows[number]
         if found:
             self.note("recovered", episodes=found)
         return found
 
-    def extend(self, trials: Sequence[Trial]) -> None:
+    def extend(self, trials: Trials) -> None:
         """Add trials to the plan, and to the one on disk before this returns.
 
         Args:
@@ -227,19 +186,19 @@ class DatasetWriter:
         Raises:
             DatasetError: If the plan cannot be written.
         """
-        plan = Plan(self._config, (*self.plan.trials, *trials))
-        plan.write(self._directory / PLAN)
-        self.plan = plan
-        self.note("planned", trials=len(plan.trials))
+        append_round(self._directory / PLAN, trials)
+        self.plan.trials.extend(trials)
+        self.note("planned", trials=len(self.plan.trials))
         self._expect(trials)
 
     def close_plan(self) -> None:
         """No trial will be added any more.
 
         Raises:
-            DatasetError: If a shard that is now complete cannot be written.
+            DatasetError: If the plan, or a shard that is now complete, cannot be written.
         """
         self._growing = False
+        self.plan.take_in_rounds(self._directory / PLAN)
         for number in list(self._shards):
             self._finish_shard_if_complete(number)
 
@@ -252,8 +211,7 @@ class DatasetWriter:
             entry: What the manifest says of its file.
             rows: The rows of its trials in the table of throws.
         """
-        self._shards.pop(number)
-        self._rows.pop(number)
+        self._unfinished.discard(number)
         self._finished[number] = _Finished(summary, entry, rows)
 
     def append(self, episode: Episode, result: Result) -> None:
@@ -268,7 +226,7 @@ class DatasetWriter:
         """
         trial = episode.header.trial
         number = self._waiting_shard(trial)
-        shard = self._shards[number]
+        shard = self._shard(number)
         shard.append(episode)
         place = Place(shard.path.name, -1, episode.header.samples, episode.digest)
         self._rows[number][trial] = self._row(trial, result, place)
@@ -327,8 +285,8 @@ class DatasetWriter:
         Raises:
             DatasetError: If trials are missing, or a file cannot be written.
         """
-        if self._shards:
-            missing = sorted(number for shard in self._shards.values() for number in shard.missing)
+        if self._unfinished:
+            missing = sorted(trial for number in self._unfinished for trial in self._shard(number).missing)
             example = f", such as {missing[0]}" if missing else ""
             raise DatasetError(f"lacks {format_count(len(missing), 'trial')}{example}", path=self._directory)
         finished = [self._finished[shard] for shard in sorted(self._finished)]
@@ -354,27 +312,38 @@ class DatasetWriter:
         self._held.close()
         self._journal = None
 
-    def _expect(self, trials: Sequence[Trial]) -> None:
-        members: dict[int, list[Trial]] = {}
-        for trial in trials:
-            members.setdefault(trial.number // self._config.record.trials_per_shard, []).append(trial)
-        for number, added in members.items():
-            if number not in self._shards:
-                path = self._directory / shard_name(self._config.name, number)
-                self._shards[number] = OpenShard(path, self._channels)
-                self._rows[number] = {}
-            self._shards[number].expect(trial.number for trial in added if trial.refused is None)
-            for trial in added:
-                if trial.refused is not None:
-                    self._rows[number][trial.number] = self._table.make_refused_row(trial)
-            self._finish_shard_if_complete(number)
+    def _expect(self, trials: Trials) -> None:
+        per_shard = self._config.record.trials_per_shard
+        for number in range(trials.first // per_shard, -(-trials.numbers.stop // per_shard)):
+            self._unfinished.add(number)
+            if number in self._shards:
+                self._shards[number].expect(each for each in self._to_run(number) if each in trials.numbers)
+            if number in self._shards or next(self._to_run(number), None) is None:
+                self._finish_shard_if_complete(number)
+
+    def _members(self, number: int) -> range:
+        """Numbers of the trials of a shard."""
+        per_shard, numbers = self._config.record.trials_per_shard, self.plan.trials.numbers
+        return range(max(number * per_shard, numbers.start), min((number + 1) * per_shard, numbers.stop))
+
+    def _to_run(self, number: int) -> Iterator[int]:
+        """Numbers of the trials of a shard that are not refused."""
+        return (each for each in self._members(number) if each not in self.plan.trials.refused)
+
+    def _shard(self, number: int) -> OpenShard:
+        """An unfinished shard; what is known of it is held in memory only from when it is first asked for."""
+        if number not in self._shards:
+            shard = OpenShard(self._directory / shard_name(self._config.name, number), self._channels)
+            shard.expect(self._to_run(number))
+            self._shards[number], self._rows[number] = shard, {}
+        return self._shards[number]
 
     def _row(self, trial: int, result: Result, place: Place | None) -> Row:
         return self._table.row(self.plan.trial(trial), result, place)
 
     def _waiting_shard(self, trial: int) -> int:
         shard = trial // self._config.record.trials_per_shard
-        if shard not in self._shards or trial not in self._shards[shard].missing:
+        if shard not in self._unfinished or trial not in self._shard(shard).missing:
             raise DatasetError(f"no episode of trial {trial} is waited for", path=self._directory)
         return shard
 
@@ -383,14 +352,16 @@ class DatasetWriter:
         return not self._growing or len(self.plan.trials) >= (number + 1) * self._config.record.trials_per_shard
 
     def _finish_shard_if_complete(self, number: int) -> None:
-        shard = self._shards[number]
+        shard = self._shard(number)
         if not shard.missing and self._settled(number):
             self._close_shard(number, shard.finish())
 
     def _close_shard(self, number: int, finished: FinishedShard) -> None:
-        rows = [row for _, row in sorted(self._rows.pop(number).items())]
+        ended, refused = self._rows.pop(number), self._table.make_refused_row
+        rows = [ended.get(trial) or refused(self.plan.trial(trial)) for trial in self._members(number)]
         for row in rows:
             row["chunk_offset"] = finished.offsets.get(row["trial"])
+        self._unfinished.remove(number)
         self._finished[number] = _Finished(finished.summary, finished.entry, self._table.table(rows))
         shard = self._shards.pop(number)
         if finished.summary is not None:

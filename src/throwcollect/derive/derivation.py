@@ -12,11 +12,12 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from throwcollect.dataset.creation import create
 from throwcollect.dataset.directory import CARD, SOURCES
 from throwcollect.dataset.inspect import info
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.throws_table import Row, ThrowsTable
-from throwcollect.dataset.writer import DatasetWriter, create
+from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.derive.origins import encode_sources, sources_section
 from throwcollect.derive.source import Source
 from throwcollect.derive.trial_list import list_of_trials
@@ -89,7 +90,7 @@ def write(sources: Sequence[Source], directory: Path, *, name: str | None = None
     if name is not None:
         config = config.model_copy(update={"name": name})
     # Every trial has been run before, so none is to be checked.
-    plan = Plan(config, tuple(make_trials(config, points)))
+    plan = Plan(config, make_trials(config, points))
     # The robot is the one that the sources were recorded with, so nothing of it has to be installed.
     channels = Channels(config, sources[0].dataset.robot_description() or full_description(config))
     create(directory, plan, listed=points)

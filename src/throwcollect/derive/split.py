@@ -126,7 +126,7 @@ def assign(
     places = grid.cells(everything.dataset.throws.take(everything.trials))
     members: dict[str, dict[int, Cell | None]] = {name: {} for name in shares}
     for trial, cell, digest in zip(everything.trials, places, contents, strict=True):
-        owner = _owner(f"trial {digest}" if cell is None else f"cell {list(cell)}", shares, seed)
+        owner = _owner(f"trial {digest.tobytes().hex()}" if cell is None else f"cell {list(cell)}", shares, seed)
         members[owner][trial] = cell
     if empty := [name for name, trials in members.items() if not trials]:
         raise ConfigError(

@@ -95,10 +95,12 @@ class MessageLayout:
                 "itemsize": len(self.template),
             }
         )
-        self._varies = np.zeros(len(self.template), bool)
+        varies = np.zeros(len(self.template), bool)
         for place in places:
-            self._varies[_ENCAPSULATION_BYTES + place.offset : _ENCAPSULATION_BYTES + place.end] = True
-        self._fixed_bits = int.from_bytes(np.where(self._varies, 0, 255).astype(np.uint8).tobytes(), "little")
+            varies[_ENCAPSULATION_BYTES + place.offset : _ENCAPSULATION_BYTES + place.end] = True
+        changes = np.flatnonzero(np.diff(varies, prepend=True, append=True)).tolist()
+        self._fixed_parts = [slice(start, end) for start, end in zip(changes[::2], changes[1::2], strict=True)]
+        self._fixed_bits = int.from_bytes(np.where(varies, 0, 255).astype(np.uint8).tobytes(), "little")
         self._fixed = int.from_bytes(self.template, "little") & self._fixed_bits
 
     def describes_message(self, message: bytes | bytearray) -> bool:
@@ -119,7 +121,8 @@ class MessageLayout:
         """
         if rows.shape[1] != len(self.template):
             return False
-        return bool(((rows == np.frombuffer(self.template, np.uint8)) | self._varies).all())
+        # Copied, so that they lie side by side, bytes are compared in a fraction of the time that arrays take.
+        return all(rows[:, part].tobytes() == self.template[part] * len(rows) for part in self._fixed_parts)
 
 
 def _merge(numbers: Sequence[_Numbers], path: str, type_name: str) -> _Numbers:

@@ -6,7 +6,7 @@ from throwcollect.config.schema import Config
 from throwcollect.episode.message import Delivery, Episode
 from throwcollect.sim.simulation import Simulation
 from throwcollect.sim.trial_runner import TrialRunner
-from throwcollect.sweep.plan import Trial
+from throwcollect.sweep.trials import Trial
 
 
 class Replayer:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
 
@@ -17,7 +17,13 @@ from throwcollect.files import StrPath
 from throwcollect.replay.audit import replay_throws, select_trials
 
 
-def verify_dataset(directory: StrPath, *, replay: int | None = None, processes: int = 1) -> list[Finding]:
+def verify_dataset(
+    directory: StrPath,
+    *,
+    replay: int | None = None,
+    processes: int = 1,
+    say: Callable[[str], object] = lambda _: None,
+) -> list[Finding]:
     """Check a finished dataset: its files against each other, its episodes against physics, its plan against the robot.
 
     Without the extra ``collect``, what takes the robot's model is left out; `dataset.verify.find_unchecked` names it.
@@ -28,6 +34,7 @@ def verify_dataset(directory: StrPath, *, replay: int | None = None, processes: 
             for none.
         processes: How many processes may check the recordings of a large dataset; more than one import the program that
             calls this, as those of `multiprocessing` do.
+        say: Is told how far the check of a large dataset has come.
 
     Returns:
         What is wrong, file by file; empty when nothing is.
@@ -42,7 +49,7 @@ def verify_dataset(directory: StrPath, *, replay: int | None = None, processes: 
         with suppress(DatasetError):
             require_engine(Dataset.open(Path(directory)).config.sim.engine)
         require("pinocchio")
-    findings = verify(Path(directory), check_of=feasibility_check, processes=processes)
+    findings = verify(Path(directory), check_of=feasibility_check, processes=processes, say=say)
     if replay is not None:
         findings += _replay_findings(Path(directory), replay)
     return findings

@@ -24,15 +24,17 @@ from rclpy.action import (
     get_action_names_and_types,
     get_action_server_names_and_types_by_node,
 )
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.context import Context
 from rclpy.exceptions import NameValidationException
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor, TimeoutException
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.logging import get_logger
 from rclpy.node import Node
-from rclpy.parameter import Parameter
+from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.serialization import deserialize_message
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 from rclpy.time import Time
@@ -182,6 +184,12 @@ def graph_changes(_node: Node) -> int:
     return next(_looks)
 
 
+def let_callbacks_wait(node: Node) -> None:
+    """Have a node go on with other callbacks while one, a coroutine, waits."""
+    # What is made without naming a group of callbacks is put into this one; there is no public way to choose it.
+    node._default_callback_group = ReentrantCallbackGroup()
+
+
 def joins_protected() -> bool:
     """Whether nodes of this process join a graph that lets nobody in without a key: other RMWs know of no key.
 
@@ -270,6 +278,7 @@ __all__ = [
     "SetParametersResult",
     "SingleThreadedExecutor",
     "Time",
+    "deserialize_message",
     "get_action",
     "get_action_client_names_and_types_by_node",
     "get_action_names_and_types",
@@ -279,6 +288,8 @@ __all__ = [
     "graph_changes",
     "init",
     "joins_protected",
+    "let_callbacks_wait",
+    "parameter_value_to_python",
     "pass_on_log",
     "provide_time",
     "shutdown",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
@@ -111,57 +111,64 @@ def scale(run: Run, simulations: int) -> None:
     record.middleware.joining.settle()
     from throwcollect.runtimes.node_collection import SIMULATIONS
 
-    result = set_parameter(run, f"/{LAUNCHER}", SIMULATIONS, simulations)
+    (result,) = set_parameter(run, [f"/{LAUNCHER}"], SIMULATIONS, simulations)
     if not result.successful:
         raise ConfigError(f"run {run.id}: {result.reason}")
 
 
-def set_parameter(run: Run, node: str, name: str, value: float) -> SetParametersResult:
-    """Set a parameter of a node of a run.
+def set_parameter(run: Run, nodes: Sequence[str], name: str, value: float | str) -> list[SetParametersResult]:
+    """Set a parameter of nodes of a run.
 
     Args:
         run: The run.
-        node: Name of the node with its namespace.
+        nodes: Names of the nodes, with their namespaces.
         name: Name of the parameter.
         value: Its value.
 
+    Returns:
+        What each of them answers.
+
     Raises:
-        WorkerError: If the router or the node does not answer.
+        WorkerError: If the router or a node does not answer.
     """
     connection = run.connection
     if connection is None or not answers(connection.endpoint, patience_s=_ANSWER_S):
-        raise _silent(run, node)
+        raise _silent(run, nodes[0])
     connection.middleware.joining.settle()
     from throwcollect import ros
 
     context = ros.Context()
     ros.init(context=context, connection=connection)
     try:
-        result = _set_parameter(context, node, name, value)
+        asking = ros.Node(f"_throwcollect_{os.getpid()}", context=context)
+        results = []
+        for node in nodes:
+            if (result := _set_parameter(asking, context, node, ros.Parameter(name, value=value))) is None:
+                raise _silent(run, node)
+            results.append(result)
+        asking.destroy_node()
+        return results
     finally:
         ros.shutdown(context=context)
-    if result is None:
-        raise _silent(run, node)
-    return result
 
 
-def _set_parameter(context: ros.Context, node: str, name: str, value: float) -> SetParametersResult | None:
-    """What the node answers; None if it does not."""
+def _set_parameter(
+    asking: ros.Node, context: ros.Context, node: str, wanted: ros.Parameter
+) -> SetParametersResult | None:
+    """What a node answers; None if it does not."""
     from throwcollect import ros
     from throwcollect.ros.srv import SetParameters
 
-    asking = ros.Node(f"_throwcollect_{os.getpid()}", context=context)
     executor = ros.SingleThreadedExecutor(context=context)
     executor.add_node(asking)
     client = asking.create_client(SetParameters, f"{node}/set_parameters")
     if not client.wait_for_service(_ANSWER_S):
         return None
-    wanted = ros.Parameter(name, value=value).to_parameter_msg()
-    future = client.call_async(SetParameters.Request(parameters=[wanted]))
+    future = client.call_async(SetParameters.Request(parameters=[wanted.to_parameter_msg()]))
     executor.spin_until_future_complete(future, timeout_sec=_ANSWER_S)
-    result = future.result().results[0] if future.done() else None
-    asking.destroy_node()
-    return result
+    executor.remove_node(asking)
+    asking.destroy_client(client)
+    return future.result().results[0] if future.done() else None
 
 
 def _silent(run: Run, node: str) -> WorkerError:

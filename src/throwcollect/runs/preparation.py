@@ -257,7 +257,7 @@ def _make_plan(request: Request, directory: Path, onlooker: Onlooker) -> Plan:
 def _in_words(plan: Plan) -> str:
     from throwcollect.coordinator.prepare import more_trials
 
-    refused = sum(trial.refused is not None for trial in plan.trials)
+    refused = len(plan.trials.refused)
     note = f", {refused} refused by calculation (see `throwcollect plan`)" if refused else ""
     return f"{format_count(len(plan.trials), 'trial')}{note}{more_trials(plan)}"
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from throwcollect.config.loader import load, load_locating_errors
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.resume import refuse_changes
+from throwcollect.dataset.creation import create
 from throwcollect.dataset.directory import METADATA, PLAN, config_path
 from throwcollect.dataset.inspect import loss
 from throwcollect.dataset.slice_directory import (
@@ -22,7 +23,6 @@ from throwcollect.dataset.slice_directory import (
     remove_stopped,
     take_recordings,
 )
-from throwcollect.dataset.writer import create
 from throwcollect.errors import ConfigError, Interrupted, Problem
 from throwcollect.runs.onlooker import SILENT, Onlooker
 from throwcollect.runs.preparation import Request, prepare_run
@@ -76,7 +76,7 @@ def collect_slice(
     take_recordings(earlier, attempt)
     if scratch is None:
         remove_stopped(earlier)
-    onlooker.say(f"slice {slice}: trials {plan.trials[0].number} to {plan.trials[-1].number}")
+    onlooker.say(f"slice {slice}: trials {plan.trials.first} to {plan.trials.numbers[-1]}")
     request = Request(config, directory, attempt, started, resumed=True, ahead=True)
     with prepare_run(Records(), request, plan, onlooker) as run:
         try:

@@ -15,11 +15,16 @@ from pydantic import JsonValue
 
 from throwcollect.dataset.directory import config_path
 from throwcollect.errors import ConfigError, ConflictError, NotFoundError, Problem, WorkerError
+from throwcollect.robots.appearance import check_appearance
 from throwcollect.runs import control
 from throwcollect.runs.background import begin_run
 from throwcollect.runs.record import Origin
 from throwcollect.runs.records import Records, Run, state_directory
+from throwcollect.runs.selection import require_living
 from throwcollect.serve.catalogue import NAME, Catalogue, Component
+from throwcollect.serve.live import find_node
+from throwcollect.serve.robot_files import description_of
+from throwcollect.serve.state import simulations_of
 
 _KEPT = ("run", "containers", "cluster", "sweep.file")
 """Keys of a configuration that are the operator's alone: what they name is of this machine."""
@@ -158,6 +163,31 @@ class Instances:
         run = self.get(instance)
         control.scale(run, simulations)
         return run.now()
+
+    def show(self, instance: str, urdf: str | None) -> None:
+        """Have viewers of all simulations of an instance draw another description, or that of its configuration again.
+
+        Args:
+            instance: Its id.
+            urdf: URDF text, which may differ in what is seen; None for that of the configuration.
+
+        Raises:
+            NotFoundError: If there is no such run.
+            ConflictError: If it has ended or has no simulation that runs, or more than what is seen differs.
+            ConfigError: If it is no URDF.
+            WorkerError: If a simulation does not answer.
+        """
+        run = self.get(instance)
+        own = description_of(run)
+        if urdf is not None:
+            check_appearance(own, urdf)
+        record = require_living(run)
+        nodes = [find_node(run, name) for name in simulations_of(record)]
+        if not nodes:
+            raise ConflictError(f"run {run.id}: no simulation runs")
+        for result in control.set_parameter(run, nodes, "robot_description", urdf or own):
+            if not result.successful:
+                raise ConflictError(f"run {run.id}: {result.reason}")
 
 
 def _is_instance(run: Run, component: str) -> bool:

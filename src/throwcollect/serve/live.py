@@ -140,8 +140,17 @@ def _set_speed(run: Run, simulation: str, factor: float | None) -> None:
         WorkerError: If the simulation does not do so.
     """
     config = load(config_path(run.place.directory))
-    node = f"/{simulation}" if config.run.root_namespace else f"/{simulation}/{simulation}"
     wanted = (config.sim.real_time_factor or _FULL_SPEED) if factor is None else factor
-    result = set_parameter(run, node, _PARAMETER, wanted)
+    (result,) = set_parameter(run, [find_node(run, simulation)], _PARAMETER, wanted)
     if not result.successful:
         raise WorkerError(f"run {run.id}: {simulation} cannot change its speed: {result.reason}")
+
+
+def find_node(run: Run, simulation: str) -> str:
+    """Name of the node of a simulation, with its namespace.
+
+    Raises:
+        ConfigError: If the run's configuration cannot be read.
+    """
+    config = load(config_path(run.place.directory))
+    return f"/{simulation}" if config.run.root_namespace else f"/{simulation}/{simulation}"

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping
 from contextlib import suppress
 from functools import lru_cache
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 from throwcollect.config.loader import load
 from throwcollect.dataset.directory import config_path
-from throwcollect.errors import NotFoundError
+from throwcollect.errors import ConfigError, NotFoundError
 from throwcollect.members import load_member, names_of
 from throwcollect.robots.description import full_description
 from throwcollect.robots.robot import Robot
@@ -41,20 +43,32 @@ def find_mesh(package: str, path: str) -> Path:
         path: Path within the package.
 
     Raises:
-        NotFoundError: If no robot has such a package, or it has no such file.
+        NotFoundError: If no robot's description names such a package, or it has no such file.
+        ConfigError: If the description of a robot cannot be read.
     """
-    # What no file can be called.
+    root = _find_packages().get(package)
+    # What no file can be called raises an error, and neither dots nor links lead out of the package.
     with suppress(OSError, ValueError):
-        for share in _shares():
-            root = (share / package).resolve()
-            file = (root / path).resolve()
-            # Neither dots nor links lead out of the package.
-            if root.parent == share and file.is_relative_to(root) and file.is_file():
+        if root is not None and ".." not in PurePosixPath(path).parts:
+            file = (root / path).resolve(strict=True)
+            if file.is_relative_to(root.resolve()) and file.is_file():
                 return file
     raise NotFoundError(f"no mesh package://{package}/{path}")
 
 
 @lru_cache(maxsize=1)
-def _shares() -> tuple[Path, ...]:
-    robots: list[Robot] = [load_member("robots", name) for name in names_of("robots")]
-    return tuple(dict.fromkeys(robot.share().resolve() for robot in robots))
+def _find_packages() -> Mapping[str, Path]:
+    """Directories of the packages that the descriptions of all robots name, by their names.
+
+    Raises:
+        ConfigError: If the description of a robot cannot be read.
+    """
+    found: dict[str, Path] = {}
+    for name in names_of("robots"):
+        robot: Robot = load_member("robots", name)
+        try:
+            text = robot.urdf_path.read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            raise ConfigError(f"{robot.urdf_path}: cannot be read: {error}") from error
+        found |= {package: robot.share() / package for package in re.findall(r"package://([\w.-]+)/", text)}
+    return found

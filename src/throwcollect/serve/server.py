@@ -78,6 +78,8 @@ def serve(
             access_log=False,
             ws="websockets-sansio",
             ws_max_size=_MOST_FRAME,
+            # On this machine it would cost time and spare nothing.
+            ws_per_message_deflate=False,
             limit_concurrency=_MOST_CLIENTS,
             timeout_graceful_shutdown=1,
             # Who asks, and how, is seen from the connection alone.

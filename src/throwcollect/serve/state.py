@@ -11,6 +11,7 @@ from pydantic import TypeAdapter
 from throwcollect.coordinator.progress import Progress
 from throwcollect.dataset.summary import Info
 from throwcollect.errors import ConfigError
+from throwcollect.runs.record import Record
 from throwcollect.runs.records import Records, Run
 from throwcollect.runtimes.runtime import NodeState
 from throwcollect.serve.catalogue import Catalogue
@@ -158,7 +159,6 @@ def describe(run: Run) -> InstanceState:
     """What is seen of a run."""
     record = run.record
     error = record.error if record.failure else None
-    robots = [node.name for node in record.nodes if node.name.startswith("sim_") and node.status == "running"]
     return InstanceState(
         id=run.id,
         component=None if record.origin is None else record.origin.component,
@@ -175,8 +175,13 @@ def describe(run: Run) -> InstanceState:
         progress=record.progress,
         dataset=run.place.dataset if record.kind == "collection" else None,
         summary=record.summary,
-        robots=robots,
+        robots=simulations_of(record),
     )
+
+
+def simulations_of(record: Record) -> list[str]:
+    """Names of the simulations of a run that run."""
+    return [node.name for node in record.nodes if node.name.startswith("sim_") and node.status == "running"]
 
 
 def _status(run: Run) -> Status:

@@ -6,10 +6,11 @@ import asyncio
 import json
 import struct
 import threading
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterable
 from contextlib import asynccontextmanager
+from functools import partial
 
-from throwcollect.coordinator.topics import SHOWN_QOS, SHOWN_TOPIC
+from throwcollect.coordinator.topics import SHOWN_QOS, make_shown_topic
 from throwcollect.episode.message import Delivery, unpack
 from throwcollect.errors import ThrowcollectError
 from throwcollect.ros import Node
@@ -17,6 +18,7 @@ from throwcollect.ros.msg import UInt8MultiArray
 from throwcollect.run_key import Signer
 from throwcollect.runs.records import Run
 from throwcollect.runtimes.run_listener import RunListener
+from throwcollect.serve.state import simulations_of
 from throwcollect.units import NS_PER_S
 
 _SPIN_S = 0.2
@@ -25,16 +27,18 @@ _LENGTH = struct.Struct("<I")
 _LANDING = ("landing_x_m", "landing_y_m", "landing_z_m")
 
 
-def encode_throw(delivery: Delivery) -> bytes:
+def encode_throw(delivery: Delivery, simulation: str) -> bytes:
     """An episode as the page takes it.
 
     Args:
-        delivery: The episode, with what came of the trial.
+        delivery: The episode, and what came of it.
+        simulation: Name of the simulation that it is of.
 
     Returns:
         Length of a JSON header as uint32, the header, zero bytes up to a multiple of four, then float32: angles of the
         joints [rad], shape ``(n_samples, n_joints)``, and the ball's centre in the world [m], shape ``(n_samples, 3)``;
-        all little-endian. The header has ``trial``, ``outcome``, ``joints``, ``samples``, ``rate_hz`` and ``landing``.
+        all little-endian. The header has ``trial``, ``simulation``, ``outcome``, ``joints``, ``samples``, ``rate_hz``
+        and ``landing``.
 
     Raises:
         DatasetError: If the episode is damaged.
@@ -46,6 +50,7 @@ def encode_throw(delivery: Delivery) -> bytes:
     landing = [result.get(key) for key in _LANDING]
     header = {
         "trial": episode.header.trial,
+        "simulation": simulation,
         "outcome": result["outcome"],
         "joints": episode.table.joints,
         "samples": len(samples),
@@ -97,32 +102,59 @@ class ThrowWatch:
 
     def _listen(self, unwanted: threading.Event) -> None:
         run = self._run
-        with RunListener(lambda _: None, on_connect=self._subscribe) as listener:
+        subscriptions = _Subscriptions(self._hear)
+        with RunListener(lambda _: None, on_connect=subscriptions.move) as listener:
             while not unwanted.is_set():
                 try:
                     run = run.now()
                     if run.connection is not None:
                         run.record.middleware.joining.settle()
+                    subscriptions.add(simulations_of(run.record))
                     listener.spin(run.connection, _SPIN_S)
                 except ThrowcollectError:
                     # The run has ended, and was forgotten, or cannot be joined; whoever looks on sees so in the state.
                     unwanted.wait(_SPIN_S)
 
-    def _subscribe(self, node: Node) -> None:
-        node.create_subscription(UInt8MultiArray, SHOWN_TOPIC, self._hear, SHOWN_QOS, raw=True)
-
-    def _hear(self, message: bytes) -> None:
+    def _hear(self, simulation: str, message: bytes) -> None:
         try:
             delivery = unpack(message, Signer.of_key(self._run.key))
             if not isinstance(delivery, Delivery) or not delivery.result:
                 return
-            frame = encode_throw(delivery)
+            frame = encode_throw(delivery, simulation)
         except ThrowcollectError:
             # Somebody else has published something else there.
             return
         self._newest = frame
         for queue, loop in list(self._listeners.items()):
             loop.call_soon_threadsafe(_replace, queue, frame)
+
+
+class _Subscriptions:
+    """Hears all simulations of a run, those that come later, too.
+
+    Args:
+        hear: Called with the name of a simulation and the message that carries its newest episode.
+    """
+
+    def __init__(self, hear: Callable[[str, bytes], None]) -> None:
+        self._hear = hear
+        self._node: Node | None = None
+        self._heard: set[str] = set()
+
+    def move(self, node: Node) -> None:
+        """Go on with another node."""
+        self._node = node
+        heard, self._heard = self._heard, set()
+        self.add(heard)
+
+    def add(self, simulations: Iterable[str]) -> None:
+        """Hear some simulations, unless they are heard already."""
+        if self._node is None:
+            return
+        for name in set(simulations) - self._heard:
+            self._heard.add(name)
+            hear = partial(self._hear, name)
+            self._node.create_subscription(UInt8MultiArray, make_shown_topic(f"/{name}"), hear, SHOWN_QOS, raw=True)
 
 
 def _replace(queue: asyncio.Queue[bytes], frame: bytes) -> None:

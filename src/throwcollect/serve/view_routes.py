@@ -5,16 +5,46 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Awaitable, Callable
 
-from fastapi import APIRouter, Response, WebSocket
+from fastapi import APIRouter, Request, Response, WebSocket
 from fastapi.responses import FileResponse
 
 from throwcollect.errors import NotFoundError, ThrowcollectError
 from throwcollect.serve.access import MAY_ONLY_LOOK
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.live import take
+from throwcollect.serve.problems import describe_bytes
 from throwcollect.serve.robot_files import description_of, find_mesh
 from throwcollect.serve.sockets import FAILED, MAY_NOT, NOT_FOUND, keep_telling, refuse
 from throwcollect.serve.throws import ThrowWatch
+
+_XML = {"requestBody": {"required": True, "content": {"application/xml": {"schema": {"type": "string"}}}}}
+
+
+def make_description_routes(instances: Instances) -> APIRouter:
+    """Routes on what the robot of a run looks like.
+
+    Args:
+        instances: All runs, and what can be done with them.
+    """
+    router = APIRouter()
+
+    @router.get("/instances/{instance}/urdf", response_class=Response, responses=describe_bytes("application/xml"))
+    def urdf(instance: str) -> Response:
+        """The robot of a run, with its tool, in URDF; meshes are ``package://`` URLs."""
+        return Response(description_of(instances.get(instance)), media_type="application/xml")
+
+    @router.put("/instances/{instance}/urdf", status_code=202, openapi_extra=_XML)
+    async def show(instance: str, request: Request) -> None:
+        """Have viewers draw another description, which may differ in what is seen."""
+        urdf = (await request.body()).decode(errors="replace")
+        await asyncio.to_thread(instances.show, instance, urdf)
+
+    @router.delete("/instances/{instance}/urdf", status_code=202)
+    def show_own(instance: str) -> None:
+        """Have viewers draw the description of the configuration again."""
+        instances.show(instance, None)
+
+    return router
 
 
 def make_view_routes(instances: Instances) -> APIRouter:
@@ -25,11 +55,6 @@ def make_view_routes(instances: Instances) -> APIRouter:
     """
     router = APIRouter()
     watches: dict[str, ThrowWatch] = {}
-
-    @router.get("/instances/{instance}/urdf", response_class=Response)
-    def urdf(instance: str) -> Response:
-        """The robot of a run, with its tool, in URDF; meshes are ``package://`` URLs."""
-        return Response(description_of(instances.get(instance)), media_type="application/xml")
 
     @router.get("/meshes/{package}/{path:path}", response_class=FileResponse)
     def mesh(package: str, path: str) -> FileResponse:

@@ -16,6 +16,7 @@ from throwcollect.episode.message import pack
 from throwcollect.episode.record import Samples
 from throwcollect.episode.topics import Topic
 from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.robots.appearance import check_appearance
 from throwcollect.robots.description import full_description
 from throwcollect.ros import (
     DurabilityPolicy,
@@ -30,7 +31,7 @@ from throwcollect.ros import (
     graph_changes,
     provide_time,
 )
-from throwcollect.ros.msg import SetParametersResult, UInt8MultiArray
+from throwcollect.ros.msg import SetParametersResult, String, UInt8MultiArray
 from throwcollect.run_key import Signer
 from throwcollect.sim import descriptors
 from throwcollect.sim.controller_manager import ControllerManager
@@ -60,6 +61,10 @@ _REPEAT_S = 0.02
 """Real time between two messages on a topic of samples while time stands still; that of the robot's joint states."""
 
 _FACTOR = "sim.real_time_factor"
+DESCRIPTION = "robot_description"
+"""The parameter of ROS' robot_state_publisher, too."""
+_OF_ONLOOKERS = (_FACTOR, DESCRIPTION)
+"""Parameters that change nothing that is recorded, so anybody may set them, in the middle of a trial, too."""
 _NO_LIMIT = 0.0
 _HIDDEN = (Effect.PLAN, Effect.RUN)
 """Effects of keys that the node does not show as parameters, as they say nothing of a simulation."""
@@ -87,9 +92,10 @@ class SimulationNode(Node):
         config = simulation.config
         # The simulation is the source of its time, so the clock is set and not subscribed to.
         provide_time(self)
-        self._declare_parameters(config)
-        description = full_description(config)
+        self._description = description = full_description(config)
         self._publish_latched(Channels(config, description))
+        self._declare_description()
+        self._declare_parameters(config)
         self._runner = TrialRunner(simulation)
         self._leases = LeaseQueue(self._runner)
         self._live = [
@@ -219,6 +225,19 @@ class SimulationNode(Node):
             publisher.publish(message)
             self._latched.append(publisher)
 
+    def _declare_description(self) -> None:
+        """Declare the parameter by which viewers are given another description to draw."""
+        about = "URDF that viewers draw; only what is seen may differ from that of the configuration."
+        self.declare_parameter(DESCRIPTION, self._description, ParameterDescriptor(description=about))
+        (self._described,) = (each for each in self._latched if each.topic_name.endswith(DESCRIPTION))
+
+        def show(parameters: list[Parameter]) -> None:
+            for parameter in parameters:
+                if parameter.name == DESCRIPTION:
+                    self._described.publish(String(data=parameter.value))
+
+        self.add_post_set_parameters_callback(show)
+
     def _declare_parameters(self, config: Config) -> None:
         physics = set(sweepable_keys(config, Effect.PHYSICS))
         shown = {leaf.name: leaf.value for leaf in leaves(config) if leaf.key.effect not in _HIDDEN}
@@ -250,6 +269,8 @@ class SimulationNode(Node):
         values = {parameter.name: parameter.value for parameter in parameters}
         try:
             self._check_factor(values.get(_FACTOR, _NO_LIMIT))
+            if DESCRIPTION in values:
+                check_appearance(self._description, values[DESCRIPTION])
             if values.get(LEASES):
                 self._asked = self._read_leases(values)
             elif not self._restoring:
@@ -294,7 +315,7 @@ class SimulationNode(Node):
             ConfigError: If the simulation is leased, so that only its coordinator may change it.
         """
         trial = self._simulation.trial
-        changed = [name for name in values if name != _FACTOR]
+        changed = [name for name in values if name not in _OF_ONLOOKERS]
         if trial.leased and changed == [NUMBER] and values[NUMBER] < 0:
             self._leases.clear()
             trial.set_up_nothing()

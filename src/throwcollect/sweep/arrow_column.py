@@ -12,21 +12,25 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
+from numpy.typing import NDArray
 
 _CODES = {pa.int64(): "q", pa.uint64(): "Q", pa.float64(): "d"}
 
 
-def make_column(values: Sequence[Any], kind: pa.DataType) -> pa.Array:
+def make_column(values: Sequence[Any] | NDArray[Any], kind: pa.DataType) -> pa.Array:
     """What ``pyarrow.array(values, kind)`` gives.
 
     Args:
-        values: Numbers or texts; None for what is null.
+        values: Numbers or texts; None for what is null. In an array, which must have the very kind, texts are bytes of
+            one length, and nothing is null.
         kind: ``int64``, ``uint64``, ``float64`` or ``string``.
 
     Raises:
         TypeError: If a value is of another kind.
         OverflowError: If a number is too large, or the texts are longer than 2 GiB in all.
     """
+    if isinstance(values, np.ndarray):
+        return _make_array_column(values, kind)
     nulls = sum(value is None for value in values)
     valid = np.packbits([value is not None for value in values], bitorder="little") if nulls else None
     if kind == pa.string():
@@ -38,7 +42,24 @@ def make_column(values: Sequence[Any], kind: pa.DataType) -> pa.Array:
     return pa.Array.from_buffers(kind, len(values), parts, null_count=nulls)
 
 
-def make_table(columns: Sequence[Sequence[Any]], schema: pa.Schema) -> pa.Table:
+def _make_array_column(values: NDArray[Any], kind: pa.DataType) -> pa.Array:
+    width = values.dtype.itemsize
+    parts = [np.arange(0, width * len(values) + 1, width, dtype=np.int32)] if kind == pa.string() else []
+    parts.append(np.ascontiguousarray(values))
+    return pa.Array.from_buffers(kind, len(values), [None, *map(pa.py_buffer, parts)], null_count=0)
+
+
+def read_numbers(column: pa.Array) -> NDArray[Any]:
+    """The numbers of a column of which nothing is null, ``(n_rows,)``; not to be written to.
+
+    Args:
+        column: Of ``int64``, ``uint64`` or ``float64``.
+    """
+    dtype = np.dtype(_CODES[column.type])
+    return np.frombuffer(column.buffers()[1], dtype, len(column), dtype.itemsize * column.offset)
+
+
+def make_table(columns: Sequence[Sequence[Any] | NDArray[Any]], schema: pa.Schema) -> pa.Table:
     """The Arrow table of columns of Python values.
 
     Args:

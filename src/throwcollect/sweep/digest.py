@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Sequence
+import re
+from collections.abc import Iterable
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from throwcollect.config.key import Effect, key_of_field
 from throwcollect.config.schema import Config
@@ -14,6 +18,12 @@ from throwcollect.config.values import leaves
 from throwcollect.sweep.points import Points
 
 _FORMAT = "throwcollect trial 1"
+_DIGEST = re.compile(r"[0-9a-f]{64}")
+
+
+def is_digest(value: object) -> bool:
+    """Whether a value is a digest in hexadecimal."""
+    return isinstance(value, str) and bool(_DIGEST.fullmatch(value))
 
 
 def config_digest(config: Config) -> str:
@@ -37,8 +47,8 @@ def _name_uncounted(section: Section) -> dict[str, Any]:
     return uncounted
 
 
-def trial_digests(config: Config, points: Points, seeds: Sequence[int]) -> Iterator[str]:
-    """Hash everything that determines the samples of each trial, SHA-256 in hex.
+def trial_digests(config: Config, points: Points, seeds: Iterable[int]) -> NDArray[np.uint8]:
+    """Hash everything that determines the samples of each trial, SHA-256, shape ``(n_trials, 32)``.
 
     The hashed text has one line ``key=value`` for each effective key of the trial's configuration, sorted by key, so
     it does not matter whether a value was swept or fixed.
@@ -55,11 +65,14 @@ def trial_digests(config: Config, points: Points, seeds: Sequence[int]) -> Itera
     }
     lines["seed"] = ""
     lines = dict(sorted(lines.items()))
-    for seed, row in zip(seeds, points.values.tolist(), strict=True):
-        lines["seed"] = _line("seed", seed)
-        for key, value in zip(points.keys, row, strict=True):
+    digests = np.empty((len(points.values), hashlib.sha256().digest_size), np.uint8)
+    for digest, seed, row in zip(digests, seeds, points.values, strict=True):
+        lines["seed"] = _line("seed", int(seed))
+        for key, value in zip(points.keys, row.tolist(), strict=True):
             lines[key] = _line(key, value)
-        yield hashlib.sha256("\n".join([_FORMAT, *lines.values()]).encode()).hexdigest()
+        text = "\n".join([_FORMAT, *lines.values()])
+        digest[:] = np.frombuffer(hashlib.sha256(text.encode()).digest(), np.uint8)
+    return digests
 
 
 def _line(key: str, value: object) -> str:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +14,8 @@ from throwcollect.files import open_regular, unreadable
 _OPENED = "/proc/self/fd/{}"
 _MOST_ROWS = 20_000_000
 _MOST_VALUES = 2_000_000_000
+_BUFFER_BYTES = 1 << 20
+"""How much of a column is read at once."""
 
 
 def encode_table(table: Any) -> bytes:
@@ -29,6 +33,22 @@ def read_parquet(path: Path) -> Any:
     Raises:
         DatasetError: If the file is missing or damaged, or announces more than any table of a dataset holds.
     """
+    with open_parquet(path) as file:
+        table = file.read()
+        table.validate(full=True)
+    return table
+
+
+@contextmanager
+def open_parquet(path: Path) -> Iterator[Any]:
+    """A Parquet file, to be read bit by bit; what goes wrong while it is read counts as damage to it.
+
+    Yields:
+        A `pyarrow.parquet.ParquetFile`, whose values are not validated yet.
+
+    Raises:
+        DatasetError: As for `read_parquet`.
+    """
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -45,17 +65,17 @@ def read_parquet(path: Path) -> Any:
         # still waits for the interpreter when this process ends takes the process down.
         with (
             open(descriptor, "rb"),
-            pq.ParquetFile(_OPENED.format(descriptor), page_checksum_verification=True) as file,
+            pq.ParquetFile(
+                _OPENED.format(descriptor), page_checksum_verification=True, buffer_size=_BUFFER_BYTES, pre_buffer=False
+            ) as file,
         ):
             rows, columns = file.metadata.num_rows, file.metadata.num_columns
             if not 0 <= rows <= _MOST_ROWS or rows * columns > _MOST_VALUES:
                 raise DatasetError(f"is damaged: announces {rows} rows of {columns} columns", path=path)
-            table = file.read()
-        table.validate(full=True)
+            yield file
     except (OSError, ValueError, MemoryError, pa.ArrowException) as error:
         # A name or a text whose bytes are not valid ends as one of these errors, at the latest when it is validated.
         raise DatasetError(f"is damaged: {_first_line(error)}", path=path) from error
-    return table
 
 
 def _first_line(error: BaseException) -> str:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,12 +13,14 @@ import numpy as np
 from throwcollect.config.schema import Config
 from throwcollect.config.values import reason_not_sweepable, with_values
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError, PlanError, Problem
-from throwcollect.files import write_file
-from throwcollect.sweep.digest import config_digest, trial_digests
-from throwcollect.sweep.parquet_file import encode_table, read_parquet
+from throwcollect.files import is_there, remove, write_file
+from throwcollect.sweep.digest import config_digest, is_digest, trial_digests
+from throwcollect.sweep.parquet_file import encode_table, open_parquet
 from throwcollect.sweep.points import Points
+from throwcollect.sweep.round_file import read_rounds, rounds_path
 from throwcollect.sweep.samplers import draw_points
 from throwcollect.sweep.slice import Slice
+from throwcollect.sweep.trials import DIGEST_BYTES, Trial, Trials
 from throwcollect.wording import blank_numbers, format_count
 
 _FORMAT = "1"
@@ -26,6 +28,8 @@ _FORMAT_KEY = b"throwcollect.plan_format"
 _CONFIG_KEY = b"throwcollect.config_digest"
 _SLICE_KEY = b"throwcollect.slice"
 _MOST_REASONS = 5
+_ROWS_AT_ONCE = 1 << 16
+_MISNUMBERED = "the trials are not numbered from 0 without gaps"
 
 ROUND_TRIALS = 64
 """Number of trials in a round, by which a plan grows."""
@@ -34,25 +38,6 @@ FIRST_TRIALS = 2 * ROUND_TRIALS
 
 Check = Callable[[Config], str | None]
 """Says of the configuration of a trial why it cannot be run, or None when it can."""
-
-
-@dataclass(frozen=True)
-class Trial:
-    """One numbered point of the sweep.
-
-    Attributes:
-        number: From 0.
-        values: Value of each swept dotted key, in the key's unit.
-        seed: Seed for anything random in the trial, from the root seed and the number; fits uint64.
-        digest: SHA-256 in hex over everything that determines the trial's samples.
-        refused: Why the trial is not run, or None.
-    """
-
-    number: int
-    values: Mapping[str, float]
-    seed: int
-    digest: str
-    refused: str | None = None
 
 
 @dataclass(frozen=True)
@@ -66,13 +51,13 @@ class Plan:
     """
 
     config: Config
-    trials: tuple[Trial, ...]
+    trials: Trials
     slice: Slice | None = None
 
     @property
     def keys(self) -> tuple[str, ...]:
         """Swept dotted keys."""
-        return tuple(self.trials[0].values)
+        return self.trials.keys
 
     def trial(self, number: int) -> Trial:
         """The trial of a number.
@@ -80,7 +65,7 @@ class Plan:
         Raises:
             IndexError: If the plan has no such trial.
         """
-        index = number - self.trials[0].number
+        index = number - self.trials.first
         if index < 0:
             raise IndexError(number)
         return self.trials[index]
@@ -98,26 +83,23 @@ class Plan:
         """Configuration of one trial."""
         return with_values(self.config, trial.values)
 
-    def refuse(self, reasons: Sequence[str | None]) -> Plan:
-        """This plan with trials refused.
-
-        Args:
-            reasons: Why each trial is not run, in order; None for those that are.
-
-        Raises:
-            PlanError: If every trial is refused.
-        """
-        _check_some_left([reason for reason in reasons if reason is not None], len(self.trials))
-        pairs = zip(self.trials, reasons, strict=True)
-        return replace(self, trials=tuple(replace(trial, refused=reason) for trial, reason in pairs))
-
     def write(self, path: Path) -> None:
-        """Write the plan as a Parquet file, whole or not at all.
+        """Write the plan as a Parquet file, whole or not at all; rounds that lay beside it are in it then.
 
         Raises:
             DatasetError: If the file cannot be written.
         """
         write_file(path, self.encode())
+        remove(rounds_path(path))
+
+    def take_in_rounds(self, path: Path) -> None:
+        """Write the plan as a whole if rounds lie beside its file, as its trials have these.
+
+        Raises:
+            DatasetError: If the file cannot be written.
+        """
+        if is_there(rounds_path(path)):
+            self.write(path)
 
     def encode(self) -> bytes:
         """Bytes of the plan's Parquet file; equal plans give equal bytes.
@@ -127,12 +109,13 @@ class Plan:
         """
         from throwcollect.sweep.arrow_column import make_table
 
+        trials = self.trials
         columns: list[Any] = [
-            [trial.number for trial in self.trials],
-            [trial.digest for trial in self.trials],
-            [trial.seed for trial in self.trials],
-            [trial.refused for trial in self.trials],
-            *([trial.values[key] for trial in self.trials] for key in self.keys),
+            np.arange(trials.first, trials.numbers.stop),
+            np.frombuffer(trials.digests.tobytes().hex().encode(), f"S{2 * DIGEST_BYTES}"),
+            trials.seeds,
+            [trials.refused.get(number) for number in trials.numbers],
+            *trials.values.T,
         ]
         metadata = {_FORMAT_KEY: _FORMAT, _CONFIG_KEY: config_digest(self.config)}
         if self.slice is not None:
@@ -145,7 +128,7 @@ class Plan:
         """Read a plan that was written for a configuration.
 
         Args:
-            path: File that `write` wrote.
+            path: File that `write` wrote; rounds that were added since lie beside it.
             config: The configuration; its section `run` may differ.
             slice: Which slice of the plan that the file holds is wanted; None for all that it holds.
 
@@ -154,35 +137,33 @@ class Plan:
             ForeignPlanError: If it is the plan of another configuration.
             ConfigError: If the plan has fewer shards than there are slices.
         """
-        table = read_parquet(path)
-        metadata = table.schema.metadata or {}
-        keys = tuple(table.column_names[4:])
-        found = metadata.get(_FORMAT_KEY, b"none").decode(errors="replace")
-        if found != _FORMAT or not table.schema.equals(_schema(keys)) or not table.num_rows:
-            raise DatasetError(
-                "not a plan that this version reads",
-                path=path,
-                expected=f"plan format {_FORMAT}",
-                evidence=f"got {found}",
-            )
-        if metadata.get(_CONFIG_KEY, b"") != config_digest(config).encode():
-            raise ForeignPlanError("the plan belongs to another configuration", path=path)
-        for key in keys:
-            if reason := reason_not_sweepable(config, key):
-                raise DatasetError(f"is damaged: column {key!r}: {reason}", path=path)
+        with open_parquet(path) as file:
+            metadata = file.schema_arrow.metadata or {}
+            keys = tuple(file.schema_arrow.names[4:])
+            found = metadata.get(_FORMAT_KEY, b"none").decode(errors="replace")
+            if found != _FORMAT or not file.schema_arrow.equals(_schema(keys)) or not file.metadata.num_rows:
+                raise DatasetError(
+                    "not a plan that this version reads",
+                    path=path,
+                    expected=f"plan format {_FORMAT}",
+                    evidence=f"got {found}",
+                )
+            if metadata.get(_CONFIG_KEY, b"") != config_digest(config).encode():
+                raise ForeignPlanError("the plan belongs to another configuration", path=path)
+            for key in keys:
+                if reason := reason_not_sweepable(config, key):
+                    raise DatasetError(f"is damaged: column {key!r}: {reason}", path=path)
+            trials = _read_trials(file, keys, path)
         stored = metadata.get(_SLICE_KEY)
-        first, rows = 0, table
         if stored is not None:
-            # Its first trial has any number.
-            first, slice = table["trial"][0].as_py(), Slice.parse(stored.decode())
-        elif slice is not None:
-            wanted = slice.trials_of(table.num_rows, trials_per_shard=config.record.trials_per_shard)
-            first, rows = wanted.start, table.slice(wanted.start, len(wanted))
-        numbers, digests, seeds, refused, *values = (column.to_pylist() for column in rows.columns)
-        if numbers != list(range(first, first + len(numbers))):
-            raise DatasetError("the trials are not numbered from 0 without gaps", path=path)
-        trials = zip(numbers, zip(*values, strict=True), seeds, digests, refused, strict=True)
-        return cls(config, tuple(Trial(n, dict(zip(keys, row, strict=True)), *rest) for n, row, *rest in trials), slice)
+            return cls(config, trials, Slice.parse(stored.decode()))
+        if trials.first:
+            raise DatasetError(_MISNUMBERED, path=path)
+        read_rounds(path, trials)
+        if slice is not None:
+            wanted = slice.trials_of(len(trials), trials_per_shard=config.record.trials_per_shard)
+            trials = trials[wanted.start : wanted.stop]
+        return cls(config, trials, slice)
 
 
 def make_plan(config: Config, *, check: Check | None = None, directory: Path | None = None) -> Plan:
@@ -198,28 +179,39 @@ def make_plan(config: Config, *, check: Check | None = None, directory: Path | N
         PlanError: If the sweep has no point, or every trial is refused.
         ConfigError: If the file of the sampler `list` cannot be used.
     """
-    points = draw_points(config, directory=directory or Path())
-    if config.grows:
-        points = points.first(FIRST_TRIALS)
-    trials = tuple(make_trials(config, points, check=check))
-    return Plan(config, trials).refuse([trial.refused for trial in trials])
+    trials = make_trials(config, draw_first_points(config, directory=directory or Path()))
+    if check is not None:
+        trials = trials.refuse([refusal(with_values(config, trial.values), check) for trial in trials])
+    check_some_left(trials)
+    return Plan(config, trials)
 
 
-def make_trials(config: Config, points: Points, *, check: Check | None = None, first: int = 0) -> Iterator[Trial]:
-    """The trials of points, one by one, as each is checked.
+def draw_first_points(config: Config, *, directory: Path) -> Points:
+    """The points of all trials that are known before anything runs; of a plan that grows, of its first two rounds.
+
+    Args:
+        config: Configuration with the sweep.
+        directory: Directory at which a relative `sweep.file` starts.
+
+    Raises:
+        PlanError: If the sweep has no point.
+        ConfigError: If the file of the sampler `list` cannot be used.
+    """
+    points = draw_points(config, directory=directory)
+    return points.first(FIRST_TRIALS) if config.grows else points
+
+
+def make_trials(config: Config, points: Points, *, first: int = 0) -> Trials:
+    """The trials of points, none of which is refused.
 
     Args:
         config: Configuration that the trials vary.
         points: Their values.
-        check: Says of the configuration of a trial why it cannot be run.
         first: Number of the first one.
     """
-    seeds = [_seed(config.seed, number) for number in range(first, first + len(points.values))]
-    rows = zip(points.values.tolist(), seeds, trial_digests(config, points, seeds), strict=True)
-    for number, (row, seed, digest) in enumerate(rows, first):
-        values = dict(zip(points.keys, row, strict=True))
-        refused = refusal(with_values(config, values), check) if check else None
-        yield Trial(number, values, seed, digest, refused)
+    count = len(points.values)
+    seeds = np.fromiter((_seed(config.seed, number) for number in range(first, first + count)), np.uint64, count)
+    return Trials(points.keys, points.values, seeds, trial_digests(config, points, seeds), first=first)
 
 
 def _seed(root: int, number: int) -> int:
@@ -239,16 +231,70 @@ def refusal(config: Config, check: Check) -> str | None:
         return str(error)
 
 
-def _check_some_left(reasons: list[str], trials: int) -> None:
-    if len(reasons) < trials:
+def check_some_left(trials: Trials) -> None:
+    """Make sure that a plan has something to run.
+
+    Raises:
+        PlanError: If every trial is refused.
+    """
+    reasons = list(trials.refused.values())
+    if len(reasons) < len(trials):
         return
     # Reasons that differ only in their numbers are one; the first of them speaks for all.
     kinds = [blank_numbers(reason) for reason in reasons]
     examples = dict(zip(reversed(kinds), reversed(reasons), strict=True))
     listed = [f"{count} × {examples[kind]}" for kind, count in Counter(kinds).most_common(_MOST_REASONS)]
     raise PlanError(
-        [Problem(f"{format_count(trials, 'trial')}, all refused: {'; '.join(listed)}", key="sweep")],
+        [Problem(f"{format_count(len(trials), 'trial')}, all refused: {'; '.join(listed)}", key="sweep")],
         hint="sweep over smaller ranges or slower motions, or change task.start and task.end",
+    )
+
+
+def _read_trials(file: Any, keys: tuple[str, ...], path: Path) -> Trials:
+    """The trials of a plan's file, some after the other, as Arrow's memory for all of them is several times theirs.
+
+    Args:
+        file: The open file.
+        keys: Swept dotted keys.
+        path: Its path, for messages.
+
+    Raises:
+        DatasetError: If the numbers have gaps, or a digest is none.
+    """
+    trials: Trials | None = None
+    for rows in file.iter_batches(_ROWS_AT_ONCE):
+        rows.validate(full=True)
+        first = rows["trial"][0].as_py()
+        more = _trials_of(rows, keys, first, path)
+        if trials is None:
+            trials = more
+        elif first != trials.numbers.stop:
+            raise DatasetError(_MISNUMBERED, path=path)
+        else:
+            trials.extend(more)
+    if trials is None:
+        raise DatasetError("is damaged: has no rows", path=path)
+    return trials
+
+
+def _trials_of(rows: Any, keys: tuple[str, ...], first: int, path: Path) -> Trials:
+    from throwcollect.sweep.arrow_column import read_numbers
+
+    numbers = np.arange(first, first + len(rows))
+    if not np.array_equal(read_numbers(rows["trial"]), numbers):
+        raise DatasetError(_MISNUMBERED, path=path)
+    digests = rows["digest"].to_pylist()
+    if wrong := [number for number, digest in enumerate(digests, first) if not is_digest(digest)]:
+        raise DatasetError("is damaged: has a digest that is no SHA-256", path=path, place=f"trial {wrong[0]}")
+    values = np.column_stack([np.empty((len(rows), 0)), *(read_numbers(rows[key]) for key in keys)])
+    reasons = enumerate(rows["refused"].to_pylist(), first)
+    return Trials(
+        keys,
+        values,
+        read_numbers(rows["seed"]),
+        np.frombuffer(bytes.fromhex("".join(digests)), np.uint8).reshape(-1, DIGEST_BYTES),
+        first=first,
+        refused={number: reason for number, reason in reasons if reason is not None},
     )
 
 

@@ -7,7 +7,6 @@ busy with the next one, and the order in which results arrive does not matter. T
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,9 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
-from throwcollect.sweep.plan import FIRST_TRIALS, ROUND_TRIALS, Trial
+from throwcollect.sweep.plan import FIRST_TRIALS, ROUND_TRIALS
 from throwcollect.sweep.points import Points
+from throwcollect.sweep.rows import Rows
 from throwcollect.sweep.samplers import draw_points
+from throwcollect.sweep.trials import Trials
 from throwcollect.tasks.result import Result
 
 if TYPE_CHECKING:
@@ -42,12 +43,15 @@ class Rounds:
         self._success = config.task.success
         self._sampler = _target_sampler(config)
         targets = self._sampler.dimensions if self._sampler else 0
-        self._trials: list[Trial] = []
-        self._values = np.empty((0, len(self._points.keys)))
-        self._places = np.empty((0, targets))
-        self._waiting: set[int] = set()
+        self._values = Rows(np.empty((0, len(self._points.keys))))
+        self._places = Rows(np.empty((0, targets)))
+        self._waiting = bytearray()
+        """Of each trial, whether its result is still to come."""
         self._running: list[int] = []
         self._succeeded: list[int] = []
+        self._ended = 0
+        """Number of rounds, from the first one on, of which every result is known."""
+        self._succeeded_in_ended = 0
 
     @property
     def limit(self) -> int:
@@ -57,52 +61,55 @@ class Rounds:
     @property
     def planned(self) -> int:
         """Number of trials that there are."""
-        return len(self._trials)
+        return len(self._waiting)
 
     @property
     def over(self) -> bool:
         """Whether no trial will follow."""
         if self.planned >= self.limit:
             return True
-        before = self._decisive
-        return self._wanted is not None and before > 0 and self.due and sum(self._succeeded[:before]) >= self._wanted
+        return self._wanted is not None and self._decisive > 0 and self.due and self._succeeded_in_ended >= self._wanted
 
     @property
     def due(self) -> bool:
         """Whether every result that the next trials depend on is known."""
-        return not any(self._running[: self._decisive])
+        decisive = self._decisive
+        while self._ended < decisive and not self._running[self._ended]:
+            self._succeeded_in_ended += self._succeeded[self._ended]
+            self._ended += 1
+        return self._ended == decisive
 
     @property
     def _decisive(self) -> int:
         """Number of rounds whose results decide on the next trials."""
         return max(0, self.planned // ROUND_TRIALS - 1)
 
-    def add(self, trials: Sequence[Trial]) -> None:
+    def add(self, trials: Trials) -> None:
         """Take in trials that are in the plan.
 
         Args:
             trials: Numbered on from those that are there.
         """
-        self._trials += trials
-        self._values = np.vstack([self._values, [list(trial.values.values()) for trial in trials]])
-        self._places = np.vstack([self._places, np.full((len(trials), self._places.shape[1]), np.nan)])
-        for trial in trials:
-            if trial.number % ROUND_TRIALS == 0:
+        self._values.append(trials.values)
+        self._places.append(np.full((len(trials), self._places.all.shape[1]), np.nan))
+        for number in trials.numbers:
+            if number % ROUND_TRIALS == 0:
                 self._running.append(0)
                 self._succeeded.append(0)
-            if trial.refused is None:
-                self._running[-1] += 1
-                self._waiting.add(trial.number)
+            runs = number not in trials.refused
+            self._running[-1] += runs
+            self._waiting.append(runs)
 
     def tell(self, number: int, result: Result) -> None:
         """Take in what came of a trial; a second result of the same trial changes nothing."""
-        if number not in self._waiting:
+        if not self._waiting[number]:
             return
-        self._waiting.remove(number)
+        self._waiting[number] = False
         self._running[number // ROUND_TRIALS] -= 1
         self._succeeded[number // ROUND_TRIALS] += result.outcome.value == self._success
         if self._sampler is not None:
-            self._places[number] = self._sampler.place(self._trials[number], result)
+            values = dict(zip(self._points.keys, self._values.all[number].tolist(), strict=True))
+            self._places.all[number] = self._sampler.place(values, result)
 
     def draw(self) -> Points | None:
         """Go a step further towards the next trials, which must be due, with `over` not true.
@@ -115,7 +122,7 @@ class Rounds:
             return Points(self._points.keys, self._values_of(number)[there:])
         drawn = self._sampler.next_round
         known = (drawn - 1) * ROUND_TRIALS
-        values = self._sampler.draw(self._values_of(drawn), self._values[:known], self._places[:known])
+        values = self._sampler.draw(self._values_of(drawn), self._values.all[:known], self._places.all[:known])
         return Points(self._points.keys, values[there:]) if drawn == number else None
 
     def _values_of(self, number: int) -> NDArray[np.float64]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from throwcollect.config.schema import Config, Parameter
 from throwcollect.config.sweep import TargetConfig
 from throwcollect.sweep.inverse import InverseModel
-from throwcollect.sweep.plan import ROUND_TRIALS, Trial
+from throwcollect.sweep.plan import ROUND_TRIALS
 from throwcollect.sweep.samplers import places, spread
 from throwcollect.sweep.target_cells import NOWHERE, Cells, Thinness
 from throwcollect.tasks.result import Result
@@ -47,11 +47,16 @@ class TargetSampler:
         """Number of targets."""
         return len(self._cells.shape)
 
-    def place(self, trial: Trial, result: Result) -> NDArray[np.float64]:
-        """What `draw` wants to know of a trial, shape ``(n_targets,)``: where it landed in bins; NaN if it did not."""
+    def place(self, values: Mapping[str, float], result: Result) -> NDArray[np.float64]:
+        """What `draw` wants to know of a trial, shape ``(n_targets,)``: where it landed in bins; NaN if it did not.
+
+        Args:
+            values: Value of each swept key of the trial.
+            result: What came of it.
+        """
         if not isinstance(result, ThrowResult) or result.outcome is not ThrowOutcome.LANDED:
             return np.full(self.dimensions, np.nan)
-        return self._cells.place(trial, result)
+        return self._cells.place(values, result)
 
     def draw(
         self, otherwise: NDArray[np.float64], tried: NDArray[np.float64], ended: NDArray[np.float64]

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.config.sweep import LANDING_HEIGHT, TargetConfig
-from throwcollect.sweep.plan import Trial
 from throwcollect.tasks.throw.outcome import ThrowResult
 
 NOWHERE = -1
@@ -40,13 +40,18 @@ class Cells:
         self.shape = tuple(each.bins for each in bins)
         self.count = math.prod(self.shape)
 
-    def place(self, trial: Trial, result: ThrowResult) -> NDArray[np.float64]:
-        """Where a throw landed, in bins, shape ``(n_targets,)``; NaN if it has no landing."""
+    def place(self, values: Mapping[str, float], result: ThrowResult) -> NDArray[np.float64]:
+        """Where a throw landed, in bins, shape ``(n_targets,)``; NaN if it has no landing.
+
+        Args:
+            values: Value of each swept key of its trial.
+            result: What came of it.
+        """
         measured = dict.fromkeys(self._names, math.nan)
         if result.landing is not None and result.hit_angle_rad is not None:
             measured = {
                 "distance_m": math.hypot(*result.landing.position[:2]),
-                "height_m": trial.values.get(LANDING_HEIGHT, math.nan),
+                "height_m": values.get(LANDING_HEIGHT, math.nan),
                 "hit_angle_rad": result.hit_angle_rad,
             }
         place: NDArray[np.float64] = (np.array([measured[name] for name in self._names]) - self._low) / self._width

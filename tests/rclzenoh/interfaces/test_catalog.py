@@ -42,6 +42,23 @@ def test_a_definition_lists_dependencies_once_after_lines_of_80_equal_signs():
     assert [part.splitlines()[0] for part in parts[1:]] == ["MSG: std_msgs/Header", "MSG: builtin_interfaces/Time"]
 
 
+def test_a_definition_of_a_part_names_other_parts_in_full():
+    name = "control_msgs/action/FollowJointTrajectory"
+    parts = message_definition(f"{name}_FeedbackMessage").split("=" * 80 + "\n")
+    assert parts[0] == f"unique_identifier_msgs/UUID goal_id\n{name}_Feedback feedback\n"
+    others = {part.partition("\n")[0]: part.partition("\n")[2] for part in parts[1:]}
+    whole = message_definition(f"{name}_Feedback").split("=" * 80 + "\n")
+    assert others[f"MSG: {name}_Feedback"] == whole[0]
+    assert {part.partition("\n")[0] for part in whole[1:]} | {"MSG: unique_identifier_msgs/UUID"} == {
+        each for each in others if each != f"MSG: {name}_Feedback"
+    }
+    event = message_definition("std_srvs/srv/SetBool_Event")
+    assert event.splitlines()[:2] == [
+        "service_msgs/ServiceEventInfo info",
+        "std_srvs/srv/SetBool_Request[<=1] request",
+    ]
+
+
 def test_defaults_that_the_store_does_not_keep_are_read_from_files():
     assert {field.name: field.default for field in structure("geometry_msgs/msg/Quaternion").fields}["w"] == 1
     assert structure("simulation_interfaces/srv/StepSimulation_Request").fields[0].default == 1

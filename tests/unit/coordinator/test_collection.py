@@ -10,7 +10,7 @@ import pytest
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.collection import TrialCollection
 from throwcollect.coordinator.lookahead import Lookahead
-from throwcollect.dataset.writer import create
+from throwcollect.dataset.creation import create
 from throwcollect.episode.message import Delivery
 from throwcollect.replay.throw import Replayer
 from throwcollect.sweep.plan import Plan, make_plan

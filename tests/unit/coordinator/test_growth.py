@@ -2,12 +2,14 @@
 
 from pathlib import Path
 
+from tests.unit.sweep.columns import in_columns
 from tests.unit.sweep.thrower import collected, configuration, throw
 
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.growth import Growth
 from throwcollect.coordinator.prepare import draw_plan, more_trials
-from throwcollect.sweep.plan import Plan, Trial, make_plan
+from throwcollect.sweep.plan import Plan, make_plan
+from throwcollect.sweep.trials import Trial, Trials
 from throwcollect.tasks.throw.outcome import ThrowOutcome, ThrowResult
 
 FAST = {"task.duration_s": {"min": 0.4, "max": 1.2}, "task.trajectory.gamma": {"min": 1.0, "max": 1.4}}
@@ -17,7 +19,7 @@ def config(trials: int | None = 150, landed: int | None = None) -> Config:
     return configuration(trials=trials, landed=landed, target=None, parameters=FAST)
 
 
-def ended(growth: Growth, trials: tuple[Trial, ...]) -> None:
+def ended(growth: Growth, trials: Trials) -> None:
     for trial in trials:
         growth.tell(trial.number, ThrowResult(ThrowOutcome.RECAUGHT))
 
@@ -52,7 +54,7 @@ def test_trials_of_later_rounds_are_refused_as_those_of_a_plan_made_at_once() ->
 
 def test_a_plan_that_has_rounds_already_goes_on_where_it_was() -> None:
     settings = configuration(trials=256)
-    growth = Growth(Plan(settings, tuple(collected(settings, rounds=3))))
+    growth = Growth(Plan(settings, in_columns(collected(settings, rounds=3))))
     for trial in collected(settings, rounds=3):
         growth.tell(trial.number, throw(trial))
     steps = []

@@ -12,7 +12,8 @@ from throwcollect.config.loader import load
 from throwcollect.coordinator import node as coordinator_node
 from throwcollect.coordinator.collection import TrialCollection
 from throwcollect.coordinator.node import Coordinator
-from throwcollect.dataset.writer import DatasetWriter, create
+from throwcollect.dataset.creation import create
+from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.ros import get_message
 from throwcollect.ros.router import router
 from throwcollect.sweep.plan import make_plan

@@ -10,8 +10,9 @@ import pytest
 from tests.unit.dataset.conftest import Collection
 
 from throwcollect.coordinator.resume import finished, resume
+from throwcollect.dataset.creation import create
 from throwcollect.dataset.manifest import entry_of_file, list_promised_names, manifest_text
-from throwcollect.dataset.writer import DatasetWriter, create
+from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.errors import DatasetError
 from throwcollect.tasks.throw.outcome import ThrowResult
 

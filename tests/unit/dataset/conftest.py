@@ -148,9 +148,9 @@ class Collection:
 
     def refuse(self, trial: int, reason: str) -> None:
         """Have the plan refuse one of its trials."""
-        trials = list(self.plan.trials)
-        trials[trial] = replace(trials[trial], refused=reason)
-        self.plan = replace(self.plan, trials=tuple(trials))
+        trials = self.plan.trials
+        reasons = trials.refused | {trial: reason}
+        self.plan = replace(self.plan, trials=trials.refuse([reasons.get(number) for number in trials.numbers]))
 
 
 @pytest.fixture

@@ -26,6 +26,7 @@ from throwcollect.sweep.digest import trial_digests
 from throwcollect.sweep.plan import Plan, make_trials
 from throwcollect.sweep.points import Points
 from throwcollect.sweep.samplers import draw_points
+from throwcollect.sweep.trials import Trials
 from throwcollect.tasks.throw.outcome import ThrowOutcome, ThrowResult
 
 FORGED = 2
@@ -179,10 +180,8 @@ def test_verify_names_the_trial(collection: Collection, tmp_path: Path) -> None:
 def replanned(plan: Plan, points: Points, *, seed: int | None = None) -> Plan:
     """A plan of other points, or of the seeds of another configuration, in which digests and hashes fit."""
     seeds = plan.config if seed is None else plan.config.model_copy(update={"seed": seed})
-    drawn = [each.seed for each in make_trials(seeds, points)]
-    digests = trial_digests(plan.config, points, drawn)
-    trials = zip(make_trials(plan.config, points), drawn, digests, strict=True)
-    return replace(plan, trials=tuple(replace(trial, seed=own, digest=digest) for trial, own, digest in trials))
+    drawn = make_trials(seeds, points).seeds
+    return replace(plan, trials=Trials(points.keys, points.values, drawn, trial_digests(plan.config, points, drawn)))
 
 
 def test_a_plan_that_the_configuration_does_not_draw_is_found(collection: Collection, tmp_path: Path) -> None:
@@ -214,9 +213,7 @@ def test_refusals_that_are_invented_or_dropped_are_found(tmp_path: Path) -> None
     honest = draw_plan(collection.config, directory=tmp_path)
     assert [trial.refused is None for trial in honest.trials] == [False, True]
     assert list(find_refusal_problems(honest, (), feasibility_check)) == []
-    forged = replace(
-        honest, trials=tuple(replace(trial, refused="too fast" if trial.number else None) for trial in honest.trials)
-    )
+    forged = replace(honest, trials=honest.trials.refuse([None, "too fast"]))
     dropped, invented = find_refusal_problems(forged, (), feasibility_check)
     assert dropped.problem.startswith("is refused as None, the check says 'arm_right_7_joint moves at")
     assert invented.problem == "is refused as 'too fast', the check says None"
@@ -225,9 +222,9 @@ def test_refusals_that_are_invented_or_dropped_are_found(tmp_path: Path) -> None
 def test_what_depends_on_results_is_not_judged_without_them(tmp_path: Path) -> None:
     config = Config.model_validate({**SETTINGS, "trials": None, "until": {"landed": 60}})
     points = draw_points(config, directory=tmp_path)
-    plan = Plan(config, tuple(make_trials(config, points.first(192))))
+    plan = Plan(config, make_trials(config, points.first(192)))
     assert list(find_drawing_problems(tmp_path, plan, None)) == []
-    plan = Plan(config, tuple(make_trials(config, Points(points.keys, points.values[::-1].copy()).first(192))))
+    plan = Plan(config, make_trials(config, Points(points.keys, points.values[::-1].copy()).first(192)))
     found = list(find_drawing_problems(tmp_path, plan, None))
     assert len(found) == 128
 
@@ -245,7 +242,7 @@ def test_the_rounds_of_a_plan_that_grew_follow_from_the_results(
     tmp_path: Path, trials: int, landed: int, problem: str | None
 ) -> None:
     config = Config.model_validate({**SETTINGS, "trials": None, "until": {"landed": 60}})
-    plan = Plan(config, tuple(make_trials(config, draw_points(config, directory=tmp_path).first(trials))))
+    plan = Plan(config, make_trials(config, draw_points(config, directory=tmp_path).first(trials)))
     table = ThrowsTable.of(plan)
     outcomes = [ThrowOutcome.LANDED if number < landed else ThrowOutcome.TIMEOUT for number in range(trials)]
     made = [table.row(trial, ThrowResult(outcomes[trial.number]), None) for trial in plan.trials]

@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
+from throwcollect.dataset.creation import create
 from throwcollect.dataset.inspect import digest, info
-from throwcollect.dataset.writer import create
 from throwcollect.episode.message import header_to_json
 from throwcollect.errors import DatasetError
 

@@ -50,7 +50,8 @@ def go_on(directory: Path, source: Collection) -> None:
     try:
         there: list[int] = []
         writer.recover(lambda trial, _: there.append(trial))
-        writer.extend(())
+        writer.extend(writer.plan.trials[len(source.plan.trials) :])
+        writer.close_plan()
         source.fill(writer, [trial for trial in range(len(source.plan.trials)) if trial not in there])
         writer.finish(wall_s=1.0)
     finally:

@@ -13,9 +13,10 @@ from tests.unit.dataset.conftest import Collection
 from tests.unit.dataset.mutations import SETTINGS
 
 from throwcollect.coordinator.resume import resume
+from throwcollect.dataset.creation import create
 from throwcollect.dataset.lock import hold_alone, hold_together
 from throwcollect.dataset.rebuild import rebuild
-from throwcollect.dataset.writer import DatasetWriter, create
+from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.errors import DatasetError
 
 BUSY = r"dataset: another process collects into it, or changes it\n  try: throwcollect ps"

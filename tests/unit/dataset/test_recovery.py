@@ -14,10 +14,13 @@ import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
+from throwcollect.dataset.creation import create
 from throwcollect.dataset.verify import verify
-from throwcollect.dataset.writer import DatasetWriter, create
+from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.errors import DatasetError
+from throwcollect.side_by_side import work_side_by_side
 from throwcollect.sweep.plan import Plan
+from throwcollect.sweep.round_file import append_round
 from throwcollect.tasks.throw.outcome import ThrowResult
 
 from .conftest import Collection
@@ -147,6 +150,33 @@ def test_a_collection_killed_at_any_instant_goes_on_to_the_same_files(
         shutil.rmtree(directory)
         call, died = call + 1, killed.died
     assert call > 40
+
+
+def test_several_processes_keep_the_same_episodes(
+    trials: Trials, expected: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    directory = tmp_path / "dataset"
+    create(directory, trials.plan)
+    begun = DatasetWriter.open(directory)
+    for trial in [1, 0, 3]:
+        trials.append(begun, trial)
+    abandon(begun)
+    monkeypatch.setattr("throwcollect.dataset.recovery._MANY_EPISODES", 1)
+    there: dict[int, ThrowResult] = {}
+    asked = []
+
+    def ask(pieces: Any, *others: Any, processes: int, **named: Any) -> Any:
+        asked.append(processes)
+        return work_side_by_side(pieces, *others, processes=processes, **named)
+
+    monkeypatch.setattr("throwcollect.dataset.recovery.work_side_by_side", ask)
+    writer = DatasetWriter.open(directory)
+    assert writer.recover(there.__setitem__, processes=2) == 3
+    abandon(writer)
+    assert asked == [2]
+    assert there == {trial: trials.results[trial] for trial in [0, 1, 3]}
+    assert trials.go_on(directory) == {0, 1, 3}
+    assert files_of(directory) == expected
 
 
 @settings(
@@ -290,6 +320,25 @@ def test_a_plan_killed_while_it_grows_leaves_nothing_beside_it(trials: Trials, t
         assert {path.name for path in directory.iterdir()} == {"config.yaml", "plan.parquet", "logs"}
         call, died = call + 1, killed.died
     assert call > 2
+
+
+def test_a_plan_whose_rounds_are_taken_in_has_them_wherever_that_is_killed(trials: Trials, tmp_path: Path) -> None:
+    call, died = 0, True
+    while died:
+        directory = tmp_path / str(call)
+        create(directory, replace(trials.plan, trials=trials.plan.trials[:1]))
+        append_round(directory / "plan.parquet", trials.plan.trials[1:2])
+        append_round(directory / "plan.parquet", trials.plan.trials[2:])
+        with KilledAt(call) as killed:
+            Plan.read(directory / "plan.parquet", trials.plan.config).take_in_rounds(directory / "plan.parquet")
+        assert Plan.read(directory / "plan.parquet", trials.plan.config) == trials.plan
+        with closing(DatasetWriter.open(directory)) as writer:
+            assert writer.plan == trials.plan
+            writer.recover()
+        assert {path.name for path in directory.iterdir()} == {"config.yaml", "plan.parquet", "logs"}
+        assert (directory / "plan.parquet").read_bytes() == trials.plan.encode()
+        call, died = call + 1, killed.died
+    assert call > 4
 
 
 def test_what_earlier_versions_left_of_files_is_removed(trials: Trials, tmp_path: Path) -> None:

@@ -19,6 +19,7 @@ from tests.unit.dataset.conftest import Collection
 from tests.unit.dataset.mutations import fit_manifest, no_plan
 
 from rclzenoh.interfaces import deserialize, get_message, serialize
+from throwcollect.dataset.creation import create
 from throwcollect.dataset.inspect import digest, info
 from throwcollect.dataset.mcap_file import EPISODE
 from throwcollect.dataset.mcap_reader import StoredEpisode, open_mcap
@@ -27,7 +28,7 @@ from throwcollect.dataset.rebuild import rebuild
 from throwcollect.dataset.recovery import remove_unfinished
 from throwcollect.dataset.repair import repair
 from throwcollect.dataset.verify import verify
-from throwcollect.dataset.writer import DatasetWriter, create
+from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.derive.selection import sample
 from throwcollect.episode import channels as declared
 from throwcollect.episode.channels import Channel, Qos

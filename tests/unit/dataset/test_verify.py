@@ -36,9 +36,9 @@ from tests.unit.dataset.table_defects import (
     table_damaged,
 )
 
+from throwcollect.dataset.creation import create
 from throwcollect.dataset.inspect import digest
 from throwcollect.dataset.verify import verify
-from throwcollect.dataset.writer import create
 from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.episode.topics import joint_states
 from throwcollect.errors import DatasetError

@@ -12,8 +12,9 @@ import pyarrow.parquet as pq
 import pytest
 
 from throwcollect.config.loader import load
+from throwcollect.dataset.creation import create
 from throwcollect.dataset.verify import verify
-from throwcollect.dataset.writer import DatasetWriter, create
+from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.episode.message import Episode
 from throwcollect.errors import ConfigError, DatasetError
 

@@ -27,12 +27,12 @@ class Simulation:
         self.answers = True
         self.agrees = True
 
-    def set_parameter(self, _run: Run, node: str, name: str, value: float) -> Any:
+    def set_parameter(self, _run: Run, nodes: list[str], name: str, value: float) -> list[Any]:
         assert name == "sim.real_time_factor"
         if not self.answers:
             raise WorkerError("it does not answer")
-        self.asked.append((node, value))
-        return SimpleNamespace(successful=self.agrees, reason="no")
+        self.asked += [(node, value) for node in nodes]
+        return [SimpleNamespace(successful=self.agrees, reason="no") for _ in nodes]
 
 
 @pytest.fixture

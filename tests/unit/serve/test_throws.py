@@ -68,7 +68,7 @@ def test_the_page_is_told_all_of_a_throw(collected: Path) -> None:
     episode = next(iter(Dataset.open(collected).episodes()))
     samples = episode.samples()
     result = {"outcome": "landed", "landing_x_m": 1.0, "landing_y_m": -0.5, "landing_z_m": 0.02}
-    frame = encode_throw(Delivery(episode, json.dumps(result), "{}"))
+    frame = encode_throw(Delivery(episode, json.dumps(result), "{}"), "sim_0")
     size = int.from_bytes(frame[:4], "little")
     header = json.loads(frame[4 : 4 + size])
     assert header["landing"] == [1.0, -0.5, 0.02]
@@ -81,7 +81,7 @@ def test_the_page_is_told_all_of_a_throw(collected: Path) -> None:
     assert np.allclose(numbers[:joints].reshape(len(samples), -1), samples.position)
     assert np.allclose(numbers[joints:].reshape(-1, 3), samples.ball_position)
     fell = json.dumps({**result, "landing_z_m": None})
-    told = encode_throw(Delivery(episode, fell, "{}"))
+    told = encode_throw(Delivery(episode, fell, "{}"), "sim_0")
     assert json.loads(told[4 : 4 + int.from_bytes(told[:4], "little")])["landing"] is None
 
 
@@ -140,5 +140,5 @@ def test_what_somebody_else_publishes_is_left_out(remember: Remember, listeners:
     heard = ThrowWatch(Records().get("a"))
     assert run.key.directory.exists()
     for message in (b"", b"nonsense", bytes(10_000)):
-        heard._hear(message)
+        heard._hear("sim_0", message)
     assert heard._newest is None

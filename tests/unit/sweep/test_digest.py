@@ -23,7 +23,7 @@ RECORD_OF_OLD = RecordConfig(zstd_level=1)
 
 
 def digests(config: Config, points: Points = POINTS, seeds: tuple[int, ...] = (5, 6)) -> list[str]:
-    return list(trial_digests(config, points, seeds))
+    return [digest.tobytes().hex() for digest in trial_digests(config, points, seeds)]
 
 
 def test_digests_are_sha_256_over_the_effective_keys_in_order():

@@ -6,11 +6,13 @@ import pyarrow.parquet as pq
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.unit.sweep.columns import in_columns
 
 from throwcollect.config.run import RunConfig
 from throwcollect.config.schema import Config, Range, SweepConfig, Values
 from throwcollect.errors import ConfigError, DatasetError, PlanError
-from throwcollect.sweep.plan import Plan, Trial, make_plan
+from throwcollect.sweep.plan import Plan, make_plan
+from throwcollect.sweep.trials import Trial
 
 PARAMETERS = {"ball.mass_kg": Range(min=0.01, max=1, scale="log"), "task.duration_s": Range(min=1, max=3)}
 
@@ -104,11 +106,11 @@ rows = st.tuples(finite, finite, st.integers(0, 2**64 - 1), st.one_of(st.none(),
 @given(st.lists(rows, min_size=1, max_size=20))
 def test_a_plan_comes_back_from_disk_as_it_was(tmp_path_factory, rows):
     path = tmp_path_factory.getbasetemp() / "plan.parquet"
-    trials = tuple(
+    trials = [
         Trial(number, {"ball.mass_kg": mass, "task.duration_s": duration}, seed, f"{number:064x}", refused)
         for number, (mass, duration, seed, refused) in enumerate(rows)
-    )
-    plan = Plan(swept(), trials)
+    ]
+    plan = Plan(swept(), in_columns(trials))
     plan.write(path)
     assert Plan.read(path, swept()) == plan
 
@@ -195,6 +197,10 @@ def test_foreign_tables_are_no_plans(tmp_path):
     table = pq.read_table(path)
     pq.write_table(table.drop_columns("seed"), path)
     with pytest.raises(DatasetError, match="not a plan that this version reads"):
+        Plan.read(path, swept())
+    numbered = table.set_column(1, table.schema.field("digest"), [[f"{number:064X}" for number in range(3, 11)]])
+    pq.write_table(numbered, path)
+    with pytest.raises(DatasetError, match="trial 7: is damaged: has a digest that is no SHA-256"):
         Plan.read(path, swept())
     pq.write_table(table.slice(1), path)
     with pytest.raises(DatasetError, match=r"the trials are not numbered from 0 without gaps$"):

@@ -8,9 +8,10 @@ import pytest
 from tests.unit.sweep.thrower import collected, configuration, go_on, throw
 
 from throwcollect.errors import PlanError
-from throwcollect.sweep.plan import Trial, make_plan, make_trials
+from throwcollect.sweep.plan import make_plan, make_trials
 from throwcollect.sweep.rounds import Rounds
 from throwcollect.sweep.samplers import draw_points
+from throwcollect.sweep.trials import Trial
 from throwcollect.tasks.throw.outcome import ThrowOutcome, ThrowResult
 
 LANDED = throw(make_plan(configuration()).trials[0])
@@ -23,9 +24,9 @@ def test_the_analytic_thrower_throws() -> None:
 
 def growing(**options: object) -> tuple[Rounds, list[Trial]]:
     config = configuration(**options)  # type: ignore[arg-type]
-    rounds, trials = Rounds(config), list(make_plan(config).trials)
+    rounds, trials = Rounds(config), make_plan(config).trials
     rounds.add(trials)
-    return rounds, trials
+    return rounds, list(trials)
 
 
 def test_a_plan_begins_with_two_rounds_that_depend_on_nothing() -> None:
@@ -49,7 +50,8 @@ def test_a_round_is_due_when_all_but_the_one_before_have_ended() -> None:
 def test_refused_trials_are_not_waited_for() -> None:
     config = configuration()
     rounds = Rounds(config)
-    rounds.add([replace(trial, refused="too fast") for trial in make_plan(config).trials])
+    trials = make_plan(config).trials
+    rounds.add(trials.refuse(["too fast"] * len(trials)))
     assert rounds.due
 
 
@@ -161,4 +163,4 @@ def test_trials_of_later_rounds_are_numbered_seeded_and_hashed_as_any_other() ->
     again = configuration(trials=300, target=None)
     points = draw_points(again, directory=Path())
     last = replace(points, values=points.values[:1] * 0 + [list(trials[-1].values.values())])
-    assert next(make_trials(again, last, first=299)) == trials[-1]
+    assert make_trials(again, last, first=299)[0] == trials[-1]

@@ -66,7 +66,7 @@ def test_there_are_no_more_slices_than_shards(plan: Plan) -> None:
 def test_a_slice_of_a_plan_keeps_the_numbers_of_its_trials(plan: Plan) -> None:
     part = plan.slice_of(Slice(1, 2))
     assert [trial.number for trial in part.trials] == [6, 7, 8, 9]
-    assert part.trial(7) is plan.trial(7)
+    assert part.trial(7) == plan.trial(7)
     with pytest.raises(IndexError):
         part.trial(5)
 

@@ -12,8 +12,9 @@ from scipy.spatial import cKDTree
 from tests.unit.sweep.thrower import DISTANCE, HIT_ANGLE, PARAMETERS, TARGET, collected, configuration, throw
 
 from throwcollect.config.sweep import TargetConfig
-from throwcollect.sweep.plan import Trial, make_plan
+from throwcollect.sweep.plan import make_plan
 from throwcollect.sweep.target_cells import Cells, Thinness
+from throwcollect.sweep.trials import Trial, Trials
 from throwcollect.tasks.measures import BallState
 from throwcollect.tasks.throw.outcome import ThrowOutcome, ThrowResult
 
@@ -23,7 +24,9 @@ TRIALS = 960
 def counts(trials: Iterable[Trial], target: dict[str, object] = TARGET) -> NDArray[np.int64]:
     """Number of throws that landed in each cell."""
     cells = Cells(TargetConfig.model_validate(target))
-    places = [cells.place(trial, result) for trial in trials if (result := throw(trial)).outcome is ThrowOutcome.LANDED]
+    places = [
+        cells.place(trial.values, result) for trial in trials if (result := throw(trial)).outcome is ThrowOutcome.LANDED
+    ]
     found = cells.cells_of(np.array(places))
     return np.bincount(found[found >= 0], minlength=cells.count)
 
@@ -40,17 +43,17 @@ def spread() -> list[Trial]:
 
 
 @pytest.fixture(scope="module")
-def even_parameters() -> tuple[Trial, ...]:
+def even_parameters() -> Trials:
     return make_plan(configuration(trials=6000, target=None)).trials
 
 
 @pytest.fixture(scope="module")
-def reachable(even_parameters: tuple[Trial, ...]) -> NDArray[np.bool_]:
+def reachable(even_parameters: Trials) -> NDArray[np.bool_]:
     return counts(even_parameters) > 0
 
 
 def test_throws_are_spread_far_more_evenly_than_by_sobol(
-    spread: list[Trial], even_parameters: tuple[Trial, ...], reachable: NDArray[np.bool_]
+    spread: list[Trial], even_parameters: Trials, reachable: NDArray[np.bool_]
 ) -> None:
     ours, sobol = (counts(trials)[reachable] for trials in (spread, even_parameters[:TRIALS]))
     assert evenness(sobol) < 0.82
@@ -112,7 +115,7 @@ def test_while_almost_nothing_lands_sobol_goes_on() -> None:
         return throw(trial) if trial.number < 5 else ThrowResult(ThrowOutcome.RECAUGHT)
 
     sobol = make_plan(configuration(trials=320, target=None)).trials
-    assert tuple(collected(config, throw=unlucky)) == sobol
+    assert collected(config, throw=unlucky) == list(sobol)
 
 
 def test_another_seed_gives_other_trials(spread: list[Trial]) -> None:
@@ -141,8 +144,8 @@ def test_a_place_is_in_bins_of_distance_from_the_base_and_hit_angle() -> None:
     assert result.hit_angle_rad is not None
     x, y, _ = result.landing.position
     expected = [(math.hypot(x, y) - 1) / 0.5, (result.hit_angle_rad - 0.9) / 0.075]
-    assert CELLS.place(trial, result) == pytest.approx(expected)
-    assert np.isnan(CELLS.place(trial, ThrowResult(ThrowOutcome.TIMEOUT))).all()
+    assert CELLS.place(trial.values, result) == pytest.approx(expected)
+    assert np.isnan(CELLS.place(trial.values, ThrowResult(ThrowOutcome.TIMEOUT))).all()
 
 
 def test_both_ends_of_the_bins_are_inside() -> None:
@@ -197,5 +200,5 @@ def test_rounds_that_run_at_the_same_time_do_not_throw_at_the_same_cells() -> No
 
     cells = Cells(TargetConfig.model_validate(line))
     trials = collected(configuration(trials=256, target=line), throw=straight)
-    found = cells.cells_of(np.array([cells.place(trial, straight(trial)) for trial in trials]))
+    found = cells.cells_of(np.array([cells.place(trial.values, straight(trial)) for trial in trials]))
     assert len(set(found[128:192]) & set(found[192:])) < 20

@@ -6,9 +6,12 @@ import math
 from collections.abc import Callable, Iterable
 from typing import Any
 
+from tests.unit.sweep.columns import in_columns
+
 from throwcollect.config.schema import Config
-from throwcollect.sweep.plan import Trial, make_plan, make_trials
+from throwcollect.sweep.plan import make_plan, make_trials
 from throwcollect.sweep.rounds import Rounds
+from throwcollect.sweep.trials import Trial
 from throwcollect.tasks.measures import BallState
 from throwcollect.tasks.throw.outcome import ThrowOutcome, ThrowResult
 
@@ -67,7 +70,7 @@ def go_on(
         rounds: Rounds after which it is left.
     """
     grown = Rounds(config)
-    grown.add(trials)
+    grown.add(in_columns(trials))
     ended = 0
     while True:
         for trial in order(trials[ended:]):
@@ -77,7 +80,7 @@ def go_on(
             return trials
         points = grown.draw()
         if points is not None:
-            added = list(make_trials(config, points, first=ended))
+            added = make_trials(config, points, first=ended)
             grown.add(added)
             trials += added
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json as jsonlib
+from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -33,7 +34,8 @@ def verify_dataset(
     from throwcollect.dataset.verify import find_unchecked
     from throwcollect.replay.verification import verify_dataset as verify
 
-    findings = verify(directory, replay=replay, processes=count_cores())
+    say = partial(typer.echo, err=True)
+    findings = verify(directory, replay=replay, processes=count_cores(), say=say)
     if json:
         typer.echo(jsonlib.dumps([finding.as_dict() for finding in findings], indent=2))
     else:
@@ -59,7 +61,7 @@ def _describe_unchecked(dataset: Dataset, replay: int | None) -> str:
     else:
         more = command("dataset", "verify", dataset.directory, "--replay", _SUGGESTED)
         told = f"not checked: whether the simulation gives the same throws again ({more})"
-    run = sum(trial.refused is None for trial in dataset.plan.trials)
+    run = len(dataset.plan.trials) - len(dataset.plan.trials.refused)
     if run > CHECKED_AGAIN and is_available(dataset.config):
         told += f"; whether the robot can do them was checked of {CHECKED_AGAIN} of {run} trials"
     return told

@@ -8,8 +8,9 @@ import typer
 
 from throwcollect import ros
 from throwcollect.cli.ros.options import RunOption, TypesOption
-from throwcollect.cli.ros.session import Session, absolute_name, find_interface, join_graph, print_names, require_name
+from throwcollect.cli.ros.session import Session, join_graph, print_names, require_name
 from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError
+from throwcollect.ros.names import absolute_name, find_interface
 
 action_app = typer.Typer(help="Actions: list, send.", no_args_is_help=True)
 
@@ -36,7 +37,8 @@ def send_goal(
     run: RunOption = None,
 ) -> None:
     """Send a goal and print its result; Ctrl-C cancels the goal."""
-    from throwcollect.cli.ros.values import fill, parse
+    from throwcollect.cli.ros.yaml_values import parse
+    from throwcollect.ros.values import fill
 
     action_type = find_interface("action", ros.get_action, kind)
     message = action_type.Goal()
@@ -79,6 +81,7 @@ def _show_feedback(message: Any) -> None:
 
 
 def _indent(message: Any) -> str:
-    from throwcollect.cli.ros.values import plain, yaml_text
+    from throwcollect.cli.ros.yaml_values import yaml_text
+    from throwcollect.ros.values import plain
 
     return "".join(f"    {line}\n" for line in yaml_text(plain(message)).splitlines())

@@ -8,7 +8,8 @@ import typer
 
 from throwcollect import ros
 from throwcollect.cli.ros.options import HiddenOption, NodeArgument, RunOption
-from throwcollect.cli.ros.session import absolute_name, is_hidden, join_graph, require_name
+from throwcollect.cli.ros.session import join_graph, require_name
+from throwcollect.ros.names import absolute_name, is_hidden
 
 node_app = typer.Typer(help="Nodes: list, info.", no_args_is_help=True)
 

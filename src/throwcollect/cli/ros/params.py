@@ -9,8 +9,9 @@ import typer
 
 from throwcollect import ros
 from throwcollect.cli.ros.options import NodeArgument, ParameterArgument, RunOption
-from throwcollect.cli.ros.session import Session, absolute_name, is_hidden, join_graph, require_name
+from throwcollect.cli.ros.session import Session, join_graph, require_name
 from throwcollect.errors import ConfigError, WorkerError
+from throwcollect.ros.names import absolute_name, is_hidden
 
 param_app = typer.Typer(help="Parameters: list, get, set.", no_args_is_help=True)
 
@@ -53,7 +54,7 @@ def list_parameters(
 @param_app.command("get")
 def show_parameter(node: NodeArgument, name: ParameterArgument, run: RunOption = None) -> None:
     """Print the value of a parameter."""
-    from throwcollect.cli.ros.values import plain
+    from throwcollect.ros.values import plain
 
     with join_graph(run) as session:
         owner = _node(session, node)
@@ -86,7 +87,7 @@ def set_parameter(
 
 def _parameter(name: str, text: str) -> ros.Parameter:
     """A parameter of the type that its value has in YAML; what is of no such type is a text."""
-    from throwcollect.cli.ros.values import parse
+    from throwcollect.cli.ros.yaml_values import parse
 
     try:
         value = parse(text, "VALUE")

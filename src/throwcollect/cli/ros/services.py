@@ -8,8 +8,9 @@ import typer
 
 from throwcollect import ros
 from throwcollect.cli.ros.options import HiddenOption, RunOption, TypesOption
-from throwcollect.cli.ros.session import absolute_name, find_interface, join_graph, print_names, require_name
+from throwcollect.cli.ros.session import join_graph, print_names, require_name
 from throwcollect.errors import ConfigError
+from throwcollect.ros.names import absolute_name, find_interface
 
 service_app = typer.Typer(help="Services: list, call.", no_args_is_help=True)
 
@@ -31,7 +32,8 @@ def call_service(
     run: RunOption = None,
 ) -> None:
     """Call a service and print its response."""
-    from throwcollect.cli.ros.values import fill, parse
+    from throwcollect.cli.ros.yaml_values import parse
+    from throwcollect.ros.values import fill
 
     service_type = find_interface("srv", ros.get_service, kind)
     request = service_type.Request()

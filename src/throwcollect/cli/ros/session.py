@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import difflib
 import os
-import re
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from throwcollect import ros
 from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError, WorkerError
+from throwcollect.ros.names import is_hidden
 
 if TYPE_CHECKING:
     from throwcollect.ros.connection import Connection
@@ -22,7 +22,6 @@ _QUIET_S = 0.5
 _LOOKING_S = 3.0
 """Nodes on DDS find each other within a second; the machine may be busy."""
 _MOST_NAMES = 8
-_ABSOLUTE = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
 
 
 class Session:
@@ -136,25 +135,6 @@ def _init(connection: Connection | None) -> None:
         ) from error
 
 
-def absolute_name(name: str) -> str:
-    """Absolute name of a node, topic, service or action that a user names with or without its leading slash.
-
-    Raises:
-        ConfigError: If ROS does not allow such names.
-    """
-    whole = name if name.startswith("/") else f"/{name}"
-    if not _ABSOLUTE.fullmatch(whole):
-        raise ConfigError(
-            f"{name!r} is no name in ROS", expected="letters, digits and underscores between single slashes"
-        )
-    return whole
-
-
-def is_hidden(name: str) -> bool:
-    """Whether ROS hides a name, because a part of it begins with an underscore."""
-    return any(part.startswith("_") for part in name.split("/"))
-
-
 def require_name(what: str, name: str, names: Iterable[str], *, of: str = "") -> None:
     """Refuse a name that is not there.
 
@@ -174,28 +154,6 @@ def require_name(what: str, name: str, names: Iterable[str], *, of: str = "") ->
     listed = ", ".join(near[:_MOST_NAMES]) + (", ..." if len(near) > _MOST_NAMES else "")
     owner = f" of {of}" if of else ""
     raise ConfigError(f"no {what} {name}{owner}" + ("" if there else "; there is none"), expected=listed or None)
-
-
-def full_name(kind: str, name: str) -> str:
-    """Full name of a type that may be named without its kind, as ``std_msgs/String`` for ``std_msgs/msg/String``."""
-    return name.replace("/", f"/{kind}/") if name.count("/") == 1 else name
-
-
-def find_interface(kind: str, get: Callable[[str], Any], name: str) -> Any:
-    """Class of a message, service or action that a user names.
-
-    Args:
-        kind: ``msg``, ``srv`` or ``action``.
-        get: Finds the class by its full name.
-        name: Full name, or without the kind: ``std_msgs/String``.
-
-    Raises:
-        ConfigError: If there is no such type.
-    """
-    try:
-        return get(full_name(kind, name))
-    except ValueError as error:
-        raise ConfigError(f"{name}: {error}") from error
 
 
 def print_names(names_and_types: Iterable[tuple[str, list[str]]], *, types: bool, hidden: bool) -> None:

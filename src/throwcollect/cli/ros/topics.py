@@ -12,18 +12,11 @@ import typer
 
 from throwcollect import ros
 from throwcollect.cli.ros.options import HiddenOption, RunOption, TopicArgument, TypesOption
-from throwcollect.cli.ros.session import (
-    Session,
-    absolute_name,
-    find_interface,
-    full_name,
-    is_hidden,
-    join_graph,
-    print_names,
-    require_name,
-)
+from throwcollect.cli.ros.session import Session, join_graph, print_names, require_name
 from throwcollect.cli.streams import end_with_reader
 from throwcollect.errors import ConfigError
+from throwcollect.ros.names import absolute_name, find_interface, full_name, is_hidden
+from throwcollect.ros.offered_qos import find_offered_qos
 
 topic_app = typer.Typer(help="Topics: list, echo, hz, info.", no_args_is_help=True)
 
@@ -78,7 +71,8 @@ def echo(
     run: RunOption = None,
 ) -> None:
     """Print the messages of a topic as YAML."""
-    from throwcollect.cli.ros.values import SHORT, plain, yaml_text
+    from throwcollect.cli.ros.yaml_values import SHORT, shorten, yaml_text
+    from throwcollect.ros.values import plain
 
     end_with_reader()
     with join_graph(run) as session:
@@ -94,9 +88,10 @@ def echo(
             heard = True
             for part in path:
                 message = getattr(message, part)
-            print(yaml_text(plain(message, None if full else SHORT)), end="---\n", flush=True)
+            value = plain(message)
+            print(yaml_text(value if full else shorten(value, SHORT)), end="---\n", flush=True)
 
-        session.node.create_subscription(message_type, name, show, _find_offered_qos(session, name))
+        session.node.create_subscription(message_type, name, show, find_offered_qos(session.node, name))
         session.spin_until(lambda: once and heard)
 
 
@@ -173,14 +168,3 @@ def _check_field(message_type: Any, path: list[str]) -> None:
                 expected=f"one of {', '.join(fields)}" if fields else f"nothing below {type(value).__name__}",
             )
         value = getattr(value, part)
-
-
-def _find_offered_qos(session: Session, name: str) -> ros.QoSProfile:
-    """What all publishers of a topic offer."""
-    offered = [info.qos_profile for info in session.node.get_publishers_info_by_topic(name)]
-    profile = ros.QoSProfile(depth=_DEPTH, reliability=ros.ReliabilityPolicy.BEST_EFFORT)
-    if offered and all(qos.reliability == ros.ReliabilityPolicy.RELIABLE for qos in offered):
-        profile.reliability = ros.ReliabilityPolicy.RELIABLE
-    if offered and all(qos.durability == ros.DurabilityPolicy.TRANSIENT_LOCAL for qos in offered):
-        profile.durability = ros.DurabilityPolicy.TRANSIENT_LOCAL
-    return profile

@@ -1,0 +1,71 @@
+"""Creates the directory of a dataset: its configuration and its plan, of which no trial has run yet."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack, suppress
+from pathlib import Path
+
+from throwcollect.config.loader import dump_yaml
+from throwcollect.dataset.directory import CONFIG, PLAN, TRIALS
+from throwcollect.dataset.lock import hold_alone
+from throwcollect.errors import ConfigError
+from throwcollect.files import write_file
+from throwcollect.sweep.plan import Plan
+from throwcollect.sweep.point_file import encode_points
+from throwcollect.sweep.points import Points
+from throwcollect.wording import command
+
+
+def create(directory: Path, plan: Plan, *, listed: Points | None = None) -> None:
+    """Write the directory of a dataset of which no trial has run yet.
+
+    Args:
+        directory: Must not exist, or be empty.
+        plan: The trials and their configuration.
+        listed: Points that the sampler of the configuration is to find in ``trials.parquet``; None if it does not.
+
+    Raises:
+        ConfigError: If the directory holds files already, or cannot be made.
+        DatasetError: If the files cannot be written; nothing is left behind then.
+    """
+    try:
+        made = not directory.exists()
+        directory.mkdir(parents=True, exist_ok=True)
+    except (OSError, RecursionError) as error:
+        raise _unusable(directory, error) from error
+    with hold_alone(directory, needed=False):
+        _fill(directory, plan, listed, made=made)
+
+
+def _fill(directory: Path, plan: Plan, listed: Points | None, *, made: bool) -> None:
+    try:
+        taken = sorted(path.name for path in directory.iterdir())
+    except OSError as error:
+        raise _unusable(directory, error) from error
+    if taken:
+        begun = PLAN in taken or CONFIG in taken
+        raise ConfigError(
+            f"{directory}: holds {', '.join(taken[:3])}{' and more' if taken[3:] else ''}",
+            expected="a directory that is new or empty",
+            hint="choose another one with --output" + (f", or go on: {command('resume', directory)}" if begun else ""),
+        )
+    with ExitStack() as undo:
+        undo.callback(_clear, directory, remove=made)
+        write_file(directory / CONFIG, dump_yaml(plan.config).encode())
+        if listed is not None:
+            write_file(directory / TRIALS, encode_points(listed))
+        plan.write(directory / PLAN)
+        undo.pop_all()
+
+
+def _unusable(directory: Path, error: OSError | RecursionError) -> ConfigError:
+    reason = error.strerror if isinstance(error, OSError) else "it has too many levels"
+    return ConfigError(f"{directory}: cannot be used as directory of a dataset: {reason}")
+
+
+def _clear(directory: Path, *, remove: bool) -> None:
+    with suppress(OSError):
+        for path in directory.iterdir():
+            path.unlink()
+        if remove:
+            directory.rmdir()

@@ -1,0 +1,48 @@
+"""What a robot looks like: of its description, that may be changed while it is simulated, and nothing else."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+
+from throwcollect.errors import ConfigError, ConflictError
+
+_SEEN = ("visual", "material")
+"""Elements that say what is seen. Tooltips of links, which viewers bind plots to, are no part of the physics either."""
+
+
+def check_appearance(description: str, wanted: str) -> None:
+    """Refuse a description by which a robot would be another one, and not only look otherwise.
+
+    Args:
+        description: URDF text of the robot that is simulated.
+        wanted: URDF text that viewers are to draw.
+
+    Raises:
+        ConfigError: If that is no URDF.
+        ConflictError: If anything but shapes and colours to be seen differs: joints, masses, collision shapes.
+    """
+    try:
+        root = ElementTree.fromstring(wanted)  # noqa: S314 - expat expands nothing external, and little else
+    except ElementTree.ParseError as error:
+        raise ConfigError(f"robot_description: should be a URDF: {error}") from error
+    if root.tag != "robot":
+        raise ConfigError(f"robot_description: should be a URDF, with robot as its root, got {root.tag}")
+    differing = _physics_of(ElementTree.fromstring(description)) ^ _physics_of(root)  # noqa: S314 - it is ours
+    if differing:
+        first = min(text.split(">", 1)[0].removeprefix("<") for text in differing)
+        raise ConflictError(
+            f"robot_description: should differ in what is seen alone, but {first} is another one",
+            hint="other joints, masses or collision shapes are another configuration",
+        )
+
+
+def _physics_of(robot: ElementTree.Element) -> frozenset[str]:
+    """Links and joints without what is seen, each as text that does not depend on how it was written."""
+    texts = []
+    for element in robot:
+        if element.tag not in ("link", "joint"):
+            continue
+        for seen in [each for each in element if each.tag in _SEEN]:
+            element.remove(seen)
+        texts.append(ElementTree.canonicalize(ElementTree.tostring(element, encoding="unicode"), strip_text=True))
+    return frozenset(texts)

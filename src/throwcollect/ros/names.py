@@ -1,0 +1,52 @@
+"""Names in the ROS graph as people and programs outside of ROS give them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import Any
+
+from throwcollect.errors import ConfigError
+
+_ABSOLUTE = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
+
+
+def absolute_name(name: str) -> str:
+    """Absolute name of a node, topic, service or action that a user names with or without its leading slash.
+
+    Raises:
+        ConfigError: If ROS does not allow such names.
+    """
+    whole = name if name.startswith("/") else f"/{name}"
+    if not _ABSOLUTE.fullmatch(whole):
+        raise ConfigError(
+            f"{name!r} is no name in ROS", expected="letters, digits and underscores between single slashes"
+        )
+    return whole
+
+
+def is_hidden(name: str) -> bool:
+    """Whether ROS hides a name, because a part of it begins with an underscore."""
+    return any(part.startswith("_") for part in name.split("/"))
+
+
+def full_name(kind: str, name: str) -> str:
+    """Full name of a type that may be named without its kind, as ``std_msgs/String`` for ``std_msgs/msg/String``."""
+    return name.replace("/", f"/{kind}/") if name.count("/") == 1 else name
+
+
+def find_interface(kind: str, get: Callable[[str], Any], name: str) -> Any:
+    """Class of a message, service or action that a user names.
+
+    Args:
+        kind: ``msg``, ``srv`` or ``action``.
+        get: Finds the class by its full name.
+        name: Full name, or without the kind: ``std_msgs/String``.
+
+    Raises:
+        ConfigError: If there is no such type.
+    """
+    try:
+        return get(full_name(kind, name))
+    except ValueError as error:
+        raise ConfigError(f"{name}: {error}") from error

@@ -1,0 +1,192 @@
+"""Messages to plain values and back: mappings by field, lists and scalars, as YAML, JSON and CBOR have them."""
+
+from __future__ import annotations
+
+import array
+import base64
+import binascii
+import math
+import re
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from throwcollect.errors import ConfigError
+from throwcollect.ros import get_message
+
+Numbers = Callable[[NDArray[Any], str], Any]
+"""Makes a plain value of an array of numbers, which it is given with the type of its elements in IDL."""
+
+_ARRAY = re.compile(r"(?:sequence<(?P<element>.+?)(?:, (?P<most>\d+))?>|(?P<item>.+)\[(?P<length>\d+)\])")
+_DTYPES = {
+    **{f"{sign}int{bits}": np.dtype(f"{sign}int{bits}") for sign in ("", "u") for bits in (8, 16, 32, 64)},
+    "octet": np.dtype(np.uint8),
+    "float": np.dtype(np.float32),
+    "double": np.dtype(np.float64),
+    "boolean": np.dtype(np.bool_),
+}
+_FLOATS = ("float", "double")
+_OCTETS = ("octet", "uint8")
+_ROS_1_NAMES = {"secs": "sec", "nsecs": "nanosec"}
+
+
+def fill(message: Any, values: object, where: str = "") -> None:
+    """Set fields of a message.
+
+    Args:
+        message: The message.
+        values: Mapping of field names to values; nested messages are mappings, too. Numbers that no JSON has are null,
+            octets may be bytes or Base64, arrays may be NumPy's, and times may have the names that they have in ROS 1.
+        where: Path of the message in the whole one, with a dot at its end.
+
+    Raises:
+        ConfigError: If there is no such field, or it cannot take the value.
+    """
+    types = _field_types(message.__class__)
+    if not isinstance(values, Mapping):
+        raise ConfigError(
+            f"{where.rstrip('.') or 'values'}: should be fields with values, got {values!r:.80}",
+            expected="{" + ", ".join(f"{name}: {kind}" for name, kind in types.items()) + "}",
+        )
+    for given, value in values.items():
+        name = str(_ROS_1_NAMES.get(given, given) if "nanosec" in types else given)
+        path = f"{where}{given}"
+        if name not in types:
+            raise ConfigError(f"{path}: no such field", expected=f"one of {', '.join(types)}" if types else "no field")
+        current = getattr(message, name)
+        if _is_message(types[name]):
+            fill(current, value, f"{path}.")
+            continue
+        try:
+            setattr(message, name, _convert(types[name], value, path, current))
+        except (TypeError, ValueError, AssertionError) as error:
+            raise ConfigError(f"{path}: should be {types[name]}, got {value!r:.80}") from error
+
+
+def plain(value: Any, numbers: Numbers = lambda values, _: values.tolist()) -> Any:
+    """Message or value of a field as mappings, lists and scalars.
+
+    Args:
+        value: The message or value.
+        numbers: Makes something else of arrays of numbers than lists.
+    """
+    if hasattr(value, "get_fields_and_field_types"):
+        return {
+            name: _plain(getattr(value, name), kind, numbers) for name, kind in _field_types(value.__class__).items()
+        }
+    return _plain(value, "", numbers)
+
+
+def _plain(value: Any, kind: str, numbers: Numbers) -> Any:
+    if isinstance(value, np.ndarray):
+        return value.tolist() if value.dtype == np.bool_ else numbers(value, _element(kind))
+    if isinstance(value, array.array):
+        return numbers(np.frombuffer(value, value.typecode), _element(kind))
+    if isinstance(value, bytes):
+        return value[0] if kind == "octet" else list(value)
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        element = _element(kind)
+        if element == "octet":
+            return numbers(np.frombuffer(b"".join(value), np.uint8), "octet")
+        if element and "/" not in element:
+            return list(value)
+        return [plain(each, numbers) for each in value]
+    return plain(value, numbers) if "/" in kind else value
+
+
+@cache
+def _field_types(message_class: Any) -> Mapping[str, str]:
+    types: Mapping[str, str] = message_class.get_fields_and_field_types()
+    return types
+
+
+@cache
+def array_parts(kind: str) -> tuple[str, int | None, int | None] | None:
+    """Type of the elements of an array, their largest number, and their number; None if it is no array."""
+    found = _ARRAY.fullmatch(kind)
+    if found is None:
+        return None
+    most, length = (int(found[name]) if found[name] else None for name in ("most", "length"))
+    return found["element"] or found["item"], most, length
+
+
+def _element(kind: str) -> str:
+    parts = array_parts(kind)
+    return parts[0] if parts else ""
+
+
+def _convert(kind: str, value: object, path: str, current: Any = None) -> Any:
+    if parts := array_parts(kind):
+        element, most, length = parts
+        if element in _DTYPES:
+            found: Any = _numbers(element, value, current)
+        elif isinstance(value, list):
+            found = [_convert(element, each, f"{path}[{index}]") for index, each in enumerate(value)]
+        else:
+            raise TypeError
+        if (most is not None and len(found) > most) or (length is not None and len(found) != length):
+            raise ValueError
+        return found
+    if _is_message(kind):
+        package, _, short = kind.partition("/")
+        message = get_message(f"{package}/msg/{short}")()
+        fill(message, value, f"{path}.")
+        return message
+    if kind in _DTYPES:
+        (number,) = _check_numbers(kind, [value])
+        return bytes([number]) if isinstance(current, bytes) else number
+    if isinstance(value, bool | dict | list) or value is None:
+        raise TypeError
+    return str(value)
+
+
+def _numbers(element: str, value: object, current: Any) -> Any:
+    """An array of numbers, as the class of a message takes it; ``current`` is the value that it has."""
+    dtype = _DTYPES[element]
+    if element in _OCTETS and isinstance(value, str):
+        try:
+            value = base64.b64decode(value, validate=True)
+        except binascii.Error as error:
+            raise ValueError from error
+    if element in _OCTETS and isinstance(value, bytes | bytearray):
+        found = np.frombuffer(value, dtype)
+    elif isinstance(value, np.ndarray) and value.dtype == dtype:
+        found = value
+    elif isinstance(value, list | np.ndarray):
+        found = np.array(_check_numbers(element, value if isinstance(value, list) else value.tolist()), dtype)
+    else:
+        raise TypeError
+    if isinstance(current, array.array):
+        return array.array(current.typecode, found.tobytes())
+    if isinstance(current, list):
+        return [bytes([each]) for each in found] if element == "octet" else found.tolist()
+    return found
+
+
+def _check_numbers(kind: str, values: list[Any]) -> list[Any]:
+    """Numbers or truth values that a type can hold.
+
+    Raises:
+        TypeError: If one is something else.
+        ValueError: If one is too large or too small.
+    """
+    kinds = set(map(type, values))
+    allowed: set[type] = {bool} if kind == "boolean" else {int}
+    if kind in _FLOATS:
+        allowed = {int, float, type(None)}
+    if not kinds <= allowed:
+        raise TypeError
+    if kind in _FLOATS:
+        return [math.nan if value is None else float(value) for value in values]
+    if values and kind != "boolean":
+        limits = np.iinfo(_DTYPES[kind])
+        if min(values) < limits.min or max(values) > limits.max:
+            raise ValueError
+    return values
+
+
+def _is_message(kind: str) -> bool:
+    return "/" in kind and array_parts(kind) is None

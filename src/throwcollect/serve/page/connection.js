@@ -1,0 +1,172 @@
+/** Talks to the server: the token, requests, and sockets that come back when they are lost. */
+
+const PREFIX = "/api/v1";
+const KEPT = "throwcollect.token";
+const FIRST_WAIT_MS = 500;
+const LONGEST_WAIT_MS = 10_000;
+
+/** What the server says is wrong, or that it cannot be reached (status 0). */
+export class Problem extends Error {
+  /**
+   * @param {number} status
+   * @param {{title?: string, hint?: string, expected?: string, problems?: {key?: string, message: string}[]}} facts
+   */
+  constructor(status, facts) {
+    super(facts.title ?? `the server answered ${status}`);
+    this.status = status;
+    this.facts = facts;
+  }
+}
+
+/**
+ * The token: for the code in the address, which is removed from there, or as it was kept for this tab.
+ * @returns {Promise<string | null>} null if there is none
+ * @throws {Problem} if the code is no good and no token is kept
+ */
+export async function takeToken() {
+  const kept = sessionStorage.getItem(KEPT);
+  const code = new URLSearchParams(location.hash.slice(1)).get("code");
+  if (code === null) return kept;
+  history.replaceState(null, "", location.pathname + location.search);
+  try {
+    const { token } = await (await ask(null, "POST", "/exchange", { code })).json();
+    keepToken(token);
+    return token;
+  } catch (error) {
+    if (kept === null) throw error;
+    return kept;
+  }
+}
+
+/** @param {string | null} token what this tab is to keep; null to forget it */
+export function keepToken(token) {
+  if (token === null) sessionStorage.removeItem(KEPT);
+  else sessionStorage.setItem(KEPT, token);
+}
+
+/**
+ * @param {string | null} token
+ * @param {string} method
+ * @param {string} path below the interface
+ * @param {unknown} [body] what is sent as JSON
+ * @returns {Promise<Response>}
+ * @throws {Problem}
+ */
+async function ask(token, method, path, body) {
+  const headers = token === null ? {} : { Authorization: `Bearer ${token}` };
+  if (body !== undefined) headers["Content-Type"] = "application/json";
+  let response;
+  try {
+    response = await fetch(PREFIX + path, { method, headers, body: body === undefined ? null : JSON.stringify(body) });
+  } catch {
+    throw new Problem(0, { title: "the server cannot be reached" });
+  }
+  if (!response.ok) throw new Problem(response.status, await response.json().catch(() => ({})));
+  return response;
+}
+
+/** Requests and sockets of somebody who has a token. */
+export class Connection {
+  /** @param {string} token */
+  constructor(token) {
+    this.token = token;
+  }
+
+  /**
+   * Ask the server.
+   * @param {string} method
+   * @param {string} path
+   * @param {unknown} [body]
+   * @returns {Promise<Response>}
+   * @throws {Problem}
+   */
+  ask(method, path, body) {
+    return ask(this.token, method, path, body);
+  }
+
+  /**
+   * Open a socket, and again whenever it is lost, later each time.
+   * @param {string} path below the interface
+   * @param {SocketEvents} events
+   * @returns {Socket}
+   */
+  open(path, events) {
+    return new Socket(this.token, PREFIX + path, events);
+  }
+
+  /**
+   * Open a socket of rosbridge, which lies beside the interface.
+   * @param {string} run id of the run
+   * @param {SocketEvents} events
+   * @returns {Socket}
+   */
+  openRosbridge(run, events) {
+    return new Socket(this.token, `/rosbridge/${encodeURIComponent(run)}`, events);
+  }
+}
+
+/**
+ * @typedef {object} SocketEvents
+ * @property {(data: any) => void} receive a message: text, or an ArrayBuffer
+ * @property {() => void} [opened] each time that it is open
+ * @property {(waitMs: number) => void} [lost] it is not, and will be tried again after a while
+ */
+
+/** A socket that comes back. */
+export class Socket {
+  #socket = null;
+  #timer = 0;
+  #wait = FIRST_WAIT_MS;
+  #closed = false;
+
+  /**
+   * @param {string} token
+   * @param {string} path
+   * @param {SocketEvents} events
+   */
+  constructor(token, path, events) {
+    this.token = token;
+    this.url = `${location.origin.replace(/^http/, "ws")}${path}`;
+    this.events = events;
+    this.#connect();
+  }
+
+  /** @param {string} text is dropped when the socket is not open */
+  send(text) {
+    if (this.#socket?.readyState === WebSocket.OPEN) this.#socket.send(text);
+  }
+
+  /** Try at once, if it is lost. */
+  hurry() {
+    if (this.#timer) this.#connect();
+  }
+
+  close() {
+    this.#closed = true;
+    clearTimeout(this.#timer);
+    this.#socket?.close();
+  }
+
+  #connect() {
+    clearTimeout(this.#timer);
+    this.#timer = 0;
+    const socket = new WebSocket(this.url, [`bearer.${this.token}`]);
+    socket.binaryType = "arraybuffer";
+    this.#socket = socket;
+    socket.onopen = () => {
+      this.#wait = FIRST_WAIT_MS;
+      this.events.opened?.();
+    };
+    socket.onmessage = ({ data }) => {
+      if (!this.#closed) this.events.receive(data);
+    };
+    socket.onclose = () => {
+      if (this.#closed) return;
+      // Not all pages of a server that comes back should ask at the same instant.
+      const wait = this.#wait * (0.75 + Math.random() / 2);
+      this.#wait = Math.min(this.#wait * 2, LONGEST_WAIT_MS);
+      this.#timer = setTimeout(() => this.#connect(), wait);
+      this.events.lost?.(wait);
+    };
+  }
+}

@@ -1,0 +1,220 @@
+/** Components to start, and runs to look after. */
+
+import { get, make, setText, showProblem } from "./dom.js";
+import { legendItem } from "./landing_map.js";
+import { RunRecords } from "./run_records.js";
+import { lives, steps } from "./state.js";
+
+const WORDS = { starting: "is starting", running: "runs", ended: "has ended", died: "died" };
+
+/**
+ * Read changed keys, one a line.
+ * @param {string} text lines such as `trials: 50`; a value is JSON, or a text
+ * @returns {Record<string, unknown>}
+ * @throws {Error} if a line is none
+ */
+export function readChanges(text) {
+  const changes = {};
+  text.split("\n").forEach((line, i) => {
+    if (!line.trim()) return;
+    const [, key, value] = line.match(/^\s*([\w.]+)\s*[:=]\s*(.+?)\s*$/) ?? [];
+    if (key === undefined) throw new Error(`line ${i + 1}: should be KEY: VALUE, such as trials: 50, got '${line.trim()}'`);
+    try {
+      changes[key] = JSON.parse(value);
+    } catch {
+      changes[key] = value;
+    }
+  });
+  return changes;
+}
+
+/** Cards of components and runs, which follow the state. */
+export class Controls {
+  #components = new Map();
+  #instances = new Map();
+
+  /**
+   * @param {import("./connection.js").Connection} connection
+   * @param {(id: string) => void} watch has a run shown
+   */
+  constructor(connection, watch) {
+    this.connection = connection;
+    this.watch = watch;
+  }
+
+  /** @param {import("./state.js").State} state */
+  put(state) {
+    keep(get("components"), this.#components, state.components, (each) => each.name, () => new ComponentCard(this));
+    const living = state.instances.filter(lives);
+    const ended = state.instances.filter((each) => !lives(each));
+    const make_ = () => new InstanceCard(this);
+    const known = new Set(state.instances.map(({ id }) => id));
+    for (const [id, card] of this.#instances) {
+      if (!known.has(id)) {
+        card.element.remove();
+        this.#instances.delete(id);
+      }
+    }
+    keep(get("instances"), this.#instances, living, (each) => each.id, make_);
+    keep(get("ended"), this.#instances, ended, (each) => each.id, make_);
+    get("no-instances").hidden = living.length > 0;
+    get("ended-box").hidden = ended.length === 0;
+    setText(get("ended-count"), String(ended.length));
+  }
+}
+
+/** Have the cards of some things in a place, in their order; elements that are there already are not touched. */
+function keep(place, cards, things, keyOf, makeCard) {
+  things.forEach((thing, i) => {
+    const key = keyOf(thing);
+    if (!cards.has(key)) cards.set(key, makeCard());
+    const card = cards.get(key);
+    card.put(thing);
+    if (place.children[i] !== card.element) place.insertBefore(card.element, place.children[i] ?? null);
+  });
+  while (place.children.length > things.length) place.lastElementChild.remove();
+}
+
+/** A component, and the form that starts an instance of it. */
+class ComponentCard {
+  constructor(controls) {
+    this.controls = controls;
+    this.name = make("h3");
+    this.facts = make("p", { className: "muted" });
+    this.simulations = make("input", { type: "number", min: "1", max: "256", placeholder: "auto", inputMode: "numeric" });
+    this.changes = make("textarea", { rows: 2, spellcheck: false, placeholder: "trials: 50" });
+    this.problem = make("div", { className: "problem", role: "alert" });
+    this.button = make("button", { type: "submit" }, "Start");
+    const more = make("details", {}, make("summary", {}, "Changed keys"),
+      make("label", {}, "One a line, KEY: VALUE ", this.changes));
+    this.form = make("form", {}, make("div", { className: "row" },
+      make("label", {}, "Simulations ", this.simulations), this.button), more, this.problem);
+    this.form.addEventListener("submit", (event) => {
+      event.preventDefault();
+      this.#start();
+    });
+    this.element = make("article", { className: "card" }, this.name, this.facts, this.form);
+  }
+
+  /** @param {import("./state.js").Component} component */
+  put(component) {
+    this.component = component;
+    setText(this.name, component.pretty_name);
+    const kind = component.kind === "collection" ? "collects a dataset" : "simulations for clients, without a dataset";
+    setText(this.facts, `${kind} · ${component.instances.length} of at most ${component.max_instances} live`);
+    this.button.setAttribute("aria-label", `Start ${component.pretty_name}`);
+  }
+
+  async #start() {
+    showProblem(this.problem, null);
+    this.button.disabled = true;
+    try {
+      const body = { component: this.component.name, set: readChanges(this.changes.value) };
+      if (this.simulations.value) body.simulations = Number(this.simulations.value);
+      const instance = await (await this.controls.connection.ask("POST", "/instances", body)).json();
+      this.controls.watch(instance.id);
+    } catch (error) {
+      showProblem(this.problem, error);
+    } finally {
+      this.button.disabled = false;
+    }
+  }
+}
+
+/** A run, and what can be done with it. */
+class InstanceCard {
+  constructor(controls) {
+    this.controls = controls;
+    this.name = make("h3");
+    this.status = make("p", { className: "status", role: "status" });
+    this.bar = make("progress", { max: 1, value: 0 });
+    this.counts = make("p");
+    this.outcomes = make("ul", { className: "legend", "aria-label": "outcomes" });
+    this.nodes = make("p", { className: "muted" });
+    this.problem = make("div", { className: "problem", role: "alert" });
+    this.watch = button("Watch", () => controls.watch(this.instance.id));
+    this.stop = button("Stop", () => this.#ask("DELETE", ""));
+    this.force = button("End now", () => this.#force());
+    this.simulations = make("input", { type: "number", min: "0", max: "256", inputMode: "numeric" });
+    this.scale = make("form", { className: "row" }, make("label", {}, "Simulations ", this.simulations),
+      make("button", { type: "submit" }, "Scale"));
+    this.scale.addEventListener("submit", (event) => {
+      event.preventDefault();
+      this.#ask("PATCH", "", { simulations: Number(this.simulations.value) });
+    });
+    this.records = new RunRecords(controls.connection);
+    this.element = make("article", { className: "card" }, this.name, this.status, this.bar, this.counts, this.outcomes,
+      this.nodes, make("div", { className: "row" }, this.watch, this.stop, this.force), this.scale, this.problem,
+      this.records.element);
+  }
+
+  /** @param {import("./state.js").Instance} instance */
+  put(instance) {
+    const before = this.instance;
+    this.instance = instance;
+    const isLiving = lives(instance);
+    setText(this.name, instance.id);
+    setText(this.status, `${WORDS[instance.status]}${instance.message ? `: ${instance.message}` : ""}`);
+    this.status.dataset.status = instance.status;
+    this.#putProgress(instance.progress);
+    const troubled = instance.nodes.filter(({ status }) => !["running", "starting"].includes(status));
+    const all = instance.nodes.length ? `${instance.nodes.length} nodes` : "";
+    setText(this.nodes, [all, ...troubled.map(({ name, status }) => `${name} ${status}`)].filter(Boolean).join(", "));
+    for (const element of [this.stop, this.scale]) element.hidden = !isLiving;
+    setText(this.force, isLiving ? "End now" : "Forget");
+    if (before?.simulations !== instance.simulations) this.simulations.value = String(instance.simulations);
+    for (const each of [this.watch, this.stop, this.force]) each.setAttribute("aria-label", `${each.textContent} ${instance.id}`);
+    this.records.put(instance);
+  }
+
+  #putProgress(progress) {
+    for (const element of [this.bar, this.counts, this.outcomes]) element.hidden = progress === null;
+    if (progress === null) return;
+    const [done, all] = steps(progress);
+    this.bar.max = Math.max(all, 1);
+    this.bar.value = done;
+    this.bar.setAttribute("aria-label", `${done} of ${all}`);
+    const speed = lives(this.instance) ? `, ${progress.throws_per_s.toFixed(1)} ${progress.noun}s/s` : "";
+    setText(this.counts, `${done} of ${all}${speed}`);
+    const outcomes = JSON.stringify(progress.outcomes);
+    if (this.outcomes.dataset.shown === outcomes) return;
+    this.outcomes.dataset.shown = outcomes;
+    this.outcomes.replaceChildren(...Object.entries(progress.outcomes).map(([word, count]) => legendItem(word, count)));
+  }
+
+  async #force() {
+    const { id } = this.instance;
+    const what = lives(this.instance) ? `End ${id} at once? Throws that are running are lost; ` : `Forget ${id}? `;
+    if (await confirm(`${what}it disappears from this list. Its dataset is kept.`)) await this.#ask("DELETE", "?force=true");
+  }
+
+  async #ask(method, query, body) {
+    showProblem(this.problem, null);
+    try {
+      await this.controls.connection.ask(method, `/instances/${encodeURIComponent(this.instance.id)}${query}`, body);
+    } catch (error) {
+      showProblem(this.problem, error);
+    }
+  }
+}
+
+function button(text, act) {
+  const made = make("button", { type: "button" }, text);
+  made.addEventListener("click", act);
+  return made;
+}
+
+/**
+ * Ask the user.
+ * @param {string} question
+ * @returns {Promise<boolean>}
+ */
+function confirm(question) {
+  const dialog = get("ask-dialog");
+  setText(get("ask-text"), question);
+  dialog.returnValue = "";
+  dialog.showModal();
+  return new Promise((resolve) => {
+    dialog.addEventListener("close", () => resolve(dialog.returnValue === "yes"), { once: true });
+  });
+}

@@ -1,0 +1,70 @@
+/** Small helpers to make and change elements without disturbing what has the focus. */
+
+/**
+ * Find an element of the page by its id.
+ * @param {string} id
+ * @returns {any} the element
+ */
+export function get(id) {
+  const element = document.getElementById(id);
+  if (element === null) throw new Error(`the page has no #${id}`);
+  return element;
+}
+
+/**
+ * Make an element.
+ * @param {string} tag
+ * @param {Record<string, unknown>} [properties] properties; those with a dash, `role` and `for` are attributes
+ * @param {...(Node | string)} children
+ * @returns {any} the element
+ */
+export function make(tag, properties = {}, ...children) {
+  const element = document.createElement(tag);
+  for (const [name, value] of Object.entries(properties)) {
+    if (name.includes("-") || name === "role" || name === "for") element.setAttribute(name, String(value));
+    else element[name] = value;
+  }
+  element.append(...children);
+  return element;
+}
+
+/**
+ * Set the text of an element, if it is another: screen readers say each change.
+ * @param {Element} element
+ * @param {string} text
+ */
+export function setText(element, text) {
+  if (element.textContent !== text) element.textContent = text;
+}
+
+/**
+ * Have a list of choices in a select, and keep what is chosen if it is still there.
+ * @param {HTMLSelectElement} select
+ * @param {[string, string][]} choices values and texts
+ */
+export function setChoices(select, choices) {
+  const now = JSON.stringify(choices);
+  if (select.dataset.choices === now) return;
+  const chosen = select.value;
+  select.dataset.choices = now;
+  select.replaceChildren(...choices.map(([value, text]) => make("option", { value }, text)));
+  if (choices.some(([value]) => value === chosen)) select.value = chosen;
+}
+
+/**
+ * Show a problem where it happened, with what would be right and a hint; nothing of it if there is none.
+ * @param {Element} place
+ * @param {unknown} error
+ */
+export function showProblem(place, error) {
+  place.replaceChildren();
+  if (error === null || error === undefined) return;
+  const { message, facts = {} } = /** @type {any} */ (error);
+  place.append(make("p", {}, message));
+  const problems = (facts.problems ?? []).filter((each) => each.message && each.message !== message);
+  if (problems.length) {
+    place.append(make("ul", {}, ...problems.map(({ key, message: text }) => make("li", {}, key ? `${key}: ${text}` : text))));
+  }
+  if (facts.expected) place.append(make("p", {}, `expected: ${facts.expected}`));
+  if (facts.hint) place.append(make("p", {}, `try: ${facts.hint}`));
+}

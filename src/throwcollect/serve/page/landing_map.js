@@ -1,0 +1,167 @@
+/** The landing map: where throws have landed, seen from above; the robot stands at the origin and throws upwards. */
+
+import { get, make, setText } from "./dom.js";
+import { colorOf } from "./outcomes.js";
+
+const DOT_PX = 2.5;
+const MARGIN_PX = 26;
+
+/** @typedef {[number | null, number | null, string, number]} Landing x, y [m], outcome, trial */
+
+/** Draws landings into the canvas of the page. */
+export class LandingMap {
+  /** @type {Landing[]} */
+  #landings = [];
+  #trials = new Set();
+  #isWhole = false;
+  /** @type {import("./throws.js").Throw | null} */
+  #newest = null;
+
+  constructor() {
+    this.canvas = get("map");
+    new ResizeObserver(() => this.#draw()).observe(this.canvas);
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.#draw());
+  }
+
+  /** Forget all landings. */
+  clear() {
+    this.#trials.clear();
+    this.#newest = null;
+    this.#isWhole = false;
+    this.put([]);
+  }
+
+  /** @param {Landing[]} landings all of a dataset */
+  put(landings) {
+    this.#isWhole = landings.length > 0;
+    this.#landings = landings;
+    this.#tell();
+    this.#draw();
+  }
+
+  /** @param {import("./throws.js").Throw} shown was handed out by a run that goes on */
+  add({ trial, outcome, landing }) {
+    if (this.#isWhole || this.#trials.has(trial)) return;
+    this.#trials.add(trial);
+    this.#landings.push([landing?.[0] ?? null, landing?.[1] ?? null, outcome, trial]);
+    this.#tell();
+    this.#draw();
+  }
+
+  /** @param {import("./throws.js").Throw | null} shown is marked */
+  mark(shown) {
+    this.#newest = shown;
+    this.#draw();
+  }
+
+  #tell() {
+    const counts = new Map();
+    for (const [, , outcome] of this.#landings) counts.set(outcome, (counts.get(outcome) ?? 0) + 1);
+    const items = [...counts].sort(([, a], [, b]) => b - a).map(([outcome, count]) => legendItem(outcome, count));
+    get("legend").replaceChildren(...items);
+    const placed = this.#placed();
+    if (!placed.length) {
+      setText(get("map-text"), this.#landings.length ? "None of these throws has landed." : "Nothing has landed yet.");
+      return;
+    }
+    const [x0, x1] = range(placed.map(([x]) => x));
+    const [y0, y1] = range(placed.map(([, y]) => y));
+    const which = this.#isWhole ? `All ${placed.length} landings` : `${placed.length} landings of throws that were shown`;
+    const text = `${which}: ${x0.toFixed(2)} to ${x1.toFixed(2)} m before the robot, `
+      + `${y0.toFixed(2)} to ${y1.toFixed(2)} m to its left.`;
+    setText(get("map-text"), text);
+  }
+
+  #placed() {
+    return this.#landings.filter(([x, y]) => Number.isFinite(x) && Number.isFinite(y));
+  }
+
+  #draw() {
+    const { canvas } = this;
+    const [width, height] = [canvas.clientWidth, canvas.clientHeight];
+    if (!width || !height) return;
+    const ratio = Math.min(devicePixelRatio, 2);
+    canvas.width = width * ratio;
+    canvas.height = height * ratio;
+    const pen = canvas.getContext("2d");
+    pen.scale(ratio, ratio);
+    const style = getComputedStyle(canvas);
+    const placed = this.#placed();
+    // The robot is always in the picture. World's x points up here, and its y to the left.
+    const [x0, x1] = range([...placed.map(([x]) => x), -0.2, 1]);
+    const [y0, y1] = range([...placed.map(([, y]) => y), -0.5, 0.5]);
+    const scale = Math.min((width - 2 * MARGIN_PX) / (y1 - y0), (height - 2 * MARGIN_PX) / (x1 - x0));
+    const at = (x, y) => [width / 2 - (y - (y0 + y1) / 2) * scale, height / 2 - (x - (x0 + x1) / 2) * scale];
+    drawGrid(pen, style, at, scale, { width, height });
+    drawRobot(pen, style, at, scale);
+    pen.globalAlpha = placed.length > 500 ? 0.5 : 0.85;
+    for (const [x, y, outcome] of placed) {
+      pen.fillStyle = colorOf(outcome);
+      pen.beginPath();
+      pen.arc(...at(x, y), DOT_PX, 0, 7);
+      pen.fill();
+    }
+    pen.globalAlpha = 1;
+    if (this.#newest?.landing) {
+      pen.strokeStyle = style.color;
+      pen.lineWidth = 2;
+      pen.beginPath();
+      pen.arc(...at(this.#newest.landing[0], this.#newest.landing[1]), 3 * DOT_PX, 0, 7);
+      pen.stroke();
+    }
+  }
+}
+
+/**
+ * @param {string} outcome
+ * @param {number} count
+ * @returns {HTMLElement} an item of a legend
+ */
+export function legendItem(outcome, count) {
+  const dot = make("span", { className: "dot", "aria-hidden": "true" });
+  dot.style.background = colorOf(outcome);
+  return make("li", {}, dot, `${outcome} ${count}`);
+}
+
+function range(values) {
+  return values.reduce(([low, high], value) => [Math.min(low, value), Math.max(high, value)], [Infinity, -Infinity]);
+}
+
+function drawGrid(pen, style, at, scale, { width, height }) {
+  const step = scale > 200 ? 0.2 : scale > 70 ? 0.5 : scale > 25 ? 1 : 5;
+  const [left, bottom] = at(0, 0);
+  pen.font = "11px system-ui, sans-serif";
+  pen.fillStyle = style.getPropertyValue("--muted");
+  pen.strokeStyle = style.getPropertyValue("--grid");
+  pen.lineWidth = 1;
+  const lines = (length, origin, draw) => {
+    for (let i = Math.ceil(-origin / (step * scale)); origin + i * step * scale < length; i++) draw(i * step, origin + i * step * scale);
+  };
+  lines(width, left, (value, x) => {
+    stroke(pen, [x, 0], [x, height]);
+    pen.fillText(`${(-value).toFixed(1)}`, x + 3, height - 4);
+  });
+  lines(height, bottom, (value, y) => {
+    stroke(pen, [0, y], [width, y]);
+    pen.fillText(`${(-value).toFixed(1)} m`, 3, y - 3);
+  });
+}
+
+function stroke(pen, from, to) {
+  pen.beginPath();
+  pen.moveTo(...from);
+  pen.lineTo(...to);
+  pen.stroke();
+}
+
+function drawRobot(pen, style, at, scale) {
+  const [x, y] = at(0, 0);
+  pen.fillStyle = style.getPropertyValue("--muted");
+  pen.beginPath();
+  pen.ellipse(x, y, 0.25 * scale, 0.13 * scale, 0, 0, 7);
+  pen.fill();
+  pen.beginPath();
+  pen.arc(x, y, 0.1 * scale, 0, 7);
+  pen.fillStyle = style.color;
+  pen.fill();
+}

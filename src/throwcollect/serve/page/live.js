@@ -1,0 +1,164 @@
+/** Simulations as they move right now, by rosbridge; and descriptions of robots, which may change at any time. */
+
+import { get, setText } from "./dom.js";
+import { Rosbridge } from "./rosbridge.js";
+import { lives } from "./state.js";
+
+/** Messages that plots remember of a simulation: 30 a second. */
+const KEPT = 600;
+
+/**
+ * @typedef {object} Moment
+ * @property {number} time since the page was opened [s]
+ * @property {Record<string, number>} position of joints [rad]
+ * @property {Record<string, number>} velocity [rad/s]
+ * @property {Record<string, number>} effort [Nm]
+ * @property {number[] | null} ball [m]
+ */
+
+/** Follows the simulations that are shown. */
+export class Live {
+  /** @type {Set<string>} names of the simulations that are shown as they move */
+  simulations = new Set();
+  /** @type {Map<string, Moment[]>} */
+  #moments = new Map();
+  /** @type {Map<string, number[]>} */
+  #balls = new Map();
+  #bridge = null;
+  #run = null;
+  #described = new Set();
+  /** Sockets that hold simulations at real time for as long as they are open. */
+  #holds = new Map();
+  #wanted = false;
+  #instance = null;
+  #alone = "";
+
+  /**
+   * @param {object} parts
+   * @param {import("./connection.js").Connection} parts.connection
+   * @param {import("./scene.js").View} parts.view
+   * @param {import("./watching.js").Watching} parts.watching
+   * @param {(text: string) => void} parts.tell says what is wrong
+   */
+  constructor({ connection, view, watching, tell }) {
+    Object.assign(this, { connection, view, watching, tell });
+    get("live").addEventListener("click", () => {
+      this.#wanted = !this.#wanted;
+      this.tell("");
+      this.#follow();
+    });
+    document.addEventListener("visibilitychange", () => this.#follow());
+  }
+
+  /**
+   * @param {import("./state.js").Instance | undefined} instance that is watched
+   * @param {string} alone name of the simulation that is shown alone; empty if all are
+   */
+  put(instance, alone) {
+    if (alone !== this.#alone || instance?.id !== this.#instance?.id) this.#wanted = false;
+    this.#instance = instance;
+    this.#alone = alone;
+    this.#follow();
+  }
+
+  /**
+   * @param {string} simulation
+   * @returns {Moment[]} what it did lately
+   */
+  momentsOf(simulation) {
+    return this.#moments.get(simulation) ?? [];
+  }
+
+  #follow() {
+    const instance = this.#instance;
+    const isSeen = Boolean(instance) && lives(instance) && instance.robots.length > 0 && !document.hidden;
+    const run = isSeen ? instance.id : null;
+    if (run !== this.#run) this.#connect(run);
+    this.#showButton(instance, isSeen);
+    const isSession = instance?.kind === "session";
+    const wanted = !isSeen ? [] : isSession ? this.view.shown : this.#wanted && this.#alone ? [this.#alone] : [];
+    for (const name of [...this.simulations]) if (!wanted.includes(name)) this.#leave(name);
+    for (const name of wanted) if (!this.simulations.has(name)) this.#join(name, !isSession);
+    if (isSeen) for (const name of this.view.shown) this.#describe(name);
+  }
+
+  #showButton(instance, isSeen) {
+    const button = get("live");
+    const isPressed = this.#wanted || instance?.kind === "session";
+    button.hidden = !isSeen || instance.kind === "session";
+    button.disabled = !this.#alone && !isPressed;
+    button.title = button.disabled ? "choose one simulation first: it is slowed down to real time while it is watched" : "";
+    button.setAttribute("aria-pressed", String(isPressed));
+    setText(button, isPressed ? "Live: back to replays" : "Live");
+  }
+
+  #connect(run) {
+    this.#leaveAll();
+    this.#bridge?.close();
+    this.#bridge = null;
+    this.#described.clear();
+    this.#run = run;
+    if (run !== null) {
+      this.#bridge = new Rosbridge(this.connection, run, {
+        lost: () => this.simulations.size && this.tell("live: the connection to the run is lost; trying again"),
+        opened: () => this.simulations.size && this.tell(""),
+      });
+    }
+  }
+
+  #describe(name) {
+    if (this.#described.has(name)) return;
+    this.#described.add(name);
+    this.#bridge.subscribe(`/${name}/robot_description`, "std_msgs/msg/String", ({ data }) => this.watching.describe(name, data));
+  }
+
+  #join(name, slowly) {
+    this.simulations.add(name);
+    this.#moments.set(name, []);
+    this.#bridge.subscribe(`/${name}/joint_states`, "sensor_msgs/msg/JointState", (message) => this.#move(name, message));
+    this.#bridge.subscribe(`/${name}/ball/odometry`, "nav_msgs/msg/Odometry", ({ pose }) => {
+      const { x, y, z } = pose.pose.position;
+      this.#balls.set(name, [x, y, z]);
+      this.view.stations.get(name)?.placeBall([x, y, z]);
+      this.view.touch();
+    });
+    if (slowly) this.#slowDown(name);
+  }
+
+  #leave(name) {
+    this.simulations.delete(name);
+    this.#moments.delete(name);
+    this.#balls.delete(name);
+    for (const topic of ["joint_states", "ball/odometry"]) this.#bridge?.unsubscribe(`/${name}/${topic}`);
+    this.#holds.get(name)?.close();
+    this.#holds.delete(name);
+  }
+
+  #leaveAll() {
+    for (const name of [...this.simulations]) this.#leave(name);
+  }
+
+  #move(name, { name: joints, position, velocity, effort }) {
+    const station = this.view.stations.get(name);
+    const pairs = (values) => joints.map((joint, i) => [joint, values[i]]);
+    station?.robot?.move(pairs(position));
+    this.view.touch();
+    const moments = this.#moments.get(name);
+    if (!moments) return;
+    const [positions, velocities, efforts] = [position, velocity, effort].map((values) => Object.fromEntries(pairs(values)));
+    moments.push({
+      time: performance.now() / 1000, position: positions, velocity: velocities, effort: efforts, ball: this.#balls.get(name) ?? null,
+    });
+    if (moments.length > KEPT) moments.shift();
+  }
+
+  /** At full speed nothing could be seen. The server gives the speed back when no page holds the simulation any more. */
+  #slowDown(name) {
+    const path = `/instances/${encodeURIComponent(this.#run)}/live/${encodeURIComponent(name)}`;
+    this.#holds.set(name, this.connection.open(path, {
+      receive: () => {},
+      opened: () => this.tell(`${name} is slowed down to real time while you watch it`),
+      lost: () => this.tell(`${name} cannot be held at real time; trying again`),
+    }));
+  }
+}

@@ -1,0 +1,286 @@
+/** The page: puts its parts together. */
+
+import { Connection, Problem, keepToken, takeToken } from "./connection.js";
+import { Controls } from "./controls.js";
+import { get, setChoices, setText } from "./dom.js";
+import { listenForKeys } from "./keys.js";
+import { LandingMap } from "./landing_map.js";
+import { Live } from "./live.js";
+import { Playback } from "./playback.js";
+import { Plots } from "./plots.js";
+import { Meshes } from "./robot.js";
+import { View } from "./scene.js";
+import { Store, inOrder, lives } from "./state.js";
+import { Watching } from "./watching.js";
+
+/** Simulations in a grid; more are on further pages of it. */
+const MOST_TILES = 16;
+/** Pictures a second at most. */
+const RATE_HZ = 30;
+
+function say(kind, text) {
+  const place = get("connection");
+  place.dataset.kind = kind;
+  setText(place, text);
+}
+
+/** Ask for a token, and begin with it. */
+function signIn(why) {
+  get("page").hidden = true;
+  const form = get("sign-in");
+  form.hidden = false;
+  setText(get("sign-in-why"), why);
+  say("lost", "not connected");
+  get("token").focus();
+  form.onsubmit = async (event) => {
+    event.preventDefault();
+    const token = get("token").value.trim();
+    try {
+      await new Connection(token).ask("GET", "/components");
+    } catch (error) {
+      setText(get("sign-in-why"), error.message);
+      return;
+    }
+    keepToken(token);
+    location.reload();
+  };
+}
+
+/** The page of somebody who has a token. */
+class Page {
+  #store = new Store();
+  #first = 0;
+  #before = 0;
+  #frames = 0;
+
+  /** @param {string} token */
+  constructor(token) {
+    this.connection = new Connection(token);
+    this.view = new View(get("canvas"));
+    this.map = new LandingMap();
+    this.playback = new Playback((shown) => this.watching.begin(shown));
+    const fetchMesh = async (path) => (await this.connection.ask("GET", `/meshes/${path}`)).arrayBuffer();
+    this.meshes = new Meshes(fetchMesh);
+    const { connection, view, playback, map, meshes } = this;
+    const tell = (text) => this.tell(text);
+    this.watching = new Watching({ connection, view, playback, map, meshes, tell });
+    this.live = new Live({ connection, view, watching: this.watching, tell });
+    this.plots = new Plots({ view, playback, live: this.live });
+    this.controls = new Controls(connection, (id) => this.#watch(id));
+    if (matchMedia("(prefers-reduced-motion: reduce)").matches) this.playback.playing = false;
+    this.#store.listen((state) => this.#put(state));
+    this.#listen();
+    this.#connect();
+    requestAnimationFrame((now) => this.#frame(now));
+  }
+
+  /** @param {string} text what is wrong in the view */
+  tell(text) {
+    setText(get("view-note"), text);
+  }
+
+  #connect() {
+    this.socket = this.connection.open("/state", {
+      opened: () => say("connected", "connected"),
+      receive: (text) => this.#store.put(JSON.parse(text)),
+      lost: (waitMs) => this.#lost(waitMs),
+    });
+  }
+
+  async #lost(waitMs) {
+    say("lost", `connection lost; next try in ${Math.ceil(waitMs / 1000)} s`);
+    try {
+      await this.connection.ask("GET", "/components");
+    } catch (error) {
+      if (!(error instanceof Problem) || error.status !== 401) return;
+      this.socket.close();
+      this.watching.put(undefined);
+      this.live.put(undefined, "");
+      keepToken(null);
+      signIn("The server does not know this token: it has been started anew.");
+    }
+  }
+
+  #put(state) {
+    this.controls.put(state);
+    const ids = state.instances.filter((each) => lives(each) || each.id === this.watching.id).map(({ id }) => id);
+    const wanted = get("watched").value;
+    setChoices(get("watched"), [...ids.map((id) => [id, id]), ...(ids.length ? [] : [["", "none"]])]);
+    this.#watch(ids.includes(wanted) ? wanted : (ids[0] ?? ""));
+  }
+
+  /** @param {string} id of the run that is to be seen */
+  #watch(id) {
+    const select = get("watched");
+    if (id && ![...select.options].some(({ value }) => value === id)) {
+      setChoices(select, [...[...select.options].filter(({ value }) => value).map(({ value }) => [value, value]), [id, id]]);
+    }
+    select.value = id;
+    const instance = this.#store.instance(id);
+    if (this.watching.id !== (instance?.id ?? null)) {
+      this.#first = 0;
+      this.tell("");
+    }
+    this.watching.put(instance);
+    if (instance && !lives(instance) && this.view.shown.length) this.tell(`${instance.id} has ended; its last throws are replayed`);
+    get("map-box").hidden = instance?.kind !== "collection";
+    const names = this.#names(instance);
+    setChoices(get("alone"), [["", "all"], ...names.map((name) => [name, name])]);
+    this.#show();
+  }
+
+  /** Simulations of a run; one that has ended keeps those that were seen. */
+  #names(instance) {
+    if (!instance) return [];
+    return inOrder(lives(instance) || !this.view.stations.size ? instance.robots : [...this.view.stations.keys()]);
+  }
+
+  #show() {
+    const instance = this.watching.instance;
+    const names = this.#names(instance);
+    const alone = get("alone").value;
+    if (this.#first >= names.length) this.#first = 0;
+    const shown = alone ? [alone] : names.slice(this.#first, this.#first + MOST_TILES);
+    if (shown.join() !== this.view.shown.join() || shown.some((name) => !this.view.stations.get(name)?.robot)) {
+      this.watching.show(shown);
+    }
+    this.#label(alone ? [] : shown);
+    get("pages").hidden = Boolean(alone) || names.length <= MOST_TILES;
+    setText(get("page-shown"), `${this.#first + 1} to ${this.#first + shown.length} of ${names.length}`);
+    setText(get("empty"), shown.length ? "" : emptiness(instance));
+    this.live.put(instance, alone);
+    this.plots.put(shown);
+  }
+
+  /** Names of the tiles, which are buttons that show one alone. */
+  #label(names) {
+    const place = get("tiles");
+    if (place.dataset.names !== names.join()) {
+      place.dataset.names = names.join();
+      place.replaceChildren(...names.map((name) => {
+        const button = document.createElement("button");
+        button.type = "button";
+        button.append(name);
+        button.title = `show ${name} alone`;
+        button.addEventListener("click", () => this.#alone(name));
+        return button;
+      }));
+    }
+    names.forEach((name, i) => {
+      const { left, top } = this.view.tileOf(name);
+      place.children[i].style.transform = `translate(${left}px, ${top}px)`;
+    });
+  }
+
+  #alone(name) {
+    get("alone").value = name;
+    this.#show();
+  }
+
+  #number(key) {
+    const name = this.view.shown.length > 1 ? this.view.shown[key - 1] : this.#names(this.watching.instance)[key - 1];
+    if (name) this.#alone(name);
+  }
+
+  #turnPages(by) {
+    this.#first = Math.max(0, this.#first + by * MOST_TILES);
+    this.#show();
+  }
+
+  #toggle() {
+    this.playback.playing = !this.playback.playing;
+    this.#showTransport();
+  }
+
+  #seekBy(seconds) {
+    this.playback.seek(Math.max(0, Number(get("scrub").value) + seconds));
+  }
+
+  #listen() {
+    get("watched").addEventListener("change", ({ target }) => this.#watch(target.value));
+    get("alone").addEventListener("change", () => this.#show());
+    get("page-before").addEventListener("click", () => this.#turnPages(-1));
+    get("page-after").addEventListener("click", () => this.#turnPages(1));
+    get("play").addEventListener("click", () => this.#toggle());
+    get("scrub").addEventListener("input", ({ target }) => this.playback.seek(Number(target.value)));
+    get("speed").addEventListener("change", ({ target }) => {
+      this.playback.speed = Number(target.value);
+    });
+    get("keys-button").addEventListener("click", () => get("keys-dialog").showModal());
+    new ResizeObserver(() => this.#show()).observe(get("stage"));
+    window.addEventListener("online", () => this.socket?.hurry());
+    const { view } = this;
+    listenForKeys([
+      { keys: [" ", "k"], text: "pause or play", act: () => this.#toggle() },
+      { keys: [","], text: "a hundredth of a second back", act: () => this.#seekBy(-0.01) },
+      { keys: ["."], text: "a hundredth of a second on", act: () => this.#seekBy(0.01) },
+      { keys: ["1", "2", "3", "4", "5", "6", "7", "8", "9"], text: "one simulation alone", act: (key) => this.#number(key) },
+      { keys: ["g"], text: "all simulations", act: () => this.#alone("") },
+      { keys: ["l"], text: "live or replay", act: () => get("live").click() },
+      { keys: ["p"], text: "add a plot", act: () => get("add-plot").click() },
+      { keys: ["?"], text: "this list", act: () => get("keys-dialog").showModal() },
+    ], [
+      { keys: ["ArrowLeft"], text: "turn to the left", act: () => view.turn(-1, 0) },
+      { keys: ["ArrowRight"], text: "turn to the right", act: () => view.turn(1, 0) },
+      { keys: ["ArrowUp"], text: "look from higher up", act: () => view.turn(0, 1) },
+      { keys: ["ArrowDown"], text: "look from lower down", act: () => view.turn(0, -1) },
+      { keys: ["+", "="], text: "nearer", act: () => view.zoom(1) },
+      { keys: ["-"], text: "farther", act: () => view.zoom(-1) },
+      { keys: ["0"], text: "as it began", act: () => view.reset() },
+    ]);
+  }
+
+  #frame(now) {
+    requestAnimationFrame((next) => this.#frame(next));
+    const since = now - this.#before;
+    if (since < 1000 / RATE_HZ - 4) return;
+    this.#before = now;
+    this.playback.step(since / 1000);
+    this.watching.pose(this.live.simulations);
+    this.view.draw(since);
+    this.plots.draw();
+    this.#frames += 1;
+    this.#showTransport();
+  }
+
+  #showTransport() {
+    const { playing } = this.playback;
+    setText(get("play"), playing ? "Pause" : "Play");
+    get("play").setAttribute("aria-pressed", String(playing));
+    const at = this.view.shown.map((name) => this.playback.at(name)).find(Boolean);
+    get("transport").hidden = !at || this.live.simulations.size > 0;
+    if (!at) return;
+    const scrub = get("scrub");
+    scrub.max = at.shown.duration.toFixed(2);
+    if (document.activeElement !== scrub || playing) scrub.value = at.time.toFixed(2);
+    const { shown, time } = at;
+    get("time").value = `${time.toFixed(2)} of ${shown.duration.toFixed(2)} s, trial ${shown.trial}, ${shown.outcome}`;
+    scrub.setAttribute("aria-valuetext", `${time.toFixed(2)} seconds`);
+  }
+}
+
+function emptiness(instance) {
+  if (!instance) return "Nothing runs. Start a component, or look at a run that has ended.";
+  if (instance.status === "starting") return `${instance.id} is starting …`;
+  if (lives(instance)) return `${instance.id} has no simulation that is ready yet.`;
+  return `${instance.id} has ended; nothing moves any more.`;
+}
+
+async function begin() {
+  let token;
+  try {
+    token = await takeToken();
+  } catch (error) {
+    signIn(error.facts?.hint ? `${error.message}; ${error.facts.hint} prints a new address` : error.message);
+    return;
+  }
+  if (token === null) {
+    signIn("This page needs a token.");
+    return;
+  }
+  get("page").hidden = false;
+  // For people who look into it, and for tests.
+  window.throwcollect = new Page(token);
+}
+
+begin();

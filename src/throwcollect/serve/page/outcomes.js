@@ -1,0 +1,24 @@
+/** Colours of outcomes, told apart in the dark, in the light and by most eyes that see few colours. */
+
+const COLORS = {
+  landed: "#1f9e77",
+  dropped: "#d95f02",
+  not_released: "#7570b3",
+  recaught: "#e7298a",
+  self_hit: "#c5352f",
+  limit_violated: "#b8860b",
+  timeout: "#4a90d9",
+  tracking_failed: "#a0522d",
+  lost: "#808080",
+};
+const OTHERS = ["#1f9e77", "#4a90d9", "#d95f02", "#7570b3", "#e7298a", "#b8860b"];
+
+/**
+ * @param {string} outcome
+ * @returns {string} its colour, always the same
+ */
+export function colorOf(outcome) {
+  if (Object.hasOwn(COLORS, outcome)) return COLORS[outcome];
+  const sum = [...outcome].reduce((all, letter) => all + letter.charCodeAt(0), 0);
+  return OTHERS[sum % OTHERS.length];
+}

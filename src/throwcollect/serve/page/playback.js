@@ -1,0 +1,63 @@
+/** Replays the newest throw of each simulation; a newer one takes its place when it has come to its end. */
+
+const REST_S = 0.7;
+/** Most of the time that may pass between two pictures; a page that was out of sight does not catch up. */
+const LONGEST_STEP_S = 0.2;
+
+/** @typedef {import("./throws.js").Throw} Throw */
+
+/** Time of the throws that are shown, one a simulation. */
+export class Playback {
+  playing = true;
+  speed = 1;
+  /** @type {Map<string, {shown: Throw, time: number, next: Throw | null}>} */
+  #tracks = new Map();
+
+  /** @param {(shown: Throw) => void} began is told of each throw that begins to be shown */
+  constructor(began) {
+    this.began = began;
+  }
+
+  /** @param {Throw} newest */
+  put(newest) {
+    const track = this.#tracks.get(newest.simulation);
+    if (track === undefined || (!this.playing && track.time >= track.shown.duration)) this.#begin(newest);
+    else track.next = newest;
+  }
+
+  /** Forget all throws. */
+  clear() {
+    this.#tracks.clear();
+  }
+
+  /**
+   * @param {string} simulation
+   * @returns {{shown: Throw, time: number} | undefined}
+   */
+  at(simulation) {
+    const track = this.#tracks.get(simulation);
+    return track && { shown: track.shown, time: Math.min(track.time, track.shown.duration) };
+  }
+
+  /** @param {number} seconds that have passed */
+  step(seconds) {
+    if (!this.playing) return;
+    for (const track of this.#tracks.values()) {
+      track.time += Math.min(seconds, LONGEST_STEP_S) * this.speed;
+      if (track.time < track.shown.duration + REST_S * this.speed) continue;
+      if (track.next) this.#begin(track.next);
+      else track.time = 0;
+    }
+  }
+
+  /** @param {number} time [s] of all throws, which stand still from then on */
+  seek(time) {
+    this.playing = false;
+    for (const track of this.#tracks.values()) track.time = Math.min(time, track.shown.duration);
+  }
+
+  #begin(shown) {
+    this.#tracks.set(shown.simulation, { shown, time: this.playing ? 0 : shown.duration, next: null });
+    this.began(shown);
+  }
+}

@@ -1,0 +1,198 @@
+/** One plot: a curve over a throw with the time of its replay, or over the last seconds of a live simulation. */
+
+import uPlot from "./vendor/uplot/dist/uPlot.esm.js";
+import { get, make, setText } from "./dom.js";
+import { seriesOf } from "./throws.js";
+
+const UNITS = { position: "rad", velocity: "rad/s", effort: "Nm", ball: "m" };
+const HEIGHT_PX = 120;
+const SPAN_S = 10;
+const NUMBERS_MS = 500;
+const GAP_PX = 26;
+
+/** @typedef {{simulation: string, field: "position" | "velocity" | "effort" | "ball", name: string, link: string}} Choice */
+
+/** A panel with a plot, its buttons, and a table of its numbers. */
+export class PlotPanel {
+  #shown = null;
+  #live = false;
+  #last = -1;
+  #zoomed = null;
+  #told = 0;
+  #x = [];
+  #y = [];
+
+  /**
+   * @param {Choice} choice what is plotted, and the link that it is bound to
+   * @param {boolean} follows whether it follows the link
+   * @param {() => void} closed is called when it has been closed
+   */
+  constructor(choice, follows, closed) {
+    this.choice = choice;
+    const title = `${choice.field === "ball" ? `ball ${choice.name}` : `${choice.name} ${choice.field}`} [${UNITS[choice.field]}]`;
+    const button = (text, label, act) => {
+      const made = make("button", { type: "button", title: label, "aria-label": `${label}: ${title}` }, text);
+      made.addEventListener("click", act);
+      return made;
+    };
+    this.now = make("output", { className: "now" });
+    this.collapser = button("–", "collapse", () => this.#collapse());
+    this.follower = button("⚓", "dock", () => this.#place(!this.follows));
+    const head = make("div", { className: "plot-head" }, make("strong", {}, title), this.now,
+      button("+", "zoom in", () => this.#zoom(0.5)), button("−", "zoom out", () => this.#zoom(2)),
+      button("↔", "all of it", () => this.#zoom(null)), this.follower, this.collapser,
+      button("×", "close", () => {
+        this.#plot.destroy();
+        this.element.remove();
+        closed();
+      }));
+    this.body = make("div", { className: "plot-body" });
+    this.cells = ["now", "least", "mean", "most"].map((name) => [name, make("td", {}, "–")]);
+    this.table = make("table", {}, make("caption", {}, `${title}, ${choice.simulation}, at ${choice.link}`),
+      ...this.cells.map(([name, cell]) => make("tr", {}, make("th", { scope: "row" }, name), cell)));
+    const numbers = make("details", {}, make("summary", {}, "Numbers"), this.table);
+    this.element = make("section", { className: "plot", "aria-label": title }, head, this.body, numbers);
+    this.#place(follows);
+    this.#plot = new uPlot(this.#options(), [[], []], this.body);
+    this.line = make("div", { className: "plot-now" });
+    this.#plot.over.append(this.line);
+    new ResizeObserver(() => this.#fit()).observe(this.body);
+  }
+
+  /**
+   * Draw what is new.
+   * @param {{shown: import("./throws.js").Throw, time: number} | undefined} replay
+   * @param {import("./live.js").Moment[] | null} moments of a live simulation; null if it is replayed
+   */
+  draw(replay, moments) {
+    if (moments) this.#drawLive(moments);
+    else if (replay) this.#drawThrow(replay);
+    if (performance.now() - this.#told > NUMBERS_MS) this.#tell();
+  }
+
+  /**
+   * Go to where the link is.
+   * @param {{x: number, y: number}} at on the stage [px]
+   * @param {Element} stage
+   * @returns {{x1: number, y1: number, x2: number, y2: number}} line from the panel to the link
+   */
+  follow(at, stage) {
+    const { offsetWidth: width, offsetHeight: height } = this.element;
+    const [most, lowest] = [stage.clientWidth - width - 4, stage.clientHeight - height - 4];
+    const isRight = at.x + GAP_PX + width < stage.clientWidth;
+    const left = Math.max(4, Math.min(isRight ? at.x + GAP_PX : at.x - GAP_PX - width, most));
+    const top = Math.max(4, Math.min(at.y - height - GAP_PX, lowest));
+    this.element.style.transform = `translate(${left.toFixed(1)}px, ${top.toFixed(1)}px)`;
+    const x1 = Math.max(left, Math.min(at.x, left + width));
+    const y1 = Math.max(top, Math.min(at.y, top + height));
+    return { x1, y1, x2: at.x, y2: at.y };
+  }
+
+  #plot;
+
+  #drawThrow({ shown, time }) {
+    if (this.#shown !== shown) {
+      this.#shown = shown;
+      this.#live = false;
+      const series = seriesOf(shown, this.choice.field, this.choice.name);
+      this.#x = Float64Array.from({ length: series ? shown.samples : 0 }, (_, i) => i / shown.rate_hz);
+      this.#y = series ?? [];
+      this.#plot.setData([this.#x, this.#y], false);
+      this.#show(this.#zoomed ?? [0, shown.duration]);
+      if (!series) setText(this.now, "throws do not tell it; watch live");
+    }
+    if (!this.#y.length) return;
+    this.line.hidden = false;
+    this.line.style.transform = `translateX(${this.#plot.valToPos(time, "x").toFixed(1)}px)`;
+    this.#say(this.#y[Math.min(this.#y.length - 1, Math.round(time * shown.rate_hz))]);
+  }
+
+  #drawLive(moments) {
+    if (!moments.length || moments.at(-1).time === this.#last) return;
+    if (!this.#live) this.#zoomed = null;
+    this.#live = true;
+    this.#shown = null;
+    this.line.hidden = true;
+    this.#last = moments.at(-1).time;
+    const { field, name } = this.choice;
+    const value = ({ ball, ...moment }) => (field === "ball" ? ball?.["xyz".indexOf(name)] : moment[field][name]);
+    this.#x = moments.map(({ time }) => time - this.#last);
+    this.#y = moments.map((moment) => value(moment) ?? null);
+    this.#plot.setData([this.#x, this.#y], false);
+    this.#show(this.#zoomed ?? [-SPAN_S, 0]);
+    this.#say(this.#y.at(-1));
+  }
+
+  #say(value) {
+    setText(this.now, Number.isFinite(value) ? value.toFixed(3) : "–");
+  }
+
+  #tell() {
+    this.#told = performance.now();
+    const values = [...this.#y].filter(Number.isFinite);
+    const numbers = values.length
+      ? [Number(this.now.value), Math.min(...values), values.reduce((sum, value) => sum + value, 0) / values.length, Math.max(...values)]
+      : [];
+    this.cells.forEach(([, cell], i) => setText(cell, Number.isFinite(numbers[i]) ? numbers[i].toFixed(3) : "–"));
+  }
+
+  #show([min, max]) {
+    this.#plot.setScale("x", { min, max });
+  }
+
+  #zoom(factor) {
+    if (factor === null) {
+      this.#zoomed = null;
+      this.#show(this.#live ? [-SPAN_S, 0] : [0, this.#shown?.duration ?? 1]);
+      return;
+    }
+    const { min, max } = this.#plot.scales.x;
+    const middle = this.#live ? max : (min + max) / 2;
+    this.#zoomed = [middle + (min - middle) * factor, middle + (max - middle) * factor];
+    this.#show(this.#zoomed);
+  }
+
+  #collapse() {
+    const isClosed = this.element.classList.toggle("collapsed");
+    setText(this.collapser, isClosed ? "□" : "–");
+    this.collapser.setAttribute("aria-expanded", String(!isClosed));
+  }
+
+  #place(follows) {
+    this.follows = follows;
+    this.element.style.transform = "";
+    get(follows ? "following" : "docked").append(this.element);
+    this.follower.title = follows ? "dock below the view" : "follow the link";
+    this.follower.setAttribute("aria-pressed", String(!follows));
+  }
+
+  #fit() {
+    const width = this.body.clientWidth;
+    if (width > 0 && width !== this.#plot.width) this.#plot.setSize({ width, height: HEIGHT_PX });
+  }
+
+  #options() {
+    const style = () => getComputedStyle(this.element);
+    const axis = {
+      stroke: () => style().getPropertyValue("--muted"),
+      grid: { stroke: () => style().getPropertyValue("--grid"), width: 1 },
+      ticks: { show: false },
+      font: "10px system-ui, sans-serif",
+    };
+    return {
+      width: 240,
+      height: HEIGHT_PX,
+      legend: { show: false },
+      cursor: { drag: { x: true, y: false }, points: { show: false } },
+      scales: { x: { time: false } },
+      axes: [{ ...axis, size: 22, values: (_, ticks) => ticks.map((tick) => `${+tick.toFixed(2)} s`) }, { ...axis, size: 42 }],
+      series: [{}, { stroke: () => style().getPropertyValue("--accent"), width: 1.5, points: { show: false } }],
+      hooks: {
+        setSelect: [({ select: { left, width } }) => {
+          // A zoom by dragging stays when the next throw comes.
+          if (width > 0) this.#zoomed = [this.#plot.posToVal(left, "x"), this.#plot.posToVal(left + width, "x")];
+        }],
+      },
+    };
+  }
+}

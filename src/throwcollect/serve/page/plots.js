@@ -1,0 +1,97 @@
+/** Plots bound to links: panels that follow a link of a robot on the screen, or are docked below the view. */
+
+import { get, setChoices } from "./dom.js";
+import { PlotPanel } from "./plot_panel.js";
+
+const DEFAULT_JOINT = "arm_right_4_joint";
+
+/** All plots, and the dialog that adds one. */
+export class Plots {
+  /** @type {PlotPanel[]} */
+  panels = [];
+  #simulations = [];
+
+  /**
+   * @param {object} parts
+   * @param {import("./scene.js").View} parts.view
+   * @param {import("./playback.js").Playback} parts.playback
+   * @param {import("./live.js").Live} parts.live
+   */
+  constructor({ view, playback, live }) {
+    Object.assign(this, { view, playback, live });
+    get("add-plot").addEventListener("click", () => this.#ask());
+    get("plot-simulation").addEventListener("change", () => this.#offer());
+    get("plot-field").addEventListener("change", () => this.#offer());
+    get("plot-name").addEventListener("change", () => this.#bind());
+    get("plot-dialog").firstElementChild.addEventListener("submit", ({ submitter }) => {
+      if (submitter.value === "add" && get("plot-simulation").value) this.#add();
+    });
+  }
+
+  /** @param {string[]} simulations that are shown; plots of others are hidden */
+  put(simulations) {
+    this.#simulations = simulations;
+    get("add-plot").disabled = !simulations.length;
+  }
+
+  /** Draw what is new, and put panels where their links are. */
+  draw() {
+    const lines = [];
+    for (const panel of this.panels) {
+      const { simulation, link } = panel.choice;
+      panel.element.hidden = !this.#simulations.includes(simulation);
+      if (panel.element.hidden) continue;
+      panel.draw(this.playback.at(simulation), this.live.simulations.has(simulation) ? this.live.momentsOf(simulation) : null);
+      const at = panel.follows ? this.view.project(simulation, link) : null;
+      if (at) lines.push(panel.follow(at, get("stage")));
+    }
+    this.#drawLeaders(lines);
+  }
+
+  #ask() {
+    const { shown } = this.view;
+    setChoices(get("plot-simulation"), shown.map((name) => [name, name]));
+    this.#offer();
+    get("plot-dialog").showModal();
+  }
+
+  #robot() {
+    return this.view.stations.get(get("plot-simulation").value)?.robot;
+  }
+
+  /** Offer what the chosen field can be of, and the links. */
+  #offer() {
+    const robot = this.#robot();
+    const isBall = get("plot-field").value === "ball";
+    const names = isBall ? ["x", "y", "z"] : (robot?.joints ?? []);
+    const isFirst = get("plot-name").options.length === 0;
+    setChoices(get("plot-name"), names.map((name) => [name, name]));
+    if (isFirst && names.includes(DEFAULT_JOINT)) get("plot-name").value = DEFAULT_JOINT;
+    setChoices(get("plot-link"), (robot?.links ?? []).map((name) => [name, name]));
+    this.#bind();
+  }
+
+  /** A plot of a joint is bound to the link that it moves, unless another is chosen. */
+  #bind() {
+    const link = this.#robot()?.linkMovedBy(get("plot-name").value);
+    if (link) get("plot-link").value = link;
+  }
+
+  #add() {
+    const [simulation, field, name, link] = ["simulation", "field", "name", "link"].map((key) => get(`plot-${key}`).value);
+    const panel = new PlotPanel({ simulation, field, name, link }, get("plot-follows").checked, () => {
+      this.panels.splice(this.panels.indexOf(panel), 1);
+      get("add-plot").focus();
+    });
+    this.panels.push(panel);
+  }
+
+  #drawLeaders(lines) {
+    const place = get("leaders");
+    while (place.children.length > lines.length) place.lastElementChild.remove();
+    while (place.children.length < lines.length) place.append(document.createElementNS(place.namespaceURI, "line"));
+    lines.forEach((line, i) => {
+      for (const [key, value] of Object.entries(line)) place.children[i].setAttribute(key, value.toFixed(1));
+    });
+  }
+}

@@ -1,0 +1,255 @@
+/** The three-dimensional view: one tile a simulation, all seen from the same side. */
+
+import {
+  Color, DirectionalLight, GridHelper, Group, HemisphereLight, Mesh, MeshLambertMaterial, PerspectiveCamera, Scene,
+  SphereGeometry, Vector3, WebGLRenderer,
+} from "./vendor/three/build/three.module.js";
+import { OrbitControls } from "./vendor/three/examples/jsm/controls/OrbitControls.js";
+import { Trails } from "./trails.js";
+
+const BALL_COLOR = "#ff7300";
+const BALL_RADIUS_M = 0.04;
+const TARGET = new Vector3(0.6, 0, 1);
+const EYE = new Vector3(3.3, -4, 1.9);
+const TURN_RAD = 0.12;
+const ZOOM = 1.15;
+/** Robots that are drawn with all of their triangles; more are drawn with fewer. */
+const MOST_FINE = 1;
+/** A picture that takes longer than this on average [ms] is drawn with less. */
+const SLOW_MS = 70;
+
+/** One simulation in the view. */
+export class Station {
+  group = new Group();
+  trails = new Trails();
+  /** @type {import("./robot.js").Robot | null} */
+  robot = null;
+
+  constructor() {
+    this.ball = new Mesh(new SphereGeometry(BALL_RADIUS_M, 20, 14), new MeshLambertMaterial({ color: BALL_COLOR }));
+    this.ball.visible = false;
+    this.group.add(this.ball, this.trails.object);
+  }
+
+  /** @param {import("./robot.js").Robot} robot takes the place of the one before, in its posture */
+  setRobot(robot) {
+    if (this.robot) {
+      robot.takeFrom(this.robot);
+      this.robot.dispose();
+    }
+    this.robot = robot;
+    this.group.add(robot.object);
+  }
+
+  /** @param {number[]} place [m], frame world */
+  placeBall(place) {
+    this.ball.visible = true;
+    this.ball.position.fromArray(place);
+  }
+
+  dispose() {
+    this.trails.clear();
+    this.robot?.dispose();
+    this.group.removeFromParent();
+    this.ball.geometry.dispose();
+    this.ball.material.dispose();
+  }
+}
+
+/** Draws stations into a canvas. */
+export class View {
+  /** @type {Map<string, Station>} */
+  stations = new Map();
+  /** @type {string[]} names of the stations that are shown, in order */
+  shown = [];
+  #scene = new Scene();
+  #camera = new PerspectiveCamera(38, 1, 0.05, 60);
+  #width = 1;
+  #height = 1;
+  #columns = 1;
+  #rows = 1;
+  #changed = true;
+  #mean = 0;
+  #plain = false;
+
+  /**
+   * @param {HTMLCanvasElement} canvas
+   * @throws {Error} if the browser has no WebGL
+   */
+  constructor(canvas) {
+    this.canvas = canvas;
+    this.renderer = new WebGLRenderer({ canvas, antialias: true });
+    this.#camera.up.set(0, 0, 1);
+    this.orbit = new OrbitControls(this.#camera, canvas);
+    this.orbit.maxPolarAngle = Math.PI / 2 - 0.02;
+    this.orbit.minDistance = 0.6;
+    this.orbit.maxDistance = 20;
+    this.orbit.addEventListener("change", () => this.touch());
+    this.reset();
+    const light = new DirectionalLight("#ffffff", 2);
+    light.position.set(3, -2, 5);
+    this.#scene.add(new HemisphereLight("#ffffff", "#777777", 1.6), light);
+    this.#scene.matrixWorldAutoUpdate = false;
+    new ResizeObserver(() => this.#resize()).observe(canvas.parentElement);
+    const dark = matchMedia("(prefers-color-scheme: dark)");
+    dark.addEventListener("change", () => this.#paint());
+    this.#paint();
+    this.#resize();
+  }
+
+  /** Have the next picture drawn. */
+  touch() {
+    this.#changed = true;
+  }
+
+  /** Look from where it began. */
+  reset() {
+    this.#camera.position.copy(EYE);
+    this.orbit.target.copy(TARGET);
+    this.orbit.update();
+  }
+
+  /**
+   * @param {number} right turns, to the right and up
+   * @param {number} up
+   */
+  turn(right, up) {
+    this.orbit.rotateLeft(-right * TURN_RAD);
+    this.orbit.rotateUp(up * TURN_RAD);
+    this.orbit.update();
+  }
+
+  /** @param {number} steps nearer */
+  zoom(steps) {
+    const away = this.#camera.position.clone().sub(this.orbit.target);
+    away.setLength(Math.min(Math.max(away.length() * ZOOM ** -steps, this.orbit.minDistance), this.orbit.maxDistance));
+    this.#camera.position.copy(this.orbit.target).add(away);
+    this.orbit.update();
+  }
+
+  /**
+   * @param {string[]} names of the simulations to show, in order; those of which nothing is known yet get a station
+   */
+  show(names) {
+    this.shown = names;
+    for (const name of names) {
+      if (this.stations.has(name)) continue;
+      const station = new Station();
+      this.stations.set(name, station);
+      this.#scene.add(station.group);
+    }
+    this.#arrange();
+  }
+
+  /** Forget all stations. */
+  clear() {
+    for (const station of this.stations.values()) station.dispose();
+    this.stations.clear();
+    this.shown = [];
+    this.touch();
+  }
+
+  /**
+   * Where a tile is on the stage.
+   * @param {string} name
+   * @returns {{left: number, top: number, width: number, height: number} | null} in CSS pixels; null if it is not shown
+   */
+  tileOf(name) {
+    const at = this.shown.indexOf(name);
+    if (at < 0) return null;
+    const [width, height] = [this.#width / this.#columns, this.#height / this.#rows];
+    return { left: (at % this.#columns) * width, top: Math.floor(at / this.#columns) * height, width, height };
+  }
+
+  /**
+   * Where a link is on the stage.
+   * @param {string} name of the simulation
+   * @param {string} link
+   * @returns {{x: number, y: number} | null} in CSS pixels; null if it is not to be seen
+   */
+  project(name, link) {
+    const tile = this.tileOf(name);
+    const place = new Vector3();
+    if (!tile || !this.stations.get(name)?.robot?.locate(link, place)) return null;
+    place.project(this.#camera);
+    if (place.z > 1) return null;
+    return { x: tile.left + ((place.x + 1) / 2) * tile.width, y: tile.top + ((1 - place.y) / 2) * tile.height };
+  }
+
+  /**
+   * Draw a picture, if anything is new.
+   * @param {number} sinceMs time since the picture before
+   */
+  draw(sinceMs) {
+    if (!this.#changed) {
+      this.#mean = 0;
+      return;
+    }
+    this.#changed = false;
+    this.#adapt(sinceMs);
+    const few = this.shown.length <= MOST_FINE && !this.#plain;
+    for (const name of this.shown) this.stations.get(name).robot?.setCoarse(!few);
+    this.#scene.updateMatrixWorld();
+    this.renderer.setScissorTest(true);
+    for (const station of this.stations.values()) station.group.visible = false;
+    for (const name of this.shown.length ? this.shown : [""]) this.#drawTile(name);
+  }
+
+  #drawTile(name) {
+    const station = this.stations.get(name);
+    const { left, top, width, height } = this.tileOf(name) ?? { left: 0, top: 0, width: this.#width, height: this.#height };
+    const bottom = this.#height - top - height;
+    this.renderer.setViewport(left, bottom, width, height);
+    this.renderer.setScissor(left, bottom, width, height);
+    if (station) station.group.visible = true;
+    this.renderer.render(this.#scene, this.#camera);
+    if (station) station.group.visible = false;
+  }
+
+  /** Draw with less where pictures take long. */
+  #adapt(sinceMs) {
+    this.#mean = this.#mean === 0 ? Math.min(sinceMs, SLOW_MS) : 0.9 * this.#mean + 0.1 * Math.min(sinceMs, 1000);
+    if (this.#mean > SLOW_MS && !this.#plain) {
+      this.#plain = true;
+      this.#resize();
+    }
+  }
+
+  #resize() {
+    const box = this.canvas.parentElement;
+    this.#width = Math.max(1, box.clientWidth);
+    this.#height = Math.max(1, box.clientHeight);
+    this.renderer.setPixelRatio(this.#plain ? 1 : Math.min(devicePixelRatio, 2));
+    this.renderer.setSize(this.#width, this.#height, false);
+    this.#arrange();
+  }
+
+  /** Have as many columns as make tiles that are nearest to squares. */
+  #arrange() {
+    const count = Math.max(1, this.shown.length);
+    let best = Infinity;
+    for (let columns = 1; columns <= count; columns++) {
+      const rows = Math.ceil(count / columns);
+      const shape = Math.abs(Math.log(this.#width / columns / (this.#height / rows))) + 0.4 * (columns * rows - count);
+      if (shape < best) [best, this.#columns, this.#rows] = [shape, columns, rows];
+    }
+    this.#camera.aspect = this.#width / this.#columns / (this.#height / this.#rows);
+    // A tile that is higher than wide shows as much from left to right.
+    this.#camera.fov = this.#camera.aspect >= 1 ? 38 : Math.min(75, 38 / this.#camera.aspect);
+    this.#camera.updateProjectionMatrix();
+    this.touch();
+  }
+
+  #paint() {
+    const style = getComputedStyle(document.documentElement);
+    this.#scene.background = new Color(style.getPropertyValue("--sky").trim());
+    this.#grid?.removeFromParent();
+    const line = style.getPropertyValue("--grid").trim();
+    this.#grid = new GridHelper(16, 32, line, line);
+    this.#grid.rotation.x = Math.PI / 2;
+    this.#scene.add(this.#grid);
+    this.touch();
+  }
+
+  #grid = null;
+}

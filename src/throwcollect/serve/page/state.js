@@ -1,0 +1,93 @@
+/** The state of everything, as the server tells it: always whole, so the newest message alone matters. */
+
+/**
+ * @typedef {object} Component
+ * @property {string} name
+ * @property {string} pretty_name
+ * @property {"collection" | "session"} kind
+ * @property {number} max_instances
+ * @property {string[]} instances ids of those that live
+ */
+
+/**
+ * @typedef {object} Progress
+ * @property {number} total
+ * @property {number} ended
+ * @property {Record<string, number>} outcomes
+ * @property {number} throws_per_s
+ * @property {number | null} wanted
+ * @property {string} success
+ * @property {string} noun
+ */
+
+/**
+ * @typedef {object} Instance
+ * @property {string} id
+ * @property {string | null} component
+ * @property {string} name
+ * @property {"collection" | "session"} kind
+ * @property {"starting" | "running" | "ended" | "died"} status
+ * @property {string} started
+ * @property {string | null} ended
+ * @property {string} message
+ * @property {number} simulations
+ * @property {{name: string, status: string, restarts: number, last_end: string | null}[]} nodes
+ * @property {Progress | null} progress
+ * @property {string | null} dataset
+ * @property {object | null} summary what its dataset holds; null if it is not finished
+ * @property {string[]} robots names of its simulations that run
+ */
+
+/** @typedef {{components: Component[], instances: Instance[], revision: number}} State */
+
+/** Holds the state, and tells of each new one. */
+export class Store {
+  /** @type {State | null} */
+  state = null;
+  #listeners = [];
+
+  /** @param {(state: State) => void} listener */
+  listen(listener) {
+    this.#listeners.push(listener);
+  }
+
+  /** @param {State} state */
+  put(state) {
+    this.state = state;
+    for (const listener of this.#listeners) listener(state);
+  }
+
+  /**
+   * @param {string} id
+   * @returns {Instance | undefined}
+   */
+  instance(id) {
+    return this.state?.instances.find((each) => each.id === id);
+  }
+}
+
+/**
+ * @param {Instance} instance
+ * @returns {boolean} whether it is starting or runs
+ */
+export function lives(instance) {
+  return instance.status === "starting" || instance.status === "running";
+}
+
+/**
+ * How far a collection has come: in successes if a number of them is wanted, else in trials.
+ * @param {Progress} progress
+ * @returns {[number, number]} steps done, and all
+ */
+export function steps({ ended, total, wanted, outcomes, success }) {
+  return wanted === null ? [ended, total] : [Math.min(outcomes[success] ?? 0, wanted), wanted];
+}
+
+/**
+ * Names of simulations in the order of their numbers.
+ * @param {string[]} names
+ * @returns {string[]}
+ */
+export function inOrder(names) {
+  return [...names].sort((a, b) => a.localeCompare(b, "en", { numeric: true }));
+}

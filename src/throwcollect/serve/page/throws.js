@@ -1,0 +1,100 @@
+/** Finished throws as the server hands them out: decoding, and where joints and ball are at a time. */
+
+/**
+ * @typedef {object} Throw
+ * @property {number} trial
+ * @property {string} simulation
+ * @property {string} outcome
+ * @property {string[]} joints
+ * @property {number} samples
+ * @property {number} rate_hz
+ * @property {[number, number, number] | null} landing [m], frame world
+ * @property {Record<string, unknown>} values swept keys and their values
+ * @property {Float32Array} positions [rad], joints of a sample side by side
+ * @property {Float32Array} ball [m], frame world, x y z of a sample side by side
+ * @property {number} duration [s]
+ */
+
+/**
+ * Decode a message: length of the header, header, padding to 4 bytes, positions of joints, positions of the ball.
+ * @param {ArrayBuffer} buffer
+ * @returns {Throw}
+ * @throws {RangeError} if it is shorter than its header says
+ */
+export function decodeThrow(buffer) {
+  const length = new DataView(buffer).getUint32(0, true);
+  const header = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
+  const start = 4 + Math.ceil(length / 4) * 4;
+  const { samples, joints } = header;
+  // Little-endian as all machines with a browser are.
+  const positions = new Float32Array(buffer, start, samples * joints.length);
+  const ball = new Float32Array(buffer, start + positions.byteLength, samples * 3);
+  return { ...header, positions, ball, duration: Math.max(0, samples - 1) / header.rate_hz };
+}
+
+/**
+ * Rows at a time, between which values are interpolated.
+ * @param {Throw} shown
+ * @param {number} time [s]
+ * @returns {[number, number, number]} row before, row after, share of the row after
+ */
+function rowsAt(shown, time) {
+  const at = Math.min(Math.max(time * shown.rate_hz, 0), shown.samples - 1);
+  const before = Math.floor(at);
+  return [before, Math.min(before + 1, shown.samples - 1), at - before];
+}
+
+/**
+ * @param {Float32Array} values rows side by side
+ * @param {number} width values of a row
+ * @param {Throw} shown
+ * @param {number} time [s]
+ * @returns {number[]} the row at that time
+ */
+function valuesAt(values, width, shown, time) {
+  const [before, after, share] = rowsAt(shown, time);
+  const row = [];
+  for (let i = 0; i < width; i++) {
+    row.push(values[before * width + i] * (1 - share) + values[after * width + i] * share);
+  }
+  return row;
+}
+
+/**
+ * @param {Throw} shown
+ * @param {number} time [s]
+ * @returns {number[]} positions of its joints [rad]
+ */
+export function jointsAt(shown, time) {
+  return valuesAt(shown.positions, shown.joints.length, shown, time);
+}
+
+/**
+ * @param {Throw} shown
+ * @param {number} time [s]
+ * @returns {number[]} position of the ball [m]
+ */
+export function ballAt(shown, time) {
+  return valuesAt(shown.ball, 3, shown, time);
+}
+
+/**
+ * A number of each sample: of the ball, of a joint, or how fast a joint's position changes.
+ * @param {Throw} shown
+ * @param {"position" | "velocity" | "effort" | "ball"} field
+ * @param {string} name of a joint, or x, y, z
+ * @returns {Float64Array | null} null if throws do not tell it
+ */
+export function seriesOf(shown, field, name) {
+  const width = field === "ball" ? 3 : shown.joints.length;
+  const column = field === "ball" ? "xyz".indexOf(name) : shown.joints.indexOf(name);
+  if (column < 0 || field === "effort") return null;
+  const values = field === "ball" ? shown.ball : shown.positions;
+  const series = Float64Array.from({ length: shown.samples }, (_, i) => values[i * width + column]);
+  if (field !== "velocity") return series;
+  const last = shown.samples - 1;
+  return series.map((_, i) => {
+    const [from, to] = [Math.max(i - 1, 0), Math.min(i + 1, last)];
+    return to > from ? ((series[to] - series[from]) * shown.rate_hz) / (to - from) : 0;
+  });
+}

@@ -1,0 +1,143 @@
+/** What is seen of one run: its newest throws, its robots, its landings. */
+
+import { Robot } from "./robot.js";
+import { lives } from "./state.js";
+import { ballAt, decodeThrow, jointsAt } from "./throws.js";
+
+/** Watches one run at a time, and only while the page is to be seen. */
+export class Watching {
+  /** @type {string | null} id of the run */
+  id = null;
+  #socket = null;
+  #urdf = null;
+  #hasAll = false;
+
+  /**
+   * @param {object} parts
+   * @param {import("./connection.js").Connection} parts.connection
+   * @param {import("./scene.js").View} parts.view
+   * @param {import("./playback.js").Playback} parts.playback
+   * @param {import("./landing_map.js").LandingMap} parts.map
+   * @param {import("./robot.js").Meshes} parts.meshes
+   * @param {(text: string) => void} parts.tell says what is wrong
+   */
+  constructor({ connection, view, playback, map, meshes, tell }) {
+    Object.assign(this, { connection, view, playback, map, meshes, tell });
+    document.addEventListener("visibilitychange", () => this.#follow());
+  }
+
+  /** @param {import("./state.js").Instance | undefined} instance what is to be seen from now on; undefined for nothing */
+  put(instance) {
+    const id = instance?.id ?? null;
+    if (id !== this.id) this.#begin(id);
+    this.instance = instance;
+    this.#follow();
+    if (instance) this.#fetchSome();
+  }
+
+  /** @param {string[]} simulations to show */
+  show(simulations) {
+    this.view.show(simulations);
+    for (const name of simulations) {
+      const station = this.view.stations.get(name);
+      if (station.robot === null && this.#urdf) this.describe(name, this.#urdf);
+    }
+  }
+
+  /**
+   * Have a simulation's robot look as a description says, in the posture that it has.
+   * @param {string} name of the simulation
+   * @param {string} urdf
+   */
+  describe(name, urdf) {
+    const station = this.view.stations.get(name);
+    if (!station || station.robot?.urdf === urdf) return;
+    try {
+      station.setRobot(new Robot(urdf, this.meshes, () => this.view.touch(), ({ message }) => this.tell(`a mesh is missing: ${message}`)));
+    } catch (error) {
+      this.tell(`the robot's description cannot be drawn: ${error.message}`);
+    }
+  }
+
+  /**
+   * Put robots and balls where they are at the times of the replay.
+   * @param {Set<string>} live simulations that others move
+   */
+  pose(live) {
+    for (const name of this.view.shown) {
+      const at = this.playback.at(name);
+      if (!at || live.has(name)) continue;
+      const station = this.view.stations.get(name);
+      const { shown, time } = at;
+      if (station.posed === shown && station.posedAt === time) continue;
+      station.posed = shown;
+      station.posedAt = time;
+      station.robot?.move(jointsAt(shown, time).map((position, i) => [shown.joints[i], position]));
+      station.placeBall(ballAt(shown, time));
+      station.trails.reveal(shown.duration ? time / shown.duration : 1);
+      this.view.touch();
+    }
+  }
+
+  /** @param {import("./throws.js").Throw} shown begins to be replayed */
+  begin(shown) {
+    this.view.stations.get(shown.simulation)?.trails.add(shown);
+    this.map.mark(shown);
+  }
+
+  #begin(id) {
+    this.id = id;
+    this.#urdf = null;
+    this.#hasAll = false;
+    this.#socket?.close();
+    this.#socket = null;
+    this.view.clear();
+    this.playback.clear();
+    this.map.clear();
+  }
+
+  /** Listen for throws as long as there may be some, and somebody looks. */
+  #follow() {
+    const { instance } = this;
+    const wanted = instance?.kind === "collection" && lives(instance) && !document.hidden;
+    if (wanted && this.#socket === null) {
+      this.#socket = this.connection.open(`/instances/${encodeURIComponent(instance.id)}/shown`, {
+        receive: (data) => this.#receive(decodeThrow(data)),
+      });
+    } else if (!wanted && this.#socket !== null) {
+      this.#socket.close();
+      this.#socket = null;
+    }
+  }
+
+  #receive(newest) {
+    this.playback.put(newest);
+    this.map.add(newest);
+  }
+
+  /** Fetch what there is by now: the description of the robots, and all landings of a dataset that is finished. */
+  async #fetchSome() {
+    const { id, instance } = this;
+    const run = `/instances/${encodeURIComponent(id)}`;
+    if (this.#urdf === null && instance.robots.length) {
+      this.#urdf = "";
+      this.#urdf = await this.#ask(`${run}/urdf`, (response) => response.text());
+      if (this.id === id && this.#urdf) this.show(this.view.shown);
+    }
+    if (instance.summary && !this.#hasAll) {
+      this.#hasAll = true;
+      const landings = await this.#ask(`/collections/${encodeURIComponent(id)}/landings`, (response) => response.json());
+      if (landings !== null && this.id === id) this.map.put(landings);
+    }
+  }
+
+  /** What the server answers; null if it has nothing. */
+  async #ask(path, read) {
+    try {
+      return await read(await this.connection.ask("GET", path));
+    } catch (error) {
+      this.tell(error.message);
+      return null;
+    }
+  }
+}

@@ -1,0 +1,213 @@
+"""A bridge: all clients of one run, and their common place in its ROS graph, in a thread of its own."""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+import logging
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from queue import Empty, SimpleQueue
+from typing import TYPE_CHECKING
+
+from throwcollect import ros
+from throwcollect.errors import ThrowcollectError
+from throwcollect.ros.endpoint import answers
+from throwcollect.serve.robot_files import find_mesh
+from throwcollect.serve.rosbridge.client import Client
+from throwcollect.serve.rosbridge.codec import Frame
+from throwcollect.serve.rosbridge.file_server import FileServer
+from throwcollect.serve.rosbridge.session import Session
+
+if TYPE_CHECKING:
+    from throwcollect.ros.connection import Connection
+
+_logger = logging.getLogger(__name__)
+
+_LOOK_S = 1.0
+"""Time between two looks at the router and at what publishers offer."""
+_RETRY_S = 0.2
+_MISSES = 2
+"""Looks at the router in a row without an answer by which it has gone: a busy machine may let one of them wait."""
+
+
+class Bridge:
+    """Takes part in the ROS graph of one run for any number of clients.
+
+    Several bridges may live in one process, each in another run. On Fast DDS a process is in one run at a time.
+
+    Args:
+        connection: The way into the run; None while its router has no address, until `move` tells it.
+        find: Finds the files that clients name as ``package://NAME/PATH``, by these two.
+
+    Attributes:
+        files: What gives clients such files.
+    """
+
+    def __init__(self, connection: Connection | None, find: Callable[[str, str], Path] = find_mesh) -> None:
+        self.files = FileServer(find)
+        self._connection = connection
+        self._session: Session | None = None
+        self._joined: Connection | None = None
+        self._clients: list[Client] = []
+        self._work: SimpleQueue[Callable[[], None]] = SimpleQueue()
+        self._timers: list[tuple[float, int, Callable[[], None]]] = []
+        self._numbers = itertools.count()
+        self._lock = threading.Lock()
+        self._closing = threading.Event()
+        self._looked_at = 0.0
+        self._misses = 0
+        self._thread = threading.Thread(target=self._run, name="rosbridge", daemon=True)
+        self._thread.start()
+
+    def attach(self, send: Callable[[Frame], None], *, read_only: bool = False) -> Client:
+        """Have one more client.
+
+        Args:
+            send: Called with each frame for the client, in the bridge's thread: a text, or bytes for a binary frame. It
+                may neither wait nor fail.
+            read_only: Whether the client may only look.
+
+        Returns:
+            The client, which whoever calls this has to close.
+        """
+        client = Client(self, send, read_only=read_only)
+        self.submit(lambda: self._clients.append(client))
+        return client
+
+    def move(self, connection: Connection | None) -> None:
+        """Go on by another way into the run, as its router has got another address.
+
+        Args:
+            connection: The way by now; None while the router has no address.
+        """
+        self._connection = connection
+        self.submit(_nothing)
+
+    def close(self) -> None:
+        """End, and with it all that clients had."""
+        self._closing.set()
+        self.submit(_nothing)
+        self._thread.join()
+
+    @property
+    def is_connected(self) -> bool:
+        """Whether the bridge is in the graph of its run by now."""
+        return self._session is not None
+
+    @property
+    def session(self) -> Session:
+        """The place in the ROS graph, in the bridge's thread.
+
+        Raises:
+            ThrowcollectError: If there is no router.
+        """
+        if self._session is None:
+            raise ThrowcollectError("the router of the run does not answer")
+        return self._session
+
+    def later(self, seconds: float, action: Callable[[], None]) -> None:
+        """Have something done after a time [s]; in the bridge's thread alone."""
+        heapq.heappush(self._timers, (time.monotonic() + seconds, next(self._numbers), action))
+
+    def submit(self, action: Callable[[], None]) -> None:
+        """Have something done soon, in the bridge's thread."""
+        self._work.put(action)
+        with self._lock:
+            if self._session is not None:
+                self._session.executor.create_task(self._do_next)
+
+    def forget(self, client: Client) -> None:
+        """Know a client no longer."""
+        self._clients.remove(client)
+
+    def _run(self) -> None:
+        while not self._closing.is_set():
+            self._attempt(self._look)
+            self._call_timers()
+            wait_s = min(self._timers[0][0] - time.monotonic(), _LOOK_S) if self._timers else _LOOK_S
+            if self._session is not None:
+                self._spin(self._session, max(wait_s, 0.0))
+            else:
+                self._do_next(max(min(wait_s, _RETRY_S), 0.001))
+        for client in list(self._clients):
+            client.close()
+        while not self._work.empty():
+            self._do_next()
+        self._leave()
+
+    def _spin(self, session: Session, seconds: float) -> None:
+        try:
+            self._attempt(lambda: session.executor.spin_once(timeout_sec=seconds))
+        except ros.ExternalShutdownException:
+            # Somebody has ended all contexts of this process.
+            self._lose()
+
+    def _do_next(self, seconds: float = 0.0) -> None:
+        try:
+            action = self._work.get(timeout=seconds) if seconds else self._work.get_nowait()
+        except Empty:
+            return
+        self._attempt(action)
+
+    def _attempt(self, action: Callable[[], None]) -> None:
+        try:
+            action()
+        except ros.ExternalShutdownException:
+            raise
+        except Exception:
+            # Whatever becomes of one thing, the others go on.
+            _logger.exception("the bridge could not do something")
+
+    def _call_timers(self) -> None:
+        while self._timers and self._timers[0][0] <= time.monotonic():
+            self._attempt(heapq.heappop(self._timers)[2])
+
+    def _look(self) -> None:
+        """Join the run if its router answers, and notice when it does not any more."""
+        now = time.monotonic()
+        wait_s = _LOOK_S if self._session is not None else _RETRY_S
+        if now < self._looked_at + wait_s and self._joined == self._connection:
+            return
+        self._looked_at = now
+        wanted = self._connection
+        there = wanted is not None and answers(wanted.endpoint)
+        self._misses = 0 if there else self._misses + 1
+        if self._session is not None and (self._misses >= _MISSES or wanted != self._joined):
+            self._lose()
+        if self._session is None and wanted is not None and there:
+            self._join(wanted)
+        if self._session is not None:
+            self._session.look_around()
+
+    def _join(self, connection: Connection) -> None:
+        try:
+            session = Session(connection)
+        except ThrowcollectError as error:
+            _logger.warning("the bridge cannot join the run: %s", error)
+            return
+        with self._lock:
+            self._session = session
+        self._joined = connection
+        for client in self._clients:
+            client.restore()
+        while not self._work.empty():
+            self._do_next()
+
+    def _lose(self) -> None:
+        for client in self._clients:
+            client.lose()
+        self._leave()
+
+    def _leave(self) -> None:
+        with self._lock:
+            session, self._session = self._session, None
+        self._joined = None
+        if session is not None:
+            self._attempt(session.close)
+
+
+def _nothing() -> None:
+    """Work that only wakes the bridge."""

@@ -1,0 +1,103 @@
+"""Frames of the protocol: JSON in text frames, CBOR in binary ones, and messages in either.
+
+Numbers as rosbridge_suite writes them. In JSON, octets are Base64, and what is no finite number is null. In CBOR,
+octets are bytes and other arrays of numbers are typed arrays (RFC 8746), little endian.
+"""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import cbor2
+import numpy as np
+import orjson
+from numpy.typing import NDArray
+
+from throwcollect.errors import ConfigError
+from throwcollect.ros.values import plain
+from throwcollect.serve.rosbridge.request import Request
+
+Frame = str | bytes
+"""A text frame or a binary one."""
+
+_TAGS = {64: "u1", 69: "<u2", 70: "<u4", 71: "<u8", 72: "i1", 77: "<i2", 78: "<i4", 79: "<i8", 85: "<f4", 86: "<f8"}
+_TAG_OF = {np.dtype(kind): tag for tag, kind in _TAGS.items()}
+
+
+def read_frame(frame: Frame) -> Request:
+    """Read what a client sends.
+
+    Args:
+        frame: JSON, or CBOR in a binary frame.
+
+    Raises:
+        ConfigError: If it is neither, or no operation.
+    """
+    try:
+        # What JSON can begin with is no map in CBOR.
+        if isinstance(frame, str) or frame[:1].isspace() or frame[:1] == b"{":
+            fields = orjson.loads(frame)
+        else:
+            fields = cbor2.loads(frame, tag_hook=_read_array)
+    except (ValueError, EOFError, cbor2.CBORDecodeError, RecursionError) as error:
+        raise ConfigError(f"a frame is neither JSON nor CBOR: {error}") from error
+    if not isinstance(fields, Mapping):
+        raise ConfigError(f"a frame should be an object with an op, got {fields!r:.80}")
+    return Request(fields)
+
+
+def _read_array(tag: cbor2.CBORTag, _immutable: bool) -> Any:
+    """An array for a tag of one; other tags stay what they are."""
+    kind = _TAGS.get(tag.tag)
+    if kind is None or not isinstance(tag.value, bytes) or len(tag.value) % np.dtype(kind).itemsize:
+        return tag
+    return np.frombuffer(tag.value, kind)
+
+
+def json_values(message: Any) -> Any:
+    """A message as JSON has it; arrays of numbers are still NumPy's, which `json_text` writes."""
+    return plain(message, _json_numbers)
+
+
+def cbor_values(message: Any) -> Any:
+    """A message as CBOR has it."""
+    return plain(message, _cbor_numbers)
+
+
+def json_text(fields: object) -> str:
+    """JSON in one line."""
+    return orjson.dumps(fields, option=orjson.OPT_SERIALIZE_NUMPY).decode()
+
+
+def cbor_bytes(fields: object) -> bytes:
+    """CBOR."""
+    return bytes(cbor2.dumps(fields))
+
+
+def fragments(text: str, size: int, number: str) -> Iterator[str]:
+    """Parts of a text frame that is longer than a client wants.
+
+    Args:
+        text: The frame.
+        size: Characters in each part, at most.
+        number: What tells the parts of different frames apart.
+    """
+    total = -(-len(text) // size)
+    for index in range(total):
+        part = text[index * size : (index + 1) * size]
+        yield json_text({"op": "fragment", "id": number, "data": part, "num": index, "total": total})
+
+
+def _json_numbers(values: NDArray[Any], kind: str) -> Any:
+    if kind == "uint8":
+        return base64.b64encode(values.tobytes()).decode()
+    return np.ascontiguousarray(values)
+
+
+def _cbor_numbers(values: NDArray[Any], kind: str) -> Any:
+    if kind in ("uint8", "octet"):
+        return values.tobytes()
+    little = values.astype(values.dtype.newbyteorder("<"), copy=False)
+    return cbor2.CBORTag(_TAG_OF[little.dtype], little.tobytes())

@@ -1,0 +1,121 @@
+"""A subscription in ROS, and the samples that it gives to all clients that want them, each encoded once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import orjson
+
+from throwcollect import ros
+from throwcollect.ros.offered_qos import find_offered_qos
+from throwcollect.serve.rosbridge.codec import Frame, cbor_bytes, cbor_values, json_text, json_values
+
+NS_PER_S = 10**9
+
+
+class Sample:
+    """One message of a topic, as it came.
+
+    Args:
+        data: Its bytes in CDR.
+        message_type: Class of the message.
+        received_ns: Time of receipt on the node's clock [ns].
+    """
+
+    def __init__(self, data: bytes, message_type: Any, received_ns: int) -> None:
+        self._data = data
+        self._type = message_type
+        self._received_ns = received_ns
+        self._encoded: dict[str, Any] = {}
+        self._frames: dict[tuple[str, str], Frame] = {}
+
+    def frame(self, topic: str, compression: str) -> Frame:
+        """The message as a client gets it.
+
+        Args:
+            topic: The topic, by the name that the client has for it.
+            compression: ``none``, ``cbor`` or ``cbor-raw``.
+
+        Raises:
+            ValueError: If the bytes are malformed.
+        """
+        key = topic, compression
+        if key not in self._frames:
+            fields = {"op": "publish", "topic": topic, "msg": self._content(compression)}
+            self._frames[key] = json_text(fields) if compression == "none" else cbor_bytes(fields)
+        return self._frames[key]
+
+    def _content(self, compression: str) -> Any:
+        if compression == "cbor-raw":
+            secs, nsecs = divmod(self._received_ns, NS_PER_S)
+            return {"secs": secs, "nsecs": nsecs, "bytes": self._data}
+        if compression not in self._encoded:
+            message = ros.deserialize_message(self._data, self._type)
+            self._encoded[compression] = (
+                orjson.Fragment(json_text(json_values(message))) if compression == "none" else cbor_values(message)
+            )
+        return self._encoded[compression]
+
+
+Listener = Callable[[Sample], None]
+
+
+class Feed:
+    """Hears a topic for all clients that listen to it.
+
+    Args:
+        node: The node that hears it.
+        topic: Absolute name of the topic.
+        type_name: Full name of its type.
+        on_end: Called when nobody listens any more.
+    """
+
+    def __init__(self, node: ros.Node, topic: str, type_name: str, on_end: Callable[[], object]) -> None:
+        self._node = node
+        self._topic = topic
+        self._type = ros.get_message(type_name)
+        self._on_end = on_end
+        self._listeners: list[Listener] = []
+        self._offered = find_offered_qos(node, topic)
+        self._subscription: Any = None
+
+    @property
+    def is_latched(self) -> bool:
+        """Whether who joins late gets what was said before."""
+        return self._offered.durability == ros.DurabilityPolicy.TRANSIENT_LOCAL
+
+    def add(self, listener: Listener) -> None:
+        """Give the samples to somebody, too."""
+        self._listeners.append(listener)
+        if self._subscription is None:
+            self._subscribe()
+
+    def remove(self, listener: Listener) -> None:
+        """Give the samples to somebody no longer."""
+        self._listeners.remove(listener)
+        if not self._listeners:
+            self._node.destroy_subscription(self._subscription)
+            self._on_end()
+
+    def renew(self) -> None:
+        """Hear the topic as its publishers offer it by now."""
+        offered = find_offered_qos(self._node, self._topic)
+        if _terms(offered) != _terms(self._offered):
+            self._node.destroy_subscription(self._subscription)
+            self._offered = offered
+            self._subscribe()
+
+    def _subscribe(self) -> None:
+        self._subscription = self._node.create_subscription(
+            self._type, self._topic, self._hear, self._offered, raw=True
+        )
+
+    def _hear(self, data: bytes) -> None:
+        sample = Sample(bytes(data), self._type, self._node.get_clock().now().nanoseconds)
+        for listener in list(self._listeners):
+            listener(sample)
+
+
+def _terms(qos: ros.QoSProfile) -> tuple[object, object]:
+    return qos.reliability, qos.durability

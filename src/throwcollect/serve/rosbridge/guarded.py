@@ -1,0 +1,78 @@
+"""What nobody may hear or say over a bridge, because it would change or reveal what a run is made of."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from throwcollect.coordinator.simulation_client import EPISODE_TOPIC
+from throwcollect.errors import ConfigError
+from throwcollect.ros.names import absolute_name
+from throwcollect.trial.lease import LEASES
+
+_PARAMETER_EVENTS = "parameter_events"
+_PARAMETER_SERVICES = ("get_parameters", "set_parameters", "set_parameters_atomically")
+
+
+def is_guarded(topic: str) -> bool:
+    """Whether a topic is the coordinator's alone.
+
+    Args:
+        topic: Its absolute name.
+    """
+    return topic.rpartition("/")[2] in (EPISODE_TOPIC, _PARAMETER_EVENTS)
+
+
+def open_topic(given: str) -> str:
+    """Absolute name of a topic that a client may hear and publish.
+
+    Args:
+        given: Its name as the client has it.
+
+    Raises:
+        ConfigError: If it is no name, or a topic that a client may not have.
+    """
+    topic = absolute_name(given)
+    short = topic.rpartition("/")[2]
+    if short == EPISODE_TOPIC:
+        raise ConfigError(
+            f"{topic}: nobody but the coordinator may have this topic, as whoever is slow would hold the simulation up"
+        )
+    if short == _PARAMETER_EVENTS:
+        raise ConfigError(f"{topic}: nobody may have this topic, as it tells the signed leases of trials")
+    return topic
+
+
+def refuse_leases(parameter: str) -> None:
+    """Refuse to read or set the parameter by which trials are given.
+
+    Args:
+        parameter: Name of the parameter.
+
+    Raises:
+        ConfigError: If it is that one.
+    """
+    if parameter == LEASES:
+        raise ConfigError(f"{LEASES}: nobody but the coordinator may have this parameter, as its leases are signed")
+
+
+def refuse_secrets(service: str, arguments: object) -> None:
+    """Refuse to call a service of a node that would read or set the parameter by which trials are given.
+
+    Args:
+        service: Absolute name of the service.
+        arguments: What it would be called with.
+
+    Raises:
+        ConfigError: If it would.
+    """
+    if service.rpartition("/")[2] not in _PARAMETER_SERVICES or not isinstance(arguments, Mapping):
+        return
+    for each in [*_as_list(arguments.get("names")), *_as_list(arguments.get("parameters"))]:
+        name = each.get("name") if isinstance(each, Mapping) else each
+        if isinstance(name, str):
+            refuse_leases(name)
+
+
+def _as_list(value: object) -> list[Any]:
+    return value if isinstance(value, list) else []

@@ -1,0 +1,46 @@
+"""A client as those parts of it see it that do its operations."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Literal, Protocol
+
+from throwcollect.serve.rosbridge.codec import Frame
+from throwcollect.serve.rosbridge.request import Form, RequestId
+from throwcollect.serve.rosbridge.session import Session
+
+Level = Literal["info", "warning", "error"]
+"""How much a status message matters."""
+
+
+class Peer(Protocol):
+    """A client. All is done in the thread of the bridge."""
+
+    @property
+    def session(self) -> Session:
+        """The place of the bridge in the ROS graph."""
+
+    def later(self, seconds: float, action: Callable[[], None]) -> None:
+        """Have something done after a time [s]."""
+
+    def send(self, frame: Frame, fragment_size: int = 0) -> None:
+        """Send a frame, in parts if it is a text longer than ``fragment_size``, unless that is 0."""
+
+    def answer(self, fields: Mapping[str, object], form: Form) -> None:
+        """Send an operation; what is None is left out."""
+
+    def say(self, level: Level, text: str, request: RequestId = None) -> None:
+        """Send a status message about a request, unless the client does not want those of its level."""
+
+
+class Part(Protocol):
+    """A part of a client that has something in the ROS graph."""
+
+    def lose(self) -> None:
+        """Know that the session is gone, and all that it had."""
+
+    def restore(self) -> None:
+        """Have everything again, in a new session."""
+
+    def close(self) -> None:
+        """Withdraw everything."""

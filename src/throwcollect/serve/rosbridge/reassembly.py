@@ -1,0 +1,63 @@
+"""Frames that a client sends in parts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from throwcollect.errors import ConfigError
+from throwcollect.serve.rosbridge.request import Request, RequestId
+
+LONGEST_FRAME = 10 * 2**20
+"""Bytes of a frame that a client may send."""
+_MOST_PARTS = 100_000
+_OF_A_PART = 64
+"""Characters that count for a part besides its own."""
+
+
+@dataclass
+class _Unfinished:
+    total: int
+    parts: dict[int, str] = field(default_factory=dict)
+    size: int = 0
+
+
+class Reassembly:
+    """Parts of frames of one client that are not whole yet."""
+
+    def __init__(self) -> None:
+        self._frames: dict[RequestId, _Unfinished] = {}
+        self._size = 0
+
+    def add(self, request: Request) -> str | None:
+        """Take a part.
+
+        Returns:
+            The frame, if this was its last part.
+
+        Raises:
+            ConfigError: If it is no part of a frame, or the parts that wait for others are too long together. What is
+                there of the frame is dropped then.
+        """
+        number, total = request.natural_or("num", _MOST_PARTS), request.natural_or("total", 0)
+        data = request.any("data")
+        if request.id is None or not isinstance(data, str) or not number < total <= _MOST_PARTS:
+            raise ConfigError(
+                "fragment: should have an id, the text data, and num below total",
+                expected=f"at most {_MOST_PARTS} parts, counted from 0",
+            )
+        frame = self._frames.setdefault(request.id, _Unfinished(total))
+        if number not in frame.parts:
+            frame.parts[number] = data
+            frame.size += len(data) + _OF_A_PART
+            self._size += len(data) + _OF_A_PART
+        if frame.total != total or self._size > LONGEST_FRAME:
+            self._drop(request.id)
+            what = f"total is {total}, and was {frame.total}" if frame.total != total else "the parts are too long"
+            raise ConfigError(f"fragment: {what}", expected=f"at most {LONGEST_FRAME} characters together")
+        if len(frame.parts) < total:
+            return None
+        self._drop(request.id)
+        return "".join(frame.parts[index] for index in range(total))
+
+    def _drop(self, number: RequestId) -> None:
+        self._size -= self._frames.pop(number).size

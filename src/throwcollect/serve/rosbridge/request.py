@@ -1,0 +1,149 @@
+"""What a client asks: an operation with its fields, which are looked at as they are used."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from throwcollect.errors import ConfigError, ThrowcollectError
+
+COMPRESSIONS = ("none", "cbor", "cbor-raw")
+"""How messages are encoded that leave."""
+
+RequestId = str | int | None
+"""What a client calls a request by; None if it does not."""
+
+
+@dataclass(frozen=True)
+class Form:
+    """How something is sent to a client.
+
+    Attributes:
+        compression: ``none`` is JSON; all others are CBOR.
+        fragment_size: Characters in each part of a text frame; 0 leaves frames whole.
+    """
+
+    compression: str = "none"
+    fragment_size: int = 0
+
+
+_LONGEST = 200
+"""Characters of a name that cannot be right; it is told in messages."""
+
+
+class Fields:
+    """Fields by name, as a client gives them.
+
+    Args:
+        fields: The fields.
+        what: What they belong to; messages begin with it.
+    """
+
+    def __init__(self, fields: Mapping[Any, Any], what: str) -> None:
+        self._fields = fields
+        self._what = what
+
+    def text(self, name: str) -> str:
+        """A field that has to be there.
+
+        Raises:
+            ConfigError: If it is not, or is no text.
+        """
+        value = self._fields.get(name)
+        if not isinstance(value, str) or len(value) > _LONGEST:
+            raise self._wrong(name, "a text", value)
+        return value
+
+    def text_or(self, name: str, default: str) -> str:
+        """A field that may be left out.
+
+        Raises:
+            ConfigError: If it is no text.
+        """
+        return default if self._fields.get(name) is None else self.text(name)
+
+    def natural_or(self, name: str, default: int) -> int:
+        """A number from 0 on, which may be left out.
+
+        Raises:
+            ConfigError: If it is none.
+        """
+        value = self._fields.get(name)
+        if value is None:
+            return default
+        if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value < 1 << 53:
+            raise self._wrong(name, "a number from 0 on", value)
+        return int(value)
+
+    def seconds_or(self, name: str, default: float) -> float:
+        """A time [s] above 0, which may be left out.
+
+        Raises:
+            ConfigError: If it is none.
+        """
+        value = self._fields.get(name)
+        if value is None:
+            return default
+        if isinstance(value, bool) or not isinstance(value, int | float) or not value > 0:
+            raise self._wrong(name, "a time above 0 in seconds", value)
+        return float(value)
+
+    def flag(self, name: str, *, default: bool = False) -> bool:
+        """A truth value, which may be left out.
+
+        Raises:
+            ConfigError: If it is none.
+        """
+        value = self._fields.get(name)
+        if value is None:
+            return default
+        if not isinstance(value, bool):
+            raise self._wrong(name, "true or false", value)
+        return value
+
+    def any(self, name: str) -> Any:
+        """A field as it is; None if it was left out."""
+        return self._fields.get(name)
+
+    def _wrong(self, name: str, what: str, value: object) -> ConfigError:
+        got = "nothing" if value is None else f"{value!r:.80}"
+        return ConfigError(f"{self._what}: {name} should be {what}, got {got}")
+
+
+class Request(Fields):
+    """One operation of the protocol.
+
+    Args:
+        fields: Its fields.
+
+    Attributes:
+        op: Which operation.
+        id: What the client calls it by.
+
+    Raises:
+        ConfigError: If it does not say which operation.
+    """
+
+    def __init__(self, fields: Mapping[Any, Any]) -> None:
+        super().__init__(fields, "frame")
+        self.op = self.text("op")
+        self._what = self.op
+        given = fields.get("id")
+        self.id: RequestId = given if isinstance(given, str | int) else None
+
+    def form(self) -> Form:
+        """How messages are sent that leave because of this.
+
+        Raises:
+            ConfigError: If they cannot be sent like that.
+        """
+        compression = self.text_or("compression", "none")
+        if compression not in COMPRESSIONS:
+            raise ConfigError(f"{self.op}: no compression {compression}", expected="none, cbor or cbor-raw")
+        return Form(compression, self.natural_or("fragment_size", 0))
+
+
+def sentence(error: ThrowcollectError) -> str:
+    """What is wrong, and what would be right, in one line."""
+    return "; ".join(line.strip() for line in str(error).splitlines())

@@ -1,0 +1,184 @@
+"""The services of rosapi, by which clients look around in the ROS graph; the bridge answers them itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+
+from rclzenoh.interfaces import message_definition
+from throwcollect import ros
+from throwcollect.ros.names import absolute_name, full_name, is_hidden
+from throwcollect.serve.rosbridge.guarded import is_guarded
+from throwcollect.serve.rosbridge.peer import Peer
+from throwcollect.serve.rosbridge.questions import Questions
+from throwcollect.serve.rosbridge.rosapi_details import describe_message, describe_request, describe_response
+from throwcollect.serve.rosbridge.rosapi_parameters import Parameters
+from throwcollect.serve.rosbridge.service_calls import Call
+
+Answer = Callable[[Call], None]
+Values = Mapping[str, object]
+NamesAndTypes = Iterable[tuple[str, list[str]]]
+
+SET_PARAMETER = "rosapi/set_param"
+"""The service that changes something."""
+NS_PER_S = 10**9
+
+
+class Rosapi:
+    """The services of rosapi for one client. What ROS hides, they leave out, and what nobody may hear.
+
+    Args:
+        client: The client.
+        questions: What of the client waits for answers of nodes.
+
+    Attributes:
+        answers: What answers each service, by its name without a slash at its beginning.
+    """
+
+    def __init__(self, client: Peer, questions: Questions) -> None:
+        self._client = client
+        at_once: Mapping[str, Callable[[Call], Values]] = {
+            "topics": self._list_topics,
+            "topics_and_raw_types": self._list_topics_and_definitions,
+            "topics_for_type": self._list_topics_of_type,
+            "topic_type": self._find_topic_type,
+            "publishers": self._list_publishers,
+            "subscribers": self._list_subscribers,
+            "services": self._list_services,
+            "services_for_type": self._list_services_of_type,
+            "service_type": self._find_service_type,
+            "service_providers": self._list_providers,
+            "service_node": self._find_provider,
+            "action_servers": self._list_actions,
+            "nodes": self._list_nodes,
+            "node_details": self._describe_node,
+            "message_details": lambda call: {"typedefs": describe_message(call.fields.text("type"))},
+            "service_request_details": lambda call: {"typedefs": describe_request(call.fields.text("type"))},
+            "service_response_details": lambda call: {"typedefs": describe_response(call.fields.text("type"))},
+            "get_time": self._tell_time,
+            "get_ros_version": lambda _: {"version": 2, "distro": "jazzy"},
+        }
+        parameters = Parameters(client, questions)
+        later: Mapping[str, Answer] = {
+            "get_param": parameters.get,
+            "set_param": parameters.set,
+            "has_param": parameters.has,
+            "get_param_names": parameters.list_all,
+            "delete_param": parameters.delete,
+        }
+        self.answers: Mapping[str, Answer] = {
+            **{f"rosapi/{name}": _reply_with(answer) for name, answer in at_once.items()},
+            **{f"rosapi/{name}": answer for name, answer in later.items()},
+        }
+
+    @property
+    def _node(self) -> ros.Node:
+        return self._client.session.node
+
+    def _topics(self) -> dict[str, str]:
+        """Types of the topics that a client may hear."""
+        topics = _visible(self._node.get_topic_names_and_types())
+        return {name: types[0] for name, types in topics if not is_guarded(name)}
+
+    def _services(self) -> dict[str, str]:
+        return {name: types[0] for name, types in _visible(self._node.get_service_names_and_types())}
+
+    def _nodes(self) -> list[tuple[str, str]]:
+        """Names and namespaces."""
+        found = sorted(set(self._node.get_node_names_and_namespaces()))
+        return [(name, namespace) for name, namespace in found if not is_hidden(_join(namespace, name))]
+
+    def _list_topics(self, _call: Call) -> Values:
+        topics = self._topics()
+        return {"topics": list(topics), "types": list(topics.values())}
+
+    def _list_topics_and_definitions(self, call: Call) -> Values:
+        texts = [_definition(type_name) for type_name in self._topics().values()]
+        return {**self._list_topics(call), "typedefs_full_text": texts}
+
+    def _list_topics_of_type(self, call: Call) -> Values:
+        wanted = full_name("msg", call.fields.text("type"))
+        return {"topics": [name for name, type_name in self._topics().items() if type_name == wanted]}
+
+    def _find_topic_type(self, call: Call) -> Values:
+        return {"type": self._topics().get(absolute_name(call.fields.text("topic")), "")}
+
+    def _list_publishers(self, call: Call) -> Values:
+        infos = self._node.get_publishers_info_by_topic(absolute_name(call.fields.text("topic")))
+        return {"publishers": _names(infos)}
+
+    def _list_subscribers(self, call: Call) -> Values:
+        infos = self._node.get_subscriptions_info_by_topic(absolute_name(call.fields.text("topic")))
+        return {"subscribers": _names(infos)}
+
+    def _list_services(self, _call: Call) -> Values:
+        return {"services": list(self._services())}
+
+    def _list_services_of_type(self, call: Call) -> Values:
+        wanted = full_name("srv", call.fields.text("type"))
+        return {"services": [name for name, type_name in self._services().items() if type_name == wanted]}
+
+    def _find_service_type(self, call: Call) -> Values:
+        return {"type": self._services().get(absolute_name(call.fields.text("service")), "")}
+
+    def _providers(self, call: Call) -> list[str]:
+        service = absolute_name(call.fields.text("service"))
+        return [
+            _join(namespace, name)
+            for name, namespace in self._nodes()
+            if service in dict(self._node.get_service_names_and_types_by_node(name, namespace))
+        ]
+
+    def _list_providers(self, call: Call) -> Values:
+        return {"providers": self._providers(call)}
+
+    def _find_provider(self, call: Call) -> Values:
+        return {"node": next(iter(self._providers(call)), "")}
+
+    def _list_actions(self, _call: Call) -> Values:
+        actions = [name for name, _ in _visible(ros.get_action_names_and_types(self._node))]
+        offered = dict(self._node.get_service_names_and_types())
+        return {"action_servers": [name for name in actions if f"{name}/_action/send_goal" in offered]}
+
+    def _list_nodes(self, _call: Call) -> Values:
+        return {"nodes": [_join(namespace, name) for name, namespace in self._nodes()]}
+
+    def _describe_node(self, call: Call) -> Values:
+        namespace, _, name = absolute_name(call.fields.text("node")).rpartition("/")
+        owner = (name, namespace or "/")
+        if owner not in self._nodes():
+            # As rosapi does: whoever asks for all nodes, one after the other, should not stumble over one that ended.
+            return {"subscribing": [], "publishing": [], "services": []}
+        return {
+            "subscribing": [each for each, _ in _visible(self._node.get_subscriber_names_and_types_by_node(*owner))],
+            "publishing": [each for each, _ in _visible(self._node.get_publisher_names_and_types_by_node(*owner))],
+            "services": [each for each, _ in _visible(self._node.get_service_names_and_types_by_node(*owner))],
+        }
+
+    def _tell_time(self, _call: Call) -> Values:
+        seconds, nanoseconds = divmod(self._node.get_clock().now().nanoseconds, NS_PER_S)
+        return {"time": {"sec": seconds, "nanosec": nanoseconds}}
+
+
+def _reply_with(answer: Callable[[Call], Values]) -> Answer:
+    return lambda call: call.reply(answer(call))
+
+
+def _visible(found: NamesAndTypes) -> list[tuple[str, list[str]]]:
+    return sorted((name, types) for name, types in found if not is_hidden(name))
+
+
+def _join(namespace: str, name: str) -> str:
+    return f"{namespace.removesuffix('/')}/{name}"
+
+
+def _names(infos: Iterable[object]) -> list[str]:
+    names = {_join(info.node_namespace, info.node_name) for info in infos}  # type: ignore[attr-defined]
+    return sorted(name for name in names if not is_hidden(name))
+
+
+def _definition(type_name: str) -> str:
+    """Definition of a message as rosbag2 stores it; empty for one that is installed with ROS alone."""
+    try:
+        return message_definition(type_name)
+    except ValueError:
+        return ""

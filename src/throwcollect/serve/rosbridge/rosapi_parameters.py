@@ -1,0 +1,176 @@
+"""Parameters of nodes as rosapi reads and sets them: ``/node:parameter``, with values in JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import orjson
+
+from throwcollect import ros
+from throwcollect.errors import ConfigError
+from throwcollect.ros.names import absolute_name, is_hidden
+from throwcollect.ros.values import plain
+from throwcollect.serve.rosbridge.codec import json_text
+from throwcollect.serve.rosbridge.guarded import refuse_leases
+from throwcollect.serve.rosbridge.peer import Peer
+from throwcollect.serve.rosbridge.questions import Questions
+from throwcollect.serve.rosbridge.request import sentence
+from throwcollect.serve.rosbridge.service_calls import Call
+
+_TIMEOUT_S = 5.0
+_NOT_SET = 0
+"""Of rcl_interfaces/msg/ParameterType."""
+
+
+class Parameters:
+    """The services of rosapi for parameters, for one client.
+
+    Args:
+        client: The client.
+        questions: What of the client waits for answers of nodes.
+    """
+
+    def __init__(self, client: Peer, questions: Questions) -> None:
+        self._client = client
+        self._questions = questions
+
+    def get(self, call: Call) -> None:
+        """Answer with the value of a parameter, or the default that the client gives.
+
+        Raises:
+            ConfigError: If it is no name of a parameter, or one that nobody may read.
+        """
+        default = call.fields.text_or("default_value", "")
+
+        def answer(value: Any) -> None:
+            if value.type != _NOT_SET:
+                call.reply({"value": json_text(plain(ros.parameter_value_to_python(value)))})
+            elif default:
+                call.reply({"value": default})
+            else:
+                call.fail(f"{call.fields.text('name')}: the node has no such parameter")
+
+        self._get(call, answer)
+
+    def has(self, call: Call) -> None:
+        """Answer whether there is a parameter.
+
+        Raises:
+            ConfigError: If it is no name of a parameter, or one that nobody may read.
+        """
+        self._get(call, lambda value: call.reply({"exists": value.type != _NOT_SET}))
+
+    def set(self, call: Call) -> None:
+        """Set a parameter.
+
+        Raises:
+            ConfigError: If it is no name of a parameter, one that nobody may set, or its value is no JSON.
+        """
+        node, name = _read_name(call)
+        try:
+            wanted = orjson.loads(call.fields.text("value"))
+            ros.Parameter(name, value=wanted)
+        except (TypeError, ValueError) as error:
+            raise ConfigError(f"{call.given}: value should be that of a parameter in JSON: {error}") from error
+
+        def answer(response: Any) -> None:
+            (result,) = response.results
+            if result.successful:
+                call.reply({"successful": True, "reason": result.reason})
+            else:
+                call.fail(f"{node}:{name}: {result.reason}")
+
+        def set_as(current: Any) -> None:
+            # JavaScript writes 1.0 as 1.
+            value = _as_floats(wanted) if isinstance(_first(ros.parameter_value_to_python(current)), float) else wanted
+            request = ros.get_service("rcl_interfaces/srv/SetParameters").Request()
+            request.parameters = [ros.Parameter(name, value=value).to_parameter_msg()]
+            try:
+                self._ask(call, node, "set_parameters", "SetParameters", request, answer)
+            except ConfigError as error:
+                call.fail(sentence(error))
+
+        self._get(call, set_as)
+
+    def delete(self, call: Call) -> None:
+        """Answer that parameters of nodes cannot be deleted."""
+        call.fail(f"{call.given}: parameters of nodes cannot be deleted")
+
+    def list_all(self, call: Call) -> None:
+        """Answer with the names of the parameters of all nodes that tell them."""
+        session = self._client.session
+        offered = dict(session.node.get_service_names_and_types())
+        nodes = [
+            service.rpartition("/")[0]
+            for service, types in sorted(offered.items())
+            if "rcl_interfaces/srv/ListParameters" in types and not is_hidden(service)
+        ]
+        found: list[str] = []
+        left = len(nodes)
+
+        def finish(node: str, response: Any) -> None:
+            nonlocal left
+            left -= 1
+            if response is not None:
+                found.extend(f"{node}:{name}" for name in response.result.names)
+            if left == 0:
+                call.reply({"names": sorted(found)})
+
+        if not nodes:
+            call.reply({"names": []})
+        for node in nodes:
+            self._questions.ask(
+                f"{node}/list_parameters",
+                "rcl_interfaces/srv/ListParameters",
+                ros.get_service("rcl_interfaces/srv/ListParameters").Request(),
+                partial(finish, node),
+                lambda _, node=node: finish(node, None),  # type: ignore[misc]
+                _TIMEOUT_S,
+            )
+
+    def _get(self, call: Call, answer: Callable[[Any], None]) -> None:
+        node, name = _read_name(call)
+        request = ros.get_service("rcl_interfaces/srv/GetParameters").Request(names=[name])
+        unset = ros.get_message("rcl_interfaces/msg/ParameterValue")()
+        self._ask(
+            call,
+            node,
+            "get_parameters",
+            "GetParameters",
+            request,
+            lambda response: answer(response.values[0] if response.values else unset),
+        )
+
+    def _ask(self, call: Call, node: str, service: str, kind: str, request: Any, answer: Callable[[Any], None]) -> None:
+        path = f"{node}/{service}"
+        if path not in dict(self._client.session.node.get_service_names_and_types()):
+            raise ConfigError(f"{node}: there is no such node, or it tells nobody of its parameters")
+        self._questions.ask(path, f"rcl_interfaces/srv/{kind}", request, answer, call.fail, _TIMEOUT_S)
+
+
+def _read_name(call: Call) -> tuple[str, str]:
+    """Node and name of a parameter.
+
+    Raises:
+        ConfigError: If it is no name of a parameter, or one that nobody may have.
+    """
+    given = call.fields.text("name")
+    node, separator, name = given.partition(":")
+    if not (separator and name):
+        raise ConfigError(
+            f"{given!r} is no name of a parameter", expected="node:parameter, such as /sim_0:ball.mass_kg"
+        )
+    refuse_leases(name)
+    return absolute_name(node), name
+
+
+def _first(value: Any) -> Any:
+    return next(iter(value), None) if isinstance(value, list | tuple) or hasattr(value, "tolist") else value
+
+
+def _as_floats(value: Any) -> Any:
+    if isinstance(value, list):
+        return [_as_floats(each) for each in value]
+    return float(value) if isinstance(value, int) and not isinstance(value, bool) else value

@@ -1,0 +1,99 @@
+"""Calls of services by a client: how they are answered, and those of services that nodes have."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from throwcollect import ros
+from throwcollect.errors import ConfigError
+from throwcollect.ros.names import absolute_name, find_interface, full_name
+from throwcollect.ros.values import fill
+from throwcollect.serve.rosbridge.codec import cbor_values, json_values
+from throwcollect.serve.rosbridge.guarded import refuse_secrets
+from throwcollect.serve.rosbridge.peer import Peer
+from throwcollect.serve.rosbridge.questions import Questions
+from throwcollect.serve.rosbridge.request import Fields, Form, Request
+
+
+class Call:
+    """One call, which is answered once.
+
+    Args:
+        client: Who calls.
+        request: What it asks.
+
+    Attributes:
+        given: Name of the service as the client has it.
+        arguments: Fields of the service's request, by name or in their order.
+        form: How the answer is sent.
+
+    Raises:
+        ConfigError: If the request does not say which service.
+    """
+
+    def __init__(self, client: Peer, request: Request) -> None:
+        self._client = client
+        self._id = request.id
+        self.given = request.text("service")
+        self.arguments: Any = request.any("args")
+        self.form = Form()
+
+    @property
+    def fields(self) -> Fields:
+        """Fields of the service's request, by name."""
+        return Fields(self.arguments if isinstance(self.arguments, Mapping) else {}, self.given)
+
+    def reply(self, values: object) -> None:
+        """Answer with the fields of the response."""
+        self._answer(values, done=True)
+
+    def fail(self, why: str) -> None:
+        """Answer that the call has failed."""
+        self._answer(why, done=False)
+
+    def _answer(self, values: object, *, done: bool) -> None:
+        fields = {"op": "service_response", "id": self._id, "service": self.given, "values": values, "result": done}
+        self._client.answer(fields, self.form)
+
+
+def call_node(client: Peer, questions: Questions, call: Call, request: Request) -> None:
+    """Call a service that a node has.
+
+    Args:
+        client: Who calls.
+        questions: What of the client waits for answers of nodes.
+        call: What is to be answered.
+        request: What the client asks.
+
+    Raises:
+        ConfigError: If there is no such service, or it cannot be called like this.
+    """
+    service = absolute_name(call.given)
+    refuse_secrets(service, call.arguments)
+    there = dict(client.session.node.get_service_names_and_types()).get(service, [])
+    if not there:
+        raise ConfigError(f"nobody offers a service {service}")
+    wanted = full_name("srv", request.text_or("type", ""))
+    type_name = wanted if wanted in there else there[0]
+    message = find_interface("srv", ros.get_service, type_name).Request()
+    _fill_arguments(message, call.arguments)
+
+    def reply(response: Any) -> None:
+        call.reply(json_values(response) if call.form.compression == "none" else cbor_values(response))
+
+    questions.ask(service, type_name, message, reply, call.fail, request.seconds_or("timeout", float("inf")))
+
+
+def _fill_arguments(message: Any, arguments: object) -> None:
+    """Set the fields of a request from a mapping, or from a list in their order.
+
+    Raises:
+        ConfigError: If they cannot have these values.
+    """
+    if isinstance(arguments, list):
+        names = list(message.get_fields_and_field_types())
+        if len(arguments) > len(names):
+            raise ConfigError(f"{len(arguments)} arguments are too many", expected=f"at most {len(names)}")
+        arguments = dict(zip(names, arguments, strict=False))
+    fill(message, {} if arguments is None else arguments)

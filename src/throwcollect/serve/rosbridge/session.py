@@ -1,0 +1,129 @@
+"""The place of a bridge in the ROS graph while there is a router: a node, and what all clients share of it."""
+
+from __future__ import annotations
+
+import itertools
+import os
+from typing import TYPE_CHECKING, Any
+
+from throwcollect import ros
+from throwcollect.errors import ConfigError
+from throwcollect.ros.names import find_interface, full_name
+from throwcollect.serve.rosbridge.feed import Feed, Listener
+
+if TYPE_CHECKING:
+    from throwcollect.ros.connection import Connection
+
+
+_numbers = itertools.count()
+
+
+class Session:
+    """A context, a node in it, and its executor; of one thread.
+
+    Args:
+        connection: The way into the graph.
+
+    Attributes:
+        node: The node, which is hidden.
+        executor: Its executor.
+
+    Raises:
+        ConfigError: If the connection cannot be used.
+        ThrowcollectError: If there is no router.
+    """
+
+    def __init__(self, connection: Connection) -> None:
+        self._context = ros.Context()
+        ros.init(context=self._context, connection=connection)
+        self.node = ros.Node(
+            f"_throwcollect_bridge_{os.getpid()}_{next(_numbers)}",
+            context=self._context,
+            enable_rosout=False,
+            start_parameter_services=False,
+        )
+        ros.let_callbacks_wait(self.node)
+        self.executor = ros.SingleThreadedExecutor(context=self._context)
+        self.executor.add_node(self.node)
+        self._feeds: dict[tuple[str, str, object], Feed] = {}
+        self._clients: dict[tuple[str, str], Any] = {}
+        self._changes: int | None = None
+
+    def close(self) -> None:
+        """Leave the graph."""
+        try:
+            self.executor.shutdown()
+            self.node.destroy_node()
+        finally:
+            ros.shutdown(context=self._context)
+
+    def type_of(self, topic: str, wanted: str) -> str:
+        """Full name of the type of a topic.
+
+        Args:
+            topic: Absolute name of the topic.
+            wanted: Type that a client names, in full or as ``pkg/Type``; empty if it does not.
+
+        Raises:
+            ConfigError: If the topic has another type, or none is named and it has none or several.
+        """
+        there = dict(self.node.get_topic_names_and_types()).get(topic, [])
+        if not wanted:
+            if len(there) != 1:
+                what = f"has {len(there)} types" if there else "is published by nobody, and no type is named"
+                raise ConfigError(f"{topic} {what}", expected=f"one of {', '.join(there)}" if there else "a type")
+            return there[0]
+        name = full_name("msg", wanted)
+        find_interface("msg", ros.get_message, name)
+        if there and name not in there:
+            raise ConfigError(f"{topic} is no {name}", expected=", ".join(there))
+        return name
+
+    def listen(self, topic: str, type_name: str, listener: Listener) -> Feed:
+        """Have the messages of a topic from now on; a latched topic begins with what was said before.
+
+        Args:
+            topic: Absolute name of the topic.
+            type_name: Full name of its type.
+            listener: Called with each sample.
+        """
+        # Of a latched topic, whoever comes later gets what was said before from ROS alone.
+        alone = (topic, type_name, listener)
+        shared = (topic, type_name, None)
+        feed = self._feeds.get(shared)
+        if feed is None or feed.is_latched:
+            key = shared if feed is None else alone
+            feed = self._feeds[key] = Feed(self.node, topic, type_name, lambda: self._feeds.pop(key, None))
+        feed.add(listener)
+        return feed
+
+    def service_client(self, service: str, type_name: str) -> Any:
+        """A client of a service, which all share.
+
+        Args:
+            service: Absolute name of the service.
+            type_name: Full name of its type.
+
+        Raises:
+            ConfigError: If there is no such type.
+        """
+        key = service, type_name
+        if key not in self._clients:
+            self._clients[key] = self.node.create_client(find_interface("srv", ros.get_service, type_name), service)
+        return self._clients[key]
+
+    def is_offered_by_others(self, service: str) -> bool:
+        """Whether another node than that of the bridge offers a service, given by its absolute name."""
+        return any(
+            service in dict(self.node.get_service_names_and_types_by_node(*other))
+            for other in self.node.get_node_names_and_namespaces()
+            if other[0] != self.node.get_name()
+        )
+
+    def look_around(self) -> None:
+        """Hear topics as their publishers offer them by now."""
+        changes = ros.graph_changes(self.node)
+        if changes != self._changes:
+            self._changes = changes
+            for feed in list(self._feeds.values()):
+                feed.renew()

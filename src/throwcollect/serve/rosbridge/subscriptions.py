@@ -1,0 +1,215 @@
+"""What one client hears: its subscriptions to topics, at the rate and in the form that it wants."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from throwcollect.errors import ConfigError
+from throwcollect.serve.rosbridge.feed import Feed, Sample
+from throwcollect.serve.rosbridge.guarded import open_topic
+from throwcollect.serve.rosbridge.peer import Peer
+from throwcollect.serve.rosbridge.request import COMPRESSIONS, Form, Request
+
+
+@dataclass(frozen=True)
+class Wish:
+    """How one subscription of a client wants a topic.
+
+    Attributes:
+        throttle_s: Least time between two messages [s].
+        queue_length: Messages that wait for their time; those that find no place are left out.
+        form: How messages are sent.
+    """
+
+    throttle_s: float = 0.0
+    queue_length: int = 0
+    form: Form = field(default_factory=Form)
+
+
+class Pace:
+    """Lets samples through at the rate that a client wants.
+
+    Args:
+        send: Takes a sample that is let through.
+        later: Has something done after a time.
+    """
+
+    def __init__(self, send: Callable[[Sample], None], later: Callable[[float, Callable[[], None]], None]) -> None:
+        self._send = send
+        self._later = later
+        self._queue: deque[Sample] = deque()
+        self._wish = Wish()
+        self._due = 0.0
+        self._waits = False
+
+    def change(self, wish: Wish) -> None:
+        """Go by another wish from now on."""
+        self._wish = wish
+        self._queue = deque(self._queue, maxlen=wish.queue_length)
+        self._due = min(self._due, time.monotonic() + wish.throttle_s)
+
+    def offer(self, sample: Sample) -> None:
+        """Send a sample, keep it until its time has come, or leave it out."""
+        now = time.monotonic()
+        if now >= self._due and not self._queue:
+            self._let_through(sample, now)
+        elif self._wish.queue_length:
+            self._queue.append(sample)
+            self._wait(now)
+
+    def _let_through(self, sample: Sample, now: float) -> None:
+        # Of what waits, the times are evenly spread, however late each of them is.
+        is_late = now - self._due < self._wish.throttle_s and self._wish.queue_length
+        self._due = (self._due if is_late else now) + self._wish.throttle_s
+        self._send(sample)
+
+    def _wait(self, now: float) -> None:
+        if not self._waits:
+            self._waits = True
+            self._later(max(self._due - now, 0.0), self._continue)
+
+    def _continue(self) -> None:
+        self._waits = False
+        if self._queue:
+            now = time.monotonic()
+            self._let_through(self._queue.popleft(), now)
+            if self._queue:
+                self._wait(now)
+
+
+class Subscription:
+    """A topic that a client hears, by whatever number of subscriptions of its own.
+
+    Args:
+        client: The client.
+        given: Its name for the topic.
+        type_name: Full name of the type.
+    """
+
+    def __init__(self, client: Peer, given: str, type_name: str) -> None:
+        self._client = client
+        self._given = given
+        self._topic = open_topic(given)
+        self.type_name = type_name
+        self.wishes: dict[object, Wish] = {}
+        self._merged = Wish()
+        self._feed: Feed | None = None
+        self._pace = Pace(self._send, client.later)
+
+    def want(self, name: object, wish: Wish) -> None:
+        """Take account of one subscription of the client."""
+        self.wishes[name] = wish
+        self._merge()
+
+    def leave(self, name: object) -> None:
+        """Take no account of one subscription any more."""
+        del self.wishes[name]
+        if self.wishes:
+            self._merge()
+
+    def open(self) -> None:
+        """Begin to hear."""
+        self._feed = self._client.session.listen(self._topic, self.type_name, self._pace.offer)
+
+    def forget(self) -> None:
+        """Know that the session is gone."""
+        self._feed = None
+
+    def close(self) -> None:
+        """Hear no more."""
+        if self._feed is not None:
+            self._feed.remove(self._pace.offer)
+            self._feed = None
+
+    def _merge(self) -> None:
+        wishes = self.wishes.values()
+        self._merged = Wish(
+            min(wish.throttle_s for wish in wishes),
+            max(wish.queue_length for wish in wishes),
+            Form(
+                max((wish.form.compression for wish in wishes), key=COMPRESSIONS.index),
+                min((wish.form.fragment_size for wish in wishes if wish.form.fragment_size), default=0),
+            ),
+        )
+        self._pace.change(self._merged)
+
+    def _send(self, sample: Sample) -> None:
+        try:
+            frame = sample.frame(self._given, self._merged.form.compression)
+        except ValueError as error:
+            self._client.say("error", f"{self._topic}: a message cannot be read: {error}")
+            return
+        self._client.send(frame, self._merged.form.fragment_size)
+
+
+class Subscriptions:
+    """All topics that a client hears.
+
+    Args:
+        client: The client.
+    """
+
+    def __init__(self, client: Peer) -> None:
+        self._client = client
+        self._by_name: dict[str, Subscription] = {}
+
+    def subscribe(self, request: Request) -> None:
+        """Hear a topic.
+
+        Raises:
+            ConfigError: If there is no such topic, it has another type, or nobody may hear it.
+        """
+        given, wanted = request.text("topic"), request.text_or("type", "")
+        topic = open_topic(given)
+        wish = Wish(
+            request.natural_or("throttle_rate", 0) / 1000,
+            request.natural_or("queue_length", 0),
+            request.form(),
+        )
+        type_name = self._client.session.type_of(topic, wanted)
+        subscription = self._by_name.get(given)
+        if subscription is not None and subscription.type_name != type_name:
+            raise ConfigError(f"subscribe: {given} is heard as {subscription.type_name} already", expected="that type")
+        if subscription is None:
+            subscription = Subscription(self._client, given, type_name)
+            subscription.want(request.id, wish)
+            subscription.open()
+            self._by_name[given] = subscription
+        else:
+            subscription.want(request.id, wish)
+
+    def unsubscribe(self, request: Request) -> None:
+        """End one subscription to a topic, or all if none is named.
+
+        Raises:
+            ConfigError: If there is none.
+        """
+        given = request.text("topic")
+        subscription = self._by_name.get(given)
+        if subscription is None or (request.id is not None and request.id not in subscription.wishes):
+            which = "" if request.id is None else f" with the id {request.id}"
+            raise ConfigError(f"unsubscribe: there is no subscription to {given}{which}")
+        for name in list(subscription.wishes) if request.id is None else [request.id]:
+            subscription.leave(name)
+        if not subscription.wishes:
+            subscription.close()
+            del self._by_name[given]
+
+    def lose(self) -> None:
+        """Know that the session is gone, and all that it had."""
+        for subscription in self._by_name.values():
+            subscription.forget()
+
+    def restore(self) -> None:
+        """Hear everything again, in a new session."""
+        for subscription in self._by_name.values():
+            subscription.open()
+
+    def close(self) -> None:
+        """Hear nothing more."""
+        for subscription in self._by_name.values():
+            subscription.close()
+        self._by_name.clear()

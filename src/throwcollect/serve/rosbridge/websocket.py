@@ -1,0 +1,124 @@
+"""A bridge over WebSockets of Starlette."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections import deque
+from contextlib import suppress
+
+from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
+
+from throwcollect.serve.rosbridge.bridge import Bridge
+from throwcollect.serve.rosbridge.client import Client
+from throwcollect.serve.rosbridge.codec import Frame, json_text
+from throwcollect.serve.rosbridge.reassembly import LONGEST_FRAME
+
+MOST_FRAMES = 1000
+MOST_BYTES = 32 * 2**20
+"""What waits for a client that reads slowly; more than either, and the oldest is dropped."""
+
+_MOST_WAITING = 100
+_POLL_S = 0.01
+_TOO_BIG = 1009
+_DROPPED = json_text(
+    {
+        "op": "status",
+        "level": "warning",
+        "msg": "frames come faster than they are read, so the oldest are dropped; throttle_rate asks for fewer",
+    }
+)
+
+
+class Outbox:
+    """Frames that wait to be sent; filled in any thread, emptied in that of an event loop.
+
+    Args:
+        loop: The event loop.
+    """
+
+    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
+        self._loop = loop
+        self._lock = threading.Lock()
+        self._frames: deque[Frame] = deque()
+        self._bytes = 0
+        self._is_told = False
+        self._filled = asyncio.Event()
+
+    def put(self, frame: Frame) -> None:
+        """Have a frame sent; what has waited longest is dropped if too much waits."""
+        with self._lock:
+            was_empty = not self._frames
+            self._append(frame)
+            while len(self._frames) > MOST_FRAMES or (self._bytes > MOST_BYTES and len(self._frames) > 1):
+                self._bytes -= len(self._frames.popleft())
+                if not self._is_told:
+                    self._is_told = True
+                    self._append(_DROPPED)
+        if was_empty:
+            # The loop may have ended, and with it the client.
+            with suppress(RuntimeError):
+                self._loop.call_soon_threadsafe(self._filled.set)
+
+    async def take(self) -> Frame:
+        """The frame that has waited longest, as soon as there is one."""
+        while True:
+            with self._lock:
+                if self._frames:
+                    frame = self._frames.popleft()
+                    self._bytes -= len(frame)
+                    return frame
+                self._filled.clear()
+            await self._filled.wait()
+
+    def _append(self, frame: Frame) -> None:
+        self._frames.append(frame)
+        self._bytes += len(frame)
+
+
+async def attend(websocket: WebSocket, bridge: Bridge, *, read_only: bool = False) -> None:
+    """Have somebody at the other end of a WebSocket be a client of a bridge, until he leaves.
+
+    Args:
+        websocket: The WebSocket; it is accepted if it is not yet.
+        bridge: The bridge.
+        read_only: Whether he may only look.
+    """
+    if websocket.application_state == WebSocketState.CONNECTING:
+        await websocket.accept()
+    outbox = Outbox(asyncio.get_running_loop())
+    client = bridge.attach(outbox.put, read_only=read_only)
+    sending = asyncio.create_task(_send_all(websocket, outbox))
+    try:
+        await _receive_all(websocket, client)
+    finally:
+        client.close()
+        sending.cancel()
+        with suppress(asyncio.CancelledError):
+            await sending
+
+
+async def _receive_all(websocket: WebSocket, client: Client) -> None:
+    while True:
+        message = await websocket.receive()
+        if message["type"] == "websocket.disconnect":
+            return
+        text: str | None = message.get("text")
+        frame: Frame = message["bytes"] if text is None else text
+        if len(frame) > LONGEST_FRAME or (text is not None and len(text.encode()) > LONGEST_FRAME):
+            await websocket.close(_TOO_BIG, "a frame is longer than 10 MiB")
+            return
+        client.receive(frame)
+        while client.waiting > _MOST_WAITING:
+            await asyncio.sleep(_POLL_S)
+
+
+async def _send_all(websocket: WebSocket, outbox: Outbox) -> None:
+    # Whoever leaves is noticed where frames are received.
+    with suppress(WebSocketDisconnect, RuntimeError):
+        while True:
+            frame = await outbox.take()
+            if isinstance(frame, str):
+                await websocket.send_text(frame)
+            else:
+                await websocket.send_bytes(frame)

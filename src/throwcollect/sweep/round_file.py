@@ -1,0 +1,107 @@
+"""Rounds that a plan has got since its file was written; they lie beside it until it is written again, as a whole.
+
+The file ``plan.rounds.part`` has a line of JSON for each round, so adding one costs the same however long the plan is.
+A line that has no end was being written when its writer was killed, and none of its trials has begun by then.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+
+from throwcollect.errors import DatasetError
+from throwcollect.files import is_there, open_regular, sync_directory, unreadable, unwritable, write_all
+from throwcollect.sweep.digest import is_digest
+from throwcollect.sweep.trials import DIGEST_BYTES, Trials
+
+
+def rounds_path(plan: Path) -> Path:
+    """Where the rounds lie that the file of a plan does not have yet."""
+    return plan.with_name(f"{plan.stem}.rounds.part")
+
+
+def append_round(plan: Path, trials: Trials) -> None:
+    """Add a round to a plan on disk, whole or not at all; it survives a power cut from when this returns.
+
+    Args:
+        plan: File of the plan.
+        trials: The trials of the round, numbered on from those that are there.
+
+    Raises:
+        DatasetError: If it cannot be written.
+    """
+    path = rounds_path(plan)
+    line = {
+        "first": trials.first,
+        "values": trials.values.tolist(),
+        "seeds": trials.seeds.tolist(),
+        "digests": [digest.tobytes().hex() for digest in trials.digests],
+        "refused": [trials.refused.get(number) for number in trials.numbers],
+    }
+    try:
+        begun = is_there(path)
+        descriptor = open_regular(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
+        try:
+            write_all(descriptor, json.dumps(line).encode() + b"\n")
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+        if not begun:
+            sync_directory(path.parent)
+    except OSError as error:
+        raise unwritable(path, error) from error
+
+
+def read_rounds(plan: Path, trials: Trials) -> None:
+    """Append the rounds that lie beside the file of a plan to the trials that this file has.
+
+    Args:
+        plan: File of the plan.
+        trials: Its trials; rounds that are among them already stay as they are.
+
+    Raises:
+        DatasetError: If a round is damaged, or does not go on where those before it end.
+    """
+    path = rounds_path(plan)
+    if not is_there(path):
+        return
+    try:
+        with open(open_regular(path), "rb") as lines:
+            for number, line in enumerate(lines, 1):
+                if line.endswith(b"\n"):
+                    _take(line, trials, path, number)
+    except OSError as error:
+        raise unreadable(path, error) from error
+
+
+def _take(line: bytes, trials: Trials, path: Path, number: int) -> None:
+    try:
+        added = _parse(line, trials.keys)
+        if added.numbers.stop > trials.numbers.stop:
+            trials.extend(added)
+    except (ValueError, KeyError, TypeError, OverflowError, RecursionError) as error:
+        raise DatasetError("is damaged: no round of this plan", path=path, place=f"line {number}") from error
+
+
+def _parse(line: bytes, keys: tuple[str, ...]) -> Trials:
+    """The trials of a line.
+
+    Raises:
+        ValueError: If it is none that `append_round` writes; or another of the errors that `_take` knows.
+    """
+    found = json.loads(line)
+    count = len(found["seeds"])
+    if not all(map(is_digest, found["digests"])):
+        raise ValueError("no digests")
+    digests = np.frombuffer(bytes.fromhex("".join(found["digests"])), np.uint8)
+    trials = Trials(
+        keys,
+        np.array(found["values"], np.float64).reshape(count, len(keys)),
+        np.array(found["seeds"], np.uint64),
+        digests.reshape(count, DIGEST_BYTES),
+        first=int(found["first"]),
+    )
+    return trials.refuse([None if reason is None else str(reason) for reason in found["refused"]])

@@ -1,0 +1,38 @@
+"""Rows of an array to which others are appended, without all that are there being copied each time."""
+
+from __future__ import annotations
+
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+_Element = TypeVar("_Element", bound=np.generic)
+
+
+class Rows(Generic[_Element]):
+    """Rows of an array; appending costs as much as what is appended, taken over all of it.
+
+    Args:
+        rows: The first rows, shape ``(n_rows, ...)``; never written to.
+    """
+
+    def __init__(self, rows: NDArray[_Element]) -> None:
+        self._room: NDArray[_Element] = rows
+        self._count = len(rows)
+
+    @property
+    def all(self) -> NDArray[_Element]:
+        """All rows, shape ``(n_rows, ...)``; those that are there by now, also when others follow."""
+        return self._room[: self._count]
+
+    def append(self, rows: NDArray[Any]) -> None:
+        """Append rows, shape ``(n_added, ...)``."""
+        count = self._count + len(rows)
+        if count > len(self._room):
+            room = np.empty((max(count, 2 * self._count), *self._room.shape[1:]), self._room.dtype)
+            room[: self._count] = self.all
+            self._room = room
+        if count > self._count:
+            self._room[self._count : count] = rows
+        self._count = count

@@ -1,0 +1,170 @@
+"""Trials as a plan holds them: in columns, some 80 bytes each, of which a trial is made when it is asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from throwcollect.sweep.rows import Rows
+
+DIGEST_BYTES = 32
+"""Size of a SHA-256 [bytes]."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One numbered point of the sweep.
+
+    Attributes:
+        number: From 0.
+        values: Value of each swept dotted key, in the key's unit.
+        seed: Seed for anything random in the trial, from the root seed and the number; fits uint64.
+        digest: SHA-256 in hex over everything that determines the trial's samples.
+        refused: Why the trial is not run, or None.
+    """
+
+    number: int
+    values: Mapping[str, float]
+    seed: int
+    digest: str
+    refused: str | None = None
+
+
+class Trials(Sequence[Trial]):
+    """Trials in order and without gaps; a slice of them stays as it is when others are appended to these.
+
+    Attributes:
+        keys: Swept dotted keys.
+        first: Number of the first trial.
+
+    Args:
+        keys: Swept dotted keys, ``(n_keys,)``.
+        values: Their values in the units of the keys, shape ``(n_trials, n_keys)``.
+        seeds: Seed of each trial, shape ``(n_trials,)``.
+        digests: Digest of each trial, shape ``(n_trials, DIGEST_BYTES)``.
+        first: Number of the first trial.
+        refused: Why trials are not run, by their numbers; of those that are not run alone.
+    """
+
+    def __init__(
+        self,
+        keys: Sequence[str],
+        values: NDArray[np.float64],
+        seeds: NDArray[np.uint64],
+        digests: NDArray[np.uint8],
+        *,
+        first: int = 0,
+        refused: Mapping[int, str] = MappingProxyType({}),
+    ) -> None:
+        self.keys = tuple(keys)
+        self.first = first
+        self._values, self._seeds, self._digests = Rows(values), Rows(seeds), Rows(digests)
+        self._refused = dict(refused)
+
+    @property
+    def values(self) -> NDArray[np.float64]:
+        """Values of the keys, shape ``(n_trials, n_keys)``."""
+        return self._values.all
+
+    @property
+    def seeds(self) -> NDArray[np.uint64]:
+        """Seeds, shape ``(n_trials,)``."""
+        return self._seeds.all
+
+    @property
+    def digests(self) -> NDArray[np.uint8]:
+        """Digests, shape ``(n_trials, DIGEST_BYTES)``."""
+        return self._digests.all
+
+    @property
+    def refused(self) -> Mapping[int, str]:
+        """Why trials are not run, by their numbers and in their order; of those that are not run alone."""
+        return self._refused
+
+    @property
+    def numbers(self) -> range:
+        """Numbers of the trials."""
+        return range(self.first, self.first + len(self))
+
+    @property
+    def numbers_to_run(self) -> Iterator[int]:
+        """Numbers of the trials that are not refused, in order."""
+        return (number for number in self.numbers if number not in self._refused)
+
+    def __len__(self) -> int:
+        return len(self.seeds)
+
+    @overload
+    def __getitem__(self, which: int) -> Trial: ...
+    @overload
+    def __getitem__(self, which: slice) -> Trials: ...
+    def __getitem__(self, which: int | slice) -> Trial | Trials:
+        """A trial by its position, or those of a slice without gaps.
+
+        Raises:
+            IndexError: If there are not so many.
+            ValueError: If the slice has gaps.
+        """
+        chosen = self.numbers[which]
+        if isinstance(chosen, int):
+            return self._trial(chosen)
+        if chosen.step != 1:
+            raise ValueError(f"trials have no gaps: {which}")
+        rows = slice(chosen.start - self.first, chosen.stop - self.first)
+        refused = {number: reason for number, reason in self._refused.items() if number in chosen}
+        columns = self.values[rows], self.seeds[rows], self.digests[rows]
+        return Trials(self.keys, *columns, first=chosen.start, refused=refused)
+
+    def __iter__(self) -> Iterator[Trial]:
+        return map(self._trial, self.numbers)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Trials):
+            return NotImplemented
+        return (
+            self.keys == other.keys
+            and self.first == other.first
+            and self._refused == other._refused
+            and np.array_equal(self.values, other.values)
+            and np.array_equal(self.seeds, other.seeds)
+            and np.array_equal(self.digests, other.digests)
+        )
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        return f"Trials({len(self)} from {self.first}, {len(self._refused)} refused; swept: {', '.join(self.keys)})"
+
+    def extend(self, others: Trials) -> None:
+        """Append trials, which go on where these end and vary the same keys.
+
+        Raises:
+            ValueError: If they do not.
+        """
+        if others.first != self.numbers.stop or others.keys != self.keys:
+            raise ValueError(f"{others} cannot follow {self}")
+        self._values.append(others.values)
+        self._seeds.append(others.seeds)
+        self._digests.append(others.digests)
+        self._refused |= others.refused
+
+    def refuse(self, reasons: Sequence[str | None]) -> Trials:
+        """These trials, refused as told and not otherwise.
+
+        Args:
+            reasons: Why each trial is not run, in order; None for those that are.
+        """
+        pairs = zip(self.numbers, reasons, strict=True)
+        refused = {number: reason for number, reason in pairs if reason is not None}
+        return Trials(self.keys, self.values, self.seeds, self.digests, first=self.first, refused=refused)
+
+    def _trial(self, number: int) -> Trial:
+        row = number - self.first
+        values = dict(zip(self.keys, self.values[row].tolist(), strict=True))
+        digest = self.digests[row].tobytes().hex()
+        return Trial(number, values, int(self.seeds[row]), digest, self._refused.get(number))

@@ -1,0 +1,70 @@
+"""The page of a server in a real browser: a collection is started, watched and stopped by it."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import pytest
+
+from tests.e2e.chromium import Tab, browse, chromium
+from tests.e2e.collection import FAST, command, write_config
+
+pytestmark = pytest.mark.e2e
+
+_SEEN = """
+(() => {
+  const { view, meshes } = throwcollect;
+  const stations = view.shown.map((name) => view.stations.get(name));
+  const isSeen = ({ robot, trails }) => robot?.isWhole && trails.count > 0;
+  return stations.length === 2 && stations.every(isSeen) && meshes.count;
+})()
+"""
+_MESHES = 25
+"""Files that the description of Talos with its spoon draws."""
+
+
+@pytest.fixture
+def address(tmp_path: Path) -> Iterator[str]:
+    """Of the page of a server, with a code."""
+    # Slow enough to be stopped half-way, and to leave the processor to the browser.
+    write_config(tmp_path, trials=600, sim=f"{FAST}, real_time_factor: 1")
+    catalogue = tmp_path / "catalogue.yaml"
+    catalogue.write_text("components: {throws: {pretty_name: Throws, config: small.yaml}}\n")
+    options = ("--port", "0", "--datasets", tmp_path / "datasets", "--json")
+    with subprocess.Popen(command("serve", catalogue, *options), stdout=subprocess.PIPE, text=True) as server:
+        assert server.stdout is not None
+        yield json.loads(server.stdout.readline())["page"]
+        server.terminate()
+
+
+def press(tab: Tab, button: str) -> None:
+    tab.evaluate(f"document.querySelector('button[aria-label={json.dumps(button)}]').click()")
+
+
+@pytest.mark.skipif(chromium() is None, reason="needs Chromium: apt-get install chromium")
+def test_a_collection_is_started_watched_and_stopped_by_the_page(address: str) -> None:
+    # Software draws, and that is dear: the replay stands still at first, as it does for all who want little motion.
+    with browse(address, width=800, height=600, features={"prefers-reduced-motion": "reduce"}) as tab:
+        tab.wait_for("document.querySelector('#components form') !== null")
+        assert tab.evaluate("location.hash") == "", "the code is still in the address"
+        assert "Nothing runs" in tab.evaluate("document.querySelector('#empty').textContent")
+        tab.evaluate("document.querySelector('#components input').value = '2'")
+        press(tab, "Start Throws")
+        meshes = tab.wait_for(_SEEN, within_s=120, every_s=1)
+        fetched = [url for url in tab.requests if "/meshes/" in url]
+        assert meshes == len(fetched) == len(set(fetched)) == _MESHES
+        assert tab.evaluate("document.querySelector('#instances progress').value") > 0
+        assert tab.evaluate("document.querySelector('#play').textContent") == "Play"
+        tab.evaluate("throwcollect.playback.seek(0); document.querySelector('#play').click()")
+        tab.wait_for("document.querySelector('#scrub').value > 0.2")
+        instance = tab.evaluate("throwcollect.watching.id")
+        press(tab, f"Stop {instance}")
+        tab.wait_for("document.querySelector('#ended .status')?.textContent.startsWith('has ended')", every_s=1)
+        assert {urlsplit(url).netloc for url in tab.requests if not url.startswith(("data:", "blob:"))} == {
+            urlsplit(address).netloc
+        }
+        assert tab.errors == []

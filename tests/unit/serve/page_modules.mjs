@@ -1,0 +1,91 @@
+// What modules of the page compute, without a browser. `node --test` runs it; the page's directory is in PAGE.
+
+import assert from "node:assert/strict";
+import { readFileSync } from "node:fs";
+import { test } from "node:test";
+import { pathToFileURL } from "node:url";
+
+const load = (name) => import(pathToFileURL(`${process.env.PAGE}/${name}`));
+const { ballAt, decodeThrow, jointsAt, seriesOf } = await load("throws.js");
+const { Playback } = await load("playback.js");
+const { inOrder, steps } = await load("state.js");
+const { readChanges } = await load("controls.js");
+const { coarsen } = await load("coarse.js");
+const { BoxGeometry, SphereGeometry } = await load("vendor/three/build/three.module.js");
+
+const bytes = readFileSync(process.env.THROW);
+const thrown = () => decodeThrow(bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length));
+const near = (a, b) => assert.ok(Math.abs(a - b) < 1e-6, `${a} is not ${b}`);
+
+test("a throw is decoded as it was encoded", () => {
+  const { trial, outcome, joints, samples, duration, landing } = thrown();
+  assert.deepEqual({ trial, outcome, joints, samples, landing }, {
+    trial: 7, outcome: "landed", joints: ["elbow", "wrist"], samples: 3, landing: [1.5, -0.25, 0],
+  });
+  near(duration, 0.02);
+});
+
+test("between two samples, joints and ball are between both", () => {
+  jointsAt(thrown(), 0.005).forEach((value, i) => near(value, [0.5, 10.5][i]));
+  ballAt(thrown(), 0.015).forEach((value, i) => near(value, [1.5, 2.5, 3.5][i]));
+  assert.deepEqual(jointsAt(thrown(), 99), [2, 12]);
+  assert.deepEqual(jointsAt(thrown(), -1), [0, 10]);
+});
+
+test("velocities are slopes, and efforts are not made up", () => {
+  seriesOf(thrown(), "velocity", "wrist").forEach((value) => near(value, 100));
+  assert.deepEqual([...seriesOf(thrown(), "ball", "z")], [2, 3, 4]);
+  assert.equal(seriesOf(thrown(), "effort", "wrist"), null);
+  assert.equal(seriesOf(thrown(), "position", "knee"), null);
+});
+
+test("a newer throw waits for the end of the one that is shown", () => {
+  const began = [];
+  const playback = new Playback(({ trial }) => began.push(trial));
+  const made = (trial) => ({ ...thrown(), trial, simulation: "sim_0", duration: 1 });
+  playback.put(made(1));
+  playback.step(0.1);
+  playback.put(made(2));
+  playback.put(made(3));
+  playback.step(0.1);
+  near(playback.at("sim_0").time, 0.2);
+  for (let i = 0; i < 9; i++) playback.step(0.2);
+  assert.deepEqual(began, [1, 3]);
+});
+
+test("slow replays take as much longer, and one that stands still stays", () => {
+  const playback = new Playback(() => {});
+  playback.put({ ...thrown(), simulation: "sim_0", duration: 1 });
+  playback.speed = 0.1;
+  playback.step(0.2);
+  near(playback.at("sim_0").time, 0.02);
+  playback.seek(0.5);
+  playback.step(0.2);
+  near(playback.at("sim_0").time, 0.5);
+});
+
+test("collections that want successes count successes", () => {
+  const progress = { ended: 30, total: 100, outcomes: { landed: 12, dropped: 18 }, wanted: null, success: "landed" };
+  assert.deepEqual(steps(progress), [30, 100]);
+  assert.deepEqual(steps({ ...progress, wanted: 10 }), [10, 10]);
+});
+
+test("simulations are in the order of their numbers", () => {
+  assert.deepEqual(inOrder(["sim_10", "sim_2", "sim_1"]), ["sim_1", "sim_2", "sim_10"]);
+});
+
+test("changed keys are read line by line, and a bad line is named", () => {
+  assert.deepEqual(readChanges("trials: 50\n\nname = mine\nsim.real_time_factor: 1.5"), { trials: 50, name: "mine", "sim.real_time_factor": 1.5 });
+  assert.throws(() => readChanges("trials: 5\nwhat"), /line 2: .*'what'/);
+});
+
+test("a coarse mesh keeps its extent with fewer triangles, and edges stay sharp", () => {
+  const sphere = new SphereGeometry(1, 64, 32);
+  const coarse = coarsen(sphere, 0.3);
+  assert.ok(coarse.index.count < sphere.index.count / 4);
+  coarse.computeBoundingBox();
+  assert.ok(coarse.boundingBox.max.x > 0.8 && coarse.boundingBox.max.x <= 1);
+  const box = coarsen(new BoxGeometry(1, 1, 1), 0.4);
+  assert.equal(box.index.count, 36);
+  assert.ok(box.getAttribute("position").count > 8);
+});

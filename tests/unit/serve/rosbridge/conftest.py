@@ -1,0 +1,156 @@
+"""A router, a node beside the bridge, and clients that remember what they are sent."""
+
+from __future__ import annotations
+
+import json
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import cbor2
+import pytest
+import uvicorn
+from starlette.applications import Starlette
+from starlette.routing import WebSocketRoute
+from starlette.websockets import WebSocket
+from tests.integration.robot import FOUND_BY_OTHERS_S, ON_DDS, discovery_server
+
+from throwcollect.ros import Context, ExternalShutdownException, Node, SingleThreadedExecutor, init
+from throwcollect.ros.connection import Connection
+from throwcollect.ros.middleware import Middleware
+from throwcollect.ros.router import router
+from throwcollect.run_key import RunKey
+from throwcollect.serve.rosbridge import Bridge, attend
+
+PATIENCE_S = 30.0
+
+
+def wait_for(condition: Callable[[], Any], what: str = "") -> Any:
+    """What a condition gives as soon as it is true."""
+    deadline = time.monotonic() + PATIENCE_S
+    while not (found := condition()):
+        assert time.monotonic() < deadline, f"did not happen: {what}"
+        time.sleep(0.002)
+    return found
+
+
+def wait_for_listener(publisher: Any) -> None:
+    """Wait until somebody listens to a publisher, and knows of it."""
+    wait_for(publisher.get_subscription_count, f"somebody listens to {publisher.topic_name}")
+    if ON_DDS:
+        # Each side finds the other, and cannot know when the other has found it.
+        time.sleep(FOUND_BY_OTHERS_S)
+
+
+class Party:
+    """A client without a network, and what it was sent so far, read."""
+
+    def __init__(self, bridge: Bridge, *, read_only: bool = False) -> None:
+        self.frames: list[str | bytes] = []
+        self.times: list[float] = []
+        self.client = bridge.attach(self._take, read_only=read_only)
+        self._taken = 0
+
+    def _take(self, frame: str | bytes) -> None:
+        self.times.append(time.monotonic())
+        self.frames.append(frame)
+
+    def ask(self, **fields: Any) -> None:
+        self.client.receive(json.dumps(fields))
+
+    def got(self) -> list[Any]:
+        return [json.loads(frame) if isinstance(frame, str) else cbor2.loads(frame) for frame in list(self.frames)]
+
+    def next(self, **wanted: Any) -> Any:
+        """The first operation that has these fields among those that were not taken yet."""
+
+        def find() -> Any:
+            for number, each in enumerate(self.got()[self._taken :], self._taken + 1):
+                if all(each.get(name) == value for name, value in wanted.items()):
+                    self._taken = number
+                    return each
+            return None
+
+        return wait_for(find, f"{wanted} in {self.got()[self._taken :]}")
+
+    def call(self, service: str, /, **arguments: Any) -> Any:
+        """Fields of the response of a service; or why it failed."""
+        self.ask(op="call_service", id=f"call {service}", service=service, args=arguments)
+        return self.next(op="service_response", id=f"call {service}")["values"]
+
+
+@pytest.fixture(scope="session")
+def connection() -> Iterator[Connection]:
+    middleware = Middleware.of_process()
+    with discovery_server() if ON_DDS else router("tcp/127.0.0.1:0") as endpoint:
+        yield Connection(endpoint, RunKey(Path("/no/key")), middleware=middleware)
+
+
+@pytest.fixture(scope="session")
+def bridge(connection: Connection) -> Iterator[Bridge]:
+    bridge = Bridge(connection)
+    yield bridge
+    bridge.close()
+
+
+@pytest.fixture(autouse=True)
+def _nothing_fails(caplog: pytest.LogCaptureFixture) -> Iterator[None]:
+    """What goes wrong in a bridge ends neither it nor a test, but is logged."""
+    yield
+    assert [each.exc_info for each in caplog.records if each.name.startswith("throwcollect.serve")] == []
+
+
+@pytest.fixture(scope="session")
+def url(bridge: Bridge) -> Iterator[str]:
+    """Where the bridge is, over WebSockets."""
+
+    async def route(websocket: WebSocket) -> None:
+        await attend(websocket, bridge)
+
+    app = Starlette(routes=[WebSocketRoute("/", route)])
+    config = uvicorn.Config(app, port=0, log_level="warning", lifespan="off", ws_per_message_deflate=False)
+    server = uvicorn.Server(config)
+    thread = threading.Thread(target=server.run, daemon=True)
+    thread.start()
+    wait_for(lambda: server.started)
+    yield f"ws://127.0.0.1:{server.servers[0].sockets[0].getsockname()[1]}/"
+    server.should_exit = True
+    thread.join()
+
+
+@pytest.fixture
+def party(bridge: Bridge) -> Iterator[Party]:
+    party = Party(bridge)
+    yield party
+    party.client.close()
+
+
+@pytest.fixture(scope="session")
+def context(connection: Connection) -> Iterator[Context]:
+    context = Context()
+    init(context=context, connection=connection)
+    yield context
+    context.try_shutdown()
+
+
+@pytest.fixture
+def node(context: Context) -> Iterator[Node]:
+    """A node of ROS, which spins."""
+    node = Node("other", context=context)
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(node)
+
+    def spin() -> None:
+        try:
+            executor.spin()
+        except ExternalShutdownException:
+            return
+
+    thread = threading.Thread(target=spin, daemon=True)
+    thread.start()
+    yield node
+    executor.shutdown()
+    thread.join()
+    node.destroy_node()

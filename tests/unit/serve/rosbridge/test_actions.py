@@ -1,0 +1,183 @@
+"""Actions whose goals a client sends, and those that it offers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from tests.unit.serve.rosbridge.conftest import Party, wait_for
+
+from throwcollect.ros import ActionClient, ActionServer, CancelResponse, Future, GoalResponse, Node, get_action
+from throwcollect.serve.rosbridge import Bridge
+
+FJT: Any = get_action("control_msgs/action/FollowJointTrajectory")
+KIND = "control_msgs/FollowJointTrajectory"
+SUCCEEDED, CANCELED, ABORTED = 4, 5, 6
+
+
+class Arm:
+    """An action of a node; a goal without joints is rejected, one with the joint ``wait`` ends when it is cancelled."""
+
+    def __init__(self, node: Node) -> None:
+        self.cancelled = Future()
+        self.server = ActionServer(
+            node, FJT, "/follow", self.execute, goal_callback=self.consider, cancel_callback=self.cancel
+        )
+
+    def consider(self, goal: Any) -> GoalResponse:
+        return GoalResponse.ACCEPT if goal.trajectory.joint_names else GoalResponse.REJECT
+
+    def cancel(self, _handle: Any) -> CancelResponse:
+        self.cancelled.set_result(None)
+        return CancelResponse.ACCEPT
+
+    async def execute(self, handle: Any) -> Any:
+        handle.publish_feedback(FJT.Feedback(joint_names=handle.request.trajectory.joint_names))
+        if "wait" in handle.request.trajectory.joint_names:
+            await self.cancelled
+            handle.canceled()
+        else:
+            handle.succeed()
+        return FJT.Result(error_string="done")
+
+
+@pytest.fixture
+def arm(node: Node, party: Party) -> Arm:
+    arm = Arm(node)
+    wait_for(lambda: "/follow" in party.call("rosapi/action_servers")["action_servers"])
+    return arm
+
+
+def send(party: Party, *joints: str, number: str = "g", **more: Any) -> None:
+    goal = {"trajectory": {"joint_names": joints}}
+    fields = {"id": number, "action": "follow", "action_type": KIND, "args": goal, **more}
+    party.ask(op="send_action_goal", **fields)
+
+
+def test_a_goal_is_sent_and_its_feedback_and_result_come_back(party: Party, arm: Arm) -> None:
+    send(party, "a", feedback=True)
+    feedback = party.next(op="action_feedback")
+    assert (feedback["id"], feedback["action"], feedback["values"]["joint_names"]) == ("g", "follow", ["a"])
+    assert party.next(op="action_result") == {
+        "op": "action_result",
+        "id": "g",
+        "action": "follow",
+        "values": {"error_code": 0, "error_string": "done"},
+        "status": SUCCEEDED,
+        "result": True,
+    }
+
+
+def test_a_goal_is_cancelled_and_feedback_comes_to_those_alone_who_want_it(party: Party, arm: Arm) -> None:
+    send(party, "wait")
+    party.ask(op="cancel_action_goal", id="g", action="follow")
+    assert party.next(op="action_result")["status"] == CANCELED
+    assert [each for each in party.got() if each["op"] == "action_feedback"] == []
+    party.ask(op="cancel_action_goal", id="g", action="follow")
+    assert "no goal with the id g is under way" in party.next(op="status")["msg"]
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        ({}, "/follow: the goal was rejected"),
+        ({"action": "/nobody"}, "nobody offers an action /nobody"),
+        ({"action_type": "control_msgs/Follow"}, "unknown interface 'control_msgs/action/Follow'"),
+        ({"args": {"path": 1}}, "path: no such field"),
+        ({"compression": "png"}, "no compression png"),
+    ],
+)
+def test_a_goal_that_cannot_be_sent_is_answered_with_a_sentence(party: Party, arm: Arm, asked: Any, said: str) -> None:
+    send(party, **asked)
+    answer = party.next(op="action_result", id="g")
+    assert (answer["result"], answer["status"]) == (False, 0)
+    assert said in answer["values"]
+
+
+def test_a_goal_is_given_up_when_its_action_has_gone(party: Party, arm: Arm) -> None:
+    send(party, "wait", feedback=True)
+    party.next(op="action_feedback")
+    arm.server.destroy()
+    assert "/follow: the action has gone" in party.next(op="action_result")["values"]
+
+
+@pytest.fixture
+def offer(party: Party, node: Node) -> Callable[[], Any]:
+    """What has a node send a goal to the action that the client offers; gives what came of it."""
+    party.ask(op="advertise_action", action="swing", type=KIND)
+    client = ActionClient(node, FJT, "/swing")
+    assert client.wait_for_server(5)
+
+    class Sent:
+        def __init__(self) -> None:
+            self.feedback: list[Any] = []
+            goal = FJT.Goal()
+            goal.trajectory.joint_names = ["a"]
+            accepted = client.send_goal_async(goal, feedback_callback=self.feedback.append)
+            self.handle = wait_for(accepted.done) and accepted.result()
+            self.ended = self.handle.get_result_async()
+            self.asked = party.next(op="send_action_goal")
+            self.answer = {"id": self.asked["id"], "action": "swing"}
+
+        @property
+        def end(self) -> tuple[int, str]:
+            wait_for(self.ended.done)
+            return self.ended.result().status, self.ended.result().result.error_string
+
+    return Sent
+
+
+def test_a_client_offers_an_action(party: Party, offer: Callable[[], Any]) -> None:
+    sent = offer()
+    assert (sent.asked["action"], sent.asked["action_type"], sent.asked["feedback"]) == ("swing", KIND, True)
+    assert sent.asked["args"]["trajectory"]["joint_names"] == ["a"]
+    party.ask(op="action_feedback", **sent.answer, values={"joint_names": ["b"]})
+    wait_for(lambda: sent.feedback)
+    assert sent.feedback[0].feedback.joint_names == ["b"]
+    party.ask(op="action_result", **sent.answer, values={"error_string": "fine"}, result=True)
+    assert sent.end == (SUCCEEDED, "fine")
+
+
+def test_goals_of_a_client_end_as_it_says(party: Party, offer: Callable[[], Any]) -> None:
+    failed = offer()
+    party.ask(op="action_result", **failed.answer, result=False)
+    assert failed.end == (ABORTED, "")
+    aborted = offer()
+    party.ask(op="action_status", **aborted.answer, status=2)
+    party.ask(op="action_status", **aborted.answer, status=ABORTED)
+    assert aborted.end == (ABORTED, "")
+    cancelled = offer()
+    cancelled.handle.cancel_goal_async()
+    assert party.next(op="cancel_action_goal")["id"] == cancelled.asked["id"]
+    party.ask(op="action_result", **cancelled.answer, values={}, status=CANCELED, result=True)
+    assert cancelled.end == (CANCELED, "")
+
+
+def test_what_is_wrong_with_an_answer_is_told(party: Party, offer: Callable[[], Any]) -> None:
+    sent = offer()
+    for op, values, said in (
+        ("action_feedback", {"joint": 1}, "joint: no such field"),
+        ("action_feedback", None, "should be fields with values"),
+        ("action_result", {"error_code": "x"}, "error_code: should be int32"),
+    ):
+        party.ask(op=op, **sent.answer, values=values)
+        assert said in party.next(op="status")["msg"]
+    party.ask(op="action_feedback", id="other", action="swing", values={})
+    assert "no goal other of /swing is under way" in party.next(op="status")["msg"]
+    party.ask(op="action_feedback", id="other", action="/sing", values={})
+    assert "/sing is not advertised by this client" in party.next(op="status")["msg"]
+
+
+def test_goals_are_aborted_when_the_action_is_withdrawn_and_when_the_client_leaves(
+    bridge: Bridge, party: Party, node: Node, offer: Callable[[], Any]
+) -> None:
+    sent = offer()
+    party.ask(op="unadvertise_action", action="swing")
+    assert sent.end == (ABORTED, "")
+    wait_for(lambda: "/swing/_action/send_goal" not in dict(node.get_service_names_and_types()))
+
+
+def test_an_action_of_a_node_is_not_offered_once_more(party: Party, arm: Arm) -> None:
+    party.ask(op="advertise_action", action="/follow", type=KIND)
+    assert "/follow is offered already" in party.next(op="status")["msg"]

@@ -1,0 +1,161 @@
+"""What frames say, whichever way they say it, and frames that say nothing."""
+
+from __future__ import annotations
+
+import base64
+import json
+import math
+import random as random_numbers
+from functools import cache
+from typing import Any
+
+import cbor2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from tests.rclzenoh.interfaces.test_cdr import random_message
+from tests.unit.serve.rosbridge.conftest import Party
+
+from rclzenoh.interfaces import deserialize, message_class, serialize
+from rclzenoh.interfaces.catalog import _JAZZY, DEFINITIONS
+from throwcollect.errors import ConfigError
+from throwcollect.ros.values import array_parts, fill
+from throwcollect.serve.rosbridge.codec import cbor_bytes, cbor_values, fragments, json_text, json_values, read_frame
+from throwcollect.serve.rosbridge.feed import Sample
+from throwcollect.serve.rosbridge.reassembly import LONGEST_FRAME, Reassembly
+from throwcollect.serve.rosbridge.request import Request
+
+
+@cache
+def message_names() -> list[str]:
+    """Every message that is known, with the requests and responses of services."""
+    files = [path.relative_to(DEFINITIONS).with_suffix("").as_posix() for path in DEFINITIONS.rglob("*.*")]
+    services = [f"{name}_{part}" for name in files if "/srv/" in name for part in ("Request", "Response")]
+    parts = ("Goal", "Result", "Feedback", "FeedbackMessage")
+    actions = [f"{name}_{part}" for name in files if "/action/" in name for part in parts]
+    return sorted({*_JAZZY, *(name for name in files if "/msg/" in name), *services, *actions})
+
+
+def content(frame: str | bytes) -> Any:
+    """The message in a frame, as a client would fill it in: typed arrays, bytes and Base64 as they are."""
+    return read_frame(frame).any("msg")
+
+
+def test_json_cbor_and_bytes_say_the_same_of_every_message() -> None:
+    assert len(message_names()) > 250
+    random = random_numbers.Random(16)
+    for name in message_names():
+        message = random_message(name, random)
+        sample = Sample(serialize(message), message_class(name), 0)
+        frames = {form: sample.frame("/t", form) for form in ("none", "cbor", "cbor-raw")}
+        raw = cbor2.loads(frames["cbor-raw"])["msg"]["bytes"]
+        assert deserialize(raw, message_class(name)) == message, name
+        for form in ("none", "cbor"):
+            again = message_class(name)()
+            fill(again, content(frames[form]))
+            assert again == message, (name, form)
+
+
+def test_octets_and_numbers_are_written_as_rosbridge_writes_them() -> None:
+    values: dict[str, Any] = {
+        "std_msgs/msg/UInt8MultiArray": (b"\0\1", base64.b64encode(b"\0\1").decode(), b"\0\1"),
+        "std_msgs/msg/ByteMultiArray": (b"\0\1", [0, 1], b"\0\1"),
+        "std_msgs/msg/Int64MultiArray": ([-(2**63)], [-(2**63)], cbor2.CBORTag(79, b"\0" * 7 + b"\x80")),
+        "std_msgs/msg/UInt16MultiArray": ([258], [258], cbor2.CBORTag(69, b"\2\1")),
+        "std_msgs/msg/Float32MultiArray": (
+            [1.5, math.inf],
+            [1.5, None],
+            cbor2.CBORTag(85, np.float32([1.5, np.inf]).tobytes()),
+        ),
+        "std_msgs/msg/Float64": (math.nan, None, math.nan),
+    }
+    for name, (value, in_json, in_cbor) in values.items():
+        message = message_class(name)(data=value)
+        assert json.loads(json_text(json_values(message)))["data"] == in_json
+        found = cbor2.loads(cbor_bytes(cbor_values(message)))["data"]
+        assert found == in_cbor or (found != found and in_cbor != in_cbor)
+
+
+@pytest.mark.parametrize(
+    ("frame", "said"),
+    [
+        ("", "neither JSON nor CBOR"),
+        ("{", "neither JSON nor CBOR"),
+        (b"", "neither JSON nor CBOR"),
+        (b"\xff\xff", "neither JSON nor CBOR"),
+        (b'{"op": "', "neither JSON nor CBOR"),
+        ("[1]", "a frame should be an object with an op, got [1]"),
+        ("{}", "frame: op should be a text, got nothing"),
+        ('{"op": 1}', "frame: op should be a text, got 1"),
+        ('{"op": "png"}', "no operation png; expected: subscribe"),
+        ('{"op": "auth", "mac": "x"}', "auth: nobody has to say who he is here"),
+        ('{"op": "set_level", "level": "loud"}', "set_level: no level loud; expected: info"),
+        ('{"op": "fragment", "id": "a"}', "fragment: should have an id, the text data, and num below total"),
+        ("[" * 100_000, "neither JSON nor CBOR"),
+        (b"\x81" * 100_000, "neither JSON nor CBOR"),
+        # A list that contains itself.
+        (bytes.fromhex("a2626f70677075626c697368636d7367d81c81d81d00"), "topic should be a text, got nothing"),
+    ],
+)
+def test_a_frame_that_says_nothing_is_told_in_a_sentence(party: Party, frame: str | bytes, said: str) -> None:
+    party.client.receive(frame)
+    told = party.next(op="status")
+    assert told["level"] == "error"
+    assert said in told["msg"]
+
+
+@settings(max_examples=30)
+@given(
+    frame=st.one_of(st.binary(max_size=60), st.text(max_size=60), st.dictionaries(st.text(), st.none()).map(json.dumps))
+)
+def test_whatever_comes_is_read_or_refused(frame: str | bytes) -> None:
+    try:
+        assert isinstance(read_frame(frame), Request)
+    except ConfigError:
+        return
+
+
+def test_status_messages_come_from_the_level_on_that_is_asked_for(party: Party) -> None:
+    for level in ("none", "error"):
+        party.ask(op="set_level", level=level)
+        party.ask(op="nothing")
+    party.ask(op="unadvertise", topic="/x")
+    party.call("rosapi/get_time")
+    assert [each["level"] for each in party.got() if each["op"] == "status"] == ["error"]
+
+
+def part(number: object, total: object, data: object = "x", name: object = "a") -> Request:
+    return Request({"op": "fragment", "id": name, "num": number, "total": total, "data": data})
+
+
+def test_parts_in_any_order_become_a_frame(party: Party) -> None:
+    frame = json_text({"op": "call_service", "id": "whole", "service": "/rosapi/get_ros_version"})
+    parts = list(fragments(frame, 7, "1"))
+    for each in [*parts[::-2], *parts[::2], parts[1]]:
+        party.client.receive(each)
+    for each in parts[1::2]:
+        party.client.receive(each)
+    assert party.next(id="whole")["values"]["version"] == 2
+
+
+def test_parts_that_do_not_fit_together_are_refused_and_forgotten() -> None:
+    whole = Reassembly()
+    for wrong in (part(1, 1), part(0, 0), part(0, 10**9), part(0, 2, 7), part(0, 2, name=None), part(-1, 2)):
+        with pytest.raises(ConfigError, match="fragment: "):
+            whole.add(wrong)
+    assert whole.add(part(0, 2)) is None
+    with pytest.raises(ConfigError, match="total is 3, and was 2"):
+        whole.add(part(1, 3))
+    assert whole.add(part(0, 2, "x" * (LONGEST_FRAME // 2))) is None
+    with pytest.raises(ConfigError, match="the parts are too long"):
+        whole.add(part(0, 2, "x" * (LONGEST_FRAME // 2), name="b"))
+    assert whole.add(part(1, 2, "y")) == "x" * (LONGEST_FRAME // 2) + "y"
+    assert whole.add(part(0, 1, "x" * (LONGEST_FRAME - 100))) is not None
+
+
+def test_the_parts_of_types_are_found() -> None:
+    assert array_parts("sequence<double, 5>") == ("double", 5, None)
+    assert array_parts("sequence<std_msgs/Header>") == ("std_msgs/Header", None, None)
+    assert array_parts("float[36]") == ("float", None, 36)
+    assert array_parts("string<5>") is None

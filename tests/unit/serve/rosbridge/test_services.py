@@ -1,0 +1,144 @@
+"""Services that a client calls and offers."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import cbor2
+import pytest
+from tests.unit.serve.rosbridge.conftest import Party, wait_for
+
+from throwcollect.ros import Future, Node, get_service
+from throwcollect.serve.rosbridge import Bridge
+
+SetBool: Any = get_service("std_srvs/srv/SetBool")
+
+
+def switch(request: Any, response: Any) -> Any:
+    response.success, response.message = request.data, "switched"
+    return response
+
+
+@pytest.fixture
+def lamp(node: Node, party: Party) -> Any:
+    service = node.create_service(SetBool, "/lamp", switch)
+    wait_for(lambda: "/lamp" in party.call("rosapi/services")["services"])
+    return service
+
+
+@pytest.mark.parametrize("arguments", [{"data": True}, [True]])
+def test_a_service_is_called_with_arguments_by_name_or_in_their_order(party: Party, lamp: Any, arguments: Any) -> None:
+    party.ask(op="call_service", id="c", service="lamp", args=arguments)
+    assert party.next(id="c") == {
+        "op": "service_response",
+        "id": "c",
+        "service": "lamp",
+        "values": {"success": True, "message": "switched"},
+        "result": True,
+    }
+
+
+def test_an_answer_comes_in_cbor_or_in_parts_if_that_is_wanted(party: Party, lamp: Any) -> None:
+    party.ask(op="call_service", service="/lamp", args={"data": True}, compression="cbor")
+    wait_for(lambda: isinstance(party.frames[-1], bytes))
+    assert cbor2.loads(party.frames[-1])["values"] == {"success": True, "message": "switched"}
+    party.ask(op="call_service", service="/lamp", fragment_size=20)
+    wait_for(lambda: [each for each in party.got() if each.get("num") == each.get("total", 0) - 1], "the last part")
+    whole = "".join(each["data"] for each in party.got() if each["op"] == "fragment")
+    assert json.loads(whole)["values"] == {"success": False, "message": "switched"}
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        ({"service": "/nobody"}, "nobody offers a service /nobody"),
+        ({"service": "no name"}, "'no name' is no name in ROS"),
+        ({"service": "/lamp", "args": {"date": True}}, "date: no such field; expected: one of data"),
+        ({"service": "/lamp", "args": {"data": 1}}, "data: should be boolean, got 1"),
+        ({"service": "/lamp", "args": [True, True]}, "2 arguments are too many; expected: at most 1"),
+        ({"service": "/lamp", "compression": "png"}, "call_service: no compression png"),
+        ({"service": "/rosapi/nothing"}, "nobody offers a service /rosapi/nothing"),
+        ({"service": "/sim_0/get_parameters", "args": {"names": ["trial.leases"]}}, "nobody but the coordinator"),
+        (
+            {"service": "/sim_0/set_parameters", "args": {"parameters": [{"name": "trial.leases"}]}},
+            "trial.leases: nobody but the coordinator may have this parameter",
+        ),
+    ],
+)
+def test_a_call_that_cannot_be_made_is_answered_with_a_sentence(party: Party, lamp: Any, asked: Any, said: str) -> None:
+    party.ask(op="call_service", id="c", **asked)
+    answer = party.next(op="service_response", id="c")
+    assert answer["result"] is False
+    assert said in answer["values"]
+
+
+def test_a_call_is_given_up_in_time_or_when_its_service_has_gone(party: Party, node: Node) -> None:
+    async def wait(_request: Any, _response: Any) -> Any:
+        return await Future()
+
+    service = node.create_service(SetBool, "/slow", wait)
+    wait_for(lambda: "/slow" in party.call("rosapi/services")["services"])
+    party.ask(op="call_service", id=1, service="/slow", timeout=0.05)
+    party.ask(op="call_service", id=2, service="/slow")
+    assert party.next(id=1)["values"] == "/slow: no answer within 0.05 s"
+    node.destroy_service(service)
+    assert party.next(id=2)["values"] == "/slow: the service has gone and has not answered"
+
+
+def call(node: Node, service: str = "/clock") -> Future:
+    client = node.create_client(SetBool, service)
+    assert client.wait_for_service(5)
+    return client.call_async(SetBool.Request(data=True))
+
+
+def test_a_client_offers_a_service(party: Party, node: Node) -> None:
+    party.ask(op="advertise_service", service="clock", type="std_srvs/SetBool")
+    future = call(node)
+    asked = party.next(op="call_service")
+    assert (asked["service"], asked["args"]) == ("clock", {"data": True})
+    answer = {"op": "service_response", "id": asked["id"], "service": "clock"}
+    party.ask(**answer, values={"message": 7}, result=True)
+    party.ask(**answer, values={"messages": "a"}, result=True)
+    wait_for(future.done)
+    assert future.result() == SetBool.Response(message="7")
+    assert "waits for an answer" in party.next(op="status")["msg"]
+
+
+def test_an_answer_that_is_none_is_told_and_one_that_has_failed_has_defaults(party: Party, node: Node) -> None:
+    party.ask(op="advertise_service", service="/clock", type="std_srvs/SetBool")
+    future = call(node)
+    answer = {"op": "service_response", "id": party.next(op="call_service")["id"], "service": "/clock"}
+    party.ask(**answer, values={"messages": "a"}, result=True)
+    assert "messages: no such field" in party.next(op="status")["msg"]
+    party.ask(**answer, values="it broke", result=False)
+    wait_for(future.done)
+    assert future.result() == SetBool.Response()
+
+
+def test_a_service_can_be_withdrawn_and_offered_again_but_not_in_place_of_one_of_a_node(
+    bridge: Bridge, party: Party, node: Node, lamp: Any
+) -> None:
+    party.ask(op="advertise_service", service="/lamp", type="std_srvs/SetBool")
+    assert "/lamp is offered already" in party.next(op="status")["msg"]
+    for _ in range(2):
+        party.ask(op="advertise_service", service="/clock", type="std_srvs/SetBool")
+        future = call(node)
+        party.next(op="call_service")
+        party.ask(op="unadvertise_service", service="/clock")
+        wait_for(lambda: "/clock" not in dict(node.get_service_names_and_types()))
+        assert not future.done()
+    party.ask(op="unadvertise_service", service="/clock")
+    assert "/clock is not advertised by this client" in party.next(op="status")["msg"]
+    assert [each for each in party.got() if each["op"] == "status" and "could not be done" in each["msg"]] == []
+
+
+def test_two_clients_call_each_other(bridge: Bridge, party: Party) -> None:
+    other = Party(bridge)
+    party.ask(op="advertise_service", service="/clock", type="std_srvs/SetBool")
+    wait_for(lambda: "/clock" in other.call("rosapi/services")["services"])
+    other.ask(op="call_service", id="c", service="/clock", args={"data": True})
+    asked = party.next(op="call_service")
+    party.ask(op="service_response", id=asked["id"], service="/clock", values={"success": True}, result=True)
+    assert other.next(id="c")["values"] == {"success": True, "message": ""}
+    other.client.close()

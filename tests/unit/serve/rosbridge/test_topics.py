@@ -1,0 +1,259 @@
+"""Topics that a client hears and publishes."""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
+
+import cbor2
+import numpy as np
+import pytest
+from tests.unit.serve.rosbridge.conftest import Party, wait_for, wait_for_listener
+
+from rclzenoh.interfaces import serialize
+from throwcollect.ros import DurabilityPolicy, Node, QoSProfile, get_message
+from throwcollect.serve.rosbridge import Bridge, subscriptions
+from throwcollect.serve.rosbridge.subscriptions import Pace, Wish
+
+String: Any = get_message("std_msgs/msg/String")
+JointState: Any = get_message("sensor_msgs/msg/JointState")
+PointStamped: Any = get_message("geometry_msgs/msg/PointStamped")
+Image: Any = get_message("sensor_msgs/msg/Image")
+
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+def words(node: Node, topic: str = "/words") -> Callable[..., None]:
+    """What publishes texts once somebody listens."""
+    publisher = node.create_publisher(String, topic, 10)
+
+    def say(*texts: str) -> None:
+        wait_for_listener(publisher)
+        for text in texts:
+            publisher.publish(String(data=text))
+
+    return say
+
+
+def data(party: Party) -> list[str]:
+    return [each["msg"]["data"] for each in party.got() if each["op"] == "publish"]
+
+
+def test_a_topic_is_heard_by_the_name_that_the_client_has_for_it(party: Party, node: Node) -> None:
+    say = words(node)
+    party.ask(op="subscribe", topic="words", type="std_msgs/String")
+    say("a")
+    assert party.next(op="publish") == {"op": "publish", "topic": "words", "msg": {"data": "a"}}
+
+
+def test_whoever_comes_late_hears_a_latched_topic_even_after_others(bridge: Bridge, party: Party, node: Node) -> None:
+    node.create_publisher(String, "/latched", LATCHED).publish(String(data="urdf"))
+    other = Party(bridge)
+    for each in (party, other):
+        wait_for(lambda party=each: "/latched" in party.call("rosapi/topics")["topics"])
+        each.ask(op="subscribe", topic="/latched")
+        assert each.next(op="publish")["msg"] == {"data": "urdf"}
+    other.client.close()
+
+
+def test_a_topic_that_turns_out_to_be_latched_is_heard_from_its_beginning(party: Party, node: Node) -> None:
+    party.ask(op="subscribe", topic="/later", type="std_msgs/msg/String")
+    publisher = node.create_publisher(String, "/later", LATCHED)
+    publisher.publish(String(data="at once"))
+    assert party.next(op="publish")["msg"] == {"data": "at once"}
+    wait_for(
+        lambda: (
+            [each.qos_profile.durability for each in node.get_subscriptions_info_by_topic("/later")]
+            == [DurabilityPolicy.TRANSIENT_LOCAL]
+        )
+    )
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        ({"topic": "/nobody"}, "/nobody is published by nobody, and no type is named; expected: a type"),
+        ({"topic": "/rosout", "type": "std_msgs/String"}, "/rosout is no std_msgs/msg/String; expected: rcl_inter"),
+        ({"topic": "/x", "type": "std_msgs/Strin"}, "unknown interface 'std_msgs/msg/Strin'"),
+        ({"topic": "/x y"}, "'/x y' is no name in ROS"),
+        ({}, "subscribe: topic should be a text, got nothing"),
+        ({"topic": "/x", "type": "std_msgs/String", "throttle_rate": -1}, "throttle_rate should be a number from 0 on"),
+        ({"topic": "/x", "type": "std_msgs/String", "compression": "png"}, "no compression png; expected: none, cbor"),
+        ({"topic": "/sim_0/episode", "type": "std_msgs/UInt8MultiArray"}, "nobody but the coordinator may have this"),
+        ({"topic": "parameter_events"}, "it tells the signed leases"),
+    ],
+)
+def test_what_cannot_be_heard_is_told_in_a_sentence(party: Party, node: Node, asked: Any, said: str) -> None:
+    wait_for(lambda: "/rosout" in party.call("rosapi/topics")["topics"])
+    party.ask(op="subscribe", id="s", **asked)
+    told = party.next(op="status")
+    assert (told["level"], told["id"]) == ("error", "s")
+    assert said in told["msg"]
+
+
+def test_each_subscription_of_a_client_ends_by_its_id(party: Party, node: Node) -> None:
+    say = words(node)
+    for name in ("one", "two", "three"):
+        party.ask(op="subscribe", id=name, topic="/words", type="std_msgs/String")
+    party.ask(op="unsubscribe", id="one", topic="/words")
+    say("a")
+    party.next(msg={"data": "a"})
+    party.ask(op="unsubscribe", topic="/words")
+    party.ask(op="unsubscribe", topic="/words")
+    assert "there is no subscription to /words" in party.next(op="status")["msg"]
+    assert data(party) == ["a"]
+
+
+def test_the_lowest_throttle_and_the_longest_queue_of_a_client_count(party: Party, node: Node) -> None:
+    say = words(node)
+    party.ask(op="subscribe", id="slow", topic="/words", type="std_msgs/String", throttle_rate=60_000)
+    say("a", "b", "c")
+    party.next(msg={"data": "a"})
+    party.ask(op="subscribe", id="fast", topic="/words", throttle_rate=1, queue_length=2)
+    party.call("rosapi/get_time")
+    time.sleep(0.01)
+    say(*"defgh")
+    # What does not fit into the queue is left out, the oldest first.
+    party.next(msg={"data": "h"})
+    assert data(party)[0] == "a"
+    assert data(party)[-2:] == ["g", "h"]
+    party.ask(op="unsubscribe", id="fast", topic="/words")
+    party.call("rosapi/get_time")
+    before = len(data(party))
+    say("i", "j")
+    party.call("rosapi/get_time")
+    assert data(party)[before:] in ([], ["i"])
+
+
+def test_what_waits_in_a_queue_comes_at_even_times_however_late_each_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = 100.0
+    monkeypatch.setattr(subscriptions, "time", SimpleNamespace(monotonic=lambda: now))
+    waiting: list[tuple[float, Callable[[], None]]] = []
+    sent: list[tuple[Any, float]] = []
+    pace = Pace(
+        lambda sample: sent.append((sample, now)), lambda seconds, action: waiting.append((now + seconds, action))
+    )
+    pace.change(Wish(throttle_s=0.03, queue_length=100))
+    samples: list[Any] = list(range(20))
+    for sample in samples:
+        pace.offer(sample)
+    while waiting:
+        due, action = waiting.pop()
+        now = due + 0.005
+        action()
+    assert [sample for sample, _ in sent] == samples
+    assert [time_s for _, time_s in sent[1:]] == pytest.approx([100.005 + 0.03 * number for number in range(1, 20)])
+
+
+def test_a_message_comes_in_parts_that_are_no_longer_than_wanted(party: Party, node: Node) -> None:
+    say = words(node)
+    party.ask(op="subscribe", topic="/words", type="std_msgs/String", fragment_size=100)
+    say("ä" * 1000)
+    wait_for(lambda: [each for each in party.got() if each.get("num") == each.get("total", 0) - 1], "the last part")
+    parts = [each for each in party.got() if each["op"] == "fragment"]
+    assert {len(each["data"]) for each in parts[:-1]} == {100}
+    assert {(each["total"], each["id"]) for each in parts} == {(len(parts), parts[0]["id"])}
+    assert json.loads("".join(each["data"] for each in parts))["msg"] == {"data": "ä" * 1000}
+
+
+def test_messages_come_as_cbor_with_typed_arrays_or_as_they_are(party: Party, node: Node) -> None:
+    publisher = node.create_publisher(JointState, "/states", 10)
+    message = JointState(name=["a", "b"], position=[1.5, math.nan])
+    for compression in ("cbor", "cbor-raw"):
+        party.ask(op="subscribe", topic="/states", type="sensor_msgs/JointState", compression=compression)
+        wait_for_listener(publisher)
+        publisher.publish(message)
+        found = party.next(op="publish")["msg"]
+        if compression == "cbor":
+            assert found["name"] == ["a", "b"]
+            assert found["position"].tag == 86
+            assert np.frombuffer(found["position"].value, "<f8") == pytest.approx([1.5, math.nan], nan_ok=True)
+        else:
+            assert found["bytes"] == serialize(message)
+            assert found["secs"] + found["nsecs"] * 1e-9 == pytest.approx(time.time(), abs=60)
+        party.ask(op="unsubscribe", topic="/states")
+        wait_for(lambda: not publisher.get_subscription_count())
+
+
+def heard_by(node: Node, kind: Any, topic: str, qos: Any = 10) -> list[Any]:
+    heard: list[Any] = []
+    node.create_subscription(kind, topic, heard.append, qos)
+    return heard
+
+
+def test_messages_are_published_in_json_and_cbor_and_what_is_left_out_has_defaults(party: Party, node: Node) -> None:
+    heard = heard_by(node, Image, "/image")
+    party.ask(op="advertise", topic="image", type="sensor_msgs/Image")
+    party.ask(op="publish", topic="image", msg={"data": "AQID", "header": {"stamp": {"secs": 7, "nsecs": 8}}})
+    array = cbor2.CBORTag(64, b"\4\5")
+    for content in (b"\1\2", array):
+        party.client.receive(cbor2.dumps({"op": "publish", "topic": "/image", "msg": {"data": content, "width": 3}}))
+    wait_for(lambda: len(heard) == 3)
+    first, second, third = heard
+    assert (bytes(first.data), first.header.stamp.sec, first.header.stamp.nanosec, first.width) == (b"\1\2\3", 7, 8, 0)
+    assert (bytes(second.data), bytes(third.data), second.width) == (b"\1\2", b"\4\5", 3)
+    assert second.header.stamp.sec == pytest.approx(time.time(), abs=60)
+
+
+def test_whoever_publishes_without_announcing_it_publishes_what_the_topic_has(party: Party, node: Node) -> None:
+    heard = heard_by(node, PointStamped, "/target")
+    wait_for(lambda: "/target" in party.call("rosapi/topics")["topics"])
+    party.ask(op="publish", topic="/target", msg={"point": {"x": 1, "y": None}})
+    wait_for(lambda: heard)
+    assert (heard[0].point.x, math.isnan(heard[0].point.y)) == (1.0, True)
+
+
+def test_a_latched_message_reaches_who_comes_late_until_it_is_withdrawn(party: Party, node: Node) -> None:
+    party.ask(op="advertise", topic="/map", type="std_msgs/String", latch=True)
+    party.ask(op="publish", topic="/map", msg={"data": "here"})
+    party.call("rosapi/get_time")
+    heard = heard_by(node, String, "/map", LATCHED)
+    wait_for(lambda: heard)
+    assert node.count_publishers("/map") == 1
+    party.ask(op="unadvertise", topic="/map")
+    wait_for(lambda: not node.count_publishers("/map"))
+    party.ask(op="set_level", level="warning")
+    party.ask(op="unadvertise", topic="/map")
+    assert party.next(op="status") == {"op": "status", "level": "warning", "msg": "unadvertise: /map is not advertised"}
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        ({"op": "advertise", "topic": "/t"}, "advertise: type should be a text, got nothing"),
+        ({"op": "advertise", "topic": "/t", "type": "std_msgs/Header"}, "/t is no std_msgs/msg/Header; expected: std_"),
+        ({"op": "publish", "topic": "/nowhere", "msg": {}}, "/nowhere is published by nobody, and no type is named"),
+        ({"op": "publish", "topic": "/t", "msg": {"dat": 1}}, "dat: no such field; expected: one of data"),
+        ({"op": "publish", "topic": "/t", "msg": {"data": []}}, "data: should be string, got []"),
+        ({"op": "publish", "topic": "/t", "msg": 7}, "values: should be fields with values, got 7"),
+        ({"op": "advertise", "topic": "/sim_0/episode", "type": "std_msgs/UInt8MultiArray"}, "but the coordinator"),
+        ({"op": "publish", "topic": "/sim_0/episode", "msg": {}}, "nobody but the coordinator may have this topic"),
+    ],
+)
+def test_what_cannot_be_published_is_told_in_a_sentence(party: Party, asked: Any, said: str) -> None:
+    party.ask(op="advertise", topic="/t", type="std_msgs/String")
+    party.ask(id=9, **asked)
+    told = party.next(op="status")
+    assert (told["level"], told["id"]) == ("error", 9)
+    assert said in told["msg"]
+
+
+def test_who_leaves_takes_everything_along(bridge: Bridge, node: Node) -> None:
+    party = Party(bridge)
+    party.ask(op="advertise", topic="/mine", type="std_msgs/String")
+    party.ask(op="subscribe", topic="/yours", type="std_msgs/String")
+    party.ask(op="advertise_service", service="/do", type="std_srvs/Trigger")
+    party.ask(op="advertise_action", action="/act", type="control_msgs/FollowJointTrajectory")
+
+    def there() -> list[bool]:
+        services = dict(node.get_service_names_and_types())
+        counts = node.count_publishers("/mine"), node.count_subscribers("/yours")
+        return [*map(bool, counts), "/do" in services, "/act/_action/send_goal" in services]
+
+    wait_for(lambda: all(there()))
+    party.client.close()
+    wait_for(lambda: not any(there()))

@@ -1,0 +1,103 @@
+"""A bridge at the other end of a WebSocket."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from typing import Any
+
+import pytest
+from tests.unit.serve.rosbridge.conftest import wait_for, wait_for_listener
+from websockets.exceptions import ConnectionClosedError
+from websockets.sync.client import connect
+
+from throwcollect.ros import Node, get_message, get_service
+from throwcollect.serve.rosbridge import websocket
+from throwcollect.serve.rosbridge.websocket import Outbox
+
+String: Any = get_message("std_msgs/msg/String")
+Trigger: Any = get_service("std_srvs/srv/Trigger")
+
+
+def test_topics_are_listed_heard_and_services_called(url: str, node: Node) -> None:
+    def switch(_request: Any, response: Any) -> Any:
+        response.success, response.message = True, "on"
+        return response
+
+    service = node.create_service(Trigger, "/switch", switch)
+    publisher = node.create_publisher(String, "/words", 10)
+    with connect(url) as socket:
+
+        def ask(**fields: Any) -> Any:
+            socket.send(json.dumps(fields))
+            return json.loads(socket.recv())
+
+        listed = wait_for(
+            lambda: (
+                "/words" in (values := ask(op="call_service", service="rosapi/topics")["values"])["topics"] and values
+            )
+        )
+        assert dict(zip(listed["topics"], listed["types"], strict=True))["/words"] == "std_msgs/msg/String"
+        assert ask(op="call_service", id="a", service="/switch") == {
+            "op": "service_response",
+            "id": "a",
+            "service": "/switch",
+            "values": {"success": True, "message": "on"},
+            "result": True,
+        }
+        socket.send(json.dumps({"op": "subscribe", "topic": "words"}))
+        wait_for_listener(publisher)
+        publisher.publish(String(data="hello"))
+        assert json.loads(socket.recv()) == {"op": "publish", "topic": "words", "msg": {"data": "hello"}}
+    wait_for(lambda: not publisher.get_subscription_count(), "who has left hears nothing any more")
+    node.destroy_service(service)
+
+
+def test_a_frame_that_is_too_long_ends_the_connection(url: str) -> None:
+    with connect(url) as socket:
+        socket.send(json.dumps({"op": "nothing"}))
+        assert json.loads(socket.recv())["op"] == "status"
+        socket.send("ä" * (6 * 2**20))
+        with pytest.raises(ConnectionClosedError, match="1009"):
+            socket.recv()
+
+
+def test_who_does_not_read_loses_the_oldest_frames_and_holds_up_nobody(url: str, node: Node) -> None:
+    publisher = node.create_publisher(String, "/many", 10)
+    subscribe = json.dumps({"op": "subscribe", "topic": "/many", "type": "std_msgs/String"})
+    with connect(url, max_queue=1) as slow, connect(url) as quick:
+        for each in (slow, quick):
+            each.send(subscribe)
+        wait_for_listener(publisher)
+        # More than the buffers of the connection hold.
+        for number in range(100):
+            publisher.publish(String(data=f"{number} " + "x" * 500_000))
+            assert json.loads(quick.recv())["msg"]["data"].startswith(f"{number} ")
+        publisher.publish(String(data="last"))
+        assert json.loads(quick.recv())["msg"]["data"] == "last"
+        told: list[Any] = []
+        while not told or told[-1].get("msg") != {"data": "last"}:
+            told.append(json.loads(slow.recv()))
+        assert len(told) < 100
+        statuses = [each["msg"] for each in told if each["op"] == "status"]
+        assert len(statuses) == 1
+        assert "the oldest are dropped" in statuses[0]
+
+
+def test_what_waits_to_be_sent_is_bounded_in_number_and_in_bytes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(websocket, "MOST_FRAMES", 10)
+    monkeypatch.setattr(websocket, "MOST_BYTES", 1200)
+
+    async def left_of(frames: list[str]) -> list[str]:
+        outbox = Outbox(asyncio.get_running_loop())
+        for frame in [*frames, "end"]:
+            outbox.put(frame)
+        found: list[str] = []
+        while found[-1:] != ["end"]:
+            found.append(str(await outbox.take()))
+        return [frame for frame in found if "the oldest are dropped" not in frame]
+
+    numbers = [f"{number:04}" for number in range(30)]
+    assert asyncio.run(left_of(numbers)) == [*numbers[-9:], "end"]
+    long = [f"{number:0300}" for number in range(5)]
+    assert asyncio.run(left_of(long)) == [*long[-3:], "end"]

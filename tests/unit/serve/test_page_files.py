@@ -1,0 +1,105 @@
+"""The files of the page: nothing comes from elsewhere, nothing is missing, and libraries are as they were fetched."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+
+from throwcollect.serve import app
+
+PAGE = Path(app.__file__).parent / "page"
+VENDOR = PAGE / "vendor"
+OWN = sorted(path for path in PAGE.iterdir() if path.is_file())
+SCRIPTS = sorted(PAGE.rglob("*.js"))
+_HOST = re.compile(r"(?:\b(?:https?|wss?):|[\"'(])//[\w.-]+")
+_NAMESPACES = ("http://www.w3.org",)
+_IMPORT = re.compile(r"^(?:import\b|}\s*from\b)[^;]*?[\"']([^\"']+)[\"'];", re.MULTILINE)
+
+
+class _Tags(HTMLParser):
+    def __init__(self) -> None:
+        super().__init__()
+        self.found: list[tuple[str, dict[str, str | None]]] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.found.append((tag, dict(attrs)))
+
+
+@pytest.fixture(scope="module")
+def tags() -> list[tuple[str, dict[str, str | None]]]:
+    parser = _Tags()
+    parser.feed((PAGE / "index.html").read_text(encoding="utf-8"))
+    return parser.found
+
+
+def test_libraries_are_as_they_were_fetched() -> None:
+    lines = (VENDOR / "SHA256SUMS").read_text().splitlines()
+    wanted = {path: digest for digest, path in (line.split(maxsplit=1) for line in lines)}
+    found = {
+        str(path.relative_to(VENDOR)): hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in VENDOR.rglob("*")
+        if path.is_file() and path.name != "SHA256SUMS"
+    }
+    assert found == wanted
+
+
+def test_each_library_has_its_licence() -> None:
+    assert {path.name for path in VENDOR.iterdir() if path.is_dir()} == {"three", "urdf-loader", "uplot"}
+    assert all((path / "LICENSE").is_file() for path in VENDOR.iterdir() if path.is_dir())
+
+
+@pytest.mark.parametrize("path", OWN, ids=lambda path: path.name)
+def test_no_file_of_ours_names_another_host(path: Path) -> None:
+    hosts = [host.strip("\"'(") for host in _HOST.findall(path.read_text(encoding="utf-8"))]
+    assert [host for host in hosts if host not in _NAMESPACES] == []
+
+
+@pytest.mark.parametrize("path", SCRIPTS, ids=lambda path: path.name)
+def test_modules_import_what_is_there(path: Path) -> None:
+    for target in _IMPORT.findall(path.read_text(encoding="utf-8")):
+        assert target.startswith("."), f"{path.name} imports {target}, and browsers find paths alone"
+        assert (path.parent / target).is_file(), f"{path.name} imports {target}"
+
+
+def test_the_page_refers_to_what_is_there(tags: list[tuple[str, dict[str, str | None]]]) -> None:
+    references = [
+        value
+        for _, attributes in tags
+        for name, value in attributes.items()
+        if name in ("src", "href") and value and not value.startswith("#")
+    ]
+    assert "main.js" in references
+    assert [value for value in references if not (PAGE / value).is_file()] == []
+
+
+def test_the_policy_lets_the_page_be(tags: list[tuple[str, dict[str, str | None]]]) -> None:
+    assert all(attributes.get("src") for tag, attributes in tags if tag == "script"), "no script may be in the page"
+    assert not [name for _, attributes in tags for name in attributes if name.startswith("on")]
+
+
+def test_scripts_find_the_elements_that_they_look_for(tags: list[tuple[str, dict[str, str | None]]]) -> None:
+    ids = [attributes["id"] for _, attributes in tags if "id" in attributes]
+    assert len(ids) == len(set(ids))
+    asked = {
+        name for path in OWN for name in re.findall(r"(?<![.\w])get\(\"([\w-]+)\"\)", path.read_text(encoding="utf-8"))
+    }
+    assert asked - set(ids) == set()
+
+
+def test_what_people_use_has_a_name(tags: list[tuple[str, dict[str, str | None]]]) -> None:
+    labelled = {attributes.get("for") for tag, attributes in tags if tag == "label"}
+    text = (PAGE / "index.html").read_text(encoding="utf-8")
+    for tag, attributes in tags:
+        if tag not in ("input", "select", "textarea"):
+            continue
+        name = attributes["id"]
+        wrapped = re.search(rf"<label>(?:(?!</label>).)*id=\"{name}\"", text, re.DOTALL)
+        assert wrapped or name in labelled or attributes.get("aria-label"), f"#{name} has no label"
+
+
+def test_our_modules_are_short() -> None:
+    assert {path.name: n for path in OWN if (n := len(path.read_text(encoding="utf-8").splitlines())) > 400} == {}

@@ -1,0 +1,38 @@
+"""What modules of the page compute: messages of the server, replays, meshes with fewer triangles."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import struct
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from throwcollect.serve import app
+
+
+def test_modules_compute_what_they_should(tmp_path: Path) -> None:
+    if (node := shutil.which("node")) is None:
+        pytest.skip("needs node, which runs modules of the page without a browser")
+    header = {"trial": 7, "outcome": "landed", "joints": ["elbow", "wrist"], "samples": 3, "rate_hz": 100.0}
+    text = json.dumps({**header, "landing": [1.5, -0.25, 0.0]}).encode()
+    numbers = [0, 10, 1, 11, 2, 12, *(0, 1, 2), *(1, 2, 3), *(2, 3, 4)]
+    message = (
+        struct.pack("<I", len(text)) + text + b"\0" * (-len(text) % 4) + struct.pack(f"<{len(numbers)}f", *numbers)
+    )
+    (tmp_path / "throw").write_bytes(message)
+    # Without what an installation by hand has node read first.
+    environment = {
+        **os.environ,
+        "PAGE": str(Path(app.__file__).parent / "page"),
+        "THROW": str(tmp_path / "throw"),
+        "NODE_OPTIONS": "",
+    }
+    script = Path(__file__).with_name("page_modules.mjs")
+    done = subprocess.run(
+        [node, "--test", script], env=environment, capture_output=True, text=True, timeout=60, check=False
+    )
+    assert done.returncode == 0, done.stdout + done.stderr

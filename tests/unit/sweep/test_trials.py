@@ -1,0 +1,74 @@
+"""Trials in columns are what they would be one by one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tests.unit.sweep.columns import in_columns
+
+from throwcollect.sweep.rows import Rows
+from throwcollect.sweep.trials import Trial, Trials
+
+LISTED = [
+    Trial(
+        number, {"ball.mass_kg": number / 7, "task.duration_s": 1.0}, 2**64 - 1 - number, f"{number**9:064x}", refused
+    )
+    for number, refused in enumerate((None, "too fast", None, None, "too far"))
+]
+
+
+def trials() -> Trials:
+    return in_columns(LISTED)
+
+
+def test_they_are_a_sequence_of_trials() -> None:
+    assert list(trials()) == LISTED
+    assert [trials()[index] for index in range(-5, 5)] == LISTED + LISTED
+    assert list(trials()[1:4]) == list(trials()[1:][:3]) == LISTED[1:4]
+    assert list(trials().numbers_to_run) == [0, 2, 3]
+    assert list(trials()[3:].numbers_to_run) == [3]
+    with pytest.raises(IndexError):
+        trials()[5]
+    with pytest.raises(ValueError, match="no gaps"):
+        trials()[::2]
+
+
+@pytest.mark.parametrize("changed", [{"seed": 1}, {"digest": "0" * 64}, {"refused": "too slow"}])
+def test_they_are_equal_if_all_of_each_is(changed: dict[str, object]) -> None:
+    assert trials() == trials()
+    assert trials()[1:] != trials()[:4]
+    other = [*LISTED[:4], replace(LISTED[4], **changed)]  # type: ignore[arg-type]
+    assert in_columns(other) != trials()
+    assert in_columns([*LISTED[:4], replace(LISTED[4], values={"ball.mass_kg": 4 / 7, "task.duration_s": 2.0})]) != (
+        trials()
+    )
+
+
+def test_those_that_are_appended_do_not_change_what_was_taken_before() -> None:
+    grown = trials()[:2]
+    before, values = grown[:], grown.values
+    for index in range(2, 5):
+        grown.extend(trials()[index : index + 1])
+    assert grown == trials()
+    assert list(before) == LISTED[:2]
+    before.extend(trials()[2:3].refuse(["too slow"]))
+    assert grown == trials()
+    assert values.tolist() == [list(trial.values.values()) for trial in LISTED[:2]]
+    with pytest.raises(ValueError, match="cannot follow"):
+        grown.extend(trials()[3:])
+
+
+def test_reasons_replace_those_that_were_there() -> None:
+    assert trials().refuse(["a", None, None, "b", None]).refused == {0: "a", 3: "b"}
+
+
+def test_appended_rows_are_seldom_copied() -> None:
+    rows = Rows(np.zeros((1, 2)))
+    places = set()
+    for number in range(1000):
+        rows.append(np.full((1, 2), number))
+        places.add(rows.all.__array_interface__["data"][0])
+    assert rows.all[1:, 1].tolist() == list(range(1000))
+    assert len(places) < 15
