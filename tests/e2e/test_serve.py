@@ -24,7 +24,9 @@ from websockets.sync.client import ClientConnection, connect
 from tests.e2e.collection import FAST, call_here, collect_here, command, fingerprints, write_config
 from throwcollect import ros
 from throwcollect.ros.srv import GetParameters
+from throwcollect.run_key import RunKey
 from throwcollect.runs.records import STATE_VARIABLE, Records
+from throwcollect.serve.finding import find_server, make_page_address
 
 pytestmark = pytest.mark.e2e
 TRIALS = 10
@@ -203,7 +205,7 @@ def test_a_run_is_watched_outlives_its_server_is_stopped_and_resumed(
             assert isinstance(frame, bytes)
             header = json.loads(frame[4 : 4 + int.from_bytes(frame[:4], "little")])
             numbers = header["samples"] * (len(header["joints"]) + 3)
-            assert set(header) == {"trial", "outcome", "joints", "samples", "rate_hz", "landing"}
+            assert {"trial", "outcome", "joints", "samples", "rate_hz", "landing"} <= set(header)
             assert len(frame) % 4 == 0
             assert 0 <= len(frame) - 4 * numbers - 4 - len(json.dumps(header)) < 4
             before = first.instance("watched")
@@ -307,3 +309,40 @@ def test_view_starts_one_server(place: Place, monkeypatch: pytest.MonkeyPatch) -
         assert len(pids) == 1
     finally:
         psutil.Process(place.address()["pid"]).kill()
+
+
+def test_what_nobody_can_be_served_at_is_told_in_one_message(place: Place, tmp_path: Path) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = str(taken.getsockname()[1])
+        said = call_here("serve", "--port", port)
+    assert said.returncode == 2
+    assert said.stderr.startswith(f"throwcollect: --host 127.0.0.1 --port {port}: nobody can be served there: Address")
+    said = call_here("serve", "--host", "0.0.0.0", "--port", "0")  # noqa: S104 - it is refused
+    assert said.returncode == 2
+    assert "--host 0.0.0.0: whoever is on that network could read the token" in said.stderr
+    (tmp_path / "no.pem").write_text("no certificate\n")
+    for file in ("none.pem", "no.pem"):
+        said = call_here("serve", "--port", "0", "--tls-cert", tmp_path / file, "--tls-key", tmp_path / file)
+        assert said.returncode == 2
+        assert f"--tls-cert {tmp_path / file} --tls-key {tmp_path / file}: cannot be used: " in said.stderr
+
+
+def test_a_server_speaks_ipv6_and_tls(place: Place, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    key = RunKey(tmp_path / "key")
+    key.create()
+    monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "state"))
+    words = command("serve", "--host", "::1", "--port", "0", "--json")
+    options = ("--tls-cert", str(key.certificate), "--tls-key", str(key.private_key))
+    with subprocess.Popen([*words, *options], cwd=tmp_path, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        url = json.loads(process.stdout.readline())["url"]
+        assert url.startswith("https://[::1]:")
+        found = find_server()
+        assert found is not None
+        assert found.url == url
+        assert make_page_address(found).startswith(f"{url}/#code=")
+        process.terminate()
+        assert process.wait(timeout=5) == 0
+    assert find_server() is None
