@@ -37,8 +37,8 @@ def encode_throw(delivery: Delivery, simulation: str) -> bytes:
     Returns:
         Length of a JSON header as uint32, the header, zero bytes up to a multiple of four, then float32: angles of the
         joints [rad], shape ``(n_samples, n_joints)``, and the ball's centre in the world [m], shape ``(n_samples, 3)``;
-        all little-endian. The header has ``trial``, ``simulation``, ``outcome``, ``joints``, ``samples``, ``rate_hz`` and
-        ``landing``.
+        all little-endian. The header has ``trial``, ``simulation``, ``outcome``, ``joints``, ``samples``, ``rate_hz``
+        and ``landing``.
 
     Raises:
         DatasetError: If the episode is damaged.
@@ -118,7 +118,7 @@ class ThrowWatch:
     def _hear(self, simulation: str, message: bytes) -> None:
         try:
             delivery = unpack(message, Signer.of_key(self._run.key))
-            if not isinstance(delivery, Delivery):
+            if not isinstance(delivery, Delivery) or not delivery.result:
                 return
             frame = encode_throw(delivery, simulation)
         except ThrowcollectError:
