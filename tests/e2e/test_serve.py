@@ -29,7 +29,7 @@ from throwcollect.runs.records import STATE_VARIABLE, Records
 from throwcollect.serve.finding import find_server, make_page_address
 
 pytestmark = pytest.mark.e2e
-TRIALS = 10
+TRIALS, MANY = 10, 24
 SLOWLY = {"sim.real_time_factor": 1}
 CATALOGUE = """\
 components:
@@ -194,7 +194,8 @@ def never_read(server: Server, path: str) -> socket.socket:
 def test_a_run_is_watched_outlives_its_server_is_stopped_and_resumed(
     place: Place, first: Server, tmp_path: Path
 ) -> None:
-    wish = {"component": "throws", "simulations": 2, "set": SLOWLY}
+    # Enough to go on for as long as a server takes to start on a busy machine.
+    wish = {"component": "throws", "simulations": 2, "set": {**SLOWLY, "trials": MANY}}
     assert first.ask("PUT", "/instances/watched", wish)[0] == 202
     assert first.ask("PUT", "/instances/watched", wish)[0] == 200
     with closing(never_read(first, "/state")), closing(never_read(first, "/instances/watched/shown")):
@@ -229,7 +230,7 @@ def test_a_run_is_watched_outlives_its_server_is_stopped_and_resumed(
     with second.open(f"/instances/{resumed['id']}/shown"):
         assert second.wait_until(resumed["id"], "ended")["exit_code"] == 0
     second.kill()
-    collect_here(write_config(tmp_path, trials=TRIALS, sim=FAST), tmp_path / "data", "--set", "sim.real_time_factor=1")
+    collect_here(write_config(tmp_path, trials=MANY, sim=FAST), tmp_path / "data", "--set", "sim.real_time_factor=1")
     assert fingerprints(place.directory / "datasets" / "watched") == fingerprints(tmp_path / "data")
 
 
