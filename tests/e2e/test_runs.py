@@ -363,7 +363,8 @@ def test_a_launcher_that_cannot_start_its_nodes_is_told_by_the_command_that_star
 
 
 def test_a_failure_is_told_to_whoever_waits(config: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "pybullet.py").write_text("raise ImportError('broken pybullet')")
+    # Whoever starts the run is gone by then.
+    (tmp_path / "pybullet.py").write_text("import time\ntime.sleep(1)\nraise ImportError('broken pybullet')")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     detach(config, tmp_path / "data", "--set", "run.restarts=0", "--set", "sim.engine=bullet")
     waited = call_here("wait")

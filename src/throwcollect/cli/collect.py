@@ -88,7 +88,7 @@ def up(
     """Collect a dataset: start the simulations, run all trials, write the files."""
     changes = overrides(settings, trials=trials, run__simulations=simulations, run__runtime=runtime, run__listen=listen)
     if slice is not None:
-        unfit = {"CONFIG": config, "--resume": resume, "--detach": detach or None}
+        unfit = {"CONFIG": config, "--resume": resume, "--detach": detach or None, "--view": view or None}
         if wrong := next((name for name, value in unfit.items() if value is not None), None):
             raise ConfigError(f"{wrong}: should be left out with --slice, which goes by the plan in --output DIR")
         if output is None:
@@ -112,7 +112,7 @@ def up(
     elif output is not None:
         raise ConfigError(f"--output {output}: should be left out with --resume, which names the directory")
     else:
-        _go_on(resume, config, changes, detach=detach, json=json, token_file=token_file)
+        _go_on(resume, config, changes, detach=detach, json=json, token_file=token_file, view=view)
 
 
 def resume(
@@ -224,6 +224,7 @@ def _go_on(
     json: bool,
     check: bool = False,
     token_file: Path | None = None,
+    view: bool = False,
 ) -> None:
     launched = _collect(
         lambda runs, shown: runs.resume(
@@ -232,6 +233,7 @@ def _go_on(
         detach=detach,
         json=json,
         token_file=token_file,
+        view=view,
     )
     if not launched:
         from throwcollect.cli.dataset.info import print_summary

@@ -79,17 +79,19 @@ def quote(value: Any) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
-def findings(error: ValidationError, values: Any, *, above: Location = ()) -> list[Finding]:
+def findings(error: ValidationError, values: Any, *, above: Location = (), shape: Shape | None = None) -> list[Finding]:
     """What pydantic found, or the first 200 of it: one finding a key, unknown keys first.
 
     Args:
         error: What pydantic raised.
         values: The values that it was given.
         above: Where in a configuration these values are.
+        shape: What these values should be; None for what a configuration has there.
     """
+    expected = shape or shape_of(above)
     found: dict[Location, Finding] = {}
     for details in error.errors(include_url=False)[:MOST_EXAMINED]:
-        for finding in _findings(details, values, above):
+        for finding in _findings(details, values, above, expected):
             # A union reports once for each alternative; the sentence speaks of all of them anyway.
             found.setdefault(finding.location, finding)
     for location in [place[:length] for place in found for length in range(len(place))]:
@@ -105,13 +107,13 @@ def _nearest(finding: Finding) -> str:
     return finding.sentence.partition("did you mean '")[2].partition("'")[0]
 
 
-def _findings(details: ErrorDetails, values: Any, above: Location) -> Iterator[Finding]:
-    location, shape = _locate(details, values, above)
+def _findings(details: ErrorDetails, values: Any, above: Location, expected: Shape) -> Iterator[Finding]:
+    location, shape = _locate(details, values, above, expected)
     kind, value = details["type"], details["input"]
     cause = details.get("ctx", {}).get("error")
     is_key = details["loc"][-1:] == ("[key]",)
     if kind == "extra_forbidden":
-        section, name = _section(details, values, above), str(location[-1])
+        section, name = _section(details, values, above, expected), str(location[-1])
         yield Finding(location, section.refused.get(name) or unknown_key(name, list(section.keys)), unknown=True)
     elif isinstance(cause, ContradictionError):
         for key, sentence in cause.sentences.items():
@@ -151,9 +153,9 @@ def _radians(kind: str, shape: Shape, value: Any) -> str:
     return f"; angles are in radians: {value:g} degrees are {math.radians(value):.4f}"
 
 
-def _locate(details: ErrorDetails, values: Any, above: Location) -> tuple[Location, Shape]:
+def _locate(details: ErrorDetails, values: Any, above: Location, expected: Shape) -> tuple[Location, Shape]:
     """Where an error is, without the names of models and unions that pydantic mixes into its locations."""
-    location, shape, here = list(above), shape_of(above), values
+    location, shape, here = list(above), expected, values
     parts = details["loc"]
     for index, part in enumerate(parts):
         inside = part in here if isinstance(here, Mapping) else isinstance(here, list) and isinstance(part, int)
@@ -167,9 +169,9 @@ def _locate(details: ErrorDetails, values: Any, above: Location) -> tuple[Locati
     return tuple(location), shape
 
 
-def _section(details: ErrorDetails, values: Any, above: Location) -> Shape:
+def _section(details: ErrorDetails, values: Any, above: Location, expected: Shape) -> Shape:
     container = ErrorDetails(type="section", loc=details["loc"][:-1], msg="", input=None)
-    return _locate(container, values, above)[1]
+    return _locate(container, values, above, expected)[1]
 
 
 def _split(key: str) -> Location:

@@ -12,8 +12,9 @@ from pydantic import AfterValidator, Field, PositiveInt, ValidationError, model_
 
 from throwcollect.config.document import Document
 from throwcollect.config.loader import load
-from throwcollect.config.problems import findings
+from throwcollect.config.problems import Finding, findings
 from throwcollect.config.section import Section
+from throwcollect.config.shape import Shape
 from throwcollect.errors import ConfigError, NotFoundError
 
 NAME = r"[a-z0-9][a-z0-9_-]{0,62}"
@@ -89,7 +90,9 @@ class Catalogue:
         try:
             return self.components[name]
         except KeyError:
-            raise NotFoundError(f"no component {name!r}", expected=f"one of {', '.join(self.components)}") from None
+            known = f"one of {', '.join(self.components)}" if self.components else None
+            hint = None if known else "throwcollect serve CATALOG.yaml offers what is in a catalogue"
+            raise NotFoundError(f"no component {name!r}", expected=known, hint=hint) from None
 
     @classmethod
     def find(cls, path: Path) -> Catalogue:
@@ -117,7 +120,7 @@ class Catalogue:
         try:
             found = CatalogueFile.model_validate(document.values, strict=True)
         except ValidationError as error:
-            problems = [document.problem(each.location, each.sentence) for each in findings(error, document.values)]
+            problems = [document.problem(each.location, each.sentence) for each in _find(error, document)]
             raise ConfigError([*document.problems, *problems]) from error
         if document.problems:
             raise ConfigError(document.problems)
@@ -133,3 +136,9 @@ class Catalogue:
                 raise ConfigError([problem, *error.problems], hint=error.hint) from error
             components[name] = Component(name, section.pretty_name or name, kind, named, section.max_instances)
         return cls(components)
+
+
+def _find(error: ValidationError, document: Document) -> list[Finding]:
+    """What is wrong in a catalogue."""
+    components = {"type": "object", "additionalProperties": ComponentSection.model_json_schema()}
+    return findings(error, document.values, shape=Shape({"type": "object", "properties": {"components": components}}))

@@ -131,8 +131,9 @@ def ensure_server() -> Address:
     log = state_directory() / _LOG
     words = [sys.executable, "-m", "throwcollect", "serve", "--json"]
     with open(open_log(log), "ab") as output:
+        # What it prints has a code, and others may be allowed to read the log.
         process = subprocess.Popen(
-            words, stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT, start_new_session=True
+            words, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=output, start_new_session=True
         )
     deadline = time.monotonic() + _START_S
     while time.monotonic() < deadline and process.poll() is None:

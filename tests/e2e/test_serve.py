@@ -1,0 +1,303 @@
+"""`throwcollect serve` with real processes: what it begins, who watches, and what becomes of it all when it is killed."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import httpx
+import psutil
+import pytest
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import ClientConnection, connect
+
+from tests.e2e.collection import FAST, call_here, collect_here, command, fingerprints, write_config
+from throwcollect import ros
+from throwcollect.ros.srv import GetParameters
+from throwcollect.runs.records import STATE_VARIABLE, Records
+
+pytestmark = pytest.mark.e2e
+TRIALS = 10
+SLOWLY = {"sim.real_time_factor": 1}
+CATALOGUE = """\
+components:
+  throws: {config: small.yaml, max_instances: 2}
+  talos: {session: small.yaml}
+"""
+
+
+def wait_for(condition: Callable[[], Any], seconds: float = 60) -> Any:
+    deadline = time.monotonic() + seconds
+    while not (found := condition()):
+        assert time.monotonic() < deadline, "did not happen"
+        time.sleep(0.1)
+    return found
+
+
+@dataclass
+class Server:
+    """A server, and how programs find it."""
+
+    process: psutil.Process
+    address: dict[str, Any]
+
+    def ask(self, method: str, path: str, content: Any = None) -> tuple[int, Any]:
+        answer = httpx.request(
+            method,
+            f"{self.address['url']}/api/v1{path}",
+            json=content,
+            headers={"Authorization": f"Bearer {self.address['token']}"},
+            timeout=60,
+        )
+        return answer.status_code, answer.json() if answer.content else None
+
+    def open(self, path: str) -> ClientConnection:
+        url = self.address["url"].replace("http", "ws", 1)
+        return connect(
+            f"{url}/api/v1{path}", subprotocols=[f"bearer.{self.address['token']}"], open_timeout=60, max_size=None
+        )  # type: ignore[arg-type]
+
+    def instance(self, name: str) -> dict[str, Any]:
+        status, found = self.ask("GET", f"/instances/{name}")
+        assert status == 200, found
+        return dict(found)
+
+    def wait_until(self, name: str, status: str) -> dict[str, Any]:
+        return dict(wait_for(lambda: found if (found := self.instance(name))["status"] == status else None))
+
+    def kill(self) -> None:
+        with suppress(psutil.NoSuchProcess):
+            self.process.kill()
+            self.process.wait()
+
+
+@dataclass
+class Place:
+    """A directory with a catalogue, and the state of a user."""
+
+    directory: Path
+    state: Path
+
+    def serve(self, *options: str) -> Server:
+        """A server of its own."""
+        words = command("serve", "catalogue.yaml", "--port", "0", "--json", *options)
+        process = subprocess.Popen(
+            words, cwd=self.directory, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+        )
+        assert process.stdout is not None
+        line = process.stdout.readline()
+        assert line, "no server starts"
+        url = json.loads(line)["url"]
+        found = wait_for(lambda: self.address() if self.address()["url"] == url else None) if not options else {}
+        return Server(psutil.Process(process.pid), found or {"url": url})
+
+    def address(self) -> dict[str, Any]:
+        path = self.state / "serve.json"
+        return dict(json.loads(path.read_text())) if path.exists() else {"url": None}
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Place]:
+    directory = tmp_path_factory.mktemp("served")
+    write_config(directory, trials=TRIALS, sim=FAST)
+    (directory / "catalogue.yaml").write_text(CATALOGUE)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv(STATE_VARIABLE, str(directory / "state"))
+        patch.setenv("DOCKER_HOST", f"unix://{directory}/none.sock")
+        yield Place(directory, directory / "state")
+        for run in Records().all():
+            if run.lives:
+                os.kill(run.record.launcher, signal.SIGKILL)
+
+
+@pytest.fixture(scope="module")
+def first(place: Place) -> Iterator[Server]:
+    server = place.serve()
+    yield server
+    if server.process.is_running():
+        server.kill()
+
+
+@pytest.fixture
+def server(place: Place, first: Server) -> Iterator[Server]:
+    """A server; a new one if a test has killed that before."""
+    if first.process.is_running():
+        yield first
+    else:
+        again = place.serve()
+        yield again
+        again.kill()
+
+
+def test_clients_who_ask_at_once_never_get_one_too_many(server: Server) -> None:
+    wish = {"component": "throws", "simulations": 1, "set": SLOWLY}
+    with ThreadPoolExecutor(4) as pool:
+        answers = list(pool.map(lambda name: server.ask("PUT", f"/instances/{name}", wish), ("a", "b", "c", "d")))
+    assert sorted(status for status, _ in answers) == [202, 202, 409, 409]
+    refused = next(content for status, content in answers if status == 409)
+    assert refused["title"] == "component throws: 2 instances live, as many as max_instances allows"
+    begun = [content["id"] for status, content in answers if status == 202]
+    assert refused["hint"] == f"stop one of {begun[0]}, {begun[1]}" or refused["hint"].endswith(f"{begun[0]}")
+    # They have hardly begun, and are told to stop; whoever asks for the same once more changes nothing.
+    for name in begun:
+        assert server.ask("DELETE", f"/instances/{name}")[0] == 202
+    for name in begun:
+        end = server.wait_until(name, "ended")
+        assert (end["exit_code"], end["message"]) == (130, "stopped before any node was started")
+        assert server.ask("PUT", f"/instances/{name}", wish) == (200, end)
+        assert server.ask("PUT", f"/instances/{name}", {"component": "throws"})[0] == 409
+        assert server.ask("DELETE", f"/instances/{name}")[0] == 409
+
+
+def test_what_the_preparation_fails_of_is_told(place: Place, server: Server) -> None:
+    taken = place.directory / "datasets" / "taken"
+    taken.mkdir(parents=True)
+    (taken / "mine").touch()
+    assert server.ask("PUT", "/instances/taken", {"component": "throws"})[0] == 202
+    end = server.wait_until("taken", "ended")
+    assert end["exit_code"] == 2
+    assert end["message"].startswith(f"{taken}: ")
+    assert [path.name for path in taken.iterdir()] == ["mine"]
+
+
+def never_read(server: Server, path: str) -> socket.socket:
+    """A client that asks for a socket and reads nothing of what comes."""
+    host, port = server.address["url"].removeprefix("http://").split(":")
+    client = socket.create_connection((host, int(port)))
+    client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1024)
+    client.sendall(
+        f"GET /api/v1{path}?token={server.address['token']} HTTP/1.1\r\nHost: {host}:{port}\r\nConnection: Upgrade\r\n"
+        "Upgrade: websocket\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n".encode()
+    )
+    return client
+
+
+def test_a_run_is_watched_outlives_its_server_is_stopped_and_resumed(
+    place: Place, first: Server, tmp_path: Path
+) -> None:
+    wish = {"component": "throws", "simulations": 2, "set": SLOWLY}
+    assert first.ask("PUT", "/instances/watched", wish)[0] == 202
+    assert first.ask("PUT", "/instances/watched", wish)[0] == 200
+    with closing(never_read(first, "/state")), closing(never_read(first, "/instances/watched/shown")):
+        first.wait_until("watched", "running")
+        with first.open("/state") as state, first.open("/instances/watched/shown") as shown:
+            assert json.loads(state.recv())["instances"][0]["id"] == "watched"
+            frame = shown.recv(timeout=60)
+            assert isinstance(frame, bytes)
+            header = json.loads(frame[4 : 4 + int.from_bytes(frame[:4], "little")])
+            numbers = header["samples"] * (len(header["joints"]) + 3)
+            assert set(header) == {"trial", "outcome", "joints", "samples", "rate_hz", "landing"}
+            assert len(frame) % 4 == 0
+            assert 0 <= len(frame) - 4 * numbers - 4 - len(json.dumps(header)) < 4
+            before = first.instance("watched")
+            first.kill()
+            with pytest.raises(ConnectionClosed):
+                while True:
+                    state.recv(timeout=10)
+    second = place.serve()
+    after = second.instance("watched")
+    growing = ("progress", "nodes")
+    assert {k: v for k, v in after.items() if k not in growing} == {k: v for k, v in before.items() if k not in growing}
+    assert [node["handle"] for node in after["nodes"]] == [node["handle"] for node in before["nodes"]]
+    assert second.ask("GET", "/collections/watched/files")[0] == 409
+    assert second.ask("POST", "/collections/watched/resume")[0] == 409
+    assert second.ask("DELETE", "/instances/watched")[0] == 202
+    wait_for(lambda: (found := second.instance("watched"))["stopping"] or found["status"] == "ended")
+    # Whoever asks once more does not end what is under way.
+    assert second.ask("DELETE", "/instances/watched")[0] in (202, 409)
+    assert second.wait_until("watched", "ended")["exit_code"] == 130
+    status, resumed = second.ask("POST", "/collections/watched/resume")
+    assert status == 202
+    with second.open(f"/instances/{resumed['id']}/shown"):
+        assert second.wait_until(resumed["id"], "ended")["exit_code"] == 0
+    second.kill()
+    collect_here(write_config(tmp_path, trials=TRIALS, sim=FAST), tmp_path / "data", "--set", "sim.real_time_factor=1")
+    assert fingerprints(place.directory / "datasets" / "watched") == fingerprints(tmp_path / "data")
+
+
+def read_factor(name: str) -> float:
+    """What a simulation of a run answers by a service."""
+    run = Records().get(name)
+    context = ros.Context()
+    ros.init(context=context, connection=run.connection)
+    try:
+        node = ros.Node("_asks", context=context)
+        executor = ros.SingleThreadedExecutor(context=context)
+        executor.add_node(node)
+        client = node.create_client(GetParameters, "/sim_0/sim_0/get_parameters")
+        assert client.wait_for_service(20)
+        future = client.call_async(GetParameters.Request(names=["sim.real_time_factor"]))
+        executor.spin_until_future_complete(future, timeout_sec=20)
+        return float(future.result().values[0].double_value)
+    finally:
+        ros.shutdown(context=context)
+
+
+def test_a_session_serves_clients_and_is_slow_as_long_as_somebody_watches(place: Place, server: Server) -> None:
+    assert server.ask("PUT", "/instances/talos", {"component": "talos", "simulations": 1})[0] == 202
+    assert server.ask("PUT", "/instances/other", {"component": "talos"})[0] == 409
+    begun = server.wait_until("talos", "running")
+    assert (begun["kind"], begun["robots"], begun["dataset"]) == ("session", ["sim_0"], None)
+    assert read_factor("talos") == 0.0
+    with server.open("/instances/talos/live/sim_0"):
+        with server.open("/instances/talos/live/sim_0"):
+            assert read_factor("talos") == 1.0
+        time.sleep(1.0)
+        assert read_factor("talos") == 1.0
+    wait_for(lambda: read_factor("talos") == 0.0)
+    with server.open("/instances/talos/live/sim_1") as nobody, pytest.raises(ConnectionClosed) as end:
+        nobody.recv()
+    assert (end.value.rcvd and end.value.rcvd.code) == 4404
+    with server.open("/instances/talos/live/sim_0"):
+        server.kill()
+        # Another server lets go of what a killed one has slowed down.
+        assert read_factor("talos") == 1.0
+        again = place.serve()
+        wait_for(lambda: read_factor("talos") == 0.0)
+    assert again.ask("DELETE", "/instances/talos")[0] == 202
+    assert again.wait_until("talos", "ended")["exit_code"] == 0
+    again.kill()
+
+
+def test_a_server_that_is_told_to_end_does_so_whoever_listens(server: Server, place: Place) -> None:
+    other = place.serve("--datasets", "elsewhere")
+    assert place.address()["url"] == server.address["url"]
+    with server.open("/state") as state, closing(never_read(server, "/state")):
+        state.recv()
+        server.process.terminate()
+        server.process.wait(timeout=3)
+        with pytest.raises(ConnectionClosed):
+            state.recv(timeout=3)
+    # Who came second is found when the first has ended.
+    wait_for(lambda: place.address()["url"] == other.address["url"], 5)
+    other.kill()
+
+
+def test_view_starts_one_server(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(place.directory)
+    pids = set()
+    try:
+        for _ in range(2):
+            said = call_here("view", "--json")
+            assert said.returncode == 0, said.stderr
+            address = place.address()
+            pids.add(address["pid"])
+            assert json.loads(said.stdout)["page"].startswith(f"{address['url']}/#code=")
+            code = json.loads(said.stdout)["page"].rpartition("=")[2]
+            # Others may be allowed to read the log.
+            assert code not in (place.state / "serve.log").read_text()
+        said = call_here("up", "--view", "--runtime", "inprocess", "--trials", "1", "small.yaml", "--output", "seen")
+        assert f"look inside: {address['url']}/#code=" in said.stderr
+        assert len(pids) == 1
+    finally:
+        psutil.Process(place.address()["pid"]).kill()

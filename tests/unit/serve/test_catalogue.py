@@ -1,0 +1,98 @@
+"""Catalogues, and what their messages say."""
+
+from pathlib import Path
+
+import pytest
+from tests.unit.serve.conftest import CONFIG
+
+from throwcollect.errors import ConfigError, NotFoundError
+from throwcollect.serve.catalogue import Catalogue
+
+
+@pytest.fixture
+def directory(tmp_path: Path) -> Path:
+    (tmp_path / "small.yaml").write_text(CONFIG)
+    return tmp_path
+
+
+def write(directory: Path, text: str) -> Path:
+    path = directory / "catalogue.yaml"
+    path.write_text(text)
+    return path
+
+
+def test_components_are_read(directory: Path) -> None:
+    text = "components:\n  a: {config: small.yaml, pretty_name: Throws of A, max_instances: 3}\n  b: {session: small.yaml}\n"
+    catalogue = Catalogue.read(write(directory, text))
+    a, b = catalogue.get("a"), catalogue.get("b")
+    assert (a.kind, a.pretty_name, a.max_instances, a.config) == (
+        "collection",
+        "Throws of A",
+        3,
+        directory / "small.yaml",
+    )
+    assert (b.kind, b.pretty_name, b.max_instances) == ("session", "b", 1)
+    with pytest.raises(NotFoundError, match="no component 'c'") as error:
+        catalogue.get("c")
+    assert error.value.expected == "one of a, b"
+
+
+def test_a_configuration_is_the_only_component(directory: Path) -> None:
+    catalogue = Catalogue.find(directory / "small.yaml")
+    assert [(each.name, each.kind, each.max_instances) for each in catalogue.components.values()] == [
+        ("small", "collection", 1)
+    ]
+
+
+def test_without_a_catalogue_nothing_can_be_begun(directory: Path) -> None:
+    catalogue = Catalogue.find(directory / "none.yaml")
+    with pytest.raises(NotFoundError, match="no component 'a'") as error:
+        catalogue.get("a")
+    assert error.value.expected is None
+    assert "catalogue" in (error.value.hint or "")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("components: {}\n", ":1: components: should"),
+        ("components:\n  a:\n    pretty_name: A\n", ":2: components.a: should have one of config and session"),
+        ("components:\n  a: {config: small.yaml, session: small.yaml}\n", ":2: components.a: should have one of"),
+        ("components:\n  a:\n    config: small.yaml\n    image: ubuntu\n", ":4: components.a.image: unknown key"),
+        ("components:\n  a:\n    config: small.yaml\n    max_instance: 2\n", "did you mean 'max_instances'"),
+        ("components:\n  a:\n    config: small.yaml\n    max_instances: 0\n", ":4: components.a.max_instances: should"),
+        (
+            "components:\n  a:\n    config: small.yaml\n    max_instances: true\n",
+            ":4: components.a.max_instances: should",
+        ),
+        ("components:\n  a:\n    config: 7\n", ":3: components.a.config: should"),
+        ("components:\n  ../a: {config: small.yaml}\n", "should be at most 63 of a-z, 0-9, - and _, got '../a'"),
+        ("components:\n  A: {config: small.yaml}\n", ":2: components.A"),
+        ("components:\n  -rf: {config: small.yaml}\n", "got '-rf'"),
+        ("components:\n  a: {config: small.yaml}\nmore: 1\n", ":3: more: unknown key"),
+        (
+            "components:\n  a: {config: small.yaml}\n  a: {config: small.yaml}\n",
+            ":3: components.a: the key is here twice",
+        ),
+        ("components:\n  a:\n    config: none.yaml\n", ":3: components.a.config: names a file with errors"),
+        ("components: [a]\n", ":1: components: should"),
+        ("components: {a: \n", "not valid YAML"),
+    ],
+)
+def test_mistakes_are_told_with_line_and_key(directory: Path, text: str, message: str) -> None:
+    path = write(directory, text)
+    with pytest.raises(ConfigError) as error:
+        Catalogue.read(path)
+    assert str(path) in str(error.value)
+    assert message in str(error.value)
+
+
+def test_mistakes_in_a_configuration_are_told_with_its_own_line(directory: Path) -> None:
+    (directory / "small.yaml").write_text("name: small\ntrails: 3\n")
+    path = write(directory, "components:\n  a:\n    session: small.yaml\n")
+    with pytest.raises(ConfigError) as error:
+        Catalogue.read(path)
+    assert str(error.value).splitlines()[:2] == [
+        f"{path}:3: components.a.session: names a file with errors",
+        f"{directory / 'small.yaml'}:2: trails: unknown key; did you mean 'trials'?",
+    ]

@@ -1,0 +1,247 @@
+"""What clients may ask of instances, without any process."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from starlette.testclient import TestClient
+from tests.unit.serve.conftest import Remember, Served, ended
+
+from throwcollect.runs.record import Failure, Origin
+from throwcollect.runs.records import Records, Run
+from throwcollect.runtimes.runtime import NodeState
+from throwcollect.serve import instances as instances_module
+
+URL = "/api/v1/instances"
+
+
+@pytest.fixture(autouse=True)
+def begun(monkeypatch: pytest.MonkeyPatch, remember: Remember) -> list[dict[str, Any]]:
+    """What runs are begun from; they live at once, and do nothing."""
+    asked: list[dict[str, Any]] = []
+
+    def begin(config: Path, **options: Any) -> Run:
+        asked.append({"config": config, **options})
+        name = options.get("run") or f"resumed-{len(asked)}"
+        remember(name, origin=options["origin"], kind=options.get("kind", "collection"))
+        return Records().get(name)
+
+    monkeypatch.setattr(instances_module, "begin_run", begin)
+    return asked
+
+
+def put(client: TestClient, name: str, **wish: Any) -> Any:
+    return client.put(f"{URL}/{name}", json={"component": "throws", **wish})
+
+
+def test_the_same_request_again_changes_nothing(
+    client: TestClient, begun: list[dict[str, Any]], tmp_path: Path
+) -> None:
+    wish = {"simulations": 3, "set": {"task.duration_s": 1.1, "sim.engine": "ballistic"}}
+    first, again = put(client, "a", **wish), put(client, "a", **wish)
+    assert (first.status_code, again.status_code) == (202, 200)
+    assert first.json() == again.json()
+    assert (first.json()["id"], first.json()["component"], first.json()["status"]) == ("a", "throws", "starting")
+    (order,) = begun
+    assert order["overrides"] == ["task.duration_s=1.1", 'sim.engine="ballistic"', "run.simulations=3"]
+    assert (order["output"], order["kind"]) == (tmp_path / "datasets" / "a", "collection")
+    other = put(client, "a", simulations=2)
+    assert (other.status_code, other.json()["title"]) == (409, "there is an instance a already, of another request")
+    assert len(begun) == 1
+
+
+def test_there_are_never_more_than_may_live(client: TestClient, remember: Remember) -> None:
+    remember("old", **ended(origin=Origin("throws")))
+    assert [put(client, name).status_code for name in ("a", "b", "c")] == [202, 202, 409]
+    # Those of another component, and runs that commands have begun, do not count.
+    remember("by-hand")
+    assert client.put(f"{URL}/d", json={"component": "talos"}).status_code == 202
+    assert client.put(f"{URL}/e", json={"component": "talos"}).json()["hint"] == "stop one of d"
+
+
+def test_a_resumed_collection_counts(client: TestClient, remember: Remember, tmp_path: Path) -> None:
+    directory = tmp_path / "datasets" / "old"
+    directory.mkdir(parents=True)
+    (directory / "config.yaml").write_text("name: small\n")
+    remember("old", **ended(origin=Origin("throws")))
+    remember("none", **ended(origin=Origin("throws")))
+    remember("session", **ended(kind="session"))
+    resume = lambda name: client.post(f"/api/v1/collections/{name}/resume").status_code  # noqa: E731
+    assert resume("old") == 202
+    assert [resume(name) for name in ("nobody", "none", "session", "resumed-1")] == [404, 409, 409, 409]
+    assert put(client, "a").status_code == 202
+    assert resume("old") == 409
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("run.runtime", "inprocess"),
+        ("run", {"runtime": "inprocess"}),
+        ("run .runtime", "inprocess"),
+        (" run.runtime", "inprocess"),
+        ("run.runtime ", "inprocess"),
+        ("run={runtime: inprocess} #", 1),
+        ("trials=1\nrun.runtime", 1),
+        ("containers.image", "ubuntu"),
+        ("containers.mounts", ["/:/host"]),
+        ("cluster", {}),
+        ("sweep.file", "/etc/passwd"),
+        ("sweep", {"sampler": "list", "file": "/etc/passwd"}),
+        ("", 1),
+        (".", 1),
+        ("a..b", 1),
+    ],
+)
+def test_some_keys_are_the_operators_alone(
+    client: TestClient, begun: list[dict[str, Any]], key: str, value: Any
+) -> None:
+    answer = put(client, "a", set={"trials": 2, key: value})
+    assert answer.status_code == 422, answer.text
+    assert [problem["key"] for problem in answer.json()["problems"]]
+    assert not begun
+
+
+@pytest.mark.parametrize(
+    "wish",
+    [
+        {},
+        {"component": 7},
+        {"component": "throws", "image": "ubuntu"},
+        {"component": "throws", "simulations": 0},
+        {"component": "throws", "simulations": 257},
+        {"component": "throws", "set": {"trials": {"image": "ubuntu"}}, "mounts": ["/:/host"]},
+        {"component": "throws", "set": []},
+        [],
+        None,
+        "throws",
+    ],
+)
+def test_a_request_of_another_form_is_refused(client: TestClient, begun: list[dict[str, Any]], wish: Any) -> None:
+    answer = client.put(f"{URL}/a", json=wish)
+    assert answer.status_code == 422
+    assert answer.json()["problems"]
+    assert not begun
+
+
+def test_what_is_no_json_is_refused(client: TestClient) -> None:
+    for content in (b"{", b"\xff", b'{"component": "throws", "set": {"a": "\\ud800"}}', b"[" * 5000):
+        answer = client.put(f"{URL}/a", content=content, headers={"Content-Type": "application/json"})
+        assert answer.status_code in (400, 422), (content[:60], answer.text)
+
+
+@pytest.mark.parametrize("name", ["-rf", "A", "a.b", "a b", "ä", 64 * "a", "a%0A", "%00", "..%2fa", ".."])
+def test_ids_of_strange_form_begin_nothing(client: TestClient, begun: list[dict[str, Any]], name: str) -> None:
+    assert put(client, name).status_code in (404, 405, 422)
+    assert not begun
+    assert client.get(f"{URL}/{name}").status_code == 404 or name == ".."
+    assert client.get(f"{URL}/{name}/events").status_code == 404
+
+
+def test_a_component_that_is_none_is_not_found(client: TestClient) -> None:
+    answer = client.put(f"{URL}/a", json={"component": "nothing"})
+    assert (answer.status_code, answer.json()["expected"]) == (404, "one of throws, talos")
+    assert client.get("/api/v1/components/nothing").status_code == 404
+    assert client.get("/api/v1/components/talos").json()["kind"] == "session"
+
+
+def test_an_id_is_chosen_for_who_has_none(client: TestClient) -> None:
+    answer = client.post(URL, json={"component": "throws"})
+    assert answer.status_code == 202
+    assert answer.headers["location"] == f"{URL}/{answer.json()['id']}"
+    assert client.get(answer.headers["location"]).status_code == 200
+
+
+def test_what_has_ended_cannot_be_stopped_or_scaled(client: TestClient, remember: Remember) -> None:
+    remember("over", **ended())
+    remember("dead", lives=False)
+    for name, status in (("over", 409), ("dead", 503), ("nobody", 404)):
+        assert client.delete(f"{URL}/{name}").status_code == status
+        assert client.patch(f"{URL}/{name}", json={"simulations": 1}).status_code == status
+    assert client.patch(f"{URL}/over", json={"simulations": 257}).status_code == 422
+
+
+def test_a_run_that_is_stopping_is_not_told_again(
+    client: TestClient, remember: Remember, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told: list[str] = []
+    monkeypatch.setattr(instances_module.control, "stop", lambda run, **_: told.append(run.id))
+    remember("a")
+    remember("b", stopping=True)
+    assert [client.delete(f"{URL}/{name}").status_code for name in ("a", "b")] == [202, 202]
+    assert told == ["a"]
+    assert client.get(f"{URL}/b").json()["stopping"] is True
+
+
+def test_records_that_cannot_be_read_are_told_of(client: TestClient, state: Path, remember: Remember) -> None:
+    remember("newer", **ended())
+    path = state / "runs" / "newer.json"
+    path.write_text(json.dumps({**json.loads(path.read_text()), "version": 2}))
+    (state / "runs" / "torn.json").write_text('{"run": "to')
+    for name, said in (("newer", "of another version"), ("torn", "damaged")):
+        answer = client.get(f"{URL}/{name}")
+        assert answer.status_code == 409
+        assert said in answer.json()["title"]
+        assert answer.json()["hint"].startswith("throwcollect down --run")
+    # All else goes on.
+    assert client.get(URL).json() == []
+    assert client.get("/api/v1/state").json()["instances"] == []
+
+
+def test_the_state_tells_of_all_that_live_and_the_latest_that_are_over(client: TestClient, remember: Remember) -> None:
+    for number in range(103):
+        remember(f"over-{number}", **ended())
+    nodes = (NodeState("router", "running", 0, "1", ""), NodeState("sim_0", "running", 0, "2", ""))
+    remember("living", origin=Origin("throws"), nodes=nodes)
+    remember("lost", lives=False, nodes=(NodeState("sim_0", "running", 0, "2", ""),))
+    remember("failed", **ended(exit_code=2, failure=Failure("no plan", hint="mend it")))
+    found = client.get("/api/v1/state").json()
+    assert [each["status"] for each in found["instances"]][:3] == ["running", "ended", "died"]
+    assert len(found["instances"]) == 101
+    assert found["components"][0]["instances"] == ["living"]
+    assert found["instances"][0]["robots"] == ["sim_0"]
+    assert found["instances"][1]["message"] == "no plan\n  try: mend it"
+    assert len(client.get(URL).json()) == 106
+    assert client.get("/api/v1/state").json() == found
+
+
+def test_logs_and_events_are_read_where_they_lie(client: TestClient, remember: Remember, tmp_path: Path) -> None:
+    remember("a")
+    assert client.get(f"{URL}/a/log/sim_0").status_code == 404
+    assert client.get(f"{URL}/a/events").content == b""
+    logs = tmp_path / "datasets" / "a" / "logs"
+    logs.mkdir(parents=True)
+    (logs / "sim_0.log").write_bytes(b"".join(b"line %d\xff\n" % number for number in range(500)))
+    (logs / "events.jsonl").write_text('{"event": "started"}\n')
+    secret = tmp_path / "secret.log"
+    secret.write_text("secret")
+    (logs / "leak.log").symlink_to(secret)
+    assert client.get(f"{URL}/a/log/sim_0?tail=2").text == "line 498\ufffd\nline 499\ufffd\n"
+    assert len(client.get(f"{URL}/a/log/sim_0").text.splitlines()) == 200
+    assert client.get(f"{URL}/a/events").text == '{"event": "started"}\n'
+    for node in ("leak", "..%2f..%2f..%2fsecret", "../secret", "sim_1", "%00", 300 * "a"):
+        answer = client.get(f"{URL}/a/log/{node}")
+        assert answer.status_code == 404, node
+        assert "secret\n" not in answer.text
+    for tail in ("0", "10001", "x"):
+        assert client.get(f"{URL}/a/log/sim_0?tail={tail}").status_code == 422
+
+
+def test_meshes_come_from_packages_of_robots_alone(served: Served) -> None:
+    client = served.client()
+    base = "/api/v1/meshes"
+    assert client.get(f"{base}/talos_data/meshes/torso/torso_1.STL").status_code in (200, 404)
+    for path in (
+        "../x",
+        "..%2f..%2fsetup.py",
+        "%2e%2e/x",
+        "nothing/x",
+        "%00/x",
+        "a/%00",
+        f"a/{300 * 'a'}",
+        "%2fetc/passwd",
+    ):
+        assert client.get(f"{base}/{path}").status_code == 404, path

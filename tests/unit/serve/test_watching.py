@@ -1,0 +1,130 @@
+"""Who is told of what, and when."""
+
+import asyncio
+import json
+from collections.abc import Awaitable, Callable
+from contextlib import aclosing
+from typing import Any
+
+import pytest
+
+from throwcollect.errors import ConfigError
+from throwcollect.serve import watching
+from throwcollect.serve.state import ComponentState, State
+from throwcollect.serve.watching import StateWatch
+
+
+class World:
+    """What there is to be seen, and how often somebody has looked."""
+
+    def __init__(self) -> None:
+        self.instances = 0
+        self.looks = 0
+        self.fails = False
+
+    def look(self) -> State:
+        self.looks += 1
+        if self.fails:
+            raise ConfigError("the disk is full")
+        return State([ComponentState("a", "A", "session", 1, [str(self.instances)])], [])
+
+
+@pytest.fixture(autouse=True)
+def _quickly(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(watching, "_LOOK_S", 0.005)
+
+
+def run(scenario: Callable[[World, StateWatch], Awaitable[None]]) -> None:
+    async def whole() -> None:
+        world = World()
+        await asyncio.wait_for(scenario(world, StateWatch(world.look)), 10)
+
+    asyncio.run(whole())
+
+
+async def read(states: Any) -> tuple[int, str]:
+    found = json.loads(await anext(states))
+    return found["revision"], found["components"][0]["instances"][0]
+
+
+def test_a_client_is_told_the_state_and_then_each_change() -> None:
+    async def scenario(world: World, watch: StateWatch) -> None:
+        async with aclosing(watch.states()) as states:
+            assert await read(states) == (1, "0")
+            world.instances = 1
+            assert await read(states) == (2, "1")
+
+    run(scenario)
+
+
+def test_nothing_is_told_while_nothing_changes() -> None:
+    async def scenario(world: World, watch: StateWatch) -> None:
+        async with aclosing(watch.states()) as states:
+            await anext(states)
+            with pytest.raises(TimeoutError):
+                await asyncio.wait_for(anext(states), 0.1)
+            assert world.looks > 3
+
+    run(scenario)
+
+
+def test_one_who_is_slow_gets_the_latest_alone() -> None:
+    async def scenario(world: World, watch: StateWatch) -> None:
+        async with aclosing(watch.states()) as slow, aclosing(watch.states()) as quick:
+            await anext(slow)
+            await anext(quick)
+            for number in range(1, 6):
+                world.instances = number
+                assert await read(quick) == (number + 1, str(number))
+            assert await read(slow) == (6, "5")
+
+    run(scenario)
+
+
+def test_thirty_listeners_are_looked_for_once() -> None:
+    async def scenario(world: World, watch: StateWatch) -> None:
+        listeners = [watch.states() for _ in range(30)]
+        for each in listeners:
+            await anext(each)
+        before, began = world.looks, asyncio.get_running_loop().time()
+        await asyncio.sleep(0.1)
+        assert world.looks - before <= (asyncio.get_running_loop().time() - began) / 0.005 + 1
+        world.instances = 7
+        assert {await read(each) for each in listeners} == {(2, "7")}
+        for each in listeners:
+            await each.aclose()
+        await asyncio.sleep(0.02)
+        before = world.looks
+        await asyncio.sleep(0.05)
+        assert world.looks == before
+
+    run(scenario)
+
+
+def test_records_that_cannot_be_read_for_a_while_end_nothing() -> None:
+    async def scenario(world: World, watch: StateWatch) -> None:
+        async with aclosing(watch.states()) as states:
+            await anext(states)
+            world.fails = True
+            before = world.looks
+            while world.looks < before + 3:
+                await asyncio.sleep(0.005)
+            world.fails, world.instances = False, 1
+            assert await read(states) == (2, "1")
+
+    run(scenario)
+
+
+def test_what_was_seen_before_is_never_told_after() -> None:
+    """Many ask at once; who has looked late must not be overtaken by who has looked early and takes long."""
+
+    async def scenario(world: World, watch: StateWatch) -> None:
+        async def ask() -> int:
+            world.instances += 1
+            return int((await watch.current()).components[0].instances[0])
+
+        assert [await asyncio.create_task(ask()) for _ in range(3)] == [1, 2, 3]
+        found = await asyncio.gather(*(watch.current() for _ in range(8)))
+        assert {state.revision for state in found} == {3}
+
+    run(scenario)
