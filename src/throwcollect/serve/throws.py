@@ -37,8 +37,8 @@ def encode_throw(delivery: Delivery, simulation: str) -> bytes:
     Returns:
         Length of a JSON header as uint32, the header, zero bytes up to a multiple of four, then float32: angles of the
         joints [rad], shape ``(n_samples, n_joints)``, and the ball's centre in the world [m], shape ``(n_samples, 3)``;
-        all little-endian. The header has ``trial``, ``simulation``, ``outcome``, ``joints``, ``samples``, ``rate_hz`` and
-        ``landing``.
+        all little-endian. The header has ``trial``, ``simulation``, ``outcome``, ``joints``, ``samples``, ``rate_hz``
+        and ``landing``.
 
     Raises:
         DatasetError: If the episode is damaged.
