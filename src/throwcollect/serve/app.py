@@ -18,7 +18,7 @@ from throwcollect.serve.dataset_routes import make_dataset_routes
 from throwcollect.serve.instance_routes import make_component_routes, make_instance_routes, make_log_routes
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.live import keep_letting_go
-from throwcollect.serve.problems import add_handlers, problem
+from throwcollect.serve.problems import add_handlers, describe_problems, problem
 from throwcollect.serve.rosbridge_routes import make_rosbridge_routes
 from throwcollect.serve.sockets import keep_telling
 from throwcollect.serve.state import Lookout, State
@@ -27,6 +27,8 @@ from throwcollect.serve.watching import StateWatch
 from throwcollect.version import __version__
 
 PREFIX = "/api/v1"
+_ALWAYS = (400, 403, 413, 421, 500)
+"""Statuses of problems that any request may be answered with."""
 _PAGE = Path(__file__).parent / "page"
 
 
@@ -67,19 +69,23 @@ def make_app(instances: Instances, keys: Keys) -> FastAPI:
     add_handlers(app)
     lookout = Lookout(instances.catalogue)
     watch = StateWatch(lookout.look)
-    app.include_router(_general(watch, keys), prefix=PREFIX)
-    app.include_router(make_component_routes(watch), prefix=PREFIX)
-    app.include_router(make_instance_routes(instances, lookout), prefix=PREFIX)
-    app.include_router(make_log_routes(instances), prefix=PREFIX)
-    app.include_router(make_dataset_routes(instances), prefix=PREFIX)
-    app.include_router(make_description_routes(instances), prefix=PREFIX)
-    app.include_router(make_view_routes(instances), prefix=PREFIX)
+    app.include_router(_public(keys), prefix=PREFIX, responses=describe_problems(*_ALWAYS))
+    app.include_router(_general(watch, keys), prefix=PREFIX, responses=describe_problems(*_ALWAYS, 401))
+    app.include_router(
+        make_component_routes(watch), prefix=PREFIX, responses=describe_problems(*_ALWAYS, 401, 404, 422)
+    )
+    of_runs = describe_problems(*_ALWAYS, 401, 404, 409, 422, 503)
+    app.include_router(make_instance_routes(instances, lookout), prefix=PREFIX, responses=of_runs)
+    app.include_router(make_log_routes(instances), prefix=PREFIX, responses=of_runs)
+    app.include_router(make_dataset_routes(instances), prefix=PREFIX, responses=of_runs)
+    app.include_router(make_description_routes(instances), prefix=PREFIX, responses=of_runs)
+    app.include_router(make_view_routes(instances), prefix=PREFIX, responses=of_runs)
     app.include_router(make_rosbridge_routes(instances, Bridges()))
     app.mount("/", StaticFiles(directory=_PAGE, html=True))
     return app
 
 
-def _general(watch: StateWatch, keys: Keys) -> APIRouter:
+def _public(keys: Keys) -> APIRouter:
     router = APIRouter()
 
     @router.get("/health")
@@ -87,18 +93,24 @@ def _general(watch: StateWatch, keys: Keys) -> APIRouter:
         """Whether it serves; for anybody."""
         return {"status": "ok", "version": __version__}
 
-    @router.post("/codes", status_code=201)
-    def make_code() -> Code:
-        """A code that can be exchanged for the token once, for an address that is given to a browser."""
-        return Code(code=keys.new_code())
-
-    @router.post("/exchange", response_model=Token)
+    @router.post("/exchange", response_model=Token, responses=describe_problems(422))
     def exchange(code: Code) -> Any:
         """The token for a code that nobody has exchanged yet; for anybody who has one."""
         token = keys.exchange(code.code)
         if token is None:
             return problem(403, "this code has been exchanged already, or is too old", hint="throwcollect view")
         return Token(token=token)
+
+    return router
+
+
+def _general(watch: StateWatch, keys: Keys) -> APIRouter:
+    router = APIRouter()
+
+    @router.post("/codes", status_code=201)
+    def make_code() -> Code:
+        """A code that can be exchanged for the token once, for an address that is given to a browser."""
+        return Code(code=keys.new_code())
 
     @router.get("/state")
     async def state() -> State:

@@ -19,7 +19,7 @@ from throwcollect.dataset.directory import CARD, MANIFEST, PROVENANCE, THROWS
 from throwcollect.dataset.manifest import read_manifest, size_of_file
 from throwcollect.errors import ConflictError, NotFoundError
 from throwcollect.files import check_regular, open_regular
-from throwcollect.runs.records import Run
+from throwcollect.runs.records import Records, Run
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.state import InstanceState, describe
 from throwcollect.sweep.parquet_file import read_parquet
@@ -126,7 +126,9 @@ def _find_finished(instances: Instances, instance: str) -> Path:
     """
     run = _get_collection(instances, instance)
     directory = run.place.directory
-    if run.status == "running" or not (directory / MANIFEST).is_file():
+    # A run that goes on with it is one of its own.
+    grows = any(each.status == "running" and each.place.directory == directory for each in Records().all())
+    if grows or not (directory / MANIFEST).is_file():
         raise ConflictError(f"run {instance}: its dataset is not finished")
     return directory
 

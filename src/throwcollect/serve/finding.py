@@ -13,7 +13,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import closing, contextmanager, suppress
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from http import HTTPStatus
 from pathlib import Path
 from urllib.parse import urlsplit
@@ -79,13 +79,17 @@ def publish(address: Address) -> Iterator[None]:
         lock = os.open(path.with_name(_LOCK), os.O_RDWR | os.O_CREAT, 0o600)
     except OSError as error:
         raise WorkerError(f"{path}: nobody would find this server: {error.strerror}") from error
-    text = json.dumps(asdict(address)).encode()
+    turn, has_left = threading.Lock(), threading.Event()
 
     def wait() -> None:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        # The disk may be full by now; this server can do without.
-        with suppress(DatasetError):
-            write_secret(path, text)
+        with turn:
+            if has_left.is_set():
+                os.close(lock)
+                return
+            # The disk may be full by now; this server can do without.
+            with suppress(DatasetError):
+                write_secret(path, _ADDRESS.dump_json(address))
 
     try:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -93,13 +97,15 @@ def publish(address: Address) -> Iterator[None]:
         # The lock goes with the process that has it, however that ends.
         threading.Thread(target=wait, name="next to be found", daemon=True).start()
     else:
-        write_secret(path, text)
+        write_secret(path, _ADDRESS.dump_json(address))
     try:
         yield
     finally:
-        found = _read()
-        if found == address:
-            path.unlink(missing_ok=True)
+        with turn:
+            has_left.set()
+            if _read() == address:
+                path.unlink(missing_ok=True)
+                os.close(lock)
 
 
 def find_server() -> Address | None:

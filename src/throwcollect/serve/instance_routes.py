@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import time
 from collections import deque
@@ -11,14 +12,14 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Response
 from fastapi.responses import PlainTextResponse
-from pydantic import BaseModel, ConfigDict, Field, JsonValue
+from pydantic import BaseModel, ConfigDict, Field, JsonValue, field_validator
 
 from throwcollect.files import open_log
 from throwcollect.runs.events import EVENTS
 from throwcollect.runs.record import Origin
 from throwcollect.runtimes.node_logs import NodeLogs
 from throwcollect.serve.instances import Instances
-from throwcollect.serve.problems import problem
+from throwcollect.serve.problems import describe_bytes, problem
 from throwcollect.serve.state import ComponentState, InstanceState, Lookout, describe
 from throwcollect.serve.watching import StateWatch
 
@@ -31,6 +32,13 @@ class Wish(BaseModel):
     component: str
     simulations: int | None = Field(default=None, ge=1, le=256)
     set: dict[str, JsonValue] = Field(default_factory=dict)
+
+    @field_validator("component", "set")
+    @classmethod
+    def _is_text(cls, value: JsonValue) -> JsonValue:
+        # JSON has escapes of halves of characters, which no file can hold.
+        json.dumps(value, ensure_ascii=False).encode()
+        return value
 
 
 class Scaling(BaseModel):
@@ -82,7 +90,9 @@ def make_instance_routes(instances: Instances, lookout: Lookout) -> APIRouter:
         """A run."""
         return describe(instances.get(instance))
 
-    @router.put("/{instance}", status_code=202)
+    @router.put(
+        "/{instance}", status_code=202, responses={200: {"model": InstanceState, "description": "It was begun before"}}
+    )
     def put(instance: str, wish: Wish, response: Response) -> InstanceState:
         """Begin an instance of a component; the same request again changes nothing."""
         run, new = instances.put(instance, Origin(wish.component, wish.simulations, wish.set))
@@ -131,7 +141,7 @@ def make_log_routes(instances: Instances) -> APIRouter:
             known = f"one of {', '.join(files)}" if files else None
             return problem(404, f"run {instance} has no log of {node!r}", expected=known)
 
-    @router.get("/{instance}/events", response_class=Response)
+    @router.get("/{instance}/events", response_class=Response, responses=describe_bytes("application/x-ndjson"))
     def events(instance: str) -> Response:
         """What has happened in a run, one event in JSON a line."""
         path = Path(instances.get(instance).record.logs) / EVENTS

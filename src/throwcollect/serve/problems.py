@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from http import HTTPStatus
 from typing import Any
 
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
+from starlette.routing import Match
 
 from throwcollect.errors import (
     ConfigError,
@@ -30,6 +32,20 @@ _STATUS: tuple[tuple[type[ThrowcollectError], int], ...] = (
 """Status of each kind of error; the first that fits counts."""
 
 
+_SCHEMA = {
+    "type": "object",
+    "required": ["title", "status"],
+    "properties": {
+        "title": {"type": "string", "description": "Where and what."},
+        "status": {"type": "integer"},
+        "expected": {"type": "string", "description": "What would have been right."},
+        "evidence": {"type": "string", "description": "What was seen."},
+        "hint": {"type": "string", "description": "What gets further."},
+        "problems": {"type": "array", "items": {"type": "object"}, "description": "Each key that is wrong."},
+    },
+}
+
+
 class ProblemResponse(JSONResponse):
     """A problem by RFC 9457."""
 
@@ -47,6 +63,17 @@ def problem(status: int, title: str, headers: dict[str, str] | None = None, **fa
     """
     content = {"title": title, "status": status, **{key: value for key, value in facts.items() if value is not None}}
     return ProblemResponse(content, status_code=status, headers=headers)
+
+
+def describe_bytes(*media_types: str) -> dict[int | str, dict[str, Any]]:
+    """What the description of a request says of an answer that is no JSON."""
+    return {200: {"description": "OK", "content": {each: {} for each in media_types}}}
+
+
+def describe_problems(*statuses: int) -> dict[int | str, dict[str, Any]]:
+    """What the description of a request says of statuses that are answered with a problem."""
+    content = {ProblemResponse.media_type: {"schema": _SCHEMA}}
+    return {status: {"description": HTTPStatus(status).phrase, "content": content} for status in statuses}
 
 
 def answer(error: ThrowcollectError) -> ProblemResponse:
@@ -69,9 +96,13 @@ def add_handlers(app: FastAPI) -> None:
     async def unexpected(_: Request, __: Exception) -> ProblemResponse:
         return problem(500, "internal error", hint="the log of the server says where; please report it")
 
-    async def http(_: Request, error: Exception) -> ProblemResponse:
+    async def http(request: Request, error: Exception) -> ProblemResponse:
         if isinstance(error, HTTPException):
-            return problem(error.status_code, str(error.detail), headers=dict(error.headers or {}))
+            headers = dict(error.headers or {})
+            if "Allow" in headers:
+                # Each method is a route of its own, of which one alone has been asked.
+                headers["Allow"] = ", ".join(sorted(_methods_at(request)))
+            return problem(error.status_code, str(error.detail), headers=headers)
         return problem(500, "internal error")
 
     async def request(_: Request, error: Exception) -> ProblemResponse:
@@ -83,3 +114,8 @@ def add_handlers(app: FastAPI) -> None:
     app.add_exception_handler(HTTPException, http)
     app.add_exception_handler(Exception, unexpected)
     app.add_exception_handler(RequestValidationError, request)
+
+
+def _methods_at(request: Request) -> set[str]:
+    there = [route for route in request.app.routes if route.matches(request.scope)[0] is not Match.NONE]
+    return {method for route in there for method in getattr(route, "methods", None) or ()}

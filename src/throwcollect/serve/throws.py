@@ -118,7 +118,7 @@ class ThrowWatch:
     def _hear(self, simulation: str, message: bytes) -> None:
         try:
             delivery = unpack(message, Signer.of_key(self._run.key))
-            if not isinstance(delivery, Delivery):
+            if not isinstance(delivery, Delivery) or not delivery.result:
                 return
             frame = encode_throw(delivery, simulation)
         except ThrowcollectError:

@@ -12,6 +12,7 @@ from throwcollect.errors import NotFoundError, ThrowcollectError
 from throwcollect.serve.access import MAY_ONLY_LOOK
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.live import take
+from throwcollect.serve.problems import describe_bytes
 from throwcollect.serve.robot_files import description_of, find_mesh
 from throwcollect.serve.sockets import FAILED, MAY_NOT, NOT_FOUND, keep_telling, refuse
 from throwcollect.serve.throws import ThrowWatch
@@ -27,7 +28,7 @@ def make_description_routes(instances: Instances) -> APIRouter:
     """
     router = APIRouter()
 
-    @router.get("/instances/{instance}/urdf", response_class=Response)
+    @router.get("/instances/{instance}/urdf", response_class=Response, responses=describe_bytes("application/xml"))
     def urdf(instance: str) -> Response:
         """The robot of a run, with its tool, in URDF; meshes are ``package://`` URLs."""
         return Response(description_of(instances.get(instance)), media_type="application/xml")

@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 from starlette.testclient import TestClient, WebSocketTestSession
+from tests.e2e.collection import FAST, collect_here, write_config
 
 from throwcollect.runs.record import Record
 from throwcollect.runs.records import STATE_VARIABLE, OpenRun, Records
@@ -27,6 +28,15 @@ def state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Where runs are remembered."""
     monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "state"))
     return tmp_path / "state"
+
+
+@pytest.fixture(scope="session")
+def collected(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    directory = tmp_path_factory.mktemp("collected")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv(STATE_VARIABLE, str(directory / "state"))
+        collect_here(write_config(directory, trials=3, sim=FAST), directory / "data")
+    return directory / "data"
 
 
 @dataclass

@@ -22,8 +22,8 @@ def write(directory: Path, text: str) -> Path:
 
 
 def test_components_are_read(directory: Path) -> None:
-    text = "components:\n  a: {config: small.yaml, pretty_name: Throws of A, max_instances: 3}\n  b: {session: small.yaml}\n"
-    catalogue = Catalogue.read(write(directory, text))
+    first = "{config: small.yaml, pretty_name: Throws of A, max_instances: 3}"
+    catalogue = Catalogue.read(write(directory, f"components:\n  a: {first}\n  b: {{session: small.yaml}}\n"))
     a, b = catalogue.get("a"), catalogue.get("b")
     assert (a.kind, a.pretty_name, a.max_instances, a.config) == (
         "collection",

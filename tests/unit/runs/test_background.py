@@ -1,0 +1,169 @@
+"""Runs that begin in a process of their own, without what that process does (which `tests/e2e/test_serve.py` sees)."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from throwcollect.errors import ConfigError, ConflictError, Interrupted, WorkerError
+from throwcollect.runs import background
+from throwcollect.runs.background import begin_run, carry_out
+from throwcollect.runs.onlooker import SILENT
+from throwcollect.runs.record import Origin
+from throwcollect.runs.records import STATE_VARIABLE, OpenRun, Records
+
+ORIGIN = Origin("throws", 1, {"trials": 2})
+
+
+@pytest.fixture(autouse=True)
+def state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "state"))
+    return tmp_path / "state"
+
+
+@pytest.fixture
+def config(tmp_path: Path) -> Path:
+    path = tmp_path / "small.yaml"
+    path.write_text(
+        "name: small\ntrials: 2\nsim: {engine: ballistic}\nrun: {runtime: local}\n"
+        "sweep: {sampler: uniform, parameters: {task.duration_s: {min: 1.0, max: 1.2}}}\n"
+    )
+    return path
+
+
+@pytest.fixture
+def processes(monkeypatch: pytest.MonkeyPatch) -> list[subprocess.Popen[bytes]]:
+    """Processes that take an order and do nothing."""
+    started: list[subprocess.Popen[bytes]] = []
+    begin = subprocess.Popen
+
+    def start(words: list[str], **options: Any) -> subprocess.Popen[bytes]:
+        started.append(begin(["cat"], **{**options, "stdout": subprocess.PIPE}))
+        return started[-1]
+
+    monkeypatch.setattr(background.subprocess, "Popen", start)
+    return started
+
+
+def end(process: subprocess.Popen[bytes]) -> bytes:
+    """What the process was told; it has ended."""
+    assert process.stdout is not None
+    with process.stdout as told:
+        order = told.read()
+    process.wait()
+    return order
+
+
+def begin(config: Path, tmp_path: Path, **options: Any) -> Any:
+    return begin_run(config, overrides=["trials=1"], output=tmp_path / "data", run="a", origin=ORIGIN, **options)
+
+
+def test_a_run_has_a_record_from_its_first_moment(
+    config: Path, tmp_path: Path, processes: list[subprocess.Popen[bytes]]
+) -> None:
+    run = begin(config, tmp_path)
+    (process,) = processes
+    assert run.status == "running"
+    assert (run.record.launcher, run.record.origin, run.record.kind) == (process.pid, ORIGIN, "collection")
+    assert run.record.directory == str(tmp_path / "data")
+    assert not (tmp_path / "data").exists()
+    order = end(process)
+    made_from = background._ORDERS.validate_json(order)
+    assert (made_from.config, made_from.overrides, made_from.resumed) == (config, ("trials=1",), False)
+    # Its lock goes with the process, and with that alone.
+    assert Records().get("a").status == "died"
+
+
+def test_there_is_one_run_of_an_id(config: Path, tmp_path: Path, processes: list[subprocess.Popen[bytes]]) -> None:
+    begin(config, tmp_path)
+    with pytest.raises(ConflictError, match="there is a run a already"):
+        begin(config, tmp_path)
+    assert len(processes) == 1
+    end(processes[0])
+
+
+def test_a_signal_that_asks_to_stop_waits_until_it_can_be_heeded(
+    config: Path, tmp_path: Path, processes: list[subprocess.Popen[bytes]]
+) -> None:
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [])
+    begin(config, tmp_path)
+    blocked = next(
+        int(line.split()[1], 16)
+        for line in Path(f"/proc/{processes[0].pid}/status").read_text().splitlines()
+        if line.startswith("SigBlk")
+    )
+    for number in (signal.SIGTERM, signal.SIGINT):
+        assert blocked & 1 << (number - 1)
+    assert not blocked & 1 << (signal.SIGKILL - 1)
+    assert signal.pthread_sigmask(signal.SIG_BLOCK, []) == before
+    end(processes[0])
+
+
+def test_what_cannot_be_begun_leaves_nothing(
+    config: Path,
+    tmp_path: Path,
+    state: Path,
+    processes: list[subprocess.Popen[bytes]],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    with pytest.raises(ConfigError, match="trails: unknown key; did you mean 'trials'"):
+        begin_run(config, overrides=["trails=1"], output=tmp_path / "data", run="a")
+    with pytest.raises(ConfigError, match=r"run\.runtime: should have nodes for clients to talk to, got inprocess"):
+        begin_run(config, overrides=["run.runtime=inprocess"], output=tmp_path / "data", run="a", kind="session")
+    assert processes == []
+
+    def fail(*_: object) -> None:
+        raise ConfigError("the disk is full")
+
+    monkeypatch.setattr(OpenRun, "write", fail)
+    with pytest.raises(ConfigError, match="the disk is full"):
+        begin(config, tmp_path)
+    assert processes[0].poll() is not None
+    monkeypatch.setattr(
+        background.subprocess, "Popen", lambda *_, **__: (_ for _ in ()).throw(OSError(12, "no memory"))
+    )
+    with pytest.raises(WorkerError, match=r"run a cannot be begun: .*no memory"):
+        begin(config, tmp_path)
+    assert list((state / "runs").iterdir()) == []
+
+
+def take_over(config: Path, tmp_path: Path, processes: list[subprocess.Popen[bytes]]) -> bytes:
+    """A run that has been begun, whose order this process carries out in place of the one that was started."""
+    begin(config, tmp_path)
+    return end(processes[0])
+
+
+def test_what_the_preparation_fails_of_is_in_the_record(
+    config: Path, tmp_path: Path, processes: list[subprocess.Popen[bytes]]
+) -> None:
+    order = take_over(config, tmp_path, processes)
+    (tmp_path / "data").mkdir()
+    (tmp_path / "data" / "mine").touch()
+    run = Records().take("a")
+    assert run is not None
+    with pytest.raises(ConfigError) as error:
+        carry_out("a", run.lock, order, onlooker=SILENT, interruptions=lambda: 0)
+    run.close()
+    record = Records().get("a").record
+    assert (record.exit_code, record.ended is not None) == (2, True)
+    assert str(record.error) == str(error.value)
+    assert str(tmp_path / "data") in str(record.error)
+    assert record.origin == ORIGIN
+
+
+def test_who_stops_it_while_it_is_prepared_is_heeded(
+    config: Path, tmp_path: Path, processes: list[subprocess.Popen[bytes]]
+) -> None:
+    order = take_over(config, tmp_path, processes)
+    run = Records().take("a")
+    assert run is not None
+    with pytest.raises(Interrupted):
+        carry_out("a", run.lock, order, onlooker=SILENT, interruptions=lambda: 1)
+    run.close()
+    record = Records().get("a").record
+    assert (record.exit_code, str(record.error)) == (130, "stopped before any node was started")
+    assert (record.origin, record.kind) == (ORIGIN, "collection")

@@ -1,0 +1,115 @@
+"""What clients get of a dataset, and what they do not."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import shutil
+import tarfile
+from pathlib import Path
+
+import pytest
+from starlette.testclient import TestClient
+from tests.unit.serve.conftest import Remember, ended
+
+URL = "/api/v1/collections"
+
+
+@pytest.fixture
+def directory(collected: Path, tmp_path: Path, remember: Remember) -> Path:
+    """The dataset of a run that has ended."""
+    directory = tmp_path / "datasets" / "a"
+    shutil.copytree(collected, directory)
+    remember("a", **ended())
+    return directory
+
+
+def test_files_are_those_of_the_dataset(client: TestClient, directory: Path) -> None:
+    listed = client.get(f"{URL}/a/files").json()
+    assert {"config.yaml", "throws.parquet"} <= {each["path"] for each in listed}
+    for each in listed:
+        content = client.get(f"{URL}/a/files/{each['path']}").content
+        assert (len(content), hashlib.sha256(content).hexdigest()) == (each["bytes"], each["sha256"])
+    for name in ("datapackage.json", "README.md", "provenance.json"):
+        assert client.get(f"{URL}/a/files/{name}").content == (directory / name).read_bytes()
+    part = client.get(f"{URL}/a/files/throws.parquet", headers={"Range": "bytes=0-3"})
+    assert (part.status_code, part.content) == (206, b"PAR1")
+    assert client.get(f"{URL}/a/files/throws.parquet", headers={"Range": "bytes=99999999-"}).status_code == 416
+
+
+def test_nothing_else_is_given(client: TestClient, directory: Path, tmp_path: Path) -> None:
+    (tmp_path / "secret").write_text("secret")
+    (directory / "notes.txt").write_text("mine")
+    paths = [
+        "notes.txt",
+        "logs",
+        "logs/events.jsonl",
+        "../../secret",
+        "..%2f..%2fsecret",
+        f"{tmp_path}/secret",
+        "",
+        "%2e",
+        "%00",
+    ]
+    for path in (*paths, "%2e/config.yaml", "logs%2f..%2fconfig.yaml", "CONFIG.YAML", 300 * "a"):
+        assert client.get(f"{URL}/a/files/{path}").status_code == 404, path
+
+
+@pytest.mark.parametrize("name", ["throws.parquet", "README.md", "datapackage.json"])
+def test_a_link_leads_nowhere(client: TestClient, directory: Path, tmp_path: Path, name: str) -> None:
+    (tmp_path / "secret").write_text("secret")
+    (directory / name).unlink()
+    (directory / name).symlink_to(tmp_path / "secret")
+    for path in (f"files/{name}", "dataset.tar"):
+        answer = client.get(f"{URL}/a/{path}")
+        assert answer.status_code == 500
+        assert "a symbolic link leads elsewhere" in answer.json()["title"]
+        assert "secret\n" not in answer.text
+
+
+def test_the_archive_is_the_dataset(client: TestClient, directory: Path, tmp_path: Path) -> None:
+    answer = client.get(f"{URL}/a/dataset.tar")
+    assert answer.headers["content-disposition"] == 'attachment; filename="a.tar"'
+    with tarfile.open(fileobj=io.BytesIO(answer.content)) as archive:
+        archive.extractall(tmp_path / "out", filter="data")
+    inside = {path.name: path.read_bytes() for path in (tmp_path / "out" / "a").iterdir()}
+    assert inside == {path.name: path.read_bytes() for path in directory.iterdir() if path.is_file()}
+    assert client.get(f"{URL}/a/dataset.tar").content == answer.content
+
+
+def test_landings_and_the_report_are_made_of_it(client: TestClient, directory: Path) -> None:
+    landings = client.get(f"{URL}/a/landings").json()
+    assert [(outcome, trial) for _, _, outcome, trial in landings] == [("landed", 0), ("landed", 1), ("landed", 2)]
+    assert all(isinstance(x, float) and 0 < x < 20 for x, *_ in landings)
+
+
+def test_what_is_not_finished_is_not_given(client: TestClient, directory: Path, remember: Remember) -> None:
+    remember("growing", directory=str(directory))
+    remember("torn", **ended(exit_code=3))
+    remember("session", **ended(kind="session"))
+    remember("volume", **ended(volume="v"))
+    for what in ("files", "files/config.yaml", "dataset.tar", "report", "landings"):
+        found = {name: client.get(f"{URL}/{name}/{what}").status_code for name in ("growing", "torn")}
+        assert found == {"growing": 409, "torn": 409}, what
+        for name in ("session", "volume", "nobody", ".."):
+            assert client.get(f"{URL}/{name}/{what}").status_code == 404, (name, what)
+
+
+def test_a_dataset_that_somebody_goes_on_with_is_not_given(
+    client: TestClient, directory: Path, remember: Remember
+) -> None:
+    """Another run collects into the directory of one that has ended."""
+    assert client.get(f"{URL}/a/files").status_code == 200
+    remember("again", directory=str(directory))
+    assert client.get(f"{URL}/a/files").status_code == 409
+
+
+def test_a_damaged_manifest_is_told(client: TestClient, directory: Path) -> None:
+    manifest = json.loads((directory / "datapackage.json").read_text())
+    manifest["resources"][0]["path"] = "../secret"
+    (directory / "datapackage.json").write_text(json.dumps(manifest))
+    for what in ("files", "files/..%2fsecret", "dataset.tar"):
+        answer = client.get(f"{URL}/a/{what}")
+        assert answer.status_code == 500
+        assert "is not the manifest of a dataset" in answer.json()["title"]

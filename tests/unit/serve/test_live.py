@@ -1,0 +1,144 @@
+"""Simulations that are slowed down to be watched, by several servers, some of which are killed."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from tests.unit.serve.conftest import CONFIG, Remember, ended
+
+from throwcollect.errors import NotFoundError, WorkerError
+from throwcollect.runs.records import Records, Run
+from throwcollect.runtimes.runtime import NodeState
+from throwcollect.serve import live
+from throwcollect.serve.live import let_go_of_left, take
+
+SIM = NodeState("sim_0", "running", 0, "7", "")
+
+
+class Simulation:
+    """A simulation that does not move, and how fast that is."""
+
+    def __init__(self) -> None:
+        self.asked: list[tuple[str, float]] = []
+        self.answers = True
+        self.agrees = True
+
+    def set_parameter(self, _run: Run, nodes: list[str], name: str, value: float) -> list[Any]:
+        assert name == "sim.real_time_factor"
+        if not self.answers:
+            raise WorkerError("it does not answer")
+        self.asked += [(node, value) for node in nodes]
+        return [SimpleNamespace(successful=self.agrees, reason="no") for _ in nodes]
+
+
+@pytest.fixture
+def simulation(monkeypatch: pytest.MonkeyPatch) -> Simulation:
+    simulation = Simulation()
+    monkeypatch.setattr(live, "set_parameter", simulation.set_parameter)
+    return simulation
+
+
+def make(remember: Remember, tmp_path: Path, name: str = "a", more: str = "", **fields: Any) -> Run:
+    directory = tmp_path / "datasets" / name
+    directory.mkdir(parents=True, exist_ok=True)
+    (directory / "config.yaml").write_text(CONFIG + more)
+    remember(name, **{"nodes": (SIM,), **fields})
+    return Records().get(name)
+
+
+def notes(state: Path, name: str = "a") -> list[str]:
+    directory = state / "runs" / name / "live"
+    return sorted(os.listdir(directory)) if directory.exists() else []
+
+
+SLOW, FAST = ("/sim_0/sim_0", 1.0), ("/sim_0/sim_0", 0.0)
+
+
+def test_the_last_who_leaves_gives_the_speed_back(
+    remember: Remember, tmp_path: Path, state: Path, simulation: Simulation
+) -> None:
+    run = make(remember, tmp_path)
+    one, other = take(run, "sim_0"), take(run, "sim_0")
+    one.let_go()
+    assert simulation.asked == [SLOW, SLOW]
+    # Another server, which begins meanwhile, leaves alone what somebody watches.
+    let_go_of_left()
+    assert simulation.asked == [SLOW, SLOW]
+    assert notes(state) == ["sim_0"]
+    other.let_go()
+    assert simulation.asked == [SLOW, SLOW, FAST]
+    assert notes(state) == []
+    take(run, "sim_0").let_go()
+    assert simulation.asked[3:] == [SLOW, FAST]
+
+
+def test_the_speed_is_that_of_the_configuration(remember: Remember, tmp_path: Path, simulation: Simulation) -> None:
+    run = make(remember, tmp_path, more="sim: {real_time_factor: 3.0}\nrun: {simulations: 1, root_namespace: true}\n")
+    take(run, "sim_0").let_go()
+    assert simulation.asked == [("/sim_0", 1.0), ("/sim_0", 3.0)]
+
+
+def test_the_successor_of_a_killed_server_lets_go(
+    remember: Remember, tmp_path: Path, state: Path, simulation: Simulation
+) -> None:
+    # Its locks went with it.
+    os.close(take(make(remember, tmp_path), "sim_0").lock)
+    let_go_of_left()
+    assert simulation.asked == [SLOW, FAST]
+    assert notes(state) == []
+
+
+def test_what_does_not_answer_is_tried_again(
+    remember: Remember, tmp_path: Path, state: Path, simulation: Simulation
+) -> None:
+    hold = take(make(remember, tmp_path), "sim_0")
+    simulation.answers = False
+    hold.let_go()
+    assert notes(state) == ["sim_0"]
+    let_go_of_left()
+    assert notes(state) == ["sim_0"]
+    simulation.answers = True
+    let_go_of_left()
+    assert simulation.asked == [SLOW, FAST]
+    assert notes(state) == []
+
+
+@pytest.mark.parametrize("way", ["silent", "unwilling"])
+def test_one_that_was_not_slowed_down_is_let_go_of(
+    remember: Remember, tmp_path: Path, state: Path, simulation: Simulation, way: str
+) -> None:
+    run = make(remember, tmp_path)
+    simulation.answers, simulation.agrees = way != "silent", way != "unwilling"
+    with pytest.raises(WorkerError, match="does not answer" if way == "silent" else "cannot change its speed: no"):
+        take(run, "sim_0")
+    simulation.answers = simulation.agrees = True
+    let_go_of_left()
+    # It may have heard it after all.
+    assert simulation.asked[-1] == FAST
+    assert notes(state) == []
+
+
+def test_only_simulations_that_run_are_slowed_down(remember: Remember, tmp_path: Path, simulation: Simulation) -> None:
+    run = make(remember, tmp_path)
+    over = make(remember, tmp_path, "over", **ended())
+    for each, name in ((run, "sim_1"), (run, "../key"), (run, ""), (over, "sim_0")):
+        with pytest.raises(NotFoundError, match="no simulation"):
+            take(each, name)
+    assert simulation.asked == []
+
+
+def test_a_run_that_vanishes_while_it_is_watched_needs_nothing(
+    remember: Remember, tmp_path: Path, simulation: Simulation
+) -> None:
+    directory = tmp_path / "datasets" / "a"
+    directory.mkdir(parents=True)
+    (directory / "config.yaml").write_text(CONFIG)
+    opened = remember("a", nodes=(SIM,))
+    hold = take(Records().get("a"), "sim_0")
+    opened.forget()
+    hold.let_go()
+    assert simulation.asked == [SLOW]

@@ -1,0 +1,144 @@
+"""The newest throws, as the page takes them, and the thread that hears them."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import threading
+import time
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.unit.serve.conftest import Remember
+
+from throwcollect.dataset.reader import Dataset
+from throwcollect.episode.message import Delivery
+from throwcollect.ros.connection import Connection
+from throwcollect.runs.records import Records, Run
+from throwcollect.serve import throws
+from throwcollect.serve.throws import ThrowWatch, encode_throw
+
+_ALL: list[Any] = []
+
+
+class Listener:
+    """Takes the place of a node, and counts how often it was asked to listen."""
+
+    def __init__(self, _on_progress: object, *, on_connect: object) -> None:
+        self.spins = 0
+        _ALL.append(self)
+
+    def __enter__(self) -> Listener:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+    def spin(self, _connection: Connection | None, seconds: float) -> None:
+        self.spins += 1
+        time.sleep(seconds)
+
+
+@pytest.fixture
+def listeners(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
+    _ALL.clear()
+    monkeypatch.setattr(throws, "RunListener", Listener)
+    monkeypatch.setattr(throws, "_SPIN_S", 0.02)
+    return _ALL
+
+
+def threads() -> list[threading.Thread]:
+    return [each for each in threading.enumerate() if each.name.startswith("throws of")]
+
+
+def watch(run: Run, scenario: Callable[[ThrowWatch], Awaitable[None]]) -> None:
+    async def whole() -> None:
+        await asyncio.wait_for(scenario(ThrowWatch(run)), 10)
+
+    asyncio.run(whole())
+    for each in threads():
+        each.join(5)
+    assert not threads()
+
+
+def test_the_page_is_told_all_of_a_throw(collected: Path) -> None:
+    episode = next(iter(Dataset.open(collected).episodes()))
+    samples = episode.samples()
+    result = {"outcome": "landed", "landing_x_m": 1.0, "landing_y_m": -0.5, "landing_z_m": 0.02}
+    frame = encode_throw(Delivery(episode, json.dumps(result), "{}"), "sim_0")
+    size = int.from_bytes(frame[:4], "little")
+    header = json.loads(frame[4 : 4 + size])
+    assert header["landing"] == [1.0, -0.5, 0.02]
+    assert (header["trial"], header["outcome"], header["samples"]) == (0, "landed", len(samples))
+    assert header["rate_hz"] == pytest.approx(1e9 / (samples.stamps_ns[1] - samples.stamps_ns[0]))
+    begin = 4 + size + (-(4 + size) % 4)
+    assert not any(frame[4 + size : begin])
+    numbers = np.frombuffer(frame[begin:], "<f4")
+    joints = len(samples) * len(header["joints"])
+    assert np.allclose(numbers[:joints].reshape(len(samples), -1), samples.position)
+    assert np.allclose(numbers[joints:].reshape(-1, 3), samples.ball_position)
+    fell = json.dumps({**result, "landing_z_m": None})
+    told = encode_throw(Delivery(episode, fell, "{}"), "sim_0")
+    assert json.loads(told[4 : 4 + int.from_bytes(told[:4], "little")])["landing"] is None
+
+
+def test_there_is_one_thread_as_long_as_anybody_listens(remember: Remember, listeners: list[Any]) -> None:
+    remember("a")
+
+    async def scenario(heard: ThrowWatch) -> None:
+        async with heard.throws(), heard.throws():
+            assert len(threads()) == 1
+        assert heard.is_idle
+        # Who comes while the thread ends gets one of its own, and does not keep that one.
+        async with heard.throws():
+            await asyncio.sleep(0.2)
+            assert len(threads()) == 1
+        assert len(listeners) == 2
+
+    watch(Records().get("a"), scenario)
+
+
+def test_a_run_that_vanishes_keeps_no_core_busy(remember: Remember, listeners: list[Any]) -> None:
+    opened = remember("a")
+    run = Records().get("a")
+
+    async def scenario(heard: ThrowWatch) -> None:
+        async with heard.throws():
+            await asyncio.sleep(0.05)
+            opened.forget()
+            await asyncio.sleep(0.05)
+            before = time.process_time()
+            await asyncio.sleep(0.3)
+            assert time.process_time() - before < 0.15
+
+    watch(run, scenario)
+
+
+def test_who_is_slow_gets_the_newest_and_who_is_late_the_last(remember: Remember, listeners: list[Any]) -> None:
+    remember("a")
+
+    async def scenario(heard: ThrowWatch) -> None:
+        async with heard.throws() as next_throw:
+            for frame in (b"1", b"2", b"3"):
+                heard._newest = frame
+                for queue in heard._listeners:
+                    throws._replace(queue, frame)
+            assert await next_throw() == b"3"
+            with pytest.raises(TimeoutError):
+                await asyncio.wait_for(next_throw(), 0.05)
+            async with heard.throws() as late:
+                assert await late() == b"3"
+
+    watch(Records().get("a"), scenario)
+
+
+def test_what_somebody_else_publishes_is_left_out(remember: Remember, listeners: list[Any]) -> None:
+    run = remember("a")
+    heard = ThrowWatch(Records().get("a"))
+    assert run.key.directory.exists()
+    for message in (b"", b"nonsense", bytes(10_000)):
+        heard._hear("sim_0", message)
+    assert heard._newest is None
