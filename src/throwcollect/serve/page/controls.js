@@ -154,7 +154,7 @@ class InstanceCard {
     this.instance = instance;
     const isLiving = lives(instance);
     setText(this.name, instance.id);
-    setText(this.status, `${WORDS[instance.status]}${instance.message ? `: ${instance.message}` : ""}`);
+    setText(this.status, `${isLiving && instance.stopping ? "is stopping" : WORDS[instance.status]}${instance.message ? `: ${instance.message}` : ""}`);
     this.status.dataset.status = instance.status;
     this.#putProgress(instance.progress);
     const troubled = instance.nodes.filter(({ status }) => !["running", "starting"].includes(status));

@@ -43,6 +43,10 @@ export class Live {
   constructor({ connection, view, watching, tell }) {
     Object.assign(this, { connection, view, watching, tell });
     get("live").addEventListener("click", () => {
+      if (!this.#alone) {
+        this.tell("choose one simulation first: it is slowed down to real time while it is watched");
+        return;
+      }
       this.#wanted = !this.#wanted;
       this.tell("");
       this.#follow();
@@ -86,8 +90,7 @@ export class Live {
     const button = get("live");
     const isPressed = this.#wanted || instance?.kind === "session";
     button.hidden = !isSeen || instance.kind === "session";
-    button.disabled = !this.#alone && !isPressed;
-    button.title = button.disabled ? "choose one simulation first: it is slowed down to real time while it is watched" : "";
+    button.setAttribute("aria-disabled", String(!this.#alone));
     button.setAttribute("aria-pressed", String(isPressed));
     setText(button, isPressed ? "Live: back to replays" : "Live");
   }

@@ -8,7 +8,8 @@ const UNITS = { position: "rad", velocity: "rad/s", effort: "Nm", ball: "m" };
 const HEIGHT_PX = 120;
 const SPAN_S = 10;
 const NUMBERS_MS = 500;
-const GAP_PX = 26;
+const GAP_PX = 70;
+const MOST_GAP = 0.08;
 
 /** @typedef {{simulation: string, field: "position" | "velocity" | "effort" | "ball", name: string, link: string}} Choice */
 
@@ -79,9 +80,10 @@ export class PlotPanel {
   follow(at, stage) {
     const { offsetWidth: width, offsetHeight: height } = this.element;
     const [most, lowest] = [stage.clientWidth - width - 4, stage.clientHeight - height - 4];
-    const isRight = at.x + GAP_PX + width < stage.clientWidth;
-    const left = Math.max(4, Math.min(isRight ? at.x + GAP_PX : at.x - GAP_PX - width, most));
-    const top = Math.max(4, Math.min(at.y - height - GAP_PX, lowest));
+    const gap = Math.min(GAP_PX, stage.clientWidth * MOST_GAP);
+    const isRight = at.x + gap + width < stage.clientWidth;
+    const left = Math.max(4, Math.min(isRight ? at.x + gap : at.x - gap - width, most));
+    const top = Math.max(4, Math.min(at.y - height - gap, lowest));
     this.element.style.transform = `translate(${left.toFixed(1)}px, ${top.toFixed(1)}px)`;
     const x1 = Math.max(left, Math.min(at.x, left + width));
     const y1 = Math.max(top, Math.min(at.y, top + height));

@@ -29,7 +29,8 @@
  * @property {"starting" | "running" | "ended" | "died"} status
  * @property {string} started
  * @property {string | null} ended
- * @property {string} message
+ * @property {boolean} stopping whether it has been asked to stop
+ * @property {string} message what it ended with; empty if there was no error
  * @property {number} simulations
  * @property {{name: string, status: string, restarts: number, last_end: string | null}[]} nodes
  * @property {Progress | null} progress
