@@ -26,7 +26,7 @@ INSTALL := $(BIN)/python -m pip install --no-compile --disable-pip-version-check
 
 $(READY): pyproject.toml | $(VENV)/bin/python
 	@echo "installing about 60 packages, 1.5 GB with the robot's description, into $(VENV)"
-	$(INSTALL) -e '.[collect,docker,report,export]'
+	$(INSTALL) -e '.[collect,docker,report,export,serve]'
 	@touch $@
 
 $(READY_DEV): pyproject.toml | $(VENV)/bin/python
