@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -89,6 +89,7 @@ class Place:
 
     directory: Path
     state: Path
+    servers: list[Server] = field(default_factory=list)
 
     def serve(self, *options: str) -> Server:
         """A server of its own."""
@@ -101,7 +102,8 @@ class Place:
         assert line, "no server starts"
         url = json.loads(line)["url"]
         found = wait_for(lambda: self.address() if self.address()["url"] == url else None) if not options else {}
-        return Server(psutil.Process(process.pid), found or {"url": url})
+        self.servers.append(Server(psutil.Process(process.pid), found or {"url": url}))
+        return self.servers[-1]
 
     def address(self) -> dict[str, Any]:
         path = self.state / "serve.json"
@@ -116,7 +118,10 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Place]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv(STATE_VARIABLE, str(directory / "state"))
         patch.setenv("DOCKER_HOST", f"unix://{directory}/none.sock")
-        yield Place(directory, directory / "state")
+        place = Place(directory, directory / "state")
+        yield place
+        for server in place.servers:
+            server.kill()
         for run in Records().all():
             if run.lives:
                 os.kill(run.record.launcher, signal.SIGKILL)
