@@ -23,6 +23,13 @@ _SEEN = """
   return stations.length === 2 && stations.every(isSeen) && meshes.count;
 })()
 """
+_TOOLTIPS = """<robot name="talos">
+  <tooltip name="elbow" topic="joint_states" field="position[arm_right_4_joint]">
+    <parent link="arm_right_4_link"/>
+  </tooltip>
+  <tooltip name="ball" topic="/sim_0/ball/odometry" field="pose.pose.position.z"><parent link="torso_2_link"/></tooltip>
+  <tooltip name="image" topic="/img/base_joint_speed"><parent link="wrist_1_link"/></tooltip>
+</robot>"""
 _MESHES = 25
 """Files that the description of Talos with its spoon draws."""
 
@@ -61,6 +68,10 @@ def test_a_collection_is_started_watched_and_stopped_by_the_page(address: str) -
         assert tab.evaluate("document.querySelector('#play').textContent") == "Play"
         tab.evaluate("throwcollect.playback.seek(0); document.querySelector('#play').click()")
         tab.wait_for("document.querySelector('#scrub').value > 0.2")
+        # A description brings its plots, each once; what cannot be plotted is left out.
+        tab.evaluate(f"for (const _ of [1, 2]) throwcollect.plots.bind('sim_0', {json.dumps(_TOOLTIPS)})")
+        titles = "[...document.querySelectorAll('.plot strong')].map((each) => each.textContent).join()"
+        assert tab.evaluate(titles) == "arm_right_4_joint position [rad],ball z [m]"
         instance = tab.evaluate("throwcollect.watching.id")
         press(tab, f"Stop {instance}")
         tab.wait_for("document.querySelector('#ended .status')?.textContent.startsWith('has ended')", every_s=1)

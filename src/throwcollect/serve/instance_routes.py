@@ -108,6 +108,11 @@ def make_instance_routes(instances: Instances, lookout: Lookout) -> APIRouter:
         response.headers["Location"] = f"/api/v1/instances/{run.id}"
         return describe(run)
 
+    @router.delete("", status_code=202)
+    def delete_all() -> list[str]:
+        """Stop all runs that clients have begun and that live; tells their ids."""
+        return instances.stop_all()
+
     @router.delete("/{instance}", status_code=202)
     def delete(instance: str, force: bool = False) -> None:
         """Stop a run: running trials are finished; by force, everything ends at once, and the run is forgotten."""

@@ -7,7 +7,7 @@ import json
 import os
 import re
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -150,6 +150,19 @@ class Instances:
             control.down(run)
         elif not (run.lives and run.record.stopping):
             control.stop(run, keep_on=lambda: False)
+
+    def stop_all(self) -> list[str]:
+        """Have all runs that clients have begun and that live drain and end; returns their ids.
+
+        Raises:
+            WorkerError: If one of them cannot be told.
+        """
+        living = [run.id for run in Records().all() if run.record.origin is not None and run.status == "running"]
+        for run in living:
+            # One may have ended just now.
+            with suppress(ConflictError):
+                self.stop(run)
+        return living
 
     def scale(self, instance: str, simulations: int) -> Run:
         """Ask an instance for another number of simulations.

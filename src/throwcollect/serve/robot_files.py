@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from contextlib import suppress
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path, PurePosixPath
 
@@ -24,10 +25,53 @@ def description_of(run: Run) -> str:
         NotFoundError: If the run has no configuration yet.
         ConfigError: If the robot's files cannot be read.
     """
+    path = _find_config(run)
+    return _describe(path, path.stat().st_mtime_ns)
+
+
+@dataclass(frozen=True)
+class SceneFacts:
+    """What viewers have to know of the scene of a run.
+
+    Attributes:
+        base_height_m: Height of the robot's fixed base above the ground [m].
+        landing_height_m: Height of the plane in which throws land [m]; None if that varies.
+        target_distance_m: Least and greatest distance from the robot's base at which throws are to land [m]; None
+            without such a target.
+    """
+
+    base_height_m: float
+    landing_height_m: float | None
+    target_distance_m: tuple[float, float] | None
+
+
+def scene_of(run: Run) -> SceneFacts:
+    """The scene of a run.
+
+    Raises:
+        NotFoundError: If the run has no configuration yet.
+        ConfigError: If it cannot be read.
+    """
+    config = load(_find_config(run))
+    varies = "scene.landing_height_m" in config.sweep.parameters
+    distance = None if config.sweep.target is None else config.sweep.target.distance_m
+    return SceneFacts(
+        config.robot.base_height_m,
+        None if varies else config.scene.landing_height_m,
+        None if distance is None else (distance.min, distance.max),
+    )
+
+
+def _find_config(run: Run) -> Path:
+    """File of the configuration of a run.
+
+    Raises:
+        NotFoundError: If there is none yet.
+    """
     path = config_path(Path(run.record.directory))
     if not path.is_file():
         raise NotFoundError(f"run {run.id} has no configuration yet")
-    return _describe(path, path.stat().st_mtime_ns)
+    return path
 
 
 @lru_cache(maxsize=16)

@@ -13,7 +13,7 @@ from throwcollect.serve.access import MAY_ONLY_LOOK
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.live import take
 from throwcollect.serve.problems import describe_bytes
-from throwcollect.serve.robot_files import description_of, find_mesh
+from throwcollect.serve.robot_files import SceneFacts, description_of, find_mesh, scene_of
 from throwcollect.serve.sockets import FAILED, MAY_NOT, NOT_FOUND, keep_telling, refuse
 from throwcollect.serve.throws import ThrowWatch
 
@@ -32,6 +32,11 @@ def make_description_routes(instances: Instances) -> APIRouter:
     def urdf(instance: str) -> Response:
         """The robot of a run, with its tool, in URDF; meshes are ``package://`` URLs."""
         return Response(description_of(instances.get(instance)), media_type="application/xml")
+
+    @router.get("/instances/{instance}/scene")
+    def scene(instance: str) -> SceneFacts:
+        """What viewers have to know besides."""
+        return scene_of(instances.get(instance))
 
     @router.put("/instances/{instance}/urdf", status_code=202, openapi_extra=_XML)
     async def show(instance: str, request: Request) -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import signal
 import subprocess
+import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -35,25 +37,37 @@ def config(tmp_path: Path) -> Path:
     return path
 
 
+PROCESS = """
+import os, sys, time
+os.write(1, sys.stdin.buffer.read())
+os.close(1), os.close(2)
+time.sleep(60)
+"""
+
+
 @pytest.fixture
-def processes(monkeypatch: pytest.MonkeyPatch) -> list[subprocess.Popen[bytes]]:
-    """Processes that take an order and do nothing."""
+def processes(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[subprocess.Popen[bytes]]]:
+    """Processes that take an order and do nothing, until they are ended."""
     started: list[subprocess.Popen[bytes]] = []
     begin = subprocess.Popen
 
     def start(words: list[str], **options: Any) -> subprocess.Popen[bytes]:
-        started.append(begin(["cat"], **{**options, "stdout": subprocess.PIPE}))
+        started.append(begin([sys.executable, "-ISc", PROCESS], **{**options, "stdout": subprocess.PIPE}))
         return started[-1]
 
     monkeypatch.setattr(background.subprocess, "Popen", start)
-    return started
+    yield started
+    for process in started:
+        process.kill()
+        process.wait()
 
 
 def end(process: subprocess.Popen[bytes]) -> bytes:
-    """What the process was told; it has ended."""
+    """End a process; returns what it was told."""
     assert process.stdout is not None
     with process.stdout as told:
         order = told.read()
+    process.kill()
     process.wait()
     return order
 

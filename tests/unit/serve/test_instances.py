@@ -10,6 +10,7 @@ import pytest
 from starlette.testclient import TestClient
 from tests.unit.serve.conftest import Remember, Served, ended
 
+from throwcollect.robots.talos import TALOS
 from throwcollect.runs.record import Failure, Origin
 from throwcollect.runs.records import Records, Run
 from throwcollect.runtimes.runtime import NodeState
@@ -182,6 +183,35 @@ def test_a_run_that_is_stopping_is_not_told_again(
     assert client.get(f"{URL}/b").json()["stopping"] is True
 
 
+def test_all_that_clients_have_begun_are_stopped_and_nothing_else(
+    client: TestClient, remember: Remember, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told: list[str] = []
+    monkeypatch.setattr(instances_module.control, "stop", lambda run, **_: told.append(run.id))
+    remember("begun", origin=Origin("throws"))
+    remember("over", origin=Origin("throws"), **ended())
+    remember("of-a-command")
+    answer = client.delete(URL)
+    assert (answer.status_code, answer.json(), told) == (202, ["begun"], ["begun"])
+
+
+def test_viewers_are_told_of_the_scene(client: TestClient, remember: Remember, tmp_path: Path) -> None:
+    directory = tmp_path / "datasets" / "a"
+    remember("a")
+    assert client.get(f"{URL}/a/scene").status_code == 404
+    directory.mkdir(parents=True)
+    text = "name: a\ntrials: 3\nrobot: {base_height_m: 1.1}\nscene: {landing_height_m: 0.4}\n"
+    (directory / "config.yaml").write_text(text)
+    known = {"base_height_m": 1.1, "landing_height_m": 0.4, "target_distance_m": None}
+    assert client.get(f"{URL}/a/scene").json() == known
+    (directory / "config.yaml").write_text(f"""{text}sweep:
+  parameters: {{scene.landing_height_m: {{min: 0.1, max: 0.5}}, task.duration_s: {{min: 0.9, max: 1.2}}}}
+  target: {{distance_m: {{min: 0.5, max: 2.5, bins: 4}}}}
+""")
+    aimed = {"base_height_m": 1.1, "landing_height_m": None, "target_distance_m": [0.5, 2.5]}
+    assert client.get(f"{URL}/a/scene").json() == aimed
+
+
 def test_records_that_cannot_be_read_are_told_of(client: TestClient, state: Path, remember: Remember) -> None:
     remember("newer", **ended())
     path = state / "runs" / "newer.json"
@@ -239,7 +269,8 @@ def test_logs_and_events_are_read_where_they_lie(client: TestClient, remember: R
 def test_meshes_come_from_packages_of_robots_alone(served: Served) -> None:
     client = served.client()
     base = "/api/v1/meshes"
-    assert client.get(f"{base}/talos_data/meshes/torso/torso_1.STL").status_code in (200, 404)
+    mesh = "example-robot-data/robots/talos_data/meshes/head/head_1.stl"
+    assert client.get(f"{base}/{mesh}").content == (TALOS.share() / mesh).read_bytes()
     for path in (
         "../x",
         "..%2f..%2fsetup.py",

@@ -135,6 +135,9 @@ class InstanceCard {
     this.watch = button("Watch", () => controls.watch(this.instance.id));
     this.stop = button("Stop", () => this.#ask("DELETE", ""));
     this.force = button("End now", () => this.#force());
+    this.resume = button("Resume", () => this.#resume());
+    this.report = button("Report", () => this.#save("report", "html"));
+    this.download = button("Download", () => this.#save("dataset.tar", "tar"));
     this.simulations = make("input", { type: "number", min: "0", max: "256", inputMode: "numeric" });
     this.scale = make("form", { className: "row" }, make("label", {}, "Simulations ", this.simulations),
       make("button", { type: "submit" }, "Scale"));
@@ -144,7 +147,8 @@ class InstanceCard {
     });
     this.records = new RunRecords(controls.connection);
     this.element = make("article", { className: "card" }, this.name, this.status, this.bar, this.counts, this.outcomes,
-      this.nodes, make("div", { className: "row" }, this.watch, this.stop, this.force), this.scale, this.problem,
+      this.nodes, make("div", { className: "row" }, this.watch, this.stop, this.resume, this.report, this.download,
+        this.force), this.scale, this.problem,
       this.records.element);
   }
 
@@ -161,9 +165,13 @@ class InstanceCard {
     const all = instance.nodes.length ? `${instance.nodes.length} nodes` : "";
     setText(this.nodes, [all, ...troubled.map(({ name, status }) => `${name} ${status}`)].filter(Boolean).join(", "));
     for (const element of [this.stop, this.scale]) element.hidden = !isLiving;
+    const isOver = !isLiving && instance.kind === "collection";
+    this.resume.hidden = !isOver || instance.summary !== null;
+    for (const element of [this.report, this.download]) element.hidden = !isOver || instance.summary === null;
     setText(this.force, isLiving ? "End now" : "Forget");
     if (before?.simulations !== instance.simulations) this.simulations.value = String(instance.simulations);
-    for (const each of [this.watch, this.stop, this.force]) each.setAttribute("aria-label", `${each.textContent} ${instance.id}`);
+    const buttons = [this.watch, this.stop, this.resume, this.report, this.download, this.force];
+    for (const each of buttons) each.setAttribute("aria-label", `${each.textContent} ${instance.id}`);
     this.records.put(instance);
   }
 
@@ -188,10 +196,35 @@ class InstanceCard {
     if (await confirm(`${what}it disappears from this list. Its dataset is kept.`)) await this.#ask("DELETE", "?force=true");
   }
 
-  async #ask(method, query, body) {
+  #ask(method, query, body) {
+    return this.#attempt(() => this.controls.connection.ask(method, `/instances/${this.#id}${query}`, body));
+  }
+
+  #resume() {
+    return this.#attempt(async () => {
+      const answer = await this.controls.connection.ask("POST", `/collections/${this.#id}/resume`);
+      this.controls.watch((await answer.json()).id);
+    });
+  }
+
+  /** Save what the server makes of a finished dataset; a link alone could not show the token. */
+  #save(what, suffix) {
+    return this.#attempt(async () => {
+      const answer = await this.controls.connection.ask("GET", `/collections/${this.#id}/${what}`);
+      const link = make("a", { href: URL.createObjectURL(await answer.blob()), download: `${this.instance.id}.${suffix}` });
+      link.click();
+      URL.revokeObjectURL(link.href);
+    });
+  }
+
+  get #id() {
+    return encodeURIComponent(this.instance.id);
+  }
+
+  async #attempt(act) {
     showProblem(this.problem, null);
     try {
-      await this.controls.connection.ask(method, `/instances/${encodeURIComponent(this.instance.id)}${query}`, body);
+      await act();
     } catch (error) {
       showProblem(this.problem, error);
     }

@@ -14,6 +14,8 @@ export class LandingMap {
   #landings = [];
   #trials = new Set();
   #isWhole = false;
+  /** @type {[number, number] | null} */
+  #target = null;
   /** @type {import("./throws.js").Throw | null} */
   #newest = null;
 
@@ -28,6 +30,7 @@ export class LandingMap {
     this.#trials.clear();
     this.#newest = null;
     this.#isWhole = false;
+    this.#target = null;
     this.put([]);
   }
 
@@ -35,6 +38,13 @@ export class LandingMap {
   put(landings) {
     this.#isWhole = landings.length > 0;
     this.#landings = landings;
+    this.#tell();
+    this.#draw();
+  }
+
+  /** @param {[number, number] | null} distances between which throws are to land [m] */
+  aim(distances) {
+    this.#target = distances;
     this.#tell();
     this.#draw();
   }
@@ -68,7 +78,7 @@ export class LandingMap {
     const [y0, y1] = range(placed.map(([, y]) => y));
     const which = this.#isWhole ? `All ${placed.length} landings` : `${placed.length} landings of throws that were shown`;
     const text = `${which}: ${x0.toFixed(2)} to ${x1.toFixed(2)} m before the robot, `
-      + `${y0.toFixed(2)} to ${y1.toFixed(2)} m to its left.`;
+      + `${y0.toFixed(2)} to ${y1.toFixed(2)} m to its left.${this.#target ? " Aimed at: between the arcs." : ""}`;
     setText(get("map-text"), text);
   }
 
@@ -88,12 +98,13 @@ export class LandingMap {
     const style = getComputedStyle(canvas);
     const placed = this.#placed();
     // The robot is always in the picture. World's x points up here, and its y to the left.
-    const [x0, x1] = range([...placed.map(([x]) => x), -0.2, 1]);
+    const [x0, x1] = range([...placed.map(([x]) => x), -0.2, 1, this.#target?.[1] ?? 1]);
     const [y0, y1] = range([...placed.map(([, y]) => y), -0.5, 0.5]);
     const scale = Math.min((width - 2 * MARGIN_PX) / (y1 - y0), (height - 2 * MARGIN_PX) / (x1 - x0));
     const at = (x, y) => [width / 2 - (y - (y0 + y1) / 2) * scale, height / 2 - (x - (x0 + x1) / 2) * scale];
     drawGrid(pen, style, at, scale, { width, height });
     drawRobot(pen, style, at, scale);
+    if (this.#target) drawTarget(pen, style, at, scale, this.#target);
     pen.globalAlpha = placed.length > 500 ? 0.5 : 0.85;
     for (const [x, y, outcome] of placed) {
       pen.fillStyle = colorOf(outcome);
@@ -152,6 +163,19 @@ function stroke(pen, from, to) {
   pen.moveTo(...from);
   pen.lineTo(...to);
   pen.stroke();
+}
+
+function drawTarget(pen, style, at, scale, distances) {
+  const [x, y] = at(0, 0);
+  pen.strokeStyle = style.getPropertyValue("--muted");
+  pen.lineWidth = 1.5;
+  pen.setLineDash([4, 4]);
+  for (const distance of distances) {
+    pen.beginPath();
+    pen.arc(x, y, distance * scale, Math.PI, 2 * Math.PI);
+    pen.stroke();
+  }
+  pen.setLineDash([]);
 }
 
 function drawRobot(pen, style, at, scale) {

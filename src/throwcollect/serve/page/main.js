@@ -66,6 +66,7 @@ class Page {
     this.watching = new Watching({ connection, view, playback, map, meshes, tell });
     this.live = new Live({ connection, view, watching: this.watching, tell });
     this.plots = new Plots({ view, playback, live: this.live });
+    this.watching.described = (simulation, urdf) => this.plots.bind(simulation, urdf);
     this.controls = new Controls(connection, (id) => this.#watch(id));
     if (matchMedia("(prefers-reduced-motion: reduce)").matches) this.playback.playing = false;
     this.#store.listen((state) => this.#put(state));

@@ -2,6 +2,7 @@
 
 import { get, setChoices } from "./dom.js";
 import { PlotPanel } from "./plot_panel.js";
+import { readTooltips } from "./tooltips.js";
 
 const DEFAULT_JOINT = "arm_right_4_joint";
 
@@ -32,6 +33,19 @@ export class Plots {
   put(simulations) {
     this.#simulations = simulations;
     get("add-plot").disabled = !simulations.length;
+  }
+
+  /**
+   * Plot what a description binds to links, unless that is plotted already.
+   * @param {string} simulation whose robot it describes
+   * @param {string} urdf
+   */
+  bind(simulation, urdf) {
+    for (const tooltip of readTooltips(urdf)) {
+      const isThere = ({ choice }) => choice.simulation === simulation && choice.field === tooltip.field
+        && choice.name === tooltip.name && choice.link === tooltip.link;
+      if (!this.panels.some(isThere)) this.#put({ simulation, ...tooltip }, true);
+    }
   }
 
   /** Draw what is new, and put panels where their links are. */
@@ -79,7 +93,11 @@ export class Plots {
 
   #add() {
     const [simulation, field, name, link] = ["simulation", "field", "name", "link"].map((key) => get(`plot-${key}`).value);
-    const panel = new PlotPanel({ simulation, field, name, link }, get("plot-follows").checked, () => {
+    this.#put({ simulation, field, name, link }, get("plot-follows").checked);
+  }
+
+  #put(choice, follows) {
+    const panel = new PlotPanel(choice, follows, () => {
       this.panels.splice(this.panels.indexOf(panel), 1);
       get("add-plot").focus();
     });

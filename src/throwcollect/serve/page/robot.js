@@ -1,6 +1,6 @@
 /** Robots from their descriptions; each mesh is fetched once, whatever number of robots has it. */
 
-import { Box3, Group, Mesh, Vector3 } from "./vendor/three/build/three.module.js";
+import { Group, Mesh, Vector3 } from "./vendor/three/build/three.module.js";
 import { ColladaLoader } from "./vendor/three/examples/jsm/loaders/ColladaLoader.js";
 import { OBJLoader } from "./vendor/three/examples/jsm/loaders/OBJLoader.js";
 import { STLLoader } from "./vendor/three/examples/jsm/loaders/STLLoader.js";
@@ -83,7 +83,7 @@ function parse(path, bytes) {
   throw new Error(`${path}: neither STL nor Collada nor OBJ`);
 }
 
-/** A robot that stands on the ground. */
+/** A robot whose base is fixed above the origin. */
 export class Robot {
   object = new Group();
   /** Whether all meshes are there. */
@@ -94,13 +94,15 @@ export class Robot {
 
   /**
    * @param {string} urdf description
+   * @param {number} baseHeight of the base above the ground [m]
    * @param {Meshes} meshes
    * @param {() => void} changed is called when there is something new to draw
    * @param {(error: Error) => void} failed is told of meshes that cannot be had
    * @throws {Error} if the description cannot be read
    */
-  constructor(urdf, meshes, changed, failed) {
+  constructor(urdf, baseHeight, meshes, changed, failed) {
     this.urdf = urdf;
+    this.object.position.z = baseHeight;
     const loader = new URDFLoader();
     loader.packages = (name) => PACKAGE + name;
     loader.parseCollision = false;
@@ -127,7 +129,6 @@ export class Robot {
     /** All meshes are there, or cannot be had. */
     this.whole = Promise.all(loading).then(() => {
       this.isWhole = true;
-      this.#stand();
       changed();
     });
   }
@@ -152,12 +153,10 @@ export class Robot {
 
   /** @param {Iterable<[string, number]>} positions of joints [rad]; others stay where they are */
   move(positions) {
-    const isFirst = this.#positions.size === 0;
     for (const [joint, position] of positions) {
       this.#positions.set(joint, position);
       this.#robot.joints[joint]?.setJointValue(position);
     }
-    if (isFirst) this.#stand();
   }
 
   /** @param {Robot} other takes its place, and its posture */
@@ -194,13 +193,5 @@ export class Robot {
 
   #choose(part) {
     if (part.isMesh) part.geometry = (this.#coarse ? COARSE : FINE).get(part.geometry) ?? part.geometry;
-  }
-
-  /** Have its lowest point on the ground: the base is fixed, and where it is fixed stands in no description. */
-  #stand() {
-    this.object.position.z = 0;
-    this.object.updateMatrixWorld(true);
-    const box = new Box3().setFromObject(this.object, true);
-    if (!box.isEmpty()) this.object.position.z = -box.min.z;
   }
 }

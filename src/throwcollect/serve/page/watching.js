@@ -10,7 +10,10 @@ export class Watching {
   id = null;
   #socket = null;
   #urdf = null;
+  #scene = null;
   #hasAll = false;
+  /** @type {(simulation: string, urdf: string) => void} is told of each description that is drawn */
+  described = () => {};
 
   /**
    * @param {object} parts
@@ -51,9 +54,10 @@ export class Watching {
    */
   describe(name, urdf) {
     const station = this.view.stations.get(name);
-    if (!station || station.robot?.urdf === urdf) return;
+    if (!station || !this.#scene || station.robot?.urdf === urdf) return;
     try {
-      station.setRobot(new Robot(urdf, this.meshes, () => this.view.touch(), ({ message }) => this.tell(`a mesh is missing: ${message}`)));
+      station.setRobot(new Robot(urdf, this.#scene.base_height_m, this.meshes, () => this.view.touch(), ({ message }) => this.tell(`a mesh is missing: ${message}`)));
+      this.described(name, urdf);
     } catch (error) {
       this.tell(`the robot's description cannot be drawn: ${error.message}`);
     }
@@ -88,6 +92,7 @@ export class Watching {
   #begin(id) {
     this.id = id;
     this.#urdf = null;
+    this.#scene = null;
     this.#hasAll = false;
     this.#socket?.close();
     this.#socket = null;
@@ -121,8 +126,14 @@ export class Watching {
     const run = `/instances/${encodeURIComponent(id)}`;
     if (this.#urdf === null && instance.robots.length) {
       this.#urdf = "";
-      this.#urdf = await this.#ask(`${run}/urdf`, (response) => response.text());
-      if (this.id === id && this.#urdf) this.show(this.view.shown);
+      const scene = await this.#ask(`${run}/scene`, (response) => response.json());
+      const urdf = await this.#ask(`${run}/urdf`, (response) => response.text());
+      if (this.id === id && scene !== null) {
+        this.#scene = scene;
+        this.#urdf = urdf;
+        this.map.aim(scene.target_distance_m);
+        this.show(this.view.shown);
+      }
     }
     if (instance.summary && !this.#hasAll) {
       this.#hasAll = true;
