@@ -14,7 +14,10 @@ import rclzenoh
 import throwcollect
 from throwcollect.ros.middleware import uses_rclpy
 
-EXTRAS = {"docker", "plotly", "jinja2", "markupsafe", "matplotlib", "h5py"}
+EXTRAS = {
+    *("docker", "plotly", "jinja2", "markupsafe", "matplotlib", "h5py"),
+    *("fastapi", "starlette", "uvicorn", "websockets", "orjson", "cbor2"),
+}
 modules = [module for root in (rclzenoh, throwcollect) for module in pkgutil.walk_packages(root.__path__, f"{root.__name__}.")]
 for module in modules:
     if not module.name.endswith("__main__") and (uses_rclpy() or module.name != "throwcollect.ros.genuine"):
