@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -30,6 +31,8 @@ _TOOLTIPS = """<robot name="talos">
   <tooltip name="ball" topic="/sim_0/ball/odometry" field="pose.pose.position.z"><parent link="torso_2_link"/></tooltip>
   <tooltip name="image" topic="/img/base_joint_speed"><parent link="wrist_1_link"/></tooltip>
 </robot>"""
+_CHANGED = "ERR_NETWORK_CHANGED"
+"""What a browser says of requests that it breaks off when containers come and go beside it."""
 _MESHES = 25
 """Files that the description of Talos with its spoon draws."""
 
@@ -48,6 +51,17 @@ def address(tmp_path: Path) -> Iterator[str]:
         server.terminate()
 
 
+def load(tab: Tab) -> None:
+    """Wait until the page works; modules that the browser gave up, as a network of the machine changed, come again."""
+    for _ in range(5):
+        with suppress(AssertionError):
+            tab.wait_for("document.querySelector('#components form') !== null", within_s=20)
+            return
+        assert any(_CHANGED in error for error in tab.errors), tab.errors
+        tab.ask("Page.reload")
+    raise AssertionError(tab.errors)
+
+
 def press(tab: Tab, button: str) -> None:
     tab.evaluate(f"document.querySelector('button[aria-label={json.dumps(button)}]').click()")
 
@@ -56,14 +70,15 @@ def press(tab: Tab, button: str) -> None:
 def test_a_collection_is_started_watched_and_stopped_by_the_page(address: str) -> None:
     # Software draws, and that is dear: the replay stands still at first, as it does for all who want little motion.
     with browse(address, width=800, height=600, features={"prefers-reduced-motion": "reduce"}) as tab:
-        tab.wait_for("document.querySelector('#components form') !== null")
+        load(tab)
         assert tab.evaluate("location.hash") == "", "the code is still in the address"
         assert "Nothing runs" in tab.evaluate("document.querySelector('#empty').textContent")
         tab.evaluate("document.querySelector('#components input').value = '2'")
         press(tab, "Start Throws")
         meshes = tab.wait_for(_SEEN, within_s=120, every_s=1)
         fetched = [url for url in tab.requests if "/meshes/" in url]
-        assert meshes == len(fetched) == len(set(fetched)) == _MESHES
+        assert meshes == len(set(fetched)) == _MESHES
+        assert len(fetched) == _MESHES or any(_CHANGED in error for error in tab.errors)
         assert tab.evaluate("document.querySelector('#instances progress').value") > 0
         assert tab.evaluate("document.querySelector('#play').textContent") == "Play"
         tab.evaluate("throwcollect.playback.seek(0); document.querySelector('#play').click()")
@@ -78,4 +93,4 @@ def test_a_collection_is_started_watched_and_stopped_by_the_page(address: str) -
         assert {urlsplit(url).netloc for url in tab.requests if not url.startswith(("data:", "blob:"))} == {
             urlsplit(address).netloc
         }
-        assert tab.errors == []
+        assert [error for error in tab.errors if _CHANGED not in error] == []

@@ -178,7 +178,7 @@ class Coordinator(Node):
             self._collection.refuse(namespace, trial, handed.reason)
         else:
             self._collection.take_in(namespace, handed, token)
-            self._showing.offer(namespace, message)
+            self._showing.offer(simulation.name, message)
         self._lease(namespace)
 
     def _take_back(self, namespace: str, reason: str, *, refused: bool = False) -> None:

@@ -26,23 +26,23 @@ class Showing:
         self._watched: set[str] = set()
         node.create_timer(_PERIOD_S, self._show)
 
-    def offer(self, namespace: str, message: bytes) -> None:
+    def offer(self, simulation: str, message: bytes) -> None:
         """Take in an episode, to be shown when it is its simulation's turn, unless there is a newer one by then.
 
         Args:
-            namespace: Namespace of the simulation.
+            simulation: Name of its node.
             message: Serialised message of the episode.
         """
-        if namespace not in self._publishers:
-            topic = make_shown_topic(namespace)
-            self._publishers[namespace] = self._node.create_publisher(UInt8MultiArray, topic, SHOWN_QOS)
-        if namespace in self._watched:
+        if simulation not in self._publishers:
+            topic = make_shown_topic(simulation)
+            self._publishers[simulation] = self._node.create_publisher(UInt8MultiArray, topic, SHOWN_QOS)
+        if simulation in self._watched:
             # A simulation whose episode is replaced keeps its turn; one that was shown goes to the end of the line.
-            self._newest[namespace] = message
+            self._newest[simulation] = message
 
     def _show(self) -> None:
         self._watched = {each for each, publisher in self._publishers.items() if publisher.get_subscription_count()}
         self._newest = {each: message for each, message in self._newest.items() if each in self._watched}
         if self._newest:
-            namespace = next(iter(self._newest))
-            self._publishers[namespace].publish(self._newest.pop(namespace))
+            simulation = next(iter(self._newest))
+            self._publishers[simulation].publish(self._newest.pop(simulation))

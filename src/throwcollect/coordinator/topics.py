@@ -13,10 +13,10 @@ SHOWN_QOS = ros.QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 """Whoever is slow misses some, and holds nobody up."""
 
 
-def make_shown_topic(namespace: str) -> str:
+def make_shown_topic(simulation: str) -> str:
     """Topic of the newest episode of a simulation, as it arrived: a std_msgs/UInt8MultiArray.
 
     Args:
-        namespace: Namespace of the simulation, with its slash.
+        simulation: Name of its node.
     """
-    return f"/coordinator/shown{namespace}"
+    return f"/coordinator/shown/{simulation}"

@@ -154,7 +154,7 @@ class _Subscriptions:
         for name in set(simulations) - self._heard:
             self._heard.add(name)
             hear = partial(self._hear, name)
-            self._node.create_subscription(UInt8MultiArray, make_shown_topic(f"/{name}"), hear, SHOWN_QOS, raw=True)
+            self._node.create_subscription(UInt8MultiArray, make_shown_topic(name), hear, SHOWN_QOS, raw=True)
 
 
 def _replace(queue: asyncio.Queue[bytes], frame: bytes) -> None:

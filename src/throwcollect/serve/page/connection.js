@@ -4,6 +4,7 @@ const PREFIX = "/api/v1";
 const KEPT = "throwcollect.token";
 const FIRST_WAIT_MS = 500;
 const LONGEST_WAIT_MS = 10_000;
+const TRIES = 3;
 
 /** What the server says is wrong, or that it cannot be reached (status 0). */
 export class Problem extends Error {
@@ -55,14 +56,21 @@ export function keepToken(token) {
 async function ask(token, method, path, body) {
   const headers = token === null ? {} : { Authorization: `Bearer ${token}` };
   if (body !== undefined) headers["Content-Type"] = "application/json";
-  let response;
-  try {
-    response = await fetch(PREFIX + path, { method, headers, body: body === undefined ? null : JSON.stringify(body) });
-  } catch {
-    throw new Problem(0, { title: "the server cannot be reached" });
-  }
+  const request = { method, headers, body: body === undefined ? null : JSON.stringify(body) };
+  const response = await attempt(() => fetch(PREFIX + path, request), method === "GET" ? TRIES : 1);
   if (!response.ok) throw new Problem(response.status, await response.json().catch(() => ({})));
   return response;
+}
+
+/** Browsers break requests off when any network of the machine changes; what changes nothing is asked for again. */
+async function attempt(act, tries) {
+  try {
+    return await act();
+  } catch {
+    if (tries === 1) throw new Problem(0, { title: "the server cannot be reached" });
+    await new Promise((resolve) => setTimeout(resolve, FIRST_WAIT_MS));
+    return attempt(act, tries - 1);
+  }
 }
 
 /** Requests and sockets of somebody who has a token. */
