@@ -33,6 +33,7 @@ from throwcollect.errors import ConfigError, ConflictError, NotFoundError
 from throwcollect.files import beside, write_all
 from throwcollect.ros.connection import Connection
 from throwcollect.run_key import RunKey
+from throwcollect.runs.lock_file import is_locked
 from throwcollect.runs.record import VERSION, Record
 from throwcollect.runtimes.registry import get_runtime
 from throwcollect.runtimes.runtime import Place
@@ -302,17 +303,7 @@ class Records:
 
     def lives(self, run: str) -> bool:
         """Whether the launcher of a run lives."""
-        try:
-            lock = os.open(self._runs / f"{run}.lock", os.O_RDONLY)
-        except OSError:
-            return False
-        try:
-            fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        except BlockingIOError:
-            return True
-        finally:
-            os.close(lock)
-        return False
+        return is_locked(self._runs / f"{run}.lock")
 
     def _forget_old(self) -> None:
         now = datetime.now(timezone.utc)

@@ -22,6 +22,7 @@ from pydantic import TypeAdapter
 
 from throwcollect.errors import DatasetError, WorkerError
 from throwcollect.files import open_log, write_secret
+from throwcollect.runs.lock_file import is_locked
 from throwcollect.runs.records import state_directory
 
 _FILE = "serve.json"
@@ -202,17 +203,7 @@ def _path() -> Path:
 
 def _is_locked() -> bool:
     """Whether a server lives that is to be found."""
-    try:
-        lock = os.open(_path().with_name(_LOCK), os.O_RDONLY)
-    except OSError:
-        return False
-    try:
-        fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return True
-    finally:
-        os.close(lock)
-    return False
+    return is_locked(_path().with_name(_LOCK))
 
 
 def _read() -> Address | None:
