@@ -13,7 +13,8 @@ READY_ROS := $(ROS_VENV)/.ready
 # starts twice as fast when its libraries are compiled once.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: up ros test test-fast test-ros-client test-containers test-processes test-cluster check bench bench-full clean
+.PHONY: up ros test test-fast \
+    test-units test-ros test-ros-client test-containers test-processes test-cluster check bench bench-full clean
 
 up: $(READY)
 	$(BIN)/throwcollect up -n 2 configs/quickstart.yaml
@@ -49,9 +50,6 @@ $(READY_ROS): $(ROS_WHEELS)/made-from.sha256 | $(READY_DEV)
 	mv $@.pth "$$($(ROS_VENV)/bin/python -c "import sysconfig; print(sysconfig.get_path('purelib'))")/development.pth"
 	touch $@
 
-# On Fast DDS, nodes at times do not find each other on a busy machine. A run starts them again; so do its tests.
-ROS_TESTS := $(ROS_VENV)/bin/python -m pytest -n 3 --dist loadfile tests/contract tests/ros
-
 # What a contributor runs in between, in less than a minute on two cores: the rules of the house, the API of nodes on the embedded
 # backend, and all units but those that write, read, draw or simulate whole datasets.
 SLOW := cli dataset derive export replay report runs runtimes sim slimming test_simulator.py view wheels
@@ -60,27 +58,40 @@ test-fast: $(READY_DEV)
 
 # Continuous integration makes the image meanwhile, and names the process that does.
 test: check
-	$(BIN)/python -m pytest -n logical tests/unit tests/install tests/rclzenoh tests/contract tests/physics
+	$(MAKE) --no-print-directory test-units
 	@while [ -n "$(MAKES_IMAGE)" ] && kill -0 $(MAKES_IMAGE) 2> /dev/null; do sleep 1; done
 	$(MAKE) --no-print-directory ros
-	$(ROS_TESTS) || $(ROS_TESTS) --last-failed --last-failed-no-failures none
+	$(MAKE) --no-print-directory test-ros
 	$(MAKE) --no-print-directory -j 3 --output-sync=target test-containers test-processes test-cluster
 
 # The ROS client alone, on the embedded backend: what somebody runs who changes it.
 test-ros-client: $(READY_DEV)
 	$(BIN)/python -m pytest -n logical tests/rclzenoh tests/contract tests/unit/ros tests/unit/cli/ros
 
-# These three wait most of the time, so they run side by side. Tests with an engine look at all that is on it, so one by one.
+# Most tests below have several processes that wait for one another, so a busy machine can come between. What fails is run once
+# more, after all others; the first failure stays in the log. Each group remembers its own failures.
+define twice
+$(1) -o cache_dir=.pytest_cache/$@ || $(1) -o cache_dir=.pytest_cache/$@ --last-failed --last-failed-no-failures none
+endef
+
+test-units:
+	$(call twice,$(BIN)/python -m pytest -n logical tests/unit tests/install tests/rclzenoh tests/contract tests/physics)
+
+# On Fast DDS, nodes at times do not find each other on a busy machine. A run starts them again; so do its tests.
+test-ros:
+	$(call twice,$(ROS_VENV)/bin/python -m pytest -n 3 --dist loadfile tests/contract tests/ros)
+
+# The next three wait most of the time, so they run side by side. Tests with an engine look at all that is on it, so one by one.
 test-containers:
-	$(BIN)/python -m pytest tests/docker
+	$(call twice,$(BIN)/python -m pytest tests/docker)
 
 # Two files at a time.
 test-processes:
-	$(BIN)/python -m pytest -n 2 --dist loadfile tests/e2e tests/integration
+	$(call twice,$(BIN)/python -m pytest -n 2 --dist loadfile tests/e2e tests/integration)
 
 # Slurm with four nodes of this machine, and Apptainer; `.ci/cluster.sh` installs both on Debian.
 test-cluster:
-	$(BIN)/python -m pytest tests/cluster
+	$(call twice,$(BIN)/python -m pytest tests/cluster)
 
 # Format, lint, types, the direction of imports, and the rules of the house.
 check: $(READY_DEV)
