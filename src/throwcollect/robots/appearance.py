@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
+from pathlib import Path
 
 from throwcollect.errors import ConfigError, ConflictError
 
@@ -21,12 +22,7 @@ def check_appearance(description: str, wanted: str) -> None:
         ConfigError: If that is no URDF.
         ConflictError: If anything but shapes and colours to be seen differs: joints, masses, collision shapes.
     """
-    try:
-        root = ElementTree.fromstring(wanted)  # noqa: S314 - expat expands nothing external, and little else
-    except ElementTree.ParseError as error:
-        raise ConfigError(f"robot_description: should be a URDF: {error}") from error
-    if root.tag != "robot":
-        raise ConfigError(f"robot_description: should be a URDF, with robot as its root, got {root.tag}")
+    root = _parse(wanted, "robot_description")
     differing = _physics_of(ElementTree.fromstring(description)) ^ _physics_of(root)  # noqa: S314 - it is ours
     if differing:
         first = min(text.split(">", 1)[0].removeprefix("<") for text in differing)
@@ -34,6 +30,30 @@ def check_appearance(description: str, wanted: str) -> None:
             f"robot_description: should differ in what is seen alone, but {first} is another one",
             hint="other joints, masses or collision shapes are another configuration",
         )
+
+
+def read_urdf(path: Path) -> str:
+    """URDF text of a file.
+
+    Raises:
+        ConfigError: If it cannot be read, or is no URDF.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path}: cannot be read: {error}") from error
+    _parse(text, str(path))
+    return text
+
+
+def _parse(text: str, name: str) -> ElementTree.Element:
+    try:
+        root = ElementTree.fromstring(text)  # noqa: S314 - expat expands nothing external, and little else
+    except ElementTree.ParseError as error:
+        raise ConfigError(f"{name}: should be a URDF: {error}") from error
+    if root.tag != "robot":
+        raise ConfigError(f"{name}: should be a URDF, with robot as its root, got {root.tag}")
+    return root
 
 
 def _physics_of(robot: ElementTree.Element) -> frozenset[str]:

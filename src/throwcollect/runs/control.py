@@ -106,6 +106,8 @@ def scale(run: Run, simulations: int) -> None:
         WorkerError: If the launcher died, or does not answer.
     """
     record = require_living(run)
+    if record.kind == "container":
+        raise ConfigError(f"run {run.id}: is a container, and has no simulations")
     if record.runtime and not get_runtime(record.runtime).can_be_scaled:
         raise ConfigError(f"run {run.id}: has one simulation, as all runs of the runtime {record.runtime} have")
     record.middleware.joining.settle()

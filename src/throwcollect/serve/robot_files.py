@@ -13,8 +13,10 @@ from throwcollect.config.loader import load
 from throwcollect.dataset.directory import config_path
 from throwcollect.errors import ConfigError, NotFoundError
 from throwcollect.members import load_member, names_of
+from throwcollect.robots.appearance import read_urdf
 from throwcollect.robots.description import full_description
 from throwcollect.robots.robot import Robot
+from throwcollect.runs.component_container import DESCRIPTION
 from throwcollect.runs.records import Run
 
 
@@ -22,9 +24,14 @@ def description_of(run: Run) -> str:
     """URDF of the robot of a run, with its tool; meshes are ``package://`` URLs.
 
     Raises:
-        NotFoundError: If the run has no configuration yet.
+        NotFoundError: If the run has no configuration yet, or is a container without a description.
         ConfigError: If the robot's files cannot be read.
     """
+    if run.record.kind == "container":
+        path = Path(run.record.directory) / DESCRIPTION
+        if not path.is_file():
+            raise NotFoundError(f"run {run.id}: its component has no urdf")
+        return read_urdf(path)
     path = _find_config(run)
     return _describe(path, path.stat().st_mtime_ns)
 
