@@ -41,7 +41,9 @@ def test_components_are_read(directory: Path) -> None:
 
 def test_a_container_has_what_the_catalogue_says(directory: Path) -> None:
     (directory / "a.urdf").write_text("<robot/>")
-    text = "components:\n  a:\n    image: x\n    command: [run, it]\n    environment: {LAB: north}\n    networks: [lab]\n"
+    text = (
+        "components:\n  a:\n    image: x\n    command: [run, it]\n    environment: {LAB: north}\n    networks: [lab]\n"
+    )
     text += f"    volumes: ['{directory}:/mesh:ro']\n    cpus: 2\n    urdf: a.urdf\n"
     a = Catalogue.read(write(directory, text)).get("a")
     node = NodeContainerConfig(environment={"LAB": "north"}, networks=["lab"], mounts=[f"{directory}:/mesh:ro"], cpus=2)
@@ -69,8 +71,14 @@ def test_without_a_catalogue_nothing_can_be_begun(directory: Path) -> None:
         ("components: {}\n", ":1: components: should"),
         ("components:\n  a:\n    pretty_name: A\n", ":2: components.a: should have one of config, session and image"),
         ("components:\n  a: {config: small.yaml, session: small.yaml}\n", ":2: components.a: should have one of"),
-        ("components:\n  a:\n    config: small.yaml\n    image: ubuntu\n", ":2: components.a: should have one of config"),
-        ("components:\n  a:\n    config: small.yaml\n    cpus: 2\n", ":4: components.a.cpus: should be left out; it is"),
+        (
+            "components:\n  a:\n    config: small.yaml\n    image: ubuntu\n",
+            ":2: components.a: should have one of config",
+        ),
+        (
+            "components:\n  a:\n    config: small.yaml\n    cpus: 2\n",
+            ":4: components.a.cpus: should be left out; it is",
+        ),
         ("components:\n  a:\n    image: x\n    volumes: [/etc:/a]\n", "components.a.volumes.0: /etc is refused"),
         ("components:\n  a:\n    image: x\n    privileged: true\n", ":4: components.a.privileged: unknown key"),
         ("components:\n  a:\n    image: x\n    urdf: none.urdf\n", ":4: components.a.urdf: "),
