@@ -236,6 +236,7 @@ def carry_out(run: str, lock: int, order: bytes, *, onlooker: Onlooker, interrup
         launch_container(opened, CONTAINER_ORDERS.validate_json(order), onlooker=onlooker, interruptions=interruptions)
         return
     made_from = _ORDERS.validate_json(order)
+    log = NodeLogs(Path(opened.record.logs)).path(LAUNCHER)
     try:
         prepare = _prepare_session if opened.record.kind == "session" else _prepare_collection
         prepared = prepare(records, opened, made_from, onlooker)
@@ -243,6 +244,7 @@ def carry_out(run: str, lock: int, order: bytes, *, onlooker: Onlooker, interrup
             opened.update(ended=datetime.now(timezone.utc), exit_code=0)
             opened.close()
             return
+        _move_log(log, NodeLogs(Path(prepared.record.logs)).path(LAUNCHER))
         if interruptions():
             raise Interrupted("stopped before any node was started")
     except ThrowcollectError as error:
@@ -250,6 +252,26 @@ def carry_out(run: str, lock: int, order: bytes, *, onlooker: Onlooker, interrup
         raise
     with prepared:
         prepared.launch(interruptions=interruptions)
+
+
+def _move_log(before: Path, after: Path) -> None:
+    """Go on printing where the logs of the nodes are, below what was printed before there was such a place.
+
+    Raises:
+        WorkerError: If that is impossible.
+    """
+    try:
+        if before == after or not os.path.samestat(os.fstat(1), before.stat()):
+            return
+        after.parent.mkdir(exist_ok=True)
+        with open(open_log(after), "ab") as log:
+            log.write(before.read_bytes())
+            log.flush()
+            for output in (1, 2):
+                os.dup2(log.fileno(), output)
+        before.unlink()
+    except OSError as error:
+        raise WorkerError(f"{after}: the launcher cannot write there: {error.strerror}") from error
 
 
 def _prepare_collection(records: Records, run: OpenRun, order: Order, onlooker: Onlooker) -> PreparedRun | None:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from throwcollect.errors import ConfigError, ThrowcollectError, WorkerError
 from throwcollect.ros.endpoint import answers
+from throwcollect.ros.own_name import make_own_name
 from throwcollect.runs.record import Record
 from throwcollect.runs.records import Records, Run
 from throwcollect.runs.selection import find_held_runs, id_of, require_living, to_change
@@ -142,7 +143,7 @@ def set_parameter(run: Run, nodes: Sequence[str], name: str, value: float | str)
     context = ros.Context()
     ros.init(context=context, connection=connection)
     try:
-        asking = ros.Node(f"_throwcollect_{os.getpid()}", context=context)
+        asking = ros.Node(make_own_name(), context=context)
         results = []
         for node in nodes:
             if (result := _set_parameter(asking, context, node, ros.Parameter(name, value=value))) is None:
