@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -306,6 +308,25 @@ def test_logs_and_events_are_read_where_they_lie(client: TestClient, remember: R
         assert "secret\n" not in answer.text
     for tail in ("0", "10001", "x"):
         assert client.get(f"{URL}/a/log/sim_0?tail={tail}").status_code == 422
+
+
+def test_meshes_are_had_by_their_content_which_never_changes(
+    client: TestClient, remember: Remember, tmp_path: Path
+) -> None:
+    directory = tmp_path / "datasets" / "a"
+    directory.mkdir(parents=True)
+    (directory / "config.yaml").write_text("name: small\n")
+    remember("a")
+    meshes = client.get(f"{URL}/a/meshes").json()
+    named = set(re.findall(r'package://[^"]+', client.get(f"{URL}/a/urdf").text))
+    assert {each["url"] for each in meshes} == named
+    for each in (meshes[0], meshes[-1]):
+        found = client.get(f"/api/v1/meshes/{each['sha256']}")
+        assert (hashlib.sha256(found.content).hexdigest(), len(found.content)) == (each["sha256"], each["bytes"])
+        assert "immutable" in found.headers["cache-control"]
+        assert found.content == client.get(f"/api/v1/meshes/{each['url'].removeprefix('package://')}").content
+    assert client.get(f"/api/v1/meshes/{64 * '0'}").status_code == 404
+    assert client.get(f"{URL}/nobody/meshes").status_code == 404
 
 
 def test_meshes_come_from_packages_of_robots_alone(served: Served) -> None:
