@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
+from functools import lru_cache
 from pathlib import Path
 
 from throwcollect.errors import ConfigError, ConflictError
@@ -23,7 +24,7 @@ def check_appearance(description: str, wanted: str) -> None:
         ConflictError: If anything but shapes and colours to be seen differs: joints, masses, collision shapes.
     """
     root = _parse(wanted, "robot_description")
-    differing = _physics_of(ElementTree.fromstring(description)) ^ _physics_of(root)  # noqa: S314 - it is ours
+    differing = _physics_of_own(description) ^ _physics_of(root)
     if differing:
         first = min(text.split(">", 1)[0].removeprefix("<") for text in differing)
         raise ConflictError(
@@ -54,6 +55,11 @@ def _parse(text: str, name: str) -> ElementTree.Element:
     if root.tag != "robot":
         raise ConfigError(f"{name}: should be a URDF, with robot as its root, got {root.tag}")
     return root
+
+
+@lru_cache(maxsize=4)
+def _physics_of_own(description: str) -> frozenset[str]:
+    return _physics_of(ElementTree.fromstring(description))  # noqa: S314 - it is ours
 
 
 def _physics_of(robot: ElementTree.Element) -> frozenset[str]:

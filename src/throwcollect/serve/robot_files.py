@@ -168,8 +168,7 @@ def _find_files(description: str) -> Iterator[tuple[str, str, Path]]:
 
 @lru_cache(maxsize=1024)
 def _digest(file: Path, _changed_ns: int) -> str:
-    with file.open("rb") as content:
-        return hashlib.file_digest(content, "sha256").hexdigest()
+    return hashlib.sha256(file.read_bytes()).hexdigest()
 
 
 @lru_cache(maxsize=1)
