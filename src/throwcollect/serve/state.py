@@ -11,7 +11,7 @@ from pydantic import TypeAdapter
 from throwcollect.coordinator.progress import Progress
 from throwcollect.dataset.summary import Info
 from throwcollect.errors import ConfigError
-from throwcollect.runs.record import Record
+from throwcollect.runs.record import Kind, Record
 from throwcollect.runs.records import Records, Run
 from throwcollect.runtimes.runtime import NodeState
 from throwcollect.serve.catalogue import Catalogue
@@ -34,14 +34,14 @@ class ComponentState:
     Attributes:
         name: Its name.
         pretty_name: What people are shown.
-        kind: Whether its instances collect datasets, or have simulations for clients alone.
+        kind: Whether its instances collect datasets, have simulations for clients alone, or are containers.
         max_instances: How many instances may live at once.
         instances: Ids of those that live.
     """
 
     name: str
     pretty_name: str
-    kind: Literal["collection", "session"]
+    kind: Kind
     max_instances: int
     instances: list[str]
 
@@ -54,7 +54,8 @@ class InstanceState:
         id: Id of the run.
         component: Name of the component that it is an instance of; None if a command or a program began it.
         name: Name of the collection.
-        kind: Whether it collects a dataset, or has simulations for clients alone.
+        kind: Whether it collects a dataset, has simulations for clients alone, or is a container of the catalogue.
+        joins: Id of the run that a container has joined; None if it has joined none.
         status: ``starting`` until all nodes run, ``running``, ``ended``, or ``died``: its launcher did before it ended.
         started: When it was begun.
         ended: When it ended; None before.
@@ -72,7 +73,8 @@ class InstanceState:
     id: str
     component: str | None
     name: str
-    kind: Literal["collection", "session"]
+    kind: Kind
+    joins: str | None
     status: Status
     started: datetime
     ended: datetime | None
@@ -164,6 +166,7 @@ def describe(run: Run) -> InstanceState:
         component=None if record.origin is None else record.origin.component,
         name=record.name,
         kind=record.kind,
+        joins=None if record.origin is None else record.origin.joins,
         status=_status(run),
         started=record.started,
         ended=record.ended,
