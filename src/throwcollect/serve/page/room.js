@@ -113,7 +113,6 @@ export class Room {
   #leave() {
     const { view } = this;
     view.renderer.setAnimationLoop(null);
-    this.#finder?.cancel();
     for (const board of [this.info, this.mapBoard, ...this.#plotBoards.values()]) board.dispose();
     for (const source of [...this.#hands.keys()]) this.#drop(source);
     this.reticle.geometry.dispose();
