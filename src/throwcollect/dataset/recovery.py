@@ -18,7 +18,7 @@ from throwcollect.dataset.judging import judge_episode
 from throwcollect.dataset.mcap_contents import Run
 from throwcollect.dataset.mcap_reader import map_file
 from throwcollect.dataset.scan import scan_whole
-from throwcollect.dataset.shard import FinishedShard, OpenShard, unfinished_path, write_in_order
+from throwcollect.dataset.shard import FinishedShard, OpenShard, path_of_part, write_in_order
 from throwcollect.episode.channels import Channels
 from throwcollect.errors import DatasetError
 from throwcollect.files import is_there, remove, unwritable
@@ -127,7 +127,7 @@ def find_left(parts: Sequence[Part], channels: Channels, *, processes: int = 1) 
         DatasetError: If files cannot be read.
         WorkerError: If a process that looks is killed.
     """
-    there = [is_there(part.path) or is_there(unfinished_path(part.path)) for part in parts]
+    there = [is_there(part.path) or is_there(path_of_part(part.path)) for part in parts]
     # Every process gets the trials that it needs, and not a whole plan.
     pieces = [*compress(parts, there)]
     if sum(len(piece.plan.trials) for piece in pieces) < _MANY_EPISODES:
@@ -147,7 +147,7 @@ def _look_with(channels: Channels) -> Callable[[Part], LeftOfShard]:
             finished = _check_finished(part.path, channels, final)
             if finished is not None:
                 return LeftOfShard(final, {}, finished)
-        return LeftOfShard(final, _find_episodes(unfinished_path(part.path), part.plan, channels, wanted), None)
+        return LeftOfShard(final, _find_episodes(path_of_part(part.path), part.plan, channels, wanted), None)
 
     return look
 
