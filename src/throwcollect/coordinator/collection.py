@@ -21,7 +21,7 @@ from throwcollect.coordinator.lookahead import Lookahead
 from throwcollect.coordinator.progress import Progress
 from throwcollect.coordinator.replay_check import check_by_replay
 from throwcollect.dataset.directory import find_known_directory
-from throwcollect.dataset.inspect import info, loss
+from throwcollect.dataset.inspect import loss
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.episode.message import Delivery, Episode
 from throwcollect.errors import DatasetError, Interrupted, WorkerError
@@ -85,23 +85,21 @@ class TrialCollection:
             DatasetError: If the directory holds no plan, or another process collects into it.
             ConfigError: If its ``config.yaml`` is wrong.
         """
-        writer = DatasetWriter.open(directory)
-        there: list[tuple[int, Result]] = []
+        collection = cls(DatasetWriter.open(directory))
+        found = 0
         told = time.monotonic()
 
         def tell(trial: int, result: Result) -> None:
-            nonlocal told
+            nonlocal found, told
             # Episodes come file by file, so these are all of some files.
-            if there and time.monotonic() >= told + _TELL_EVERY_S:
+            if found and time.monotonic() >= told + _TELL_EVERY_S:
                 told = time.monotonic()
-                say(f"has found {format_count(len(there), 'episode')} of an earlier collection so far")
-            there.append((trial, result))
-
-        if found := writer.recover(tell, processes=processes):
-            say(f"keeps {format_count(found, 'episode')} of an earlier collection")
-        collection = cls(writer)
-        for trial, result in there:
+                say(f"has found {format_count(found, 'episode')} of an earlier collection so far")
+            found += 1
             collection.recall(trial, result)
+
+        if collection.writer.recover(tell, processes=processes):
+            say(f"keeps {format_count(found, 'episode')} of an earlier collection")
         return collection
 
     def __enter__(self) -> TrialCollection:
@@ -333,8 +331,8 @@ class TrialCollection:
         )
         if said is not None:
             say(said)
-        self.writer.finish()
-        lost = loss(info(directory).outcomes, hint=f"{command('resume', known)} runs them again" if known else None)
+        outcomes = self.writer.finish()
+        lost = loss(outcomes, hint=f"{command('resume', known)} runs them again" if known else None)
         if lost is not None:
             raise lost
 
