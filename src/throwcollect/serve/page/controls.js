@@ -5,6 +5,11 @@ import { legendItem } from "./landing_map.js";
 import { RunRecords } from "./run_records.js";
 import { lives, steps } from "./state.js";
 
+const KINDS = {
+  collection: "collects a dataset",
+  session: "simulations for clients, without a dataset",
+  container: "a container, which may join a run",
+};
 const WORDS = { starting: "is starting", running: "runs", ended: "has ended", died: "died" };
 
 /**
@@ -44,6 +49,7 @@ export class Controls {
 
   /** @param {import("./state.js").State} state */
   put(state) {
+    this.joinable = state.instances.filter((each) => lives(each) && each.kind !== "container").map(({ id }) => id);
     keep(get("components"), this.#components, state.components, (each) => each.name, () => new ComponentCard(this));
     const living = state.instances.filter(lives);
     const ended = state.instances.filter((each) => !lives(each));
@@ -81,14 +87,17 @@ class ComponentCard {
     this.controls = controls;
     this.name = make("h3");
     this.facts = make("p", { className: "muted" });
+    this.joins = make("select");
     this.simulations = make("input", { type: "number", min: "1", max: "256", placeholder: "auto", inputMode: "numeric" });
     this.changes = make("textarea", { rows: 2, spellcheck: false, placeholder: "trials: 50" });
     this.problem = make("div", { className: "problem", role: "alert" });
     this.button = make("button", { type: "submit" }, "Start");
-    const more = make("details", {}, make("summary", {}, "Changed keys"),
+    this.more = make("details", {}, make("summary", {}, "Changed keys"),
       make("label", {}, "One a line, KEY: VALUE ", this.changes));
-    this.form = make("form", {}, make("div", { className: "row" },
-      make("label", {}, "Simulations ", this.simulations), this.button), more, this.problem);
+    this.count = make("label", {}, "Simulations ", this.simulations);
+    this.run = make("label", {}, "Joins ", this.joins);
+    this.form = make("form", {}, make("div", { className: "row" }, this.count, this.run, this.button), this.more,
+      this.problem);
     this.form.addEventListener("submit", (event) => {
       event.preventDefault();
       this.#start();
@@ -100,19 +109,32 @@ class ComponentCard {
   put(component) {
     this.component = component;
     setText(this.name, component.pretty_name);
-    const kind = component.kind === "collection" ? "collects a dataset" : "simulations for clients, without a dataset";
-    setText(this.facts, `${kind} · ${component.instances.length} of at most ${component.max_instances} live`);
+    setText(this.facts, `${KINDS[component.kind]} · ${component.instances.length} of at most ${component.max_instances} live`);
     this.button.setAttribute("aria-label", `Start ${component.pretty_name}`);
+    const isContainer = component.kind === "container";
+    for (const element of [this.count, this.more]) element.hidden = isContainer;
+    this.run.hidden = !isContainer;
+    const runs = ["", ...this.controls.joinable];
+    if (isContainer && runs.join(" ") !== [...this.joins.options].map(({ value }) => value).join(" ")) {
+      const chosen = this.joins.value;
+      this.joins.replaceChildren(...runs.map((id) => make("option", { value: id }, id || "no run")));
+      this.joins.value = runs.includes(chosen) ? chosen : "";
+    }
   }
 
   async #start() {
     showProblem(this.problem, null);
     this.button.disabled = true;
     try {
-      const body = { component: this.component.name, set: readChanges(this.changes.value) };
-      if (this.simulations.value) body.simulations = Number(this.simulations.value);
+      const body = { component: this.component.name };
+      if (this.component.kind === "container") {
+        if (this.joins.value) body.joins = this.joins.value;
+      } else {
+        body.set = readChanges(this.changes.value);
+      }
+      if (this.simulations.value && this.component.kind !== "container") body.simulations = Number(this.simulations.value);
       const instance = await (await this.controls.connection.ask("POST", "/instances", body)).json();
-      this.controls.watch(instance.id);
+      if (instance.kind !== "container") this.controls.watch(instance.id);
     } catch (error) {
       showProblem(this.problem, error);
     } finally {
@@ -138,6 +160,7 @@ class InstanceCard {
     this.resume = button("Resume", () => this.#resume());
     this.report = button("Report", () => this.#save("report", "html"));
     this.download = button("Download", () => this.#save("dataset.tar", "tar"));
+    this.joins = make("select");
     this.simulations = make("input", { type: "number", min: "0", max: "256", inputMode: "numeric" });
     this.scale = make("form", { className: "row" }, make("label", {}, "Simulations ", this.simulations),
       make("button", { type: "submit" }, "Scale"));
@@ -162,9 +185,12 @@ class InstanceCard {
     this.status.dataset.status = instance.status;
     this.#putProgress(instance.progress);
     const troubled = instance.nodes.filter(({ status }) => !["running", "starting"].includes(status));
+    const joined = instance.joins ? `joined ${instance.joins}` : "";
     const all = instance.nodes.length ? `${instance.nodes.length} nodes` : "";
-    setText(this.nodes, [all, ...troubled.map(({ name, status }) => `${name} ${status}`)].filter(Boolean).join(", "));
-    for (const element of [this.stop, this.scale]) element.hidden = !isLiving;
+    setText(this.nodes, [joined, all, ...troubled.map(({ name, status }) => `${name} ${status}`)].filter(Boolean).join(", "));
+    this.stop.hidden = !isLiving;
+    this.scale.hidden = !isLiving || instance.kind === "container";
+    this.watch.hidden = instance.kind === "container";
     const isOver = !isLiving && instance.kind === "collection";
     this.resume.hidden = !isOver || instance.summary !== null;
     for (const element of [this.report, this.download]) element.hidden = !isOver || instance.summary === null;

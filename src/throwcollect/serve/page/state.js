@@ -4,7 +4,7 @@
  * @typedef {object} Component
  * @property {string} name
  * @property {string} pretty_name
- * @property {"collection" | "session"} kind
+ * @property {"collection" | "session" | "container"} kind
  * @property {number} max_instances
  * @property {string[]} instances ids of those that live
  * @property {string[]} targets keys that a request may set in sweep.target; none if its throws cannot be aimed
@@ -26,7 +26,8 @@
  * @property {string} id
  * @property {string | null} component
  * @property {string} name
- * @property {"collection" | "session"} kind
+ * @property {"collection" | "session" | "container"} kind
+ * @property {string | null} joins id of the run that a container has joined
  * @property {"starting" | "running" | "ended" | "died"} status
  * @property {string} started
  * @property {string | null} ended
