@@ -22,8 +22,10 @@ _BIAS = 0.2
 _LATENT = 0.6
 """Standard deviation of a latent, scaled: about that of numbers that are spread evenly over the range."""
 _STEPS = 30
+_SMALL_STEP = 1e-9
+"""After a step that is smaller [scaled, or m or rad], nothing would change any more."""
 _THROWS_FOR_BIAS = 3
-_CLEARLY = 2.0
+_CLEARLY = 3.0
 """A single miss that is so many times as large as what is expected is no accident."""
 
 
@@ -151,9 +153,12 @@ def _find(
         transposed = np.ascontiguousarray(flat.T)
         normal = matmul(transposed, flat) / scatter**2 + precision
         right = matmul(transposed, missing.reshape(-1, 1))[:, 0] / scatter**2 - found / spread**2
-        found = found + solve(normal, right[:, np.newaxis])[:, 0]
+        before = found
+        found = before + solve(normal, right[:, np.newaxis])[:, 0]
         if method is Method.LATENT:
             found[:width] = np.clip(begun.latents + found[:width], -1.0, 1.0) - begun.latents
+        if np.abs(found - before).max() < _SMALL_STEP:
+            break
     covariance = solve(normal, np.eye(len(found)))
     return _shift(begun, method, found, width), np.sqrt(np.diagonal(covariance))
 

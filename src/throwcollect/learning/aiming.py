@@ -19,7 +19,11 @@ TOLERANCE = 0.01
 """So is one that the best parameters are predicted to miss by more [m or rad]."""
 _STARTS = 8
 """Number of throws, those that ended nearest to a target, from each of which a way to it is looked for."""
+_MANY_STARTS = 48
+"""The same where the ways are chosen among."""
 _STEPS = 25
+_SMALL_STEP = 1e-9
+"""After a step that is smaller, scaled, nothing would change any more."""
 _DAMPING = 1e-4
 """Error [m or rad], by scaled input, that a step may leave in order to be smaller."""
 _CLOSE = 1e-4
@@ -79,7 +83,7 @@ def _aim_at(learned: LearnedMap, target: Array, context: Array, choice: Choice) 
     """Parameters for one target, where they should lead, and where the nearest throw would have ended."""
     landings = learned.carry_over(context)
     squares = ((landings - target) ** 2).sum(axis=1)
-    starts = np.argsort(squares, kind="stable")[:_STARTS]
+    starts = np.argsort(squares, kind="stable")[: _STARTS if choice is Choice.NEAREST else _MANY_STARTS]
     begun = np.clip(learned.inputs[starts][:, learned.columns_of(Role.PARAMETER)], -1.0, 1.0)
     given = np.repeat(context[np.newaxis], len(starts), axis=0)
     shift = learned.residuals[starts] + learned.correction.offset
@@ -103,7 +107,9 @@ def _walk(learned: LearnedMap, parameters: Array, context: Array, goals: Array) 
         # What would leave its range stays where it is, and the others make up for it.
         stuck = np.abs(np.clip(parameters + step, -1.0, 1.0) - parameters) < 1e-12
         step = _step(np.where(stuck[:, np.newaxis], 0.0, slopes), missing)
-        parameters = np.clip(parameters + step, -1.0, 1.0)
+        before, parameters = parameters, np.clip(parameters + step, -1.0, 1.0)
+        if np.abs(parameters - before).max() < _SMALL_STEP:
+            break
     return parameters
 
 

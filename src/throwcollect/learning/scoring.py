@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
 from throwcollect.dataset.throw import Throw
-from throwcollect.learning.adapting import adapt, adapt_by_nothing
+from throwcollect.learning.adapting import Adaptation, adapt, adapt_by_nothing
 from throwcollect.learning.aiming import Choice, aim
 from throwcollect.learning.fitting import enough_throws, fit_throws
 from throwcollect.learning.learned_map import LearnedMap, Role
@@ -66,33 +66,42 @@ def score_model(
     """
     context = _nominal_context(learned)
     targets = draw_targets(learned.carry_over(context), count, seed)
-    trained = []
-    shots: list[Shot] = []
-    for size in (*(size for size in SIZES if size < len(learned.inputs)), len(learned.inputs)):
-        smaller = _learned_from(learned, size)
-        if smaller is None:
-            continue
-        places = _throw_at(smaller, targets, context, simulator, processes)[1]
-        trained.append(Trained(trained_on=size, errors=Errors.of(_distances(places, targets))))
-        shots = _list_shots(targets, places)
+    sizes = [*(size for size in SIZES if size < len(learned.values)), len(learned.values)]
+    maps = {size: smaller for size in sizes if (smaller := _learned_from(learned, size)) is not None}
+    loops = _throw_at(list(maps.values()), targets, context, simulator, processes)
+    trained = [
+        Trained(trained_on=size, errors=Errors.of(_distances(places, targets)))
+        for size, (_, places) in zip(maps, loops, strict=True)
+    ]
     adapted: list[Adapted] = []
     adapted_shots: list[Shot] = []
     if world is not None:
-        adapted, adapted_shots = _adapt_step_by_step(
+        tries = draw_targets(learned.carry_over(context), REAL_THROWS[-1], seed + 1)
+        [(parameters, places)] = _throw_at([learned], tries, context, world, processes)
+        landed = np.isfinite(places).all(axis=1)
+        noise = scatter * np.random.default_rng((seed, 1)).standard_normal(places.shape)
+        adaptations = _adapt_step_by_step(
             learned,
-            world,
-            targets,
-            seed=seed,
-            scatter=scatter,
-            error=error,
+            learned.scale(Role.PARAMETER, parameters[landed]),
+            (places + noise)[landed],
+            scatter=float(np.hypot(scatter, error)),
             latents_count=latents_count,
-            processes=processes,
         )
+        worlds = [learned.corrected(each.correction) for each in adaptations.values()]
+        given = np.repeat(context[np.newaxis], len(targets), axis=0)
+        reachable = targets[aim(worlds[-1], targets, given).reachable]
+        if len(reachable):
+            found = _throw_at(worlds, reachable, context, world, processes)
+            adapted = [
+                Adapted(real_throws=number, method=each.method, errors=Errors.of(_distances(places, reachable)))
+                for (number, each), (_, places) in zip(adaptations.items(), found, strict=True)
+            ]
+            adapted_shots = _list_shots(reachable, found[-1][1])
     return Score(
         targets=count,
         seed=seed,
         trained=trained,
-        shots=shots,
+        shots=_list_shots(targets, loops[-1][1]),
         scatter=scatter,
         adapted=adapted,
         adapted_shots=adapted_shots,
@@ -100,50 +109,21 @@ def score_model(
 
 
 def _adapt_step_by_step(
-    learned: LearnedMap,
-    world: Simulates,
-    targets: Array,
-    *,
-    seed: int,
-    scatter: float,
-    error: float,
-    latents_count: bool,
-    processes: int,
-) -> tuple[list[Adapted], list[Shot]]:
-    """Adapt a map by more and more throws in another world, and throw at the targets that can be reached there."""
-    context = _nominal_context(learned)
-    randomness = np.random.default_rng((seed, 1))
-    tries = draw_targets(learned.carry_over(context), REAL_THROWS[-1], int(randomness.integers(2**32)))
-    parameters, places = _throw_at(learned, tries, context, world, processes)
-    landed = np.isfinite(places).all(axis=1)
-    parameters, places = learned.scale(Role.PARAMETER, parameters[landed]), places[landed]
-    measured = places + scatter * randomness.standard_normal(places.shape)
-    found = {}
-    for number in sorted({min(number, len(places)) for number in REAL_THROWS}):
-        if number == 0:
-            found[0] = adapt_by_nothing(learned)
-            continue
-        given = np.repeat(context[np.newaxis], number, axis=0)
+    learned: LearnedMap, parameters: Array, measured: Array, *, scatter: float, latents_count: bool
+) -> dict[int, Adaptation]:
+    """Adapt a map by more and more throws; the keys are the numbers of throws, from 0."""
+    context = np.repeat(_nominal_context(learned)[np.newaxis], len(measured), axis=0)
+    found = {0: adapt_by_nothing(learned)}
+    for number in sorted({min(number, len(measured)) for number in REAL_THROWS} - {0}):
         found[number] = adapt(
             learned,
             parameters[:number],
-            given,
+            context[:number],
             measured[:number],
-            scatter=float(np.hypot(scatter, error)),
+            scatter=scatter,
             latents_count=latents_count,
         )
-    known = learned.corrected(found[max(found)].correction)
-    reachable = targets[aim(known, targets, np.repeat(context[np.newaxis], len(targets), axis=0)).reachable]
-    adapted = []
-    shots: list[Shot] = []
-    for number, adaptation in found.items():
-        if not len(reachable):
-            break
-        places = _throw_at(learned.corrected(adaptation.correction), reachable, context, world, processes)[1]
-        errors = Errors.of(_distances(places, reachable))
-        adapted.append(Adapted(real_throws=number, method=adaptation.method, errors=errors))
-        shots = _list_shots(reachable, places)
-    return adapted, shots
+    return found
 
 
 def draw_targets(landings: Array, count: int, seed: int) -> Array:
@@ -199,27 +179,31 @@ def _learned_from(learned: LearnedMap, size: int) -> LearnedMap | None:
 
 
 def _throw_at(
-    learned: LearnedMap, targets: Array, context: Array, world: Simulates, processes: int
-) -> tuple[Array, Array]:
-    """Aim at targets, and throw.
+    maps: Sequence[LearnedMap], targets: Array, context: Array, world: Simulates, processes: int
+) -> list[tuple[Array, Array]]:
+    """Aim at targets by each of some maps, and throw.
+
+    All throws are simulated together, as processes take a while to begin.
 
     Returns:
-        Parameters in the units of their keys, shape ``(n, n_parameters)``; and where the throws ended, shape
-        ``(n, n_targets)``, with NaN where one did not succeed.
+        For each map: parameters in the units of their keys, shape ``(n, n_parameters)``; and where the throws ended,
+        shape ``(n, n_targets)``, with NaN where one did not succeed.
     """
     given = np.repeat(context[np.newaxis], len(targets), axis=0)
-    aims = aim(learned, targets, given, Choice.NEAREST)
-    parameters = learned.unscale(Role.PARAMETER, aims.parameters)
-    keys = [axis.key for axis in (*learned.axes_of(Role.PARAMETER), *learned.axes_of(Role.CONTEXT))]
-    values = np.hstack([parameters, learned.unscale(Role.CONTEXT, given)])
+    parameters = [
+        learned.unscale(Role.PARAMETER, aim(learned, targets, given, Choice.NEAREST).parameters) for learned in maps
+    ]
+    one = maps[0]
+    keys = [axis.key for axis in (*one.axes_of(Role.PARAMETER), *one.axes_of(Role.CONTEXT))]
+    values = np.hstack([np.concatenate(parameters), np.tile(one.unscale(Role.CONTEXT, given), (len(maps), 1))])
     points = [dict(zip(keys, row, strict=True)) for row in values.tolist()]
     thrown = [number for number, point in enumerate(points) if world.find_refusal(point) is None]
-    places = np.full(targets.shape, np.nan)
+    places = np.full((len(points), targets.shape[1]), np.nan)
     throws = world.throw_many([points[number] for number in thrown], processes=processes)
     for number, throw in zip(thrown, throws, strict=True):
         if throw.outcome == world.config.task.success:
-            places[number] = [throw.row[column] for column in learned.targets]
-    return parameters, places
+            places[number] = [throw.row[column] for column in one.targets]
+    return list(zip(parameters, np.split(places, len(maps)), strict=True))
 
 
 def _distances(places: Array, targets: Array) -> Array:
