@@ -397,7 +397,7 @@ def test_an_engine_that_does_not_answer_any_more_is_said_so_with_what_is_safe(
     trouble: str,
     evidence: str,
 ) -> None:
-    monkeypatch.setattr("throwcollect.runtimes.docker.containers._SILENCE_S", 3.0)
+    monkeypatch.setattr("throwcollect.runtimes.docker.containers.SILENCE_S", 3.0)
     runtime = bare(through=connect())
     runtime.start(NodeSpec(ROUTER, ("router", "--listen", runtime.listen), Role.EXPENDABLE))
     until(lambda: runtime.log_tail(ROUTER) != "")

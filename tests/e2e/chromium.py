@@ -95,7 +95,9 @@ class Tab:
 
 
 @contextmanager
-def browse(url: str, *, width: int = 1280, height: int = 800, features: dict[str, str] | None = None) -> Iterator[Tab]:
+def browse(
+    url: str, *, width: int = 1280, height: int = 800, features: dict[str, str] | None = None, script: str = ""
+) -> Iterator[Tab]:
     """Open a page in a browser of its own.
 
     Args:
@@ -103,6 +105,7 @@ def browse(url: str, *, width: int = 1280, height: int = 800, features: dict[str
         width: Of the window [px].
         height: Of the window [px].
         features: Values of media features, such as ``{"prefers-color-scheme": "dark"}``.
+        script: What runs before the scripts of each page.
     """
     found = chromium()
     assert found is not None
@@ -118,6 +121,7 @@ def browse(url: str, *, width: int = 1280, height: int = 800, features: dict[str
                 tab.ask("Emulation.setDeviceMetricsOverride", **metrics)
                 media = [{"name": name, "value": value} for name, value in (features or {}).items()]
                 tab.ask("Emulation.setEmulatedMedia", features=media)
+                tab.ask("Page.addScriptToEvaluateOnNewDocument", source=script)
                 tab.ask("Page.navigate", url=url)
                 yield tab
         finally:

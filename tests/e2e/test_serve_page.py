@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import json
-import subprocess
 from collections.abc import Iterator
-from contextlib import suppress
 from pathlib import Path
 from urllib.parse import urlsplit
 
 import pytest
 
-from tests.e2e.chromium import Tab, browse, chromium
-from tests.e2e.collection import FAST, command, write_config
+from tests.e2e.chromium import browse, chromium
+from tests.e2e.collection import FAST, write_config
+from tests.e2e.page import CHANGED, load, press, served, unexpected
 
 pytestmark = pytest.mark.e2e
 
@@ -31,8 +30,6 @@ _TOOLTIPS = """<robot name="talos">
   <tooltip name="ball" topic="/sim_0/ball/odometry" field="pose.pose.position.z"><parent link="torso_2_link"/></tooltip>
   <tooltip name="image" topic="/img/base_joint_speed"><parent link="wrist_1_link"/></tooltip>
 </robot>"""
-_CHANGED = "ERR_NETWORK_CHANGED"
-"""What a browser says of requests that it breaks off when containers come and go beside it."""
 _MESHES = 25
 """Files that the description of Talos with its spoon draws."""
 
@@ -44,26 +41,8 @@ def address(tmp_path: Path) -> Iterator[str]:
     write_config(tmp_path, trials=600, sim=f"{FAST}, real_time_factor: 1")
     catalogue = tmp_path / "catalogue.yaml"
     catalogue.write_text("components: {throws: {pretty_name: Throws, config: small.yaml}}\n")
-    options = ("--port", "0", "--datasets", tmp_path / "datasets", "--json")
-    with subprocess.Popen(command("serve", catalogue, *options), stdout=subprocess.PIPE, text=True) as server:
-        assert server.stdout is not None
-        yield json.loads(server.stdout.readline())["page"]
-        server.terminate()
-
-
-def load(tab: Tab) -> None:
-    """Wait until the page works; modules that the browser gave up, as a network of the machine changed, come again."""
-    for _ in range(5):
-        with suppress(AssertionError):
-            tab.wait_for("document.querySelector('#components form') !== null", within_s=20)
-            return
-        assert any(_CHANGED in error for error in tab.errors), tab.errors
-        tab.ask("Page.reload")
-    raise AssertionError(tab.errors)
-
-
-def press(tab: Tab, button: str) -> None:
-    tab.evaluate(f"document.querySelector('button[aria-label={json.dumps(button)}]').click()")
+    with served(catalogue, tmp_path / "datasets") as told:
+        yield told["page"]
 
 
 @pytest.mark.skipif(chromium() is None, reason="needs Chromium: apt-get install chromium")
@@ -78,7 +57,7 @@ def test_a_collection_is_started_watched_and_stopped_by_the_page(address: str) -
         meshes = tab.wait_for(_SEEN, within_s=120, every_s=1)
         fetched = [url for url in tab.requests if "/meshes/" in url]
         assert meshes == len(set(fetched)) == _MESHES
-        assert len(fetched) == _MESHES or any(_CHANGED in error for error in tab.errors)
+        assert len(fetched) == _MESHES or any(CHANGED in error for error in tab.errors)
         assert tab.evaluate("document.querySelector('#instances progress').value") > 0
         assert tab.evaluate("document.querySelector('#play').textContent") == "Play"
         tab.evaluate("throwcollect.playback.seek(0); document.querySelector('#play').click()")
@@ -93,4 +72,4 @@ def test_a_collection_is_started_watched_and_stopped_by_the_page(address: str) -
         assert {urlsplit(url).netloc for url in tab.requests if not url.startswith(("data:", "blob:"))} == {
             urlsplit(address).netloc
         }
-        assert [error for error in tab.errors if _CHANGED not in error] == []
+        assert unexpected(tab) == []

@@ -167,7 +167,9 @@ def stop(run: RunOption = None) -> None:
 
     found = to_change(Records(), run, command="stop")
     require_living(found)
-    typer.echo(f"{found.id}: finishing the running trials", err=True)
+    collects = found.record.kind == "collection"
+    if collects:
+        typer.echo(f"{found.id}: finishing the running trials", err=True)
     with Interruptions() as interruptions:
         found = control.stop(found, keep_on=lambda: not interruptions.count)
     if found.status == "running":
@@ -175,6 +177,9 @@ def stop(run: RunOption = None) -> None:
     error = describe_death(found) if found.status == "died" else found.record.error
     if error is not None and not isinstance(error, Interrupted):
         raise error
+    if not collects:
+        typer.echo(f"{found.id}: stopped")
+        return
     complete = "is complete" if error is None else "is not complete"
     typer.echo(f"{found.id}: stopped; the dataset {complete}: {found.place.dataset}")
 
@@ -228,7 +233,9 @@ def _strange_document(runtime: str, held: HeldRun) -> dict[str, Any]:
 def _row(run: Run) -> tuple[str, ...]:
     record = run.record
     throws = f"{record.progress.ended}/{record.progress.total}" if record.progress is not None else "-"
-    return run.id, record.runtime, str(record.simulations), throws, _status(run, record), run.place.dataset
+    dataset = run.place.dataset if record.kind == "collection" else "-"
+    simulations = "-" if record.kind == "container" else str(record.simulations)
+    return run.id, record.runtime, simulations, throws, _status(run, record), dataset
 
 
 def _status(run: Run, record: Record) -> str:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
+from functools import lru_cache
+from pathlib import Path
 
 from throwcollect.errors import ConfigError, ConflictError
 
@@ -21,19 +23,43 @@ def check_appearance(description: str, wanted: str) -> None:
         ConfigError: If that is no URDF.
         ConflictError: If anything but shapes and colours to be seen differs: joints, masses, collision shapes.
     """
-    try:
-        root = ElementTree.fromstring(wanted)  # noqa: S314 - expat expands nothing external, and little else
-    except ElementTree.ParseError as error:
-        raise ConfigError(f"robot_description: should be a URDF: {error}") from error
-    if root.tag != "robot":
-        raise ConfigError(f"robot_description: should be a URDF, with robot as its root, got {root.tag}")
-    differing = _physics_of(ElementTree.fromstring(description)) ^ _physics_of(root)  # noqa: S314 - it is ours
+    root = _parse(wanted, "robot_description")
+    differing = _physics_of_own(description) ^ _physics_of(root)
     if differing:
         first = min(text.split(">", 1)[0].removeprefix("<") for text in differing)
         raise ConflictError(
             f"robot_description: should differ in what is seen alone, but {first} is another one",
             hint="other joints, masses or collision shapes are another configuration",
         )
+
+
+def read_urdf(path: Path) -> str:
+    """URDF text of a file.
+
+    Raises:
+        ConfigError: If it cannot be read, or is no URDF.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path}: cannot be read: {error}") from error
+    _parse(text, str(path))
+    return text
+
+
+def _parse(text: str, name: str) -> ElementTree.Element:
+    try:
+        root = ElementTree.fromstring(text)  # noqa: S314 - expat expands nothing external, and little else
+    except ElementTree.ParseError as error:
+        raise ConfigError(f"{name}: should be a URDF: {error}") from error
+    if root.tag != "robot":
+        raise ConfigError(f"{name}: should be a URDF, with robot as its root, got {root.tag}")
+    return root
+
+
+@lru_cache(maxsize=4)
+def _physics_of_own(description: str) -> frozenset[str]:
+    return _physics_of(ElementTree.fromstring(description))  # noqa: S314 - it is ours
 
 
 def _physics_of(robot: ElementTree.Element) -> frozenset[str]:

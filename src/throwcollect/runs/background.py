@@ -6,11 +6,12 @@ Such a run has a record from its first moment. Whatever its preparation fails of
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import IO, Literal, cast
@@ -24,10 +25,17 @@ from throwcollect.errors import ConfigError, Interrupted, Problem, ThrowcollectE
 from throwcollect.files import open_log, write_file
 from throwcollect.interruption import stop_signals
 from throwcollect.runs.choice import choose
+from throwcollect.runs.component_container import (
+    CONTAINER_ORDERS,
+    DESCRIPTION,
+    ContainerOrder,
+    check_order,
+    launch_container,
+)
 from throwcollect.runs.onlooker import Onlooker
 from throwcollect.runs.preparation import Request, prepare_run, resume
 from throwcollect.runs.prepared_run import PreparedRun
-from throwcollect.runs.record import Failure, Origin, Record
+from throwcollect.runs.record import Failure, Kind, Origin, Record
 from throwcollect.runs.records import OpenRun, Records, Run
 from throwcollect.runtimes.node_logs import NodeLogs
 from throwcollect.runtimes.nodes import LAUNCHER
@@ -84,36 +92,100 @@ def begin_run(
     read = load(config, overrides)
     if kind == "session":
         _check_session(read)
-    records = Records()
-    opened = records.new(read.name, run=run)
+    opened = Records().new(read.name, run=run)
+    record = _new_record(
+        opened,
+        name=read.name,
+        directory=opened.directory / "data" if kind == "session" else output.absolute(),
+        domain_id=read.run.domain_id,
+        simulations=read.run.simulations,
+        kind=kind,
+        origin=origin,
+    )
+    order = Order(config.absolute(), tuple(overrides), output.absolute(), resumed)
+    return _begin(opened, record, _ORDERS.dump_json(order))
+
+
+def begin_container(order: ContainerOrder, *, run: str, origin: Origin, urdf: Path | None) -> Run:
+    """Begin a run that is a container of the catalogue, in a process of its own, as `begin_run` does.
+
+    Args:
+        order: What it is to be made from.
+        run: Id of the run.
+        origin: What was asked for.
+        urdf: File of a description of the robot that viewers are told; None for none.
+
+    Raises:
+        ConflictError: If there is a run of that id, or the one that it is to join has ended.
+        ConfigError: If something is not there that the catalogue asks for, or it cannot join that run.
+        WorkerError: If no engine answers, it does not have the image, or the process cannot be started.
+    """
+    check_order(order)
+    opened = Records().new(order.component, run=run)
+    directory = opened.directory / "data"
+    record = _new_record(
+        opened, name=order.component, directory=directory, domain_id=0, simulations=0, kind="container", origin=origin
+    )
+
+    def lay_out() -> None:
+        directory.mkdir()
+        if urdf is not None:
+            shutil.copyfile(urdf, directory / DESCRIPTION)
+
+    return _begin(opened, replace(record, runtime="docker"), CONTAINER_ORDERS.dump_json(order), lay_out)
+
+
+def _new_record(
+    opened: OpenRun,
+    *,
+    name: str,
+    directory: Path,
+    domain_id: int,
+    simulations: int,
+    kind: Kind,
+    origin: Origin | None,
+) -> Record:
+    return Record(
+        run=opened.run,
+        name=name,
+        runtime="",
+        directory=str(directory),
+        volume=None,
+        # What happens before there is a directory of the dataset, which has to be empty until then.
+        logs=str(opened.directory / "logs"),
+        domain_id=domain_id,
+        started=datetime.now(timezone.utc),
+        launcher=0,
+        simulations=simulations,
+        begun_in=os.getcwd(),
+        kind=kind,
+        origin=origin,
+    )
+
+
+def _begin(opened: OpenRun, record: Record, order: bytes, lay_out: Callable[[], None] = lambda: None) -> Run:
+    """Start the process of a run, and write the record.
+
+    Args:
+        opened: The run.
+        record: Its record, without that process.
+        order: What the process is told.
+        lay_out: Makes files of the run.
+
+    Raises:
+        ConfigError: If the record cannot be written.
+        WorkerError: If the process cannot be started.
+    """
     process: subprocess.Popen[bytes] | None = None
     try:
-        place = opened.directory / "data" if kind == "session" else output.absolute()
-        # The log of what happens before there is a directory of the dataset, which has to be empty until then.
-        logs = opened.directory / "logs"
+        logs = Path(record.logs)
         logs.mkdir(exist_ok=True)
+        lay_out()
         process = _start_process(opened, logs)
-        opened.write(
-            Record(
-                run=opened.run,
-                name=read.name,
-                runtime="",
-                directory=str(place),
-                volume=None,
-                logs=str(logs),
-                domain_id=read.run.domain_id,
-                started=datetime.now(timezone.utc),
-                launcher=process.pid,
-                simulations=read.run.simulations,
-                begun_in=os.getcwd(),
-                kind=kind,
-                origin=origin,
-            )
-        )
+        opened.write(replace(record, launcher=process.pid))
         # It waits for this, so that the record is there before it changes it.
-        with cast(IO[bytes], process.stdin) as order:
-            made_from = Order(config.absolute(), tuple(overrides), output.absolute(), resumed)
-            order.write(_ORDERS.dump_json(made_from))
+        with cast(IO[bytes], process.stdin) as pipe:
+            pipe.write(order)
     except (ThrowcollectError, OSError) as error:
         if process is not None:
             process.kill()
@@ -123,7 +195,7 @@ def begin_run(
             raise WorkerError(f"run {opened.run} cannot be begun: {error}") from error
         raise
     opened.close()
-    return records.get(opened.run)
+    return Records().get(opened.run)
 
 
 def _start_process(run: OpenRun, logs: Path) -> subprocess.Popen[bytes]:
@@ -160,7 +232,11 @@ def carry_out(run: str, lock: int, order: bytes, *, onlooker: Onlooker, interrup
     signal.pthread_sigmask(signal.SIG_UNBLOCK, stop_signals())
     records = Records()
     opened = records.inherit(run, lock)
+    if opened.record.kind == "container":
+        launch_container(opened, CONTAINER_ORDERS.validate_json(order), onlooker=onlooker, interruptions=interruptions)
+        return
     made_from = _ORDERS.validate_json(order)
+    log = NodeLogs(Path(opened.record.logs)).path(LAUNCHER)
     try:
         prepare = _prepare_session if opened.record.kind == "session" else _prepare_collection
         prepared = prepare(records, opened, made_from, onlooker)
@@ -168,6 +244,7 @@ def carry_out(run: str, lock: int, order: bytes, *, onlooker: Onlooker, interrup
             opened.update(ended=datetime.now(timezone.utc), exit_code=0)
             opened.close()
             return
+        _move_log(log, NodeLogs(Path(prepared.record.logs)).path(LAUNCHER))
         if interruptions():
             raise Interrupted("stopped before any node was started")
     except ThrowcollectError as error:
@@ -175,6 +252,26 @@ def carry_out(run: str, lock: int, order: bytes, *, onlooker: Onlooker, interrup
         raise
     with prepared:
         prepared.launch(interruptions=interruptions)
+
+
+def _move_log(before: Path, after: Path) -> None:
+    """Go on printing where the logs of the nodes are, below what was printed before there was such a place.
+
+    Raises:
+        WorkerError: If that is impossible.
+    """
+    try:
+        if before == after or not os.path.samestat(os.fstat(1), before.stat()):
+            return
+        after.parent.mkdir(exist_ok=True)
+        with open(open_log(after), "ab") as log:
+            log.write(before.read_bytes())
+            log.flush()
+            for output in (1, 2):
+                os.dup2(log.fileno(), output)
+        before.unlink()
+    except OSError as error:
+        raise WorkerError(f"{after}: the launcher cannot write there: {error.strerror}") from error
 
 
 def _prepare_collection(records: Records, run: OpenRun, order: Order, onlooker: Onlooker) -> PreparedRun | None:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from throwcollect.errors import ConfigError, ThrowcollectError, WorkerError
 from throwcollect.ros.endpoint import answers
+from throwcollect.ros.own_name import make_own_name
 from throwcollect.runs.record import Record
 from throwcollect.runs.records import Records, Run
 from throwcollect.runs.selection import find_held_runs, id_of, require_living, to_change
@@ -106,6 +107,8 @@ def scale(run: Run, simulations: int) -> None:
         WorkerError: If the launcher died, or does not answer.
     """
     record = require_living(run)
+    if record.kind == "container":
+        raise ConfigError(f"run {run.id}: is a container, and has no simulations")
     if record.runtime and not get_runtime(record.runtime).can_be_scaled:
         raise ConfigError(f"run {run.id}: has one simulation, as all runs of the runtime {record.runtime} have")
     record.middleware.joining.settle()
@@ -140,35 +143,40 @@ def set_parameter(run: Run, nodes: Sequence[str], name: str, value: float | str)
     context = ros.Context()
     ros.init(context=context, connection=connection)
     try:
-        asking = ros.Node(f"_throwcollect_{os.getpid()}", context=context)
-        results = []
-        for node in nodes:
-            if (result := _set_parameter(asking, context, node, ros.Parameter(name, value=value))) is None:
-                raise _silent(run, node)
-            results.append(result)
+        asking = ros.Node(make_own_name(), context=context)
+        results = _set_parameters(asking, context, nodes, ros.Parameter(name, value=value))
         asking.destroy_node()
-        return results
+        if None in results:
+            raise _silent(run, nodes[results.index(None)])
+        return [result for result in results if result is not None]
     finally:
         ros.shutdown(context=context)
 
 
-def _set_parameter(
-    asking: ros.Node, context: ros.Context, node: str, wanted: ros.Parameter
-) -> SetParametersResult | None:
-    """What a node answers; None if it does not."""
+def _set_parameters(
+    asking: ros.Node, context: ros.Context, nodes: Sequence[str], wanted: ros.Parameter
+) -> list[SetParametersResult | None]:
+    """What nodes answer, which are asked at the same time; None for each that does not."""
     from throwcollect import ros
     from throwcollect.ros.srv import SetParameters
 
     executor = ros.SingleThreadedExecutor(context=context)
     executor.add_node(asking)
-    client = asking.create_client(SetParameters, f"{node}/set_parameters")
-    if not client.wait_for_service(_ANSWER_S):
-        return None
-    future = client.call_async(SetParameters.Request(parameters=[wanted.to_parameter_msg()]))
-    executor.spin_until_future_complete(future, timeout_sec=_ANSWER_S)
+    futures: list[ros.Future | None] = []
+    for node in nodes:
+        client = asking.create_client(SetParameters, f"{node}/set_parameters")
+        if not client.wait_for_service(_ANSWER_S):
+            futures.append(None)
+            break
+        futures.append(client.call_async(SetParameters.Request(parameters=[wanted.to_parameter_msg()])))
+    deadline = time.monotonic() + _ANSWER_S
+    results: list[SetParametersResult | None] = []
+    for future in futures:
+        if future is not None:
+            executor.spin_until_future_complete(future, timeout_sec=max(0.0, deadline - time.monotonic()))
+        results.append(future.result().results[0] if future is not None and future.done() else None)
     executor.remove_node(asking)
-    asking.destroy_client(client)
-    return future.result().results[0] if future.done() else None
+    return results
 
 
 def _silent(run: Run, node: str) -> WorkerError:

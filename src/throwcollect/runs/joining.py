@@ -15,6 +15,7 @@ from throwcollect.files import write_file
 from throwcollect.ros.connection import Connection
 from throwcollect.ros.endpoint import answers
 from throwcollect.ros.middleware import Middleware
+from throwcollect.ros.own_name import make_own_name
 from throwcollect.run_key import RunKey
 from throwcollect.runs.onlooker import SILENT, Onlooker
 from throwcollect.runs.own_directory import make_own_directory
@@ -142,7 +143,7 @@ def _read_configuration(connection: Connection, token: JoinToken) -> str:
     context = ros.Context()
     ros.init(context=context, connection=connection)
     try:
-        node = ros.Node(f"_throwcollect_{os.getpid()}", context=context)
+        node = ros.Node(make_own_name(), context=context)
         executor = ros.SingleThreadedExecutor(context=context)
         executor.add_node(node)
         client = node.create_client(GetParameters, f"/{LAUNCHER}/get_parameters")

@@ -26,7 +26,7 @@ from throwcollect.runs.records import OpenRun, Records
 from throwcollect.runtimes.node_logs import NodeLogs
 from throwcollect.runtimes.nodes import LAUNCHER
 from throwcollect.runtimes.registry import get_runtime
-from throwcollect.runtimes.runtime import Host, NodeState, RunEvent, Runtime
+from throwcollect.runtimes.runtime import Host, NodeState, Place, RunEvent, Runtime
 from throwcollect.wording import command
 
 _POLL_S = 0.05
@@ -61,18 +61,51 @@ def launch(
         DatasetError: If another process changes the dataset, or it cannot be written.
         Interrupted: If the user stopped the collection.
     """
+
+    def host(place: Place) -> Host:
+        run.record.middleware.joining.settle()
+        return (runtime or get_runtime(run.record.runtime)).host(place, config, warn=onlooker.warn)
+
+    end = None if runtime is None else runtime.close
+    return launch_host(run, host, onlooker=onlooker, interruptions=interruptions, is_open=config.run.open, end=end)
+
+
+def launch_host(
+    run: OpenRun,
+    make_host: Callable[[Place], Host],
+    *,
+    onlooker: Onlooker,
+    interruptions: Callable[[], int],
+    is_open: bool = False,
+    end: Callable[[], None] | None = None,
+) -> Summary | None:
+    """Have the host of a run do what the run is for, and write down what happens, and its end.
+
+    Args:
+        run: The run, with a record; it is let go of.
+        make_host: Makes its host.
+        onlooker: Is told what goes on.
+        interruptions: How often the user has asked to stop.
+        is_open: Whether anybody can join the run.
+        end: Called when the host is closed; None for nothing.
+
+    Returns:
+        As `launch`.
+
+    Raises:
+        ThrowcollectError: As `launch`.
+    """
     session = _Session(run, onlooker, interruptions)
     place = run.record.place(run.key)
     code, summary = 1, None
     failure: Failure | None = Failure("internal error")
     host: Host | None = None
     try:
-        run.record.middleware.joining.settle()
-        host = (runtime or get_runtime(run.record.runtime)).host(place, config, warn=onlooker.warn)
+        host = make_host(place)
         with hold_together(place.directory):
             run.update(launcher=os.getpid(), nodes=(), endpoint=None, stopping=False)
             info = host.collect(session)
-            summary = None if info is None else Summary(**vars(info), open=config.run.open)
+            summary = None if info is None else Summary(**vars(info), open=is_open)
         lost = None if summary is None else loss(summary.outcomes, hint=place.way_on)
         code, failure = (0, None) if lost is None else (lost.exit_code, Failure.of(lost))
         return summary
@@ -80,8 +113,8 @@ def launch(
         code, failure = error.exit_code, Failure.of(error)
         raise
     finally:
-        if runtime is not None:
-            runtime.close()
+        if end is not None:
+            end()
         # What was there before may be there still, if it could not even be looked for.
         left = run.record.left if host is None else not host.cleared
         if left:

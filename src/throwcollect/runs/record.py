@@ -18,6 +18,8 @@ from throwcollect.runtimes.runtime import NodeState, Place
 
 VERSION: Literal[1] = 1
 """Version of the layout of records."""
+Kind = Literal["collection", "session", "container"]
+"""Whether a run collects a dataset, has simulations for clients alone, or is a container of the catalogue."""
 _EMBEDDED = Middleware()
 _KINDS = (ConfigError, WorkerError, DatasetError, LossError, Interrupted)
 
@@ -74,11 +76,13 @@ class Origin:
         component: Name of the component that the run is an instance of.
         simulations: Number of simulations; None for that of the component's configuration.
         changes: Values of dotted keys that replace those of the component's configuration.
+        joins: Id of the run that a container joins; None if it joins none.
     """
 
     component: str
     simulations: int | None = None
     changes: dict[str, JsonValue] = field(default_factory=dict)
+    joins: str | None = None
 
 
 @dataclass(frozen=True)
@@ -106,7 +110,7 @@ class Record:
         summary: What its dataset holds; None if it is not finished.
         begun_in: Absolute path of the directory in which it was begun; empty if an older version did not note it.
         middleware: What carries the messages of its nodes.
-        kind: Whether it collects a dataset, or has simulations for clients alone.
+        kind: Whether it collects a dataset, has simulations for clients alone, or is a container of the catalogue.
         origin: What a client asked for; None if a command or a program began the run.
         stopping: Whether it ends because somebody has asked for that; running trials are finished.
         version: Version of this layout.
@@ -132,7 +136,7 @@ class Record:
     summary: Summary | None = None
     begun_in: str = ""
     middleware: Middleware = _EMBEDDED
-    kind: Literal["collection", "session"] = "collection"
+    kind: Kind = "collection"
     origin: Origin | None = None
     stopping: bool = False
     version: Literal[1] = VERSION

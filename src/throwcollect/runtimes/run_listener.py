@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable
 from types import TracebackType
@@ -14,6 +13,7 @@ from throwcollect.errors import ConfigError, ThrowcollectError
 from throwcollect.ros.connection import Connection
 from throwcollect.ros.endpoint import answers
 from throwcollect.ros.msg import String
+from throwcollect.ros.own_name import make_own_name
 
 _SILENT_S = 8.0
 """Reports come several times a second; after a silence like this the connection is made anew, should it be broken."""
@@ -26,7 +26,7 @@ class RunListener:
 
     Args:
         on_progress: Called with every report, within `spin`.
-        name: Name of the node; one of this process alone, and hidden, by default.
+        name: Name of the node; one that no other node has, and hidden, by default.
         on_connect: Called with the node whenever it is made anew.
     """
 
@@ -38,7 +38,7 @@ class RunListener:
         on_connect: Callable[[ros.Node], None] = lambda _: None,
     ) -> None:
         self._on_progress = on_progress
-        self._name = name or f"_throwcollect_{os.getpid()}"
+        self._name = name or make_own_name()
         self._on_connect = on_connect
         self._node: ros.Node | None = None
         self._connection: Connection | None = None

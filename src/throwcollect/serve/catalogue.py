@@ -8,14 +8,28 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field, PositiveInt, ValidationError, model_validator
+from pydantic import AfterValidator, Field, PositiveFloat, PositiveInt, ValidationError, model_validator
 
+from throwcollect.config.container_spec import ContainerSpec
+from throwcollect.config.containers import (
+    ContainerOptions,
+    ContainerPort,
+    HostPort,
+    Mount,
+    Network,
+    NodeContainerConfig,
+    Size,
+    Variable,
+)
 from throwcollect.config.document import Document
+from throwcollect.config.kinds import ContradictionError
 from throwcollect.config.loader import load
 from throwcollect.config.problems import Finding, findings
 from throwcollect.config.section import Section
 from throwcollect.config.shape import Shape
 from throwcollect.errors import ConfigError, NotFoundError
+from throwcollect.robots.appearance import read_urdf
+from throwcollect.runs.record import Kind
 
 NAME = r"[a-z0-9][a-z0-9_-]{0,62}"
 """What names of components and ids of instances look like: words that files, URLs and containers can be named with."""
@@ -31,7 +45,10 @@ Name = Annotated[str, AfterValidator(_name)]
 
 
 class ComponentSection(Section):
-    """One component; exactly one of `config` and `session` says what its instances are."""
+    """One component; exactly one of `config`, `session` and `image` says what its instances are.
+
+    What is below `image` is for components that have one alone.
+    """
 
     pretty_name: str | None = None
     """What people are shown; the name by default."""
@@ -41,12 +58,39 @@ class ComponentSection(Section):
     """Configuration of simulations without a coordinator, for clients by hand; relative to the catalogue."""
     max_instances: PositiveInt = 1
     """How many instances may live at once."""
+    image: Annotated[str, Field(min_length=1)] | None = None
+    """Image of a container, which may join a run."""
+    command: list[str] | None = None
+    """What it runs; that of the image by default."""
+    environment: dict[Variable, str | int | float] = Field(default_factory=dict)
+    """Further environment variables."""
+    volumes: list[Mount] = Field(default_factory=list)
+    """Directories and files with data of the host that are there in the container, too; not below /data or /key."""
+    networks: list[Network] = Field(default_factory=list)
+    """Networks of the engine that it joins."""
+    ports: dict[ContainerPort, HostPort] = Field(default_factory=dict)
+    """Ports of the container (`80`, `53/udp`) and those of 127.0.0.1 at which they are published."""
+    cpus: PositiveFloat | None = None
+    """Upper bound of processor time, in cores."""
+    memory: Size | None = None
+    """Upper bound of memory; nothing is swapped out beyond it."""
+    options: ContainerOptions = Field(default_factory=ContainerOptions)
+    """Further options."""
+    urdf: str | None = None
+    """File of a description of the robot that viewers are told; relative to the catalogue."""
 
     @model_validator(mode="after")
     def _is_one_thing(self) -> ComponentSection:
-        if (self.config is None) == (self.session is None):
-            raise ValueError("should have one of config and session")
+        if sum(each is not None for each in (self.config, self.session, self.image)) != 1:
+            raise ValueError("should have one of config, session and image")
+        if self.image is None and (wrong := sorted(self.model_fields_set & _OF_CONTAINERS)):
+            raise ContradictionError(dict.fromkeys(wrong, "should be left out; it is for components with image"))
         return self
+
+
+_OF_CONTAINERS = frozenset(
+    ("command", "environment", "volumes", "networks", "ports", "cpus", "memory", "options", "urdf")
+)
 
 
 class CatalogueFile(Section):
@@ -63,16 +107,18 @@ class Component:
     Attributes:
         name: Its name.
         pretty_name: What people are shown.
-        kind: Whether its instances collect datasets, or have simulations for clients alone.
-        config: The configuration's file.
+        kind: Whether its instances collect datasets, have simulations for clients alone, or are containers.
+        source: The configuration's file, or what a container is made from.
         max_instances: How many instances may live at once.
+        urdf: File of a description of the robot that viewers are told; None for that of the configuration, if any.
     """
 
     name: str
     pretty_name: str
-    kind: Literal["collection", "session"]
-    config: Path
+    kind: Kind
+    source: Path | ContainerSpec
     max_instances: int
+    urdf: Path | None = None
 
 
 @dataclass(frozen=True)
@@ -126,16 +172,39 @@ class Catalogue:
             raise ConfigError(document.problems)
         components = {}
         for name, section in found.components.items():
-            kind: Literal["collection", "session"] = "collection" if section.session is None else "session"
-            named = path.absolute().parent / (section.config or section.session or "")
-            try:
-                load(named)
-            except ConfigError as error:
-                key = "config" if kind == "collection" else "session"
-                problem = document.problem(("components", name, key), "names a file with errors")
-                raise ConfigError([problem, *error.problems], hint=error.hint) from error
-            components[name] = Component(name, section.pretty_name or name, kind, named, section.max_instances)
+            kind, source, urdf = _read_source(section, name, document, path.absolute().parent)
+            pretty_name = section.pretty_name or name
+            components[name] = Component(name, pretty_name, kind, source, section.max_instances, urdf)
         return cls(components)
+
+
+def _read_source(
+    section: ComponentSection, name: str, document: Document, directory: Path
+) -> tuple[Kind, Path | ContainerSpec, Path | None]:
+    """Kind of a component, what its instances are made from, and the file of its description.
+
+    Raises:
+        ConfigError: If a file that it names has errors.
+    """
+    if section.image is not None:
+        urdf = None if section.urdf is None else directory / section.urdf
+        if urdf is not None:
+            try:
+                read_urdf(urdf)
+            except ConfigError as error:
+                raise ConfigError([document.problem(("components", name, "urdf"), error.message)]) from error
+        general = section.model_dump(include={"environment", "networks", "ports", "cpus", "memory", "options"})
+        node = NodeContainerConfig(**general, mounts=section.volumes)
+        command = None if section.command is None else tuple(section.command)
+        return "container", ContainerSpec(section.image, command, node), urdf
+    key: Literal["config", "session"] = "config" if section.session is None else "session"
+    named = directory / (section.config or section.session or "")
+    try:
+        load(named)
+    except ConfigError as error:
+        problem = document.problem(("components", name, key), "names a file with errors")
+        raise ConfigError([problem, *error.problems], hint=error.hint) from error
+    return "collection" if key == "config" else "session", named, None
 
 
 def _find(error: ValidationError, document: Document) -> list[Finding]:

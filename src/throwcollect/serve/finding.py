@@ -109,6 +109,15 @@ def publish(address: Address) -> Iterator[None]:
                 os.close(lock)
 
 
+def log_path() -> Path:
+    """File of what a server prints that was started in the background.
+
+    Raises:
+        ConfigError: If runs cannot be remembered.
+    """
+    return state_directory() / _LOG
+
+
 def find_server() -> Address | None:
     """Where somebody of this user serves by now; None if nobody answers.
 
@@ -135,7 +144,7 @@ def ensure_server() -> Address:
     """
     if (address := find_server()) is not None:
         return address
-    log = state_directory() / _LOG
+    log = log_path()
     words = [sys.executable, "-m", "throwcollect", "serve", "--json"]
     with open(open_log(log), "ab") as output:
         # What it prints has a code, and others may be allowed to read the log.

@@ -32,13 +32,19 @@ class Wish(BaseModel):
     component: str
     simulations: int | None = Field(default=None, ge=1, le=256)
     set: dict[str, JsonValue] = Field(default_factory=dict)
+    joins: str | None = None
 
-    @field_validator("component", "set")
+    @field_validator("component", "set", "joins")
     @classmethod
     def _is_text(cls, value: JsonValue) -> JsonValue:
         # JSON has escapes of halves of characters, which no file can hold.
         json.dumps(value, ensure_ascii=False).encode()
         return value
+
+    @property
+    def origin(self) -> Origin:
+        """What the run remembers of it."""
+        return Origin(self.component, self.simulations, self.set, self.joins)
 
 
 class Scaling(BaseModel):
@@ -95,7 +101,7 @@ def make_instance_routes(instances: Instances, lookout: Lookout) -> APIRouter:
     )
     def put(instance: str, wish: Wish, response: Response) -> InstanceState:
         """Begin an instance of a component; the same request again changes nothing."""
-        run, new = instances.put(instance, Origin(wish.component, wish.simulations, wish.set))
+        run, new = instances.put(instance, wish.origin)
         if not new:
             response.status_code = 200
         return describe(run)
@@ -104,7 +110,7 @@ def make_instance_routes(instances: Instances, lookout: Lookout) -> APIRouter:
     def post(wish: Wish, response: Response) -> InstanceState:
         """Begin an instance of a component, with an id that is chosen here."""
         made = f"{wish.component}-{time.time_ns() // 1_000_000:x}"
-        run, _ = instances.put(made, Origin(wish.component, wish.simulations, wish.set))
+        run, _ = instances.put(made, wish.origin)
         response.headers["Location"] = f"/api/v1/instances/{run.id}"
         return describe(run)
 

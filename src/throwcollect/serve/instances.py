@@ -13,11 +13,13 @@ from pathlib import Path
 
 from pydantic import JsonValue
 
+from throwcollect.config.container_spec import ContainerSpec
 from throwcollect.dataset.directory import config_path
 from throwcollect.errors import ConfigError, ConflictError, NotFoundError, Problem, WorkerError
 from throwcollect.robots.appearance import check_appearance
 from throwcollect.runs import control
-from throwcollect.runs.background import begin_run
+from throwcollect.runs.background import begin_container, begin_run
+from throwcollect.runs.component_container import ContainerOrder
 from throwcollect.runs.record import Origin
 from throwcollect.runs.records import Records, Run, state_directory
 from throwcollect.runs.selection import require_living
@@ -73,13 +75,15 @@ class Instances:
 
         Raises:
             NotFoundError: If there is no such component.
-            ConflictError: If there is another run of that id, or as many instances live as may.
-            ConfigError: If the configuration cannot be used.
+            ConflictError: If there is another run of that id, or as many instances live as may, or a container cannot
+                join the run that it is to join.
+            ConfigError: If the configuration cannot be used, or something is asked for that such a component has not.
             WorkerError: If it cannot be begun.
         """
         component = self.catalogue.get(origin.component)
         if not re.fullmatch(NAME, instance):
             raise ConfigError(f"no instance can have the id {instance!r}", expected="at most 63 of a-z, 0-9, - and _")
+        _check_wish(origin, component)
         overrides = _overrides(origin)
         with _one_at_a_time():
             try:
@@ -91,13 +95,16 @@ class Instances:
                     return found, False
                 raise ConflictError(f"there is an instance {instance} already, of another request")
             self._check_room(component)
+            if isinstance(component.source, ContainerSpec):
+                order = ContainerOrder(component.name, component.source, origin.joins)
+                return begin_container(order, run=instance, origin=origin, urdf=component.urdf), True
             run = begin_run(
-                component.config,
+                component.source,
                 overrides=overrides,
                 output=self.datasets / instance,
                 run=instance,
                 origin=origin,
-                kind=component.kind,
+                kind="session" if component.kind == "session" else "collection",
             )
         return run, True
 
@@ -174,6 +181,7 @@ class Instances:
             WorkerError: If its launcher died, or does not answer.
         """
         run = self.get(instance)
+        _check_simulations(run)
         control.scale(run, simulations)
         return run.now()
 
@@ -191,6 +199,7 @@ class Instances:
             WorkerError: If a simulation does not answer.
         """
         run = self.get(instance)
+        _check_simulations(run)
         own = description_of(run)
         if urdf is not None:
             check_appearance(own, urdf)
@@ -201,6 +210,33 @@ class Instances:
         for result in control.set_parameter(run, nodes, "robot_description", urdf or own):
             if not result.successful:
                 raise ConflictError(f"run {run.id}: {result.reason}")
+
+
+def _check_simulations(run: Run) -> None:
+    """Refuse a run that is a container of the catalogue.
+
+    Raises:
+        ConflictError: If it is one.
+    """
+    if run.record.kind == "container":
+        raise ConflictError(f"run {run.id}: is a container, and has no simulations")
+
+
+def _check_wish(origin: Origin, component: Component) -> None:
+    """Refuse what an instance of a component cannot have.
+
+    Raises:
+        ConfigError: If it is asked for.
+    """
+    problems = []
+    if component.kind != "container" and origin.joins is not None:
+        problems.append(Problem(f"{component.name} is a {component.kind}; containers join runs", key="joins"))
+    if component.kind == "container" and origin.simulations is not None:
+        problems.append(Problem(f"{component.name} is a container, and has no simulations", key="simulations"))
+    if component.kind == "container" and origin.changes:
+        problems.append(Problem(f"{component.name} is a container, and has no configuration", key="set"))
+    if problems:
+        raise ConfigError(problems)
 
 
 def _is_instance(run: Run, component: str) -> bool:

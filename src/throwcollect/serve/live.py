@@ -11,6 +11,7 @@ import fcntl
 import os
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 from throwcollect.config.loader import load
@@ -152,5 +153,11 @@ def find_node(run: Run, simulation: str) -> str:
     Raises:
         ConfigError: If the run's configuration cannot be read.
     """
-    config = load(config_path(run.place.directory))
-    return f"/{simulation}" if config.run.root_namespace else f"/{simulation}/{simulation}"
+    path = config_path(run.place.directory)
+    changed_ns = path.stat().st_mtime_ns if path.is_file() else 0
+    return f"/{simulation}" if _has_root_namespace(path, changed_ns) else f"/{simulation}/{simulation}"
+
+
+@lru_cache(maxsize=64)
+def _has_root_namespace(path: Path, _changed_ns: int) -> bool:
+    return load(path).run.root_namespace

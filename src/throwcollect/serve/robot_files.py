@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
@@ -13,18 +14,27 @@ from throwcollect.config.loader import load
 from throwcollect.dataset.directory import config_path
 from throwcollect.errors import ConfigError, NotFoundError
 from throwcollect.members import load_member, names_of
+from throwcollect.robots.appearance import read_urdf
 from throwcollect.robots.description import full_description
 from throwcollect.robots.robot import Robot
+from throwcollect.runs.component_container import DESCRIPTION
 from throwcollect.runs.records import Run
+
+_PACKAGE = "package://"
 
 
 def description_of(run: Run) -> str:
     """URDF of the robot of a run, with its tool; meshes are ``package://`` URLs.
 
     Raises:
-        NotFoundError: If the run has no configuration yet.
+        NotFoundError: If the run has no configuration yet, or is a container without a description.
         ConfigError: If the robot's files cannot be read.
     """
+    if run.record.kind == "container":
+        path = Path(run.record.directory) / DESCRIPTION
+        if not path.is_file():
+            raise NotFoundError(f"run {run.id}: its component has no urdf")
+        return read_urdf(path)
     path = _find_config(run)
     return _describe(path, path.stat().st_mtime_ns)
 
@@ -100,6 +110,67 @@ def find_mesh(package: str, path: str) -> Path:
     raise NotFoundError(f"no mesh package://{package}/{path}")
 
 
+@dataclass(frozen=True)
+class MeshFile:
+    """The file of a mesh that a description names.
+
+    Attributes:
+        url: Its name there: ``package://PACKAGE/PATH``.
+        sha256: SHA-256 of what is in it, in hexadecimal.
+        bytes: Its size.
+    """
+
+    url: str
+    sha256: str
+    bytes: int
+
+
+def list_meshes(description: str) -> list[MeshFile]:
+    """The files of meshes that a description names, each once; without those of packages that no robot has.
+
+    Args:
+        description: URDF text.
+
+    Raises:
+        ConfigError: If the description of a robot cannot be read.
+    """
+    return [
+        MeshFile(f"{_PACKAGE}{package}/{path}", _digest(file, stat.st_mtime_ns), stat.st_size)
+        for package, path, file in _find_files(description)
+        for stat in [file.stat()]
+    ]
+
+
+def find_mesh_by_content(sha256: str) -> Path:
+    """The file of a mesh that the description of a robot names.
+
+    Args:
+        sha256: SHA-256 of what is in it, in hexadecimal.
+
+    Raises:
+        NotFoundError: If no robot has such a mesh.
+        ConfigError: If the description of a robot cannot be read.
+    """
+    for text, _ in _read_descriptions():
+        for _, _, file in _find_files(text):
+            if _digest(file, file.stat().st_mtime_ns) == sha256:
+                return file
+    raise NotFoundError(f"no mesh with the SHA-256 {sha256}")
+
+
+def _find_files(description: str) -> Iterator[tuple[str, str, Path]]:
+    """Package and path of each mesh that a description names, and its file."""
+    named = dict.fromkeys(re.findall(_PACKAGE + r"([\w.-]+)/([^\"'<>]+)", description))
+    for package, path in named:
+        with suppress(NotFoundError):
+            yield package, path, find_mesh(package, path)
+
+
+@lru_cache(maxsize=1024)
+def _digest(file: Path, _changed_ns: int) -> str:
+    return hashlib.sha256(file.read_bytes()).hexdigest()
+
+
 @lru_cache(maxsize=1)
 def _find_packages() -> Mapping[str, Path]:
     """Directories of the packages that the descriptions of all robots name, by their names.
@@ -107,12 +178,25 @@ def _find_packages() -> Mapping[str, Path]:
     Raises:
         ConfigError: If the description of a robot cannot be read.
     """
-    found: dict[str, Path] = {}
+    return {
+        package: robot.share() / package
+        for text, robot in _read_descriptions()
+        for package in re.findall(_PACKAGE + r"([\w.-]+)/", text)
+    }
+
+
+@lru_cache(maxsize=1)
+def _read_descriptions() -> Sequence[tuple[str, Robot]]:
+    """The descriptions of all robots.
+
+    Raises:
+        ConfigError: If one cannot be read.
+    """
+    found = []
     for name in names_of("robots"):
         robot: Robot = load_member("robots", name)
         try:
-            text = robot.urdf_path.read_text(encoding="utf-8")
+            found.append((robot.urdf_path.read_text(encoding="utf-8"), robot))
         except (OSError, UnicodeDecodeError) as error:
             raise ConfigError(f"{robot.urdf_path}: cannot be read: {error}") from error
-        found |= {package: robot.share() / package for package in re.findall(r"package://([\w.-]+)/", text)}
     return found

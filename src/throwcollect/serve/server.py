@@ -4,26 +4,31 @@ from __future__ import annotations
 
 import contextlib
 import logging
+import logging.handlers
 import os
 import socket
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from io import TextIOWrapper
 from pathlib import Path
 from types import FrameType
 
 import uvicorn
 
 from throwcollect.errors import ConfigError
+from throwcollect.files import open_log
 from throwcollect.serve.access import Access, Keys
 from throwcollect.serve.app import make_app
-from throwcollect.serve.finding import Address, publish
+from throwcollect.serve.finding import Address, log_path, publish
 from throwcollect.serve.instances import Instances
 
 PORT = 8080
 """Where to serve if nobody says otherwise, and it is free."""
 _MOST_FRAME = 10_000_000
 _MOST_CLIENTS = 256
+_LOG_BYTES = 1_000_000
 _END_S = 2.5
 """Time in which it ends when it is told to."""
 
@@ -126,9 +131,28 @@ def _load(config: uvicorn.Config) -> None:
         ) from error
 
 
+class _CutLog(logging.handlers.RotatingFileHandler):
+    """The log of a server that was started in the background, which has at most two files of 1 MB.
+
+    All else that is printed goes there, too.
+    """
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path, maxBytes=_LOG_BYTES, backupCount=1)
+
+    def _open(self) -> TextIOWrapper:
+        log = os.fdopen(open_log(Path(self.baseFilename)), "a")
+        os.dup2(log.fileno(), sys.stderr.fileno())
+        return log
+
+
 def _write_lines() -> None:
     """Have a line written for each request."""
-    lines = logging.StreamHandler()
+    lines: logging.Handler = logging.StreamHandler()
+    # Where there is no such log, or no standard error, it is none either.
+    with contextlib.suppress(OSError, ValueError):
+        if os.path.samestat(os.fstat(sys.stderr.fileno()), log_path().stat()):
+            lines = _CutLog(log_path())
     lines.setFormatter(logging.Formatter("%(asctime)s %(message)s"))
     logger = logging.getLogger("throwcollect.serve")
     logger.setLevel(logging.INFO)

@@ -4,17 +4,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from datetime import datetime
+from functools import lru_cache
+from pathlib import Path
 from typing import Literal
 
 from pydantic import TypeAdapter
 
+from throwcollect.config.loader import load
+from throwcollect.config.sweep import LANDING_HEIGHT, TargetConfig
 from throwcollect.coordinator.progress import Progress
 from throwcollect.dataset.summary import Info
 from throwcollect.errors import ConfigError
-from throwcollect.runs.record import Record
+from throwcollect.runs.record import Kind, Record
 from throwcollect.runs.records import Records, Run
 from throwcollect.runtimes.runtime import NodeState
-from throwcollect.serve.catalogue import Catalogue
+from throwcollect.serve.catalogue import Catalogue, Component
 
 VERSION: Literal[1] = 1
 """Version of the layout of the state."""
@@ -34,16 +38,18 @@ class ComponentState:
     Attributes:
         name: Its name.
         pretty_name: What people are shown.
-        kind: Whether its instances collect datasets, or have simulations for clients alone.
+        kind: Whether its instances collect datasets, have simulations for clients alone, or are containers.
         max_instances: How many instances may live at once.
         instances: Ids of those that live.
+        targets: Keys that a request may set in ``sweep.target``, to have throws come down somewhere; none if it cannot.
     """
 
     name: str
     pretty_name: str
-    kind: Literal["collection", "session"]
+    kind: Kind
     max_instances: int
     instances: list[str]
+    targets: list[str]
 
 
 @dataclass(frozen=True)
@@ -54,7 +60,8 @@ class InstanceState:
         id: Id of the run.
         component: Name of the component that it is an instance of; None if a command or a program began it.
         name: Name of the collection.
-        kind: Whether it collects a dataset, or has simulations for clients alone.
+        kind: Whether it collects a dataset, has simulations for clients alone, or is a container of the catalogue.
+        joins: Id of the run that a container has joined; None if it has joined none.
         status: ``starting`` until all nodes run, ``running``, ``ended``, or ``died``: its launcher did before it ended.
         started: When it was begun.
         ended: When it ended; None before.
@@ -72,7 +79,8 @@ class InstanceState:
     id: str
     component: str | None
     name: str
-    kind: Literal["collection", "session"]
+    kind: Kind
+    joins: str | None
     status: Status
     started: datetime
     ended: datetime | None
@@ -130,6 +138,7 @@ class Lookout:
                 each.kind,
                 each.max_instances,
                 [instance.id for instance in living if instance.component == each.name],
+                _find_targets(each),
             )
             for each in self._catalogue.components.values()
         ]
@@ -155,6 +164,27 @@ class Lookout:
         return sorted(instances, key=lambda each: each.started, reverse=True)
 
 
+def _find_targets(component: Component) -> list[str]:
+    """Landing targets that a collection of a component can be spread over."""
+    if component.kind != "collection":
+        return []
+    try:
+        return _read_targets(component.config, component.config.stat().st_mtime_ns)
+    except (ConfigError, OSError):
+        # Whoever starts an instance is told what is wrong with the file.
+        return []
+
+
+@lru_cache(maxsize=64)
+def _read_targets(path: Path, _changed_ns: int) -> list[str]:
+    config = load(path)
+    sweep = config.sweep
+    if not config.task.throws or sweep.sampler != "sobol" or not sweep.parameters:
+        return []
+    unless_swept = () if LANDING_HEIGHT in sweep.parameters else ("height_m",)
+    return [key for key in TargetConfig.model_fields if key not in unless_swept]
+
+
 def describe(run: Run) -> InstanceState:
     """What is seen of a run."""
     record = run.record
@@ -164,6 +194,7 @@ def describe(run: Run) -> InstanceState:
         component=None if record.origin is None else record.origin.component,
         name=record.name,
         kind=record.kind,
+        joins=None if record.origin is None else record.origin.joins,
         status=_status(run),
         started=record.started,
         ended=record.ended,

@@ -6,11 +6,14 @@ import asyncio
 import json
 import struct
 import threading
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterable
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Mapping
 from contextlib import asynccontextmanager
 from functools import partial
+from pathlib import Path
 
+from throwcollect.config.loader import load
 from throwcollect.coordinator.topics import SHOWN_QOS, make_shown_topic
+from throwcollect.dataset.directory import PLAN, config_path
 from throwcollect.episode.message import Delivery, unpack
 from throwcollect.errors import ThrowcollectError
 from throwcollect.ros import Node
@@ -19,6 +22,7 @@ from throwcollect.run_key import Signer
 from throwcollect.runs.records import Run
 from throwcollect.runtimes.run_listener import RunListener
 from throwcollect.serve.state import simulations_of
+from throwcollect.sweep.plan import Plan
 from throwcollect.units import NS_PER_S
 
 _SPIN_S = 0.2
@@ -27,18 +31,19 @@ _LENGTH = struct.Struct("<I")
 _LANDING = ("landing_x_m", "landing_y_m", "landing_z_m")
 
 
-def encode_throw(delivery: Delivery, simulation: str) -> bytes:
+def encode_throw(delivery: Delivery, simulation: str, values: Mapping[str, float]) -> bytes:
     """An episode as the page takes it.
 
     Args:
         delivery: The episode, and what came of it.
         simulation: Name of the simulation that it is of.
+        values: What the sweep chose for it, by dotted key.
 
     Returns:
         Length of a JSON header as uint32, the header, zero bytes up to a multiple of four, then float32: angles of the
         joints [rad], shape ``(n_samples, n_joints)``, and the ball's centre in the world [m], shape ``(n_samples, 3)``;
-        all little-endian. The header has ``trial``, ``simulation``, ``outcome``, ``joints``, ``samples``, ``rate_hz``
-        and ``landing``.
+        all little-endian. The header has ``trial``, ``simulation``, ``outcome``, ``joints``, ``samples``, ``rate_hz``,
+        ``landing`` and ``values``.
 
     Raises:
         DatasetError: If the episode is damaged.
@@ -56,11 +61,37 @@ def encode_throw(delivery: Delivery, simulation: str) -> bytes:
         "samples": len(samples),
         "rate_hz": NS_PER_S / spacing_ns,
         "landing": None if None in landing else landing,
+        "values": dict(values),
     }
     text = json.dumps(header).encode()
     padding = b"\0" * (-(_LENGTH.size + len(text)) % _FLOAT_BYTES)
     numbers = (samples.position, samples.ball_position)
     return b"".join((_LENGTH.pack(len(text)), text, padding, *(part.astype("<f4").tobytes() for part in numbers)))
+
+
+class PlannedValues:
+    """What the sweep of a run chose for its trials; the plan is read when somebody asks, and again when it has grown.
+
+    Args:
+        directory: Of the run's dataset.
+    """
+
+    def __init__(self, directory: Path) -> None:
+        self._directory = directory
+        self._plan: Plan | None = None
+
+    def of(self, trial: int) -> Mapping[str, float]:
+        """Values of a trial, by dotted key; none if its plan cannot be read here.
+
+        Args:
+            trial: Number of the trial.
+        """
+        try:
+            if self._plan is None or trial not in self._plan.trials.numbers:
+                self._plan = Plan.read(self._directory / PLAN, load(config_path(self._directory)))
+            return self._plan.trial(trial).values
+        except (ThrowcollectError, IndexError):
+            return {}
 
 
 class ThrowWatch:
@@ -75,6 +106,7 @@ class ThrowWatch:
         self._listeners: dict[asyncio.Queue[bytes], asyncio.AbstractEventLoop] = {}
         self._unwanted = threading.Event()
         self._newest: bytes | None = None
+        self._values = PlannedValues(Path(run.record.directory))
 
     @asynccontextmanager
     async def throws(self) -> AsyncIterator[Callable[[], Awaitable[bytes]]]:
@@ -120,7 +152,7 @@ class ThrowWatch:
             delivery = unpack(message, Signer.of_key(self._run.key))
             if not isinstance(delivery, Delivery) or not delivery.result:
                 return
-            frame = encode_throw(delivery, simulation)
+            frame = encode_throw(delivery, simulation, self._values.of(delivery.episode.header.trial))
         except ThrowcollectError:
             # Somebody else has published something else there.
             return

@@ -13,7 +13,15 @@ from throwcollect.serve.access import MAY_ONLY_LOOK
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.live import take
 from throwcollect.serve.problems import describe_bytes
-from throwcollect.serve.robot_files import SceneFacts, description_of, find_mesh, scene_of
+from throwcollect.serve.robot_files import (
+    MeshFile,
+    SceneFacts,
+    description_of,
+    find_mesh,
+    find_mesh_by_content,
+    list_meshes,
+    scene_of,
+)
 from throwcollect.serve.sockets import FAILED, MAY_NOT, NOT_FOUND, keep_telling, refuse
 from throwcollect.serve.throws import ThrowWatch
 
@@ -32,6 +40,11 @@ def make_description_routes(instances: Instances) -> APIRouter:
     def urdf(instance: str) -> Response:
         """The robot of a run, with its tool, in URDF; meshes are ``package://`` URLs."""
         return Response(description_of(instances.get(instance)), media_type="application/xml")
+
+    @router.get("/instances/{instance}/meshes")
+    def meshes(instance: str) -> list[MeshFile]:
+        """The meshes that the robot of a run is drawn with; what is in them is had by their SHA-256."""
+        return list_meshes(description_of(instances.get(instance)))
 
     @router.get("/instances/{instance}/scene")
     def scene(instance: str) -> SceneFacts:
@@ -63,8 +76,14 @@ def make_view_routes(instances: Instances) -> APIRouter:
 
     @router.get("/meshes/{package}/{path:path}", response_class=FileResponse)
     def mesh(package: str, path: str) -> FileResponse:
-        """The file of a mesh."""
+        """The file of a mesh, as the description names it."""
         return FileResponse(find_mesh(package, path), headers={"Cache-Control": "private, max-age=86400"})
+
+    @router.get("/meshes/{sha256}", response_class=FileResponse)
+    def mesh_by_content(sha256: str) -> FileResponse:
+        """The file of a mesh by the SHA-256 of its content, so it never changes."""
+        headers = {"Cache-Control": "private, max-age=31536000, immutable", "ETag": f'"{sha256}"'}
+        return FileResponse(find_mesh_by_content(sha256), headers=headers)
 
     @router.websocket("/instances/{instance}/shown")
     async def shown(socket: WebSocket, instance: str) -> None:

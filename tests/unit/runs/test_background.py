@@ -181,3 +181,23 @@ def test_who_stops_it_while_it_is_prepared_is_heeded(
     record = Records().get("a").record
     assert (record.exit_code, str(record.error)) == (130, "stopped before any node was started")
     assert (record.origin, record.kind) == (ORIGIN, "collection")
+
+
+PREPARATION = """
+import sys
+from pathlib import Path
+from throwcollect.runs import background
+print("prepares", flush=True)
+background._move_log(Path(sys.argv[1]), Path(sys.argv[2]))
+print("collects", flush=True)
+print("a warning", file=sys.stderr)
+"""
+
+
+def test_the_launcher_goes_on_printing_beside_the_nodes(tmp_path: Path) -> None:
+    before, after = tmp_path / "launcher.log", tmp_path / "logs" / "launcher.log"
+    with before.open("ab") as log:
+        words = [sys.executable, "-c", PREPARATION, str(before), str(after)]
+        subprocess.run(words, stdout=log, stderr=subprocess.STDOUT, check=True, timeout=60)
+    assert after.read_text() == "prepares\ncollects\na warning\n"
+    assert not before.exists()

@@ -11,6 +11,8 @@ const { Playback } = await load("playback.js");
 const { inOrder, steps } = await load("state.js");
 const { readChanges } = await load("controls.js");
 const { coarsen } = await load("coarse.js");
+const { coverPlace } = await load("target.js");
+const { Rosbridge } = await load("rosbridge.js");
 const { BoxGeometry, SphereGeometry } = await load("vendor/three/build/three.module.js");
 
 const bytes = readFileSync(process.env.THROW);
@@ -77,6 +79,39 @@ test("simulations are in the order of their numbers", () => {
 test("changed keys are read line by line, and a bad line is named", () => {
   assert.deepEqual(readChanges("trials: 50\n\nname = mine\nsim.real_time_factor: 1.5"), { trials: 50, name: "mine", "sim.real_time_factor": 1.5 });
   assert.throws(() => readChanges("trials: 5\nwhat"), /line 2: .*'what'/);
+});
+
+test("a collection around a place lands around its distance, and at its height", () => {
+  const distance = { min: 1.4, max: 1.6, bins: 4 };
+  assert.deepEqual(coverPlace([0.9, -1.2, 0.4], ["distance_m"]), { "sweep.target.distance_m": distance, "scene.landing_height_m": 0.4 });
+  const height = { min: 0.35, max: 0.45, bins: 1 };
+  assert.deepEqual(coverPlace([0.9, -1.2, 0.4], ["distance_m", "height_m"]), { "sweep.target.distance_m": distance, "sweep.target.height_m": height });
+  assert.deepEqual(coverPlace([0.03, 0.04, -0.01], ["distance_m"]), {
+    "sweep.target.distance_m": { min: 0, max: 0.15, bins: 4 }, "scene.landing_height_m": 0,
+  });
+});
+
+test("a topic is announced once for each connection, and whoever may not publish is told", () => {
+  const sent = [];
+  const told = [];
+  let events;
+  const connection = { openRosbridge: (_run, given) => {
+    events = given;
+    return { send: (text) => sent.push(JSON.parse(text)) };
+  } };
+  const bridge = new Rosbridge(connection, "run", { refused: (text) => told.push(text) });
+  assert.throws(() => bridge.publish("/target", "geometry_msgs/msg/PointStamped", {}), /no connection/);
+  events.opened();
+  bridge.publish("/target", "geometry_msgs/msg/PointStamped", { a: 1 });
+  bridge.publish("/target", "geometry_msgs/msg/PointStamped", { a: 2 });
+  assert.deepEqual(sent.map(({ op, latch, msg }) => [op, latch ?? msg.a]), [["advertise", true], ["publish", 1], ["publish", 2]]);
+  events.lost();
+  events.opened();
+  assert.equal(sent.at(-1).op, "advertise");
+  events.receive(JSON.stringify({ op: "status", level: "error", id: sent.at(-1).id, msg: "may only look" }));
+  events.receive(JSON.stringify({ op: "status", level: "warning", id: sent.at(-1).id, msg: "slow" }));
+  events.receive(JSON.stringify({ op: "status", level: "error", id: "other", msg: "other" }));
+  assert.deepEqual(told, ["may only look"]);
 });
 
 test("a coarse mesh keeps its extent with fewer triangles, and edges stay sharp", () => {

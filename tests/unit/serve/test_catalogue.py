@@ -5,6 +5,8 @@ from pathlib import Path
 import pytest
 from tests.unit.serve.conftest import CONFIG
 
+from throwcollect.config.container_spec import ContainerSpec
+from throwcollect.config.containers import NodeContainerConfig
 from throwcollect.errors import ConfigError, NotFoundError
 from throwcollect.serve.catalogue import Catalogue
 
@@ -25,7 +27,7 @@ def test_components_are_read(directory: Path) -> None:
     first = "{config: small.yaml, pretty_name: Throws of A, max_instances: 3}"
     catalogue = Catalogue.read(write(directory, f"components:\n  a: {first}\n  b: {{session: small.yaml}}\n"))
     a, b = catalogue.get("a"), catalogue.get("b")
-    assert (a.kind, a.pretty_name, a.max_instances, a.config) == (
+    assert (a.kind, a.pretty_name, a.max_instances, a.source) == (
         "collection",
         "Throws of A",
         3,
@@ -35,6 +37,17 @@ def test_components_are_read(directory: Path) -> None:
     with pytest.raises(NotFoundError, match="no component 'c'") as error:
         catalogue.get("c")
     assert error.value.expected == "one of a, b"
+
+
+def test_a_container_has_what_the_catalogue_says(directory: Path) -> None:
+    (directory / "a.urdf").write_text("<robot/>")
+    text = (
+        "components:\n  a:\n    image: x\n    command: [run, it]\n    environment: {LAB: north}\n    networks: [lab]\n"
+    )
+    text += f"    volumes: ['{directory}:/mesh:ro']\n    cpus: 2\n    urdf: a.urdf\n"
+    a = Catalogue.read(write(directory, text)).get("a")
+    node = NodeContainerConfig(environment={"LAB": "north"}, networks=["lab"], mounts=[f"{directory}:/mesh:ro"], cpus=2)
+    assert (a.kind, a.source, a.urdf) == ("container", ContainerSpec("x", ("run", "it"), node), directory / "a.urdf")
 
 
 def test_a_configuration_is_the_only_component(directory: Path) -> None:
@@ -56,9 +69,20 @@ def test_without_a_catalogue_nothing_can_be_begun(directory: Path) -> None:
     ("text", "message"),
     [
         ("components: {}\n", ":1: components: should"),
-        ("components:\n  a:\n    pretty_name: A\n", ":2: components.a: should have one of config and session"),
+        ("components:\n  a:\n    pretty_name: A\n", ":2: components.a: should have one of config, session and image"),
         ("components:\n  a: {config: small.yaml, session: small.yaml}\n", ":2: components.a: should have one of"),
-        ("components:\n  a:\n    config: small.yaml\n    image: ubuntu\n", ":4: components.a.image: unknown key"),
+        (
+            "components:\n  a:\n    config: small.yaml\n    image: ubuntu\n",
+            ":2: components.a: should have one of config",
+        ),
+        (
+            "components:\n  a:\n    config: small.yaml\n    cpus: 2\n",
+            ":4: components.a.cpus: should be left out; it is",
+        ),
+        ("components:\n  a:\n    image: x\n    volumes: [/etc:/a]\n", "components.a.volumes.0: /etc is refused"),
+        ("components:\n  a:\n    image: x\n    privileged: true\n", ":4: components.a.privileged: unknown key"),
+        ("components:\n  a:\n    image: x\n    urdf: none.urdf\n", ":4: components.a.urdf: "),
+        ("components:\n  a:\n    image: x\n    urdf: small.yaml\n", "should be a URDF"),
         ("components:\n  a:\n    config: small.yaml\n    max_instance: 2\n", "did you mean 'max_instances'"),
         ("components:\n  a:\n    config: small.yaml\n    max_instances: 0\n", ":4: components.a.max_instances: should"),
         (

@@ -17,7 +17,7 @@ import pytest
 
 from throwcollect.errors import DatasetError, WorkerError
 from throwcollect.serve import finding
-from throwcollect.serve.finding import Address, ensure_server, find_server, make_page_address, publish
+from throwcollect.serve.finding import Address, ensure_server, find_server, log_path, make_page_address, publish
 
 
 class Handler(BaseHTTPRequestHandler):
@@ -138,3 +138,23 @@ def test_what_keeps_a_server_from_starting_is_told(
     with pytest.raises(WorkerError, match="no server starts") as error:
         ensure_server()
     assert error.value.evidence == "throwcollect: no such thing"
+
+
+LINES = """
+import logging, os, sys
+from throwcollect.serve import server
+server._LOG_BYTES = 10_000
+server._write_lines()
+for number in range(1_000):
+    logging.getLogger("throwcollect.serve").info("GET /api/v1/state %d", number)
+print("an error", file=sys.stderr)
+"""
+
+
+def test_the_log_of_a_server_in_the_background_is_cut(state: Path) -> None:
+    log = log_path()
+    with log.open("ab") as output:
+        subprocess.run([sys.executable, "-c", LINES], stderr=output, check=True, timeout=60)
+    assert log.read_text().endswith("GET /api/v1/state 999\nan error\n")
+    assert sorted(path.name for path in state.glob("serve.log*")) == ["serve.log", "serve.log.1"]
+    assert log.stat().st_size + (state / "serve.log.1").stat().st_size <= 20_100

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -11,10 +13,12 @@ from starlette.testclient import TestClient
 from tests.unit.serve.conftest import Remember, Served, ended
 
 from throwcollect.robots.talos import TALOS
+from throwcollect.runs.component_container import ContainerOrder
 from throwcollect.runs.record import Failure, Origin
 from throwcollect.runs.records import Records, Run
 from throwcollect.runtimes.runtime import NodeState
 from throwcollect.serve import instances as instances_module
+from throwcollect.serve.catalogue import Catalogue
 
 URL = "/api/v1/instances"
 
@@ -75,6 +79,46 @@ def test_a_resumed_collection_counts(client: TestClient, remember: Remember, tmp
     assert [resume(name) for name in ("nobody", "none", "session", "resumed-1")] == [404, 409, 409, 409]
     assert put(client, "a").status_code == 202
     assert resume("old") == 409
+
+
+def test_a_container_may_join_a_run(
+    served: Served, remember: Remember, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    orders: list[ContainerOrder] = []
+
+    def begin(order: ContainerOrder, *, run: str, origin: Origin, urdf: Path | None) -> Run:
+        orders.append(order)
+        directory = tmp_path / "datasets" / run
+        directory.mkdir(parents=True)
+        if urdf is not None:
+            (directory / "robot.urdf").write_bytes(urdf.read_bytes())
+        remember(run, origin=origin, kind="container", runtime="docker")
+        return Records().get(run)
+
+    monkeypatch.setattr(instances_module, "begin_container", begin)
+    (tmp_path / "a.urdf").write_text("<robot/>")
+    catalogue = tmp_path / "containers.yaml"
+    catalogue.write_text(
+        "components:\n  ear: {image: nodes, urdf: a.urdf}\n  deaf: {image: nodes}\n  talos: {session: small.yaml}\n"
+    )
+    object.__setattr__(served.instances, "catalogue", Catalogue.read(catalogue))
+    client = served.client()
+    ask = lambda name, **wish: client.put(f"{URL}/{name}", json=wish)  # noqa: E731
+    first = ask("e", component="ear", joins="t")
+    assert (first.status_code, first.json()["kind"], first.json()["joins"]) == (202, "container", "t")
+    assert ask("e", component="ear", joins="t").status_code == 200
+    assert ask("e", component="ear").status_code == 409
+    assert ask("f", component="ear", joins="t").status_code == 409
+    assert [each.joins for each in orders] == ["t"]
+    assert client.get(f"{URL}/e/urdf").text == "<robot/>"
+    assert client.put(f"{URL}/e/urdf", content="<robot/>").status_code == 409
+    patched = client.patch(f"{URL}/e", json={"simulations": 2})
+    assert (patched.status_code, patched.json()["title"]) == (409, "run e: is a container, and has no simulations")
+    assert ask("d", component="deaf").status_code == 202
+    assert client.get(f"{URL}/d/urdf").status_code == 404
+    for wish in ({"component": "deaf", "simulations": 1}, {"component": "deaf", "set": {"a": 1}}):
+        assert ask("g", **wish).status_code == 422
+    assert ask("g", component="talos", joins="t").json()["title"] == "joins: talos is a session; containers join runs"
 
 
 @pytest.mark.parametrize(
@@ -264,6 +308,25 @@ def test_logs_and_events_are_read_where_they_lie(client: TestClient, remember: R
         assert "secret\n" not in answer.text
     for tail in ("0", "10001", "x"):
         assert client.get(f"{URL}/a/log/sim_0?tail={tail}").status_code == 422
+
+
+def test_meshes_are_had_by_their_content_which_never_changes(
+    client: TestClient, remember: Remember, tmp_path: Path
+) -> None:
+    directory = tmp_path / "datasets" / "a"
+    directory.mkdir(parents=True)
+    (directory / "config.yaml").write_text("name: small\n")
+    remember("a")
+    meshes = client.get(f"{URL}/a/meshes").json()
+    named = set(re.findall(r'package://[^"]+', client.get(f"{URL}/a/urdf").text))
+    assert {each["url"] for each in meshes} == named
+    for each in (meshes[0], meshes[-1]):
+        found = client.get(f"/api/v1/meshes/{each['sha256']}")
+        assert (hashlib.sha256(found.content).hexdigest(), len(found.content)) == (each["sha256"], each["bytes"])
+        assert "immutable" in found.headers["cache-control"]
+        assert found.content == client.get(f"/api/v1/meshes/{each['url'].removeprefix('package://')}").content
+    assert client.get(f"/api/v1/meshes/{64 * '0'}").status_code == 404
+    assert client.get(f"{URL}/nobody/meshes").status_code == 404
 
 
 def test_meshes_come_from_packages_of_robots_alone(served: Served) -> None:

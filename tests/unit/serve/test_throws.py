@@ -19,7 +19,7 @@ from throwcollect.episode.message import Delivery
 from throwcollect.ros.connection import Connection
 from throwcollect.runs.records import Records, Run
 from throwcollect.serve import throws
-from throwcollect.serve.throws import ThrowWatch, encode_throw
+from throwcollect.serve.throws import PlannedValues, ThrowWatch, encode_throw
 
 _ALL: list[Any] = []
 
@@ -68,10 +68,11 @@ def test_the_page_is_told_all_of_a_throw(collected: Path) -> None:
     episode = next(iter(Dataset.open(collected).episodes()))
     samples = episode.samples()
     result = {"outcome": "landed", "landing_x_m": 1.0, "landing_y_m": -0.5, "landing_z_m": 0.02}
-    frame = encode_throw(Delivery(episode, json.dumps(result), "{}"), "sim_0")
+    frame = encode_throw(Delivery(episode, json.dumps(result), "{}"), "sim_0", {"ball.mass_kg": 0.05})
     size = int.from_bytes(frame[:4], "little")
     header = json.loads(frame[4 : 4 + size])
     assert header["landing"] == [1.0, -0.5, 0.02]
+    assert header["values"] == {"ball.mass_kg": 0.05}
     assert (header["trial"], header["outcome"], header["samples"]) == (0, "landed", len(samples))
     assert header["rate_hz"] == pytest.approx(1e9 / (samples.stamps_ns[1] - samples.stamps_ns[0]))
     begin = 4 + size + (-(4 + size) % 4)
@@ -81,8 +82,17 @@ def test_the_page_is_told_all_of_a_throw(collected: Path) -> None:
     assert np.allclose(numbers[:joints].reshape(len(samples), -1), samples.position)
     assert np.allclose(numbers[joints:].reshape(-1, 3), samples.ball_position)
     fell = json.dumps({**result, "landing_z_m": None})
-    told = encode_throw(Delivery(episode, fell, "{}"), "sim_0")
+    told = encode_throw(Delivery(episode, fell, "{}"), "sim_0", {})
     assert json.loads(told[4 : 4 + int.from_bytes(told[:4], "little")])["landing"] is None
+
+
+def test_values_are_those_of_the_plan(collected: Path, tmp_path: Path) -> None:
+    values = PlannedValues(collected)
+    for trial in Dataset.open(collected).plan.trials:
+        assert values.of(trial.number) == trial.values
+    assert set(values.of(0)) == {"task.end.arm_right_4_joint", "task.duration_s", "ball.mass_kg"}
+    assert values.of(99) == {}
+    assert PlannedValues(tmp_path).of(0) == {}
 
 
 def test_there_is_one_thread_as_long_as_anybody_listens(remember: Remember, listeners: list[Any]) -> None:

@@ -26,7 +26,7 @@ class World:
         self.looks += 1
         if self.fails:
             raise ConfigError("the disk is full")
-        return State([ComponentState("a", "A", "session", 1, [str(self.instances)])], [])
+        return State([ComponentState("a", "A", "session", 1, [str(self.instances)], [])], [])
 
 
 @pytest.fixture(autouse=True)

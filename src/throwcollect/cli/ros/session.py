@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import os
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from throwcollect import ros
 from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError, WorkerError
 from throwcollect.ros.names import is_hidden
+from throwcollect.ros.own_name import make_own_name
 
 if TYPE_CHECKING:
     from throwcollect.ros.connection import Connection
@@ -32,7 +32,7 @@ class Session:
     """
 
     def __init__(self) -> None:
-        self.node = ros.Node(f"_throwcollect_{os.getpid()}", enable_rosout=False, start_parameter_services=False)
+        self.node = ros.Node(make_own_name(), enable_rosout=False, start_parameter_services=False)
         self._executor = ros.SingleThreadedExecutor()
         self._executor.add_node(self.node)
 

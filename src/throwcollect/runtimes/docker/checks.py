@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from docker.client import DockerClient
 from docker.errors import ImageNotFound
 
+from throwcollect.config.container_spec import ContainerSpec
+from throwcollect.config.containers import NodeContainerConfig
 from throwcollect.config.host_paths import DEVICES, SECRETS, is_allowed_device, refusal
 from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError, Problem, WorkerError
@@ -34,35 +36,59 @@ def check(client: DockerClient, place: RunPlace, config: Config) -> None:
         WorkerError: If the engine does not answer, or does not have the image.
     """
     with engine_errors("the Docker engine cannot be asked"):
-        networks = {each["Name"] for each in client.api.networks()}
-        root = os.path.realpath(client.api.info()["DockerRootDir"])
         # The containers of a launcher that died hold the port already, and are taken over with it.
         begun = client.api.containers(all=True, filters={"label": f"{RUN_LABEL}={place.run_id}"})
-        try:
-            client.images.get(image(config))
-        except ImageNotFound as error:
-            name = image(config)
-            hint = "throwcollect image build" if name == default_tag() else f"docker pull {name}"
-            raise WorkerError(f"the Docker engine has no image {name}", hint=hint) from error
-    if problems := list(_problems(config, networks, root)):
-        raise ConfigError(problems)
+    _check(client, image(config), {f"containers.{kind}": section_of(config, node) for kind, node in _NODES.items()})
     if config.run.router_port and not begun:
         reserve_port(config.run).close()
 
 
-def _problems(config: Config, networks: set[str], root: str) -> Iterator[Problem]:
-    for section, node in _NODES.items():
-        wanted = section_of(config, node)
-        for index, mount in enumerate(wanted.mounts):
-            if (wrong := _wrong_mount(mount_source(mount), root)) is not None:
-                yield Problem(wrong, f"containers.{section}.mounts.{index}")
-        for index, device in enumerate(wanted.options.get("devices", [])):
-            if (wrong := _wrong_device(Path(device.partition(":")[0]))) is not None:
-                yield Problem(wrong, f"containers.{section}.options.devices.{index}")
-        for index, network in enumerate(wanted.networks):
-            if network not in networks:
-                key = f"containers.{section}.networks.{index}"
-                yield Problem(f"the Docker engine has no network {network}; create it first", key)
+def check_container(client: DockerClient, spec: ContainerSpec, component: str) -> None:
+    """Look for the image, the mounts and the networks of a container that the catalogue describes.
+
+    Args:
+        client: Client of the engine.
+        spec: What it is made from.
+        component: Name of its component.
+
+    Raises:
+        ConfigError: If a mount or a network is not there or must not be used.
+        WorkerError: If the engine does not answer, or does not have the image.
+    """
+    _check(client, spec.image, {f"components.{component}": spec.section}, mounts="volumes")
+
+
+def _check(
+    client: DockerClient, name: str, sections: Mapping[str, NodeContainerConfig], *, mounts: str = "mounts"
+) -> None:
+    with engine_errors("the Docker engine cannot be asked"):
+        networks = {each["Name"] for each in client.api.networks()}
+        root = os.path.realpath(client.api.info()["DockerRootDir"])
+        try:
+            client.images.get(name)
+        except ImageNotFound as error:
+            hint = "throwcollect image build" if name == default_tag() else f"docker pull {name}"
+            raise WorkerError(f"the Docker engine has no image {name}", hint=hint) from error
+    problems = [
+        each for key, section in sections.items() for each in _problems(key, section, networks, root, mounts=mounts)
+    ]
+    if problems:
+        raise ConfigError(problems)
+
+
+def _problems(
+    key: str, section: NodeContainerConfig, networks: set[str], root: str, *, mounts: str
+) -> Iterator[Problem]:
+    for index, mount in enumerate(section.mounts):
+        if (wrong := _wrong_mount(mount_source(mount), root)) is not None:
+            yield Problem(wrong, f"{key}.{mounts}.{index}")
+    for index, device in enumerate(section.options.get("devices", [])):
+        if (wrong := _wrong_device(Path(device.partition(":")[0]))) is not None:
+            yield Problem(wrong, f"{key}.options.devices.{index}")
+    for index, network in enumerate(section.networks):
+        if network not in networks:
+            wrong = f"the Docker engine has no network {network}; create it first"
+            yield Problem(wrong, f"{key}.networks.{index}")
 
 
 def _wrong_mount(source: Path, root: str) -> str | None:

@@ -40,10 +40,10 @@ from throwcollect.runtimes.ports import LOOPBACK
 from throwcollect.runtimes.runtime import Place, Session
 from throwcollect.wording import command
 
-_SILENCE_S = 120.0
+SILENCE_S = 120.0
 """A busy engine may leave a request waiting for half a minute; one that answers nothing for so long is given up."""
 
-_LOG_S = 2.0
+LOG_S = 2.0
 """What a node printed last is in its file within this time after its end."""
 
 _BEGIN_S = 30.0
@@ -94,7 +94,7 @@ class DockerNodes(NodeHost):
         with ExitStack() as undo:
             self._clock = EngineClock(warn)
             undo.callback(self._clock.close)
-            self._client = client or connect(timeout_s=_SILENCE_S)
+            self._client = client or connect(timeout_s=SILENCE_S)
             self._clock.attend(self._client)
             undo.callback(self._clock.ignore, self._client)
             check(self._client, self._place, config)
@@ -303,7 +303,7 @@ class DockerNodes(NodeHost):
 
     @property
     def _silent(self) -> bool:
-        return self._clock.silent_s >= _SILENCE_S
+        return self._clock.silent_s >= SILENCE_S
 
     def _state(self, name: str) -> ContainerState | None:
         node = self._nodes.get(name)
@@ -318,7 +318,7 @@ class DockerNodes(NodeHost):
             self._ended_at.pop(node.name, None)
             return None
         now = time.monotonic()
-        if not node.log_complete and now - self._ended_at.setdefault(node.name, now) < _LOG_S:
+        if not node.log_complete and now - self._ended_at.setdefault(node.name, now) < LOG_S:
             return None
         self._ended_at.pop(node.name, None)
         memory = section_of(self.config, node.name).memory
@@ -331,7 +331,7 @@ class DockerNodes(NodeHost):
             return
         with suppress(*ENGINE_ERRORS):
             self._client.api.stop(node.handle, timeout=grace_s)
-            node.wait_log(_LOG_S)
+            node.wait_log(LOG_S)
             self._client.api.remove_container(node.handle, v=True, force=True)
 
 

@@ -12,7 +12,14 @@ from docker.errors import NotFound
 
 from throwcollect.errors import WorkerError
 from throwcollect.runtimes.docker.engine import ENGINE_ERRORS, engine_errors, in_words
-from throwcollect.runtimes.docker.options import DIRECTORY_LABEL, KEY_LABEL, NODE_LABEL, RUN_LABEL, VERSION_LABEL
+from throwcollect.runtimes.docker.options import (
+    DIRECTORY_LABEL,
+    JOINED_LABEL,
+    KEY_LABEL,
+    NODE_LABEL,
+    RUN_LABEL,
+    VERSION_LABEL,
+)
 from throwcollect.runtimes.runtime import HeldNode, HeldRun
 
 _GRACE_S = 3
@@ -49,6 +56,8 @@ def find_held_runs(client: DockerClient) -> list[HeldRun]:
 def remove(client: DockerClient, run_id: str, *, volumes: bool) -> list[str]:
     """Remove what an engine holds of a run, its key included; its containers are asked to end first.
 
+    So are those that have joined it, which keep its network and its key from being removed.
+
     Args:
         client: Client of the engine.
         run_id: Name of the run.
@@ -79,7 +88,8 @@ def remove(client: DockerClient, run_id: str, *, volumes: bool) -> list[str]:
         client.api.remove_container(container["Id"], v=True, force=True)
 
     with engine_errors(f"run {run_id} cannot be removed"):
-        containers = client.api.containers(all=True, filters=filters)
+        joined = client.api.containers(all=True, filters={"label": f"{JOINED_LABEL}={run_id}"})
+        containers = [*client.api.containers(all=True, filters=filters), *joined]
         networks = client.api.networks(filters=filters)
         found_volumes = client.api.volumes(filters=filters)["Volumes"] or []
     with ThreadPoolExecutor(_AT_ONCE) as pool:

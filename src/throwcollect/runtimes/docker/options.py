@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import socket
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -29,6 +29,8 @@ DIRECTORY_LABEL = "throwcollect.directory"
 VERSION_LABEL = "throwcollect.version"
 KEY_LABEL = "throwcollect.key"
 """Marks the volume that holds the key of a run."""
+JOINED_LABEL = "throwcollect.joined"
+"""Names the run that a container has joined which is no node of it; it ends with that."""
 LOG_LABEL = "throwcollect.log-offset"
 """Size of a node's log file when this container began to write to it [bytes]."""
 
@@ -38,7 +40,7 @@ DATA = "/data"
 KEY = RunKey(Path("/key"))
 """The key of the run, as nodes see it."""
 
-_API_VERSION = "1.41"
+API_VERSION = "1.41"
 _PIDS = 512
 _TMPFS = "rw,noexec,nosuid,size=64m"
 _LOG_SIZE = {"max-size": "10m", "max-file": "2"}
@@ -120,10 +122,15 @@ def published(config: Config) -> bool:
     return bool(config.run.router_port or any(node.ports for node in each))
 
 
-def confine(place: RunPlace, config: Config) -> dict[str, Any]:
-    """Keywords for `containers.create` that every container of a run gets: it can do little but compute."""
+def confine(place: RunPlace, image: str) -> dict[str, Any]:
+    """Keywords for `containers.create` that every container of a run gets: it can do little but compute.
+
+    Args:
+        place: The run.
+        image: The container's image.
+    """
     return {
-        "image": image(config),
+        "image": image,
         "labels": place.labels(),
         "environment": {"HOME": "/tmp"},  # noqa: S108 - the one place in the container that can be written
         "user": f"{os.getuid()}:{os.getgid()}",
@@ -151,38 +158,64 @@ def node_options(
         address: Its address in the run's network; None for any.
     """
     section = section_of(config, node.name)
-    options: dict[str, Any] = dict(section.options)
-    general = confine(place, config)
     own = {
         **node_environment(Connection(router_endpoint(config, middleware), KEY, config.run.domain_id, middleware)),
         # What nodes would say otherwise, a random id and /data, means nothing outside of the container.
         HOST_VARIABLE: socket.gethostname(),
         DIRECTORY_VARIABLE: "" if place.in_volume else place.source,
+        "THROWCOLLECT_NODE": node.name,
     }
-    wanted = {key: str(value) for key, value in section.environment.items()}
-    ports = {port: (LOOPBACK, host_port) for port, host_port in section.ports.items()}
-    if node.name == ROUTER and config.run.router_port:
-        ports[f"{ROUTER_PORT}/tcp"] = (LOOPBACK, config.run.router_port)
     mounts = [place.key_mount(read_only=True)]
     if node.name != ROUTER:
         mounts.append(place.mount(read_only=node.name != COORDINATOR))
+    options = container_options(place, image(config), node.name, section, environment=own, mounts=mounts)
+    if node.name == ROUTER and config.run.router_port:
+        options["ports"][f"{ROUTER_PORT}/tcp"] = (LOOPBACK, config.run.router_port)
+    return {
+        **options,
+        "command": list(node.arguments),
+        "network": place.network,
+        "networking_config": {place.network: EndpointConfig(API_VERSION, aliases=[node.name], ipv4_address=address)},
+        "cpuset_cpus": section.cpuset or (None if node.core is None else str(node.core)),
+    }
+
+
+def container_options(
+    place: RunPlace,
+    image: str,
+    node: str,
+    section: NodeContainerConfig,
+    *,
+    environment: Mapping[str, str],
+    mounts: Sequence[Mount],
+) -> dict[str, Any]:
+    """Keywords for `containers.create` that a container of a run gets, whatever it runs.
+
+    Args:
+        place: The run.
+        image: The container's image.
+        node: Name of the node that it is.
+        section: What the operator says of it.
+        environment: Environment variables that it needs.
+        mounts: Mounts that it needs.
+    """
+    general = confine(place, image)
+    options: dict[str, Any] = dict(section.options)
+    wanted = {key: str(value) for key, value in section.environment.items()}
     return {
         **general,
         **options,
-        "command": list(node.arguments),
-        "name": place.container(node.name),
-        "labels": {**options.get("labels", {}), **place.labels(node.name)},
-        "environment": {**general["environment"], **own, **wanted, "THROWCOLLECT_NODE": node.name},
+        "name": place.container(node),
+        "labels": {**options.get("labels", {}), **place.labels(node)},
+        "environment": {**general["environment"], **environment, **wanted},
         "tmpfs": _with_tmpfs(general["tmpfs"], options.get("tmpfs", {})),
         "ulimits": [Ulimit(name=key, soft=value, hard=value) for key, value in options.get("ulimits", {}).items()],
         "mounts": [*mounts, *map(_bind, section.mounts)],
-        "network": place.network,
-        "networking_config": {place.network: EndpointConfig(_API_VERSION, aliases=[node.name], ipv4_address=address)},
-        "ports": ports,
+        "ports": {port: (LOOPBACK, host_port) for port, host_port in section.ports.items()},
         "nano_cpus": None if section.cpus is None else round(section.cpus * 10**9),
         "mem_limit": section.memory,
         "memswap_limit": section.memory,
-        "cpuset_cpus": section.cpuset or (None if node.core is None else str(node.core)),
+        "cpuset_cpus": section.cpuset,
     }
 
 

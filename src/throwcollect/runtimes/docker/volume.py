@@ -20,7 +20,7 @@ from throwcollect.dataset.summary import Info
 from throwcollect.errors import DatasetError
 from throwcollect.run_key import RunKey
 from throwcollect.runtimes.docker.engine import ENGINE_ERRORS, engine_errors
-from throwcollect.runtimes.docker.options import DATA, KEY, KEY_LABEL, RunPlace, confine
+from throwcollect.runtimes.docker.options import DATA, KEY, KEY_LABEL, RunPlace, confine, image
 
 _IN_MEMORY = 16 * 1024**2
 _INFO_S = 120
@@ -120,7 +120,9 @@ def _single(
     client: DockerClient, place: RunPlace, config: Config, command: list[str], mount: Mount
 ) -> Iterator[Container]:
     """A container of the run that is no node of it, without a network; removed at the end."""
-    container = client.containers.create(**confine(place, config), command=command, mounts=[mount], network_mode="none")
+    container = client.containers.create(
+        **confine(place, image(config)), command=command, mounts=[mount], network_mode="none"
+    )
     try:
         yield container
     finally:

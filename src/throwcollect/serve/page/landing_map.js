@@ -1,7 +1,7 @@
 /** The landing map: where throws have landed, seen from above; the robot stands at the origin and throws upwards. */
 
 import { get, make, setText } from "./dom.js";
-import { colorOf } from "./outcomes.js";
+import { TARGET_COLOR, colorOf } from "./outcomes.js";
 
 const DOT_PX = 2.5;
 const MARGIN_PX = 26;
@@ -18,9 +18,15 @@ export class LandingMap {
   #target = null;
   /** @type {import("./throws.js").Throw | null} */
   #newest = null;
+  /** @type {number[] | null} */
+  #chosen = null;
+  /** Grows with each change. */
+  revision = 0;
 
-  constructor() {
+  /** @param {(x: number, y: number) => void} choose is told of a place on the ground that was clicked [m], frame world */
+  constructor(choose) {
     this.canvas = get("map");
+    this.canvas.addEventListener("click", ({ offsetX, offsetY }) => choose(...this.#frame(this.canvas.clientWidth, this.canvas.clientHeight).from(offsetX, offsetY)));
     new ResizeObserver(() => this.#draw()).observe(this.canvas);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.#draw());
   }
@@ -46,6 +52,12 @@ export class LandingMap {
   aim(distances) {
     this.#target = distances;
     this.#tell();
+    this.#draw();
+  }
+
+  /** @param {number[] | null} place that a target was set at [m], frame world; null if there is none */
+  choose(place) {
+    this.#chosen = place;
     this.#draw();
   }
 
@@ -87,21 +99,45 @@ export class LandingMap {
   }
 
   #draw() {
+    this.revision += 1;
     const { canvas } = this;
     const [width, height] = [canvas.clientWidth, canvas.clientHeight];
-    if (!width || !height) return;
-    const ratio = Math.min(devicePixelRatio, 2);
+    if (width && height) this.paint(canvas, width, height, Math.min(devicePixelRatio, 2));
+  }
+
+  /** How places on the ground lie in a picture. World's x points up there, and its y to the left. */
+  #frame(width, height) {
+    const placed = this.#placed();
+    const [chosenX, chosenY] = this.#chosen ?? [0, 0];
+    // The robot is always in the picture.
+    const [x0, x1] = range([...placed.map(([x]) => x), -0.2, 1, this.#target?.[1] ?? 1, chosenX]);
+    const [y0, y1] = range([...placed.map(([, y]) => y), -0.5, 0.5, chosenY]);
+    const scale = Math.min((width - 2 * MARGIN_PX) / (y1 - y0), (height - 2 * MARGIN_PX) / (x1 - x0));
+    const [x, y] = [(x0 + x1) / 2, (y0 + y1) / 2];
+    return {
+      scale,
+      centre: [x, y],
+      at: (atX, atY) => [width / 2 - (atY - y) * scale, height / 2 - (atX - x) * scale],
+      from: (right, down) => [x - (down - height / 2) / scale, y - (right - width / 2) / scale],
+    };
+  }
+
+  /**
+   * Draw the map into a canvas.
+   * @param {HTMLCanvasElement} canvas
+   * @param {number} width of the picture
+   * @param {number} height
+   * @param {number} ratio pixels of the canvas for each of the picture
+   * @returns {{centre: number[], scale: number}} place in the middle [m], and units of the picture for each metre
+   */
+  paint(canvas, width, height, ratio) {
     canvas.width = width * ratio;
     canvas.height = height * ratio;
     const pen = canvas.getContext("2d");
     pen.scale(ratio, ratio);
-    const style = getComputedStyle(canvas);
+    const style = getComputedStyle(this.canvas);
     const placed = this.#placed();
-    // The robot is always in the picture. World's x points up here, and its y to the left.
-    const [x0, x1] = range([...placed.map(([x]) => x), -0.2, 1, this.#target?.[1] ?? 1]);
-    const [y0, y1] = range([...placed.map(([, y]) => y), -0.5, 0.5]);
-    const scale = Math.min((width - 2 * MARGIN_PX) / (y1 - y0), (height - 2 * MARGIN_PX) / (x1 - x0));
-    const at = (x, y) => [width / 2 - (y - (y0 + y1) / 2) * scale, height / 2 - (x - (x0 + x1) / 2) * scale];
+    const { at, scale, centre } = this.#frame(width, height);
     drawGrid(pen, style, at, scale, { width, height });
     drawRobot(pen, style, at, scale);
     if (this.#target) drawTarget(pen, style, at, scale, this.#target);
@@ -120,6 +156,8 @@ export class LandingMap {
       pen.arc(...at(this.#newest.landing[0], this.#newest.landing[1]), 3 * DOT_PX, 0, 7);
       pen.stroke();
     }
+    if (this.#chosen) drawChosen(pen, at(this.#chosen[0], this.#chosen[1]));
+    return { centre, scale };
   }
 }
 
@@ -176,6 +214,16 @@ function drawTarget(pen, style, at, scale, distances) {
     pen.stroke();
   }
   pen.setLineDash([]);
+}
+
+function drawChosen(pen, [x, y]) {
+  pen.strokeStyle = TARGET_COLOR;
+  pen.lineWidth = 2;
+  pen.beginPath();
+  pen.arc(x, y, 2.5 * DOT_PX, 0, 7);
+  pen.stroke();
+  stroke(pen, [x - 5 * DOT_PX, y], [x + 5 * DOT_PX, y]);
+  stroke(pen, [x, y - 5 * DOT_PX], [x, y + 5 * DOT_PX]);
 }
 
 function drawRobot(pen, style, at, scale) {

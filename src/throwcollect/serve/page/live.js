@@ -30,6 +30,8 @@ export class Live {
   /** Sockets that hold simulations at real time for as long as they are open. */
   #holds = new Map();
   #wanted = false;
+  /** @type {(text: string) => void} is told why something that was published is not heard */
+  refused = () => {};
   #instance = null;
   #alone = "";
 
@@ -73,6 +75,18 @@ export class Live {
     return this.#moments.get(simulation) ?? [];
   }
 
+  /**
+   * Publish a message in the run that is watched.
+   * @param {string} topic
+   * @param {string} type
+   * @param {object} message
+   * @throws {Error} if the run does not live, or there is no connection
+   */
+  publish(topic, type, message) {
+    if (this.#bridge === null) throw new Error("no simulation runs that could hear it");
+    this.#bridge.publish(topic, type, message);
+  }
+
   #follow() {
     const instance = this.#instance;
     const isSeen = Boolean(instance) && lives(instance) && instance.robots.length > 0 && !document.hidden;
@@ -105,6 +119,7 @@ export class Live {
       this.#bridge = new Rosbridge(this.connection, run, {
         lost: () => this.simulations.size && this.tell("live: the connection to the run is lost; trying again"),
         opened: () => this.simulations.size && this.tell(""),
+        refused: (text) => this.refused(text),
       });
     }
   }

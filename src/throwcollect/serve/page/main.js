@@ -9,8 +9,10 @@ import { Live } from "./live.js";
 import { Playback } from "./playback.js";
 import { Plots } from "./plots.js";
 import { Meshes } from "./robot.js";
+import { Room } from "./room.js";
 import { View } from "./scene.js";
-import { Store, inOrder, lives } from "./state.js";
+import { Store, inOrder, lives, steps } from "./state.js";
+import { Target } from "./target.js";
 import { Watching } from "./watching.js";
 
 /** Simulations in a grid; more are on further pages of it. */
@@ -51,13 +53,12 @@ class Page {
   #store = new Store();
   #first = 0;
   #before = 0;
-  #frames = 0;
 
   /** @param {string} token */
   constructor(token) {
     this.connection = new Connection(token);
     this.view = new View(get("canvas"));
-    this.map = new LandingMap();
+    this.map = new LandingMap((x, y) => this.target.setOnGround(x, y));
     this.playback = new Playback((shown) => this.watching.begin(shown));
     const fetchMesh = async (path) => (await this.connection.ask("GET", `/meshes/${path}`)).arrayBuffer();
     this.meshes = new Meshes(fetchMesh);
@@ -67,7 +68,10 @@ class Page {
     this.live = new Live({ connection, view, watching: this.watching, tell });
     this.plots = new Plots({ view, playback, live: this.live });
     this.watching.described = (simulation, urdf) => this.plots.bind(simulation, urdf);
-    this.controls = new Controls(connection, (id) => this.#watch(id));
+    const watch = (id) => this.#watch(id);
+    this.target = new Target({ connection, view, map, live: this.live, watch });
+    this.room = new Room({ view, map, target: this.target, plots: this.plots, tell, advance: (seconds) => this.#advance(seconds), facts: () => this.#facts() });
+    this.controls = new Controls(connection, watch);
     if (matchMedia("(prefers-reduced-motion: reduce)").matches) this.playback.playing = false;
     this.#store.listen((state) => this.#put(state));
     this.#listen();
@@ -104,6 +108,7 @@ class Page {
 
   #put(state) {
     this.controls.put(state);
+    this.target.put(state);
     const ids = state.instances.filter((each) => lives(each) || each.id === this.watching.id).map(({ id }) => id);
     const wanted = get("watched").value;
     setChoices(get("watched"), [...ids.map((id) => [id, id]), ...(ids.length ? [] : [["", "none"]])]);
@@ -125,6 +130,7 @@ class Page {
     this.watching.put(instance);
     if (instance && !lives(instance) && this.view.shown.length) this.tell(`${instance.id} has ended; its last throws are replayed`);
     get("map-box").hidden = instance?.kind !== "collection";
+    get("target-box").hidden = !instance;
     const names = this.#names(instance);
     setChoices(get("alone"), [["", "all"], ...names.map((name) => [name, name])]);
     this.#show();
@@ -234,14 +240,31 @@ class Page {
   #frame(now) {
     requestAnimationFrame((next) => this.#frame(next));
     const since = now - this.#before;
-    if (since < 1000 / RATE_HZ - 4) return;
+    // As long as a room is seen, the device says when it wants a picture.
+    if (since < 1000 / RATE_HZ - 4 || this.room.isEntered) return;
     this.#before = now;
-    this.playback.step(since / 1000);
-    this.watching.pose(this.live.simulations);
+    this.#advance(since / 1000);
     this.view.draw(since);
+  }
+
+  #advance(seconds) {
+    this.playback.step(seconds);
+    this.watching.pose(this.live.simulations);
     this.plots.draw();
-    this.#frames += 1;
     this.#showTransport();
+  }
+
+  /** What is going on, for where the page cannot be seen. */
+  #facts() {
+    const { instance } = this.watching;
+    const place = get("connection");
+    const throw_ = get("transport").hidden ? "" : get("time").value;
+    return {
+      title: instance ? `${instance.id}, ${instance.status}` : "nothing runs",
+      progress: instance?.progress ? steps(instance.progress) : null,
+      outcomes: instance?.progress?.outcomes ?? {},
+      lines: [throw_, throw_ && get("values").textContent, this.target.note, get("view-note").textContent, place.dataset.kind === "lost" ? place.textContent : ""],
+    };
   }
 
   #showTransport() {
@@ -257,7 +280,13 @@ class Page {
     const { shown, time } = at;
     get("time").value = `${time.toFixed(2)} of ${shown.duration.toFixed(2)} s, trial ${shown.trial}, ${shown.outcome}`;
     scrub.setAttribute("aria-valuetext", `${time.toFixed(2)} seconds`);
+    setText(get("values"), inWords(shown.values));
   }
+}
+
+/** Swept values, with keys as short as tell them. */
+function inWords(values) {
+  return Object.entries(values).map(([key, value]) => `${key.replace(/^(task|ball|scene)\./, "")} ${Number(value.toPrecision(4))}`).join(", ");
 }
 
 function emptiness(instance) {

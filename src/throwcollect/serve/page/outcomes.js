@@ -1,5 +1,8 @@
 /** Colours of outcomes, told apart in the dark, in the light and by most eyes that see few colours. */
 
+/** Of the place that is aimed at. */
+export const TARGET_COLOR = "#d6246e";
+
 const COLORS = {
   landed: "#1f9e77",
   dropped: "#d95f02",

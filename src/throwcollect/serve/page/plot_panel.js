@@ -17,6 +17,7 @@ const MOST_GAP = 0.08;
 export class PlotPanel {
   #shown = null;
   #live = false;
+  #time = 0;
   #last = -1;
   #zoomed = null;
   #told = 0;
@@ -37,7 +38,8 @@ export class PlotPanel {
       return made;
     };
     this.now = make("output", { className: "now" });
-    this.collapser = button("–", "collapse", () => this.#collapse());
+    this.title = title;
+    this.collapser = button("–", "collapse", () => this.collapse());
     this.follower = button("⚓", "dock", () => this.#place(!this.follows));
     const head = make("div", { className: "plot-head" }, make("strong", {}, title), this.now,
       button("+", "zoom in", () => this.#zoom(0.5)), button("−", "zoom out", () => this.#zoom(2)),
@@ -90,6 +92,16 @@ export class PlotPanel {
     return { x1, y1, x2: at.x, y2: at.y };
   }
 
+  /**
+   * What it shows: its number of now, its curve unless it is collapsed, and how far from the left of that now is [px].
+   * @returns {{title: string, now: string, canvas: HTMLCanvasElement | null, at: number | null}}
+   */
+  get picture() {
+    const isClosed = this.element.classList.contains("collapsed");
+    const at = this.#live || !this.#y.length ? null : this.#plot.valToPos(this.#time, "x", true);
+    return { title: this.title, now: this.now.value, canvas: isClosed ? null : this.#plot.ctx.canvas, at };
+  }
+
   #plot;
 
   #drawThrow({ shown, time }) {
@@ -105,6 +117,7 @@ export class PlotPanel {
     }
     if (!this.#y.length) return;
     this.line.hidden = false;
+    this.#time = time;
     this.line.style.transform = `translateX(${this.#plot.valToPos(time, "x").toFixed(1)}px)`;
     this.#say(this.#y[Math.min(this.#y.length - 1, Math.round(time * shown.rate_hz))]);
   }
@@ -154,7 +167,8 @@ export class PlotPanel {
     this.#show(this.#zoomed);
   }
 
-  #collapse() {
+  /** Show its head alone, or all of it again. */
+  collapse() {
     const isClosed = this.element.classList.toggle("collapsed");
     setText(this.collapser, isClosed ? "□" : "–");
     this.collapser.setAttribute("aria-expanded", String(!isClosed));

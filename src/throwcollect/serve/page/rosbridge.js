@@ -1,4 +1,4 @@
-/** A small client of rosbridge v2: topics that are heard, services that are called. */
+/** A small client of rosbridge v2: topics that are heard and published, services that are called. */
 
 const PERIOD_MS = 33;
 
@@ -6,6 +6,7 @@ const PERIOD_MS = 33;
 export class Rosbridge {
   #socket;
   #topics = new Map();
+  #advertised = new Map();
   #calls = new Map();
   #count = 0;
   #open = false;
@@ -13,16 +14,20 @@ export class Rosbridge {
   /**
    * @param {import("./connection.js").Connection} connection
    * @param {string} run id of the run
-   * @param {{opened?: () => void, lost?: () => void}} events
+   * @param {object} events
+   * @param {() => void} [events.opened]
+   * @param {() => void} [events.lost]
+   * @param {(text: string) => void} [events.refused] is told why something was not published
    */
   constructor(connection, run, events = {}) {
     this.#socket = connection.openRosbridge(run, {
       opened: () => {
         this.#open = true;
         for (const [topic, { type }] of this.#topics) this.#ask(topic, type);
+        for (const [topic, type] of this.#advertised) this.#announce(topic, type);
         events.opened?.();
       },
-      receive: (text) => this.#take(JSON.parse(text)),
+      receive: (text) => this.#take(JSON.parse(text), events),
       lost: () => {
         this.#open = false;
         for (const { reject } of this.#calls.values()) reject(new Error("the connection to the run is lost"));
@@ -63,8 +68,28 @@ export class Rosbridge {
     return answer;
   }
 
+  /**
+   * Publish a message; whoever joins late hears the last one. What the bridge refuses is told as an event.
+   * @param {string} topic
+   * @param {string} type such as geometry_msgs/msg/PointStamped
+   * @param {object} message a stamp that it lacks is the present time
+   * @throws {Error} if there is no connection
+   */
+  publish(topic, type, message) {
+    if (!this.#open) throw new Error("there is no connection to the run");
+    if (!this.#advertised.has(topic)) {
+      this.#advertised.set(topic, type);
+      this.#announce(topic, type);
+    }
+    this.#send({ op: "publish", id: `publish-${topic}`, topic, msg: message });
+  }
+
   close() {
     this.#socket.close();
+  }
+
+  #announce(topic, type) {
+    this.#send({ op: "advertise", id: `publish-${topic}`, topic, type, latch: true, queue_size: 1 });
   }
 
   #ask(topic, type) {
@@ -75,7 +100,8 @@ export class Rosbridge {
     this.#socket.send(JSON.stringify(message));
   }
 
-  #take(message) {
+  #take(message, { refused }) {
+    if (message.op === "status" && message.level === "error" && message.id?.startsWith("publish-")) refused?.(message.msg);
     if (message.op === "publish") this.#topics.get(message.topic)?.hear(message.msg);
     if (message.op !== "service_response") return;
     const call = this.#calls.get(message.id);

@@ -1,10 +1,11 @@
-/** The three-dimensional view: one tile a simulation, all seen from the same side. */
+/** The three-dimensional view: one tile a simulation, all seen from the same side; or all of them in a room. */
 
 import {
   Color, DirectionalLight, GridHelper, Group, HemisphereLight, Mesh, MeshLambertMaterial, PerspectiveCamera, Scene,
   SphereGeometry, Vector3, WebGLRenderer,
 } from "./vendor/three/build/three.module.js";
 import { OrbitControls } from "./vendor/three/examples/jsm/controls/OrbitControls.js";
+import { makeMarker } from "./marker.js";
 import { Trails } from "./trails.js";
 
 const BALL_COLOR = "#ff7300";
@@ -17,6 +18,8 @@ const ZOOM = 1.15;
 const MOST_FINE = 1;
 /** A picture that takes longer than this on average [ms] is drawn with less. */
 const SLOW_MS = 70;
+/** How far robots stand from each other in a room. */
+const SPACING_M = 1.5;
 
 /** One simulation in the view. */
 export class Station {
@@ -28,7 +31,9 @@ export class Station {
   constructor() {
     this.ball = new Mesh(new SphereGeometry(BALL_RADIUS_M, 20, 14), new MeshLambertMaterial({ color: BALL_COLOR }));
     this.ball.visible = false;
-    this.group.add(this.ball, this.trails.object);
+    this.target = makeMarker();
+    this.target.visible = false;
+    this.group.add(this.ball, this.trails.object, this.target);
   }
 
   /** @param {import("./robot.js").Robot} robot takes the place of the one before, in its posture */
@@ -47,6 +52,12 @@ export class Station {
     this.ball.position.fromArray(place);
   }
 
+  /** @param {number[] | null} place that is aimed at [m], frame world; null if none is */
+  setTarget(place) {
+    this.target.visible = place !== null;
+    if (place) this.target.position.fromArray(place);
+  }
+
   dispose() {
     this.trails.clear();
     this.robot?.dispose();
@@ -62,6 +73,13 @@ export class View {
   stations = new Map();
   /** @type {string[]} names of the stations that are shown, in order */
   shown = [];
+  /** What has its place in the frame world, which lies elsewhere as long as it is seen in a room. */
+  world = new Group();
+  /** What has its place in the room, while there is one. */
+  room = new Group();
+  /** @type {number[] | null} */
+  #target = null;
+  #isInRoom = false;
   #scene = new Scene();
   #camera = new PerspectiveCamera(38, 1, 0.05, 60);
   #width = 1;
@@ -88,7 +106,8 @@ export class View {
     this.reset();
     const light = new DirectionalLight("#ffffff", 2);
     light.position.set(3, -2, 5);
-    this.#scene.add(new HemisphereLight("#ffffff", "#777777", 1.6), light);
+    this.world.add(light, light.target);
+    this.#scene.add(new HemisphereLight("#ffffff", "#777777", 1.6), this.world, this.room);
     this.#scene.matrixWorldAutoUpdate = false;
     new ResizeObserver(() => this.#resize()).observe(canvas.parentElement);
     const dark = matchMedia("(prefers-color-scheme: dark)");
@@ -135,8 +154,9 @@ export class View {
     for (const name of names) {
       if (this.stations.has(name)) continue;
       const station = new Station();
+      station.setTarget(this.#target);
       this.stations.set(name, station);
-      this.#scene.add(station.group);
+      this.world.add(station.group);
     }
     this.#arrange();
   }
@@ -147,6 +167,59 @@ export class View {
     this.stations.clear();
     this.shown = [];
     this.touch();
+  }
+
+  /** @param {number[] | null} place that is aimed at [m], frame world; null if none is */
+  setTarget(place) {
+    this.#target = place;
+    for (const station of this.stations.values()) station.setTarget(place);
+    this.touch();
+  }
+
+  /** Have everything ready to be drawn into a room. */
+  enterRoom() {
+    this.#isInRoom = true;
+    this.renderer.xr.enabled = true;
+    this.renderer.setScissorTest(false);
+    this.#paint();
+  }
+
+  /**
+   * Draw all that is shown, side by side, into a room.
+   * @param {PerspectiveCamera} camera whose place and projections are those of the eyes
+   */
+  drawRoom(camera) {
+    this.#choose();
+    for (const [name, { group }] of this.stations) {
+      const at = this.shown.indexOf(name);
+      group.visible = at >= 0;
+      group.position.y = at * SPACING_M;
+    }
+    this.#scene.updateMatrixWorld();
+    this.renderer.render(this.#scene, camera);
+  }
+
+  /**
+   * @param {Vector3} place in the room [m]; is changed
+   * @returns {Vector3} the same in the frame world of the robot that stands nearest
+   */
+  toWorld(place) {
+    this.world.worldToLocal(place);
+    place.y -= Math.min(Math.max(Math.round(place.y / SPACING_M), 0), Math.max(this.shown.length - 1, 0)) * SPACING_M;
+    return place;
+  }
+
+  /** Have everything as it was before the room. */
+  leaveRoom() {
+    this.#isInRoom = false;
+    this.renderer.xr.enabled = false;
+    this.room.clear();
+    for (const { group } of this.stations.values()) group.position.y = 0;
+    this.world.position.set(0, 0, 0);
+    this.world.quaternion.identity();
+    this.world.visible = true;
+    this.#paint();
+    this.#resize();
   }
 
   /**
@@ -187,12 +260,17 @@ export class View {
     }
     this.#changed = false;
     this.#adapt(sinceMs);
-    const few = this.shown.length <= MOST_FINE && !this.#plain;
-    for (const name of this.shown) this.stations.get(name).robot?.setCoarse(!few);
+    this.#choose();
     this.#scene.updateMatrixWorld();
     this.renderer.setScissorTest(true);
     for (const station of this.stations.values()) station.group.visible = false;
     for (const name of this.shown.length ? this.shown : [""]) this.#drawTile(name);
+  }
+
+  /** Draw robots with all of their triangles if they are few. */
+  #choose() {
+    const few = this.shown.length <= MOST_FINE && !this.#plain;
+    for (const name of this.shown) this.stations.get(name).robot?.setCoarse(!few);
   }
 
   #drawTile(name) {
@@ -219,6 +297,8 @@ export class View {
     const box = this.canvas.parentElement;
     this.#width = Math.max(1, box.clientWidth);
     this.#height = Math.max(1, box.clientHeight);
+    // In a room, the size is that of the device; the page has its own again when that is left.
+    if (this.#isInRoom) return;
     this.renderer.setPixelRatio(this.#plain ? 1 : Math.min(devicePixelRatio, 2));
     this.renderer.setSize(this.#width, this.#height, false);
     this.#arrange();
@@ -242,12 +322,13 @@ export class View {
 
   #paint() {
     const style = getComputedStyle(document.documentElement);
-    this.#scene.background = new Color(style.getPropertyValue("--sky").trim());
+    this.#scene.background = this.#isInRoom ? null : new Color(style.getPropertyValue("--sky").trim());
     this.#grid?.removeFromParent();
     const line = style.getPropertyValue("--grid").trim();
     this.#grid = new GridHelper(16, 32, line, line);
     this.#grid.rotation.x = Math.PI / 2;
-    this.#scene.add(this.#grid);
+    // A room has a floor of its own.
+    if (!this.#isInRoom) this.world.add(this.#grid);
     this.touch();
   }
 

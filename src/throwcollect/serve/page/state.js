@@ -7,6 +7,7 @@
  * @property {"collection" | "session"} kind
  * @property {number} max_instances
  * @property {string[]} instances ids of those that live
+ * @property {string[]} targets keys that a request may set in sweep.target; none if its throws cannot be aimed
  */
 
 /**

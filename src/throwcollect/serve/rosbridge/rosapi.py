@@ -136,7 +136,12 @@ class Rosapi:
 
     def _list_actions(self, _call: Call) -> Values:
         actions = [name for name, _ in _visible(ros.get_action_names_and_types(self._node))]
-        offered = dict(self._node.get_service_names_and_types())
+        # On DDS, services that somebody would call, and nobody offers, have names, too.
+        offered = {
+            service
+            for node in self._node.get_node_names_and_namespaces()
+            for service, _ in self._node.get_service_names_and_types_by_node(*node)
+        }
         return {"action_servers": [name for name in actions if f"{name}/_action/send_goal" in offered]}
 
     def _list_nodes(self, _call: Call) -> Values:

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import itertools
-import os
 from typing import TYPE_CHECKING, Any
 
 from throwcollect import ros
 from throwcollect.errors import ConfigError
 from throwcollect.ros.names import find_interface, full_name
+from throwcollect.ros.own_name import make_own_name
 from throwcollect.serve.rosbridge.feed import Feed, Listener
 
 if TYPE_CHECKING:
     from throwcollect.ros.connection import Connection
-
-
-_numbers = itertools.count()
 
 
 class Session:
@@ -37,7 +33,7 @@ class Session:
         self._context = ros.Context()
         ros.init(context=self._context, connection=connection)
         self.node = ros.Node(
-            f"_throwcollect_bridge_{os.getpid()}_{next(_numbers)}",
+            make_own_name(),
             context=self._context,
             enable_rosout=False,
             start_parameter_services=False,

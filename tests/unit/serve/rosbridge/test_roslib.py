@@ -8,28 +8,21 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from tests.npm import install
 from tests.unit.serve.rosbridge.conftest import wait_for
 from tests.unit.serve.rosbridge.robot import Robot, SetBool
 
 from throwcollect.ros import Node
 
 HERE = Path(__file__).parent
-PACKAGES = ("roslib@2.1.0",)
-_INSTALLED = HERE.parents[3] / "build" / "roslib-2.1.0"
 
 
 @pytest.fixture(scope="module")
 def program() -> Path:
-    """The program beside roslib, which is installed once on a machine."""
-    if shutil.which("node") is None or shutil.which("npm") is None:
+    """The program beside roslib."""
+    if shutil.which("node") is None:
         pytest.skip("there is no Node.js")
-    if not (_INSTALLED / "node_modules" / "roslib").is_dir():
-        _INSTALLED.mkdir(parents=True, exist_ok=True)
-        command = ["npm", "install", "--no-audit", "--no-fund", "--prefix", str(_INSTALLED), *PACKAGES]
-        found = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
-        if found.returncode:
-            pytest.skip(f"roslib cannot be installed: {found.stderr.strip().splitlines()[-1:]}")
-    return Path(shutil.copy(HERE / "roslib_client.mjs", _INSTALLED))
+    return Path(shutil.copy(HERE / "roslib_client.mjs", install("roslib", "2.1.0")))
 
 
 def test_roslib_hears_speaks_calls_offers_and_sends_goals(program: Path, url: str, node: Node) -> None:

@@ -149,6 +149,24 @@ def test_what_waits_in_a_queue_comes_at_even_times_however_late_each_is(monkeypa
     assert [time_s for _, time_s in sent[1:]] == pytest.approx([100.005 + 0.03 * number for number in range(1, 20)])
 
 
+def test_of_50_a_second_a_plot_that_wants_30_gets_30(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = 100.0
+    monkeypatch.setattr(subscriptions, "time", SimpleNamespace(monotonic=lambda: now))
+    waiting: list[tuple[float, Callable[[], None]]] = []
+    sent: list[float] = []
+    pace = Pace(lambda _: sent.append(now), lambda seconds, action: waiting.append((now + seconds, action)))
+    pace.change(Wish(throttle_s=0.033, queue_length=1))
+    sample: Any = "sample"
+    for number in range(60 * 50):
+        arrives = 100.0 + number * 0.02
+        while waiting and waiting[0][0] <= arrives:
+            now, action = waiting.pop(0)
+            action()
+        now = arrives
+        pace.offer(sample)
+    assert len(sent) == pytest.approx(1800, abs=60)
+
+
 def test_a_message_comes_in_parts_that_are_no_longer_than_wanted(party: Party, node: Node) -> None:
     say = words(node)
     party.ask(op="subscribe", topic="/words", type="std_msgs/String", fragment_size=100)

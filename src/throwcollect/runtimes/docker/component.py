@@ -1,0 +1,259 @@
+"""A container that is an instance of a component, and no node of a run; it may join one."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass
+from typing import Any
+
+from docker.client import DockerClient
+from docker.types import EndpointConfig, Mount
+
+from throwcollect.config.container_spec import ContainerSpec
+from throwcollect.errors import ConfigError, WorkerError
+from throwcollect.ros.connection import Connection
+from throwcollect.ros.middleware import RMW_VARIABLE
+from throwcollect.run_key import RunKey
+from throwcollect.runtimes.docker.checks import check_container
+from throwcollect.runtimes.docker.clock import EngineClock
+from throwcollect.runtimes.docker.containers import LOG_S, SILENCE_S, end_in_words
+from throwcollect.runtimes.docker.engine import ENGINE_ERRORS, connect, engine_address, is_local
+from throwcollect.runtimes.docker.node_container import NodeContainer
+from throwcollect.runtimes.docker.options import (
+    API_VERSION,
+    JOINED_LABEL,
+    KEY,
+    ROUTER_PORT,
+    RunPlace,
+    container_options,
+)
+from throwcollect.runtimes.docker.watch import EngineWatch
+from throwcollect.runtimes.node_logs import NodeLogs
+from throwcollect.runtimes.nodes import ROUTER
+from throwcollect.runtimes.runtime import NodeState, Place, Session
+from throwcollect.wording import command
+
+CONTAINER = "container"
+"""Name of the only node of such an instance."""
+_POLL_S = 0.1
+_GRACE_S = 3
+_OVER_S = 3.0
+"""A run that ends cuts whoever has joined it off before it says so."""
+
+
+@dataclass(frozen=True)
+class Way:
+    """How a container gets into the ROS graph of a run.
+
+    Attributes:
+        run: Id of the run.
+        environment: Environment variables by which it joins.
+        key: The run's key, as a mount.
+        network: Network of the engine that has the router; None for that of this machine.
+    """
+
+    run: str
+    environment: Mapping[str, str]
+    key: Mount
+    network: str | None
+
+
+def find_way(run: str, runtime: str, connection: Connection, spec: ContainerSpec) -> Way:
+    """The way for a container into a run.
+
+    Args:
+        run: Id of the run.
+        runtime: Name of its runtime.
+        connection: The way for processes of this machine.
+        spec: What the container is made from.
+
+    Raises:
+        ConfigError: If there is none.
+    """
+    if connection.middleware.is_fast_dds:
+        raise ConfigError(
+            f"run {run}: is on Fast DDS, which containers of the catalogue cannot join",
+            hint="run.ros: embedded, or RMW_IMPLEMENTATION=rmw_zenoh_cpp for rclpy",
+        )
+    if runtime == "docker":
+        place = RunPlace(run, "")
+        endpoint = f"{connection.endpoint.partition('/')[0]}/{ROUTER}:{ROUTER_PORT}"
+        return Way(run, _environment(connection, endpoint), place.key_mount(read_only=True), place.network)
+    if not is_local():
+        raise ConfigError(
+            f"run {run}: is of processes of this machine, which containers at {engine_address()} do not see"
+        )
+    if spec.section.ports or spec.section.networks:
+        raise ConfigError(
+            f"run {run}: is of processes, so a container that joins it has this machine's network, and no other",
+            expected="a component without ports and networks",
+            hint="leave them out in the catalogue, or have the run in containers: run.runtime: docker",
+        )
+    key = Mount(target=str(KEY.directory), source=str(connection.key.directory), type="bind", read_only=True)
+    return Way(run, _environment(connection, connection.endpoint), key, None)
+
+
+def _environment(connection: Connection, endpoint: str) -> Mapping[str, str]:
+    inside = Connection(endpoint, RunKey(KEY.directory), connection.domain_id, connection.middleware)
+    return {**inside.environment(), RMW_VARIABLE: connection.middleware.rmw}
+
+
+class ComponentContainer:
+    """Runs one container until it ends or is told to; see `runtime.Host` for what it offers.
+
+    Args:
+        place: The instance.
+        component: Name of its component.
+        spec: What the container is made from.
+        way: How it joins a run; None if it does not.
+        goes_on: Asked again and again whether that run goes on.
+        warn: Is told in one line when the engine keeps everybody waiting.
+
+    Raises:
+        ConfigError: If something that the catalogue asks for is not there.
+        WorkerError: If no engine answers, or it does not have the image.
+    """
+
+    def __init__(
+        self,
+        place: Place,
+        component: str,
+        spec: ContainerSpec,
+        way: Way | None,
+        *,
+        goes_on: Callable[[], bool],
+        warn: Callable[[str], None],
+    ) -> None:
+        self.cleared = False
+        self._spec = spec
+        self._way = way
+        self._goes_on = goes_on
+        self._place = RunPlace(place.run, str(place.directory))
+        self._logs = NodeLogs(place.logs)
+        self._watch: EngineWatch | None = None
+        with ExitStack() as undo:
+            self._clock = EngineClock(warn)
+            undo.callback(self._clock.close)
+            self._client: DockerClient = connect(timeout_s=SILENCE_S)
+            self._clock.attend(self._client)
+            check_container(self._client, spec, component)
+            undo.pop_all()
+        self._container = NodeContainer(self._client, CONTAINER, self._logs.path(CONTAINER), self._clock)
+
+    def collect(self, session: Session) -> None:
+        """Run the container until it ends by itself, is told to, or the run that it has joined ends; then close.
+
+        Raises:
+            WorkerError: If it cannot be started, ends with an error, or the engine does not answer any more.
+        """
+        try:
+            self._watch = EngineWatch(self._client, self._place, self._clock)
+            session.event("started")
+            self._container.start(self._options(), networks=self._networks[1:])
+            while not session.interruptions():
+                session.nodes([self._look()], endpoint=None, simulations=0)
+                if self._has_ended(session):
+                    return
+                time.sleep(_POLL_S)
+            session.event("stopping")
+        finally:
+            self.close()
+
+    def close(self) -> None:
+        """End the container, and remove it; what an engine that is silent, or refuses, keeps is left there."""
+        self._container.renounce()
+        while not self._silent and self._watch is not None and not self._container.wait_begun(_POLL_S):
+            pass
+        handle = self._container.handle
+        try:
+            if handle is not None:
+                # It may be gone already.
+                with suppress(*ENGINE_ERRORS):
+                    self._client.api.stop(handle, timeout=_GRACE_S)
+                    self._container.wait_log(LOG_S)
+                    self._client.api.remove_container(handle, v=True, force=True)
+            with suppress(*ENGINE_ERRORS):
+                name = f"^/{self._place.container(CONTAINER)}$"
+                self.cleared = not self._client.api.containers(all=True, filters={"name": name})
+        finally:
+            if self._watch is not None:
+                self._watch.close()
+            self._container.close()
+            self._clock.close()
+            self._clock.ignore(self._client)
+
+    @property
+    def _silent(self) -> bool:
+        return self._clock.silent_s >= SILENCE_S
+
+    @property
+    def _networks(self) -> list[str]:
+        """Networks of the engine that it joins; none for that of this machine, or the engine's usual one."""
+        own = [self._way.network] if self._way is not None and self._way.network is not None else []
+        # Ports are published from a network with a way out alone, which that of a run may not have.
+        out = ["bridge"] if own and self._spec.section.ports and not self._spec.section.networks else []
+        return [*out, *self._spec.section.networks, *own]
+
+    def _options(self) -> dict[str, Any]:
+        way, spec = self._way, self._spec
+        options = container_options(
+            self._place,
+            spec.image,
+            CONTAINER,
+            spec.section,
+            environment={} if way is None else way.environment,
+            mounts=[] if way is None else [way.key],
+        )
+        if spec.command is not None:
+            options["command"] = list(spec.command)
+        if way is not None:
+            options["labels"] |= {JOINED_LABEL: way.run}
+        if way is not None and way.network is None:
+            options["network_mode"] = "host"
+            del options["ports"]
+        elif self._networks:
+            first = self._networks[0]
+            options["network"] = first
+            options["networking_config"] = {first: EndpointConfig(API_VERSION)}
+        return options
+
+    def _look(self) -> NodeState:
+        handle = self._container.handle
+        state = self._watch.state(handle) if self._watch is not None else None
+        if handle is None:
+            return NodeState(CONTAINER, "starting", 0, None, None)
+        frozen = state is not None and state.status == "paused"
+        return NodeState(CONTAINER, "frozen" if frozen else "running", 0, handle[:12], None)
+
+    def _has_ended(self, session: Session) -> bool:
+        """Whether the container, or the run that it has joined, has come to an end that is no error.
+
+        Raises:
+            WorkerError: If it ended with one, or could not be started.
+        """
+        container = self._container
+        if self._silent:
+            raise WorkerError(
+                f"the Docker engine has not answered for {self._clock.silent_s:.0f} s",
+                hint=f"once it answers, {command('down', '--run', self._place.run_id)} ends the container",
+            )
+        if container.failure is not None:
+            raise WorkerError(f"the container of {self._spec.image} cannot be started: {container.failure}")
+        state = self._watch.state(container.handle) if self._watch is not None else None
+        if state is not None and state.ended:
+            container.wait_log(LOG_S)
+            deadline = time.monotonic() + _OVER_S
+            while state.code != 0 and self._way is not None and self._goes_on() and time.monotonic() < deadline:
+                time.sleep(_POLL_S)
+            if state.code == 0 or (self._way is not None and not self._goes_on()):
+                return True
+            raise WorkerError(
+                f"the container of {self._spec.image} has ended: {end_in_words(state, self._spec.section.memory)}",
+                evidence=self._logs.tail(CONTAINER) or None,
+            )
+        if self._way is not None and not self._goes_on():
+            session.say(f"run {self._way.run} has ended, and so does the container that had joined it")
+            return True
+        return False

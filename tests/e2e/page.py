@@ -1,0 +1,55 @@
+"""A server with a page, and the page in a browser."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+from tests.e2e.chromium import Tab
+from tests.e2e.collection import command
+from throwcollect.runs.records import Records
+
+CHANGED = "ERR_NETWORK_CHANGED"
+"""What a browser says of requests that it breaks off when containers come and go beside it."""
+
+
+@contextmanager
+def served(catalogue: Path, datasets: Path) -> Iterator[dict[str, Any]]:
+    """Serve a catalogue; gives what `throwcollect serve --json` tells."""
+    options = ("--port", "0", "--datasets", datasets, "--json")
+    with subprocess.Popen(command("serve", catalogue, *options), stdout=subprocess.PIPE, text=True) as server:
+        assert server.stdout is not None
+        try:
+            yield json.loads(server.stdout.readline())
+        finally:
+            server.terminate()
+            # Runs outlive whoever served them.
+            for run in Records().all():
+                if run.lives and datasets in Path(run.record.directory).parents:
+                    os.kill(run.record.launcher, signal.SIGTERM)
+
+
+def load(tab: Tab) -> None:
+    """Wait until the page works; modules that the browser gave up, as a network of the machine changed, come again."""
+    for _ in range(5):
+        with suppress(AssertionError):
+            tab.wait_for("document.querySelector('#components form') !== null", within_s=20)
+            return
+        assert any(CHANGED in error for error in tab.errors), tab.errors
+        tab.ask("Page.reload")
+    raise AssertionError(tab.errors)
+
+
+def press(tab: Tab, button: str) -> None:
+    tab.evaluate(f"document.querySelector('button[aria-label={json.dumps(button)}]').click()")
+
+
+def unexpected(tab: Tab) -> list[str]:
+    """Errors of a page that are its own."""
+    return [error for error in tab.errors if CHANGED not in error]

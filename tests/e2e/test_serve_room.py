@@ -1,0 +1,230 @@
+"""The page in a room: an emulated headset enters, places the robot, sets a target, has it collected for, and leaves."""
+
+from __future__ import annotations
+
+import json
+import math
+import queue
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.e2e.chromium import Tab, browse, chromium
+from tests.e2e.collection import FAST, write_config
+from tests.e2e.page import load, press, served, unexpected
+from tests.npm import install
+from throwcollect import ros
+from throwcollect.config.loader import load as load_config
+from throwcollect.dataset.directory import config_path
+from throwcollect.runs.records import Records
+from throwcollect.runtimes.run_listener import RunListener
+
+pytestmark = [
+    pytest.mark.e2e,
+    pytest.mark.skipif(chromium() is None, reason="needs Chromium: apt-get install chromium"),
+]
+
+_MM = 1e-3
+_CONFIG = """\
+name: small
+trials: {trials}
+sweep:
+  parameters:
+    task.end.arm_right_4_joint: {{min: -0.7, max: -0.4}}
+    task.duration_s: {{min: 1.0, max: 1.2}}
+run: {{runtime: local, replay: 0}}
+"""
+_DEVICE = """
+  window.device = new IWER.XRDevice(IWER.metaQuest3);
+  device.installRuntime({forceInstall: true});
+  window.someFrames = async () => {
+    const { render } = throwcollect.view.renderer.info;
+    const until = render.frame + 4;
+    while (render.frame < until) await new Promise((resolve) => setTimeout(resolve, 20));
+  };
+  window.pull = async () => {
+    for (const value of [1, 0]) {
+      device.controllers.right.updateButtonValue("trigger", value);
+      await someFrames();
+    }
+  };
+"""
+_FLOOR = """
+  device.installSEM(class {
+    environmentCanvas = document.createElement("canvas");
+    trackedPlanes = new Set();
+    trackedMeshes = new Set();
+    render() {}
+    // Where a ray meets the ground, as a matrix.
+    computeHitTestResults(ray) {
+      const away = ray[13] / ray[9];
+      const [x, z] = [ray[12] - away * ray[8], ray[14] - away * ray[10]];
+      return away > 0 ? [[1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, x, 0, z, 1]] : [];
+    }
+  })
+"""
+"""The emulator knows rooms by another package; of a room, the page asks the floor alone."""
+_PAGE = """
+(() => {
+  const { view, room } = throwcollect;
+  const { canvas } = view;
+  const camera = view.orbit.object;
+  return JSON.stringify([
+    canvas.parentElement.id, canvas.width, canvas.height, camera.matrixWorld.elements, camera.projectionMatrix.elements,
+    view.world.matrixWorld.elements, view.world.visible, view.renderer.xr.enabled,
+    view.room.children.length, view.world.children.length,
+    [...view.stations.values()].map(({ group }) => group.position.toArray()), room.button.textContent,
+  ]);
+})()
+"""
+_POINT_AT_COLLECT = """
+(() => {
+  const { mesh } = throwcollect.room.info;
+  const { x, y, z } = mesh.localToWorld(mesh.position.clone().set(-0.33, -0.28, 0.5));
+  device.controllers.right.position.set(x, y, z);
+  device.controllers.right.quaternion.set(...mesh.quaternion.toArray());
+  return someFrames();
+})()
+"""
+_ENTER = "document.querySelector('#enter-room').click()"
+
+
+@pytest.fixture
+def server(tmp_path: Path) -> Iterator[dict[str, Any]]:
+    write_config(tmp_path, trials=600, text=_CONFIG, sim=f"{FAST}, real_time_factor: 1")
+    catalogue = tmp_path / "catalogue.yaml"
+    catalogue.write_text("components: {throws: {pretty_name: Throws, config: small.yaml, max_instances: 2}}\n")
+    with served(catalogue, tmp_path / "datasets") as told:
+        yield told
+
+
+@pytest.fixture(scope="module")
+def emulator() -> str:
+    """A script that puts an emulated headset into a browser."""
+    place = install("iwer", "2.5.0")
+    return (place / "node_modules/iwer/build/iwer.min.js").read_text(encoding="utf-8") + _DEVICE
+
+
+class Ears:
+    """Hears /target in the graph of a run, as long as it is used as a context manager.
+
+    Args:
+        run: Id of the run.
+    """
+
+    def __init__(self, run: str) -> None:
+        self._run = run
+        self._heard: queue.Queue[Any] = queue.Queue()
+        self._is_enough = threading.Event()
+        self._thread = threading.Thread(target=self._listen)
+
+    def __enter__(self) -> Ears:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._is_enough.set()
+        self._thread.join()
+
+    def hear(self) -> tuple[float, float, float]:
+        """The target that is heard next."""
+        message = self._heard.get(timeout=60)
+        assert message.header.frame_id == "world"
+        assert message.header.stamp.sec > 0
+        return message.point.x, message.point.y, message.point.z
+
+    def _listen(self) -> None:
+        with RunListener(lambda _: None, on_connect=self._subscribe) as listener:
+            while not self._is_enough.is_set():
+                listener.spin(Records().get(self._run).connection, 0.1)
+
+    def _subscribe(self, node: ros.Node) -> None:
+        # Whoever comes late hears the last one.
+        qos = ros.QoSProfile(depth=1, durability=ros.DurabilityPolicy.TRANSIENT_LOCAL)
+        node.create_subscription(ros.get_message("geometry_msgs/msg/PointStamped"), "/target", self._heard.put, qos)
+
+
+def enter(tab: Tab) -> None:
+    tab.evaluate(_ENTER)
+    tab.wait_for("throwcollect.room.isEntered && throwcollect.view.renderer.xr.isPresenting")
+
+
+def leave(tab: Tab) -> None:
+    tab.evaluate(_ENTER)
+    tab.wait_for("!throwcollect.room.isEntered")
+
+
+def hold(tab: Tab, x: float, y: float, z: float) -> None:
+    """Hold the right controller somewhere in the room [m], and point ahead."""
+    tab.evaluate(
+        f"device.controllers.right.position.set({x}, {y}, {z}); device.controllers.right.quaternion.set(0, 0, 0, 1)"
+    )
+    tab.evaluate("someFrames()")
+
+
+def turn(left: float, up: float) -> str:
+    """A quaternion (x, y, z, w) of who looks to the left and up by some angles [rad]."""
+    (sin_left, cos_left), (sin_up, cos_up) = ((math.sin(each / 2), math.cos(each / 2)) for each in (left, up))
+    return f"{cos_left * sin_up}, {sin_left * cos_up}, {-sin_left * sin_up}, {cos_left * cos_up}"
+
+
+def test_a_target_is_set_by_hand_and_collected_for(server: dict[str, Any], emulator: str) -> None:
+    still = {"prefers-reduced-motion": "reduce"}
+    with browse(server["page"], width=640, height=400, features=still, script=emulator) as tab:
+        load(tab)
+        tab.evaluate("document.querySelector('#components input').value = '2'")
+        press(tab, "Start Throws")
+        tab.wait_for("throwcollect.view.stations.get('sim_0')?.robot?.isWhole", within_s=120, every_s=1)
+        run = tab.evaluate("throwcollect.watching.id")
+        with Ears(run) as ears:
+            set_by_hand(tab, ears)
+        tab.evaluate(_POINT_AT_COLLECT)
+        tab.evaluate("pull()")
+        tab.wait_for(f"throwcollect.watching.id !== {json.dumps(run)}")
+        found = load_config(config_path(Path(Records().get(tab.evaluate("throwcollect.watching.id")).record.directory)))
+        assert found.sweep.target is not None
+        assert found.sweep.target.distance_m is not None
+        aimed = found.sweep.target.distance_m
+        distance = math.hypot(1.4, 0.2)
+        assert (aimed.min, aimed.max) == pytest.approx((distance - 0.1, distance + 0.1), abs=_MM)
+        assert found.scene.landing_height_m == pytest.approx(0.5, abs=_MM)
+        leave(tab)
+        assert unexpected(tab) == []
+
+
+def set_by_hand(tab: Tab, ears: Ears) -> None:
+    # Without a device: by a field, which is reached by the keyboard.
+    tab.evaluate("document.querySelector('#target-x').value = '1.25'")
+    tab.evaluate("document.querySelector('#target-form button').click()")
+    assert ears.hear() == pytest.approx((1.25, 0, 0), abs=_MM)
+
+    before = tab.evaluate(_PAGE)
+    enter(tab)
+    tab.wait_for("throwcollect.view.world.visible")
+    assert tab.evaluate(_PAGE) != before
+    # The robot stands 2 m ahead, and throws to the right; who holds the controller looks to its left.
+    hold(tab, 0.3, 0.9, -1.2)
+    tab.evaluate("pull()")
+    assert ears.hear() == pytest.approx((0.3, -0.8, 0.9), abs=_MM)
+    # Another robot stands behind it, and a target near that is in its own frame.
+    hold(tab, 0.4, 1.0, -3.7)
+    tab.evaluate("pull()")
+    assert ears.hear() == pytest.approx((0.4, 0.2, 1.0), abs=_MM)
+    leave(tab)
+    tab.wait_for(f"{_PAGE.strip().rstrip(';')} === {json.dumps(before)}")
+
+    # With a device that knows the floor: who stands at (1, 0) looks to the left, at the floor 1.6 m away.
+    tab.evaluate(_FLOOR)
+    tab.evaluate("device.position.set(1, 1.6, 0)")
+    tab.evaluate(f"device.quaternion.set({turn(math.pi / 2, -math.pi / 4)})")
+    enter(tab)
+    tab.wait_for("throwcollect.room.reticle.visible")
+    assert not tab.evaluate("throwcollect.view.world.visible")
+    tab.evaluate("pull()")
+    assert tab.evaluate("throwcollect.view.world.visible")
+    hold(tab, -0.4, 0.5, -1.4)
+    tab.evaluate("pull()")
+    assert ears.hear() == pytest.approx((1.4, -0.2, 0.5), abs=_MM)

@@ -1,0 +1,170 @@
+"""Runs that are one container of the catalogue, on an engine that runs nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import replace
+from datetime import datetime, timezone
+from pathlib import Path
+
+import pytest
+from tests.unit.runtimes.docker.engine import Engine, engine_at
+
+from throwcollect.config.container_spec import ContainerSpec
+from throwcollect.config.containers import NodeContainerConfig
+from throwcollect.errors import ConfigError, ConflictError, NotFoundError, WorkerError
+from throwcollect.ros.connection import Connection
+from throwcollect.ros.middleware import Middleware
+from throwcollect.run_key import RunKey
+from throwcollect.runs.component_container import ContainerOrder, check_order, launch_container
+from throwcollect.runs.control import down
+from throwcollect.runs.onlooker import SILENT
+from throwcollect.runs.record import Kind, Origin, Record
+from throwcollect.runs.records import STATE_VARIABLE, OpenRun, Records
+from throwcollect.runtimes.docker import component
+from throwcollect.runtimes.docker import watch as docker_watch
+from throwcollect.runtimes.docker.component import find_way
+from throwcollect.runtimes.docker.options import JOINED_LABEL, NODE_LABEL, RUN_LABEL
+
+SPEC = ContainerSpec("nodes", ("listen",), NodeContainerConfig())
+ORDER = ContainerOrder("ear", SPEC)
+
+
+@pytest.fixture(autouse=True)
+def engine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Engine]:
+    monkeypatch.setenv("DOCKER_HOST", f"unix://{tmp_path}/engine.sock")
+    monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "state"))
+    monkeypatch.setattr(docker_watch, "_LOOK_EVERY_S", 0.1)
+    monkeypatch.setattr(component, "_OVER_S", 0.5)
+    with engine_at(tmp_path / "engine.sock") as engine:
+        yield engine
+
+
+def remember(name: str, kind: Kind, runtime: str, *, joins: str | None = None) -> OpenRun:
+    run = Records().new(name, run=name)
+    directory = run.directory / "data"
+    directory.mkdir()
+    logs = str(run.directory / "logs")
+    record = Record(name, name, runtime, str(directory), None, logs, 0, datetime.now(timezone.utc), 1, 0, kind=kind)
+    run.write(replace(record, origin=Origin(name, joins=joins), endpoint="tls/127.0.0.1:7447"))
+    return run
+
+
+@pytest.fixture
+def session() -> Iterator[OpenRun]:
+    """A run of processes that could be joined."""
+    run = remember("talos", "session", "local")
+    yield run
+    run.close()
+
+
+def launch(engine: Engine, each_look: Callable[[], bool], order: ContainerOrder = ORDER) -> Record:
+    """The record of a container that runs until it is told to end."""
+    run = remember("ear-1", "container", "docker", joins=order.joins)
+    with suppress(WorkerError):
+        launch_container(run, order, onlooker=SILENT, interruptions=lambda: int(bool(engine.running()) and each_look()))
+    return Records().get("ear-1").record
+
+
+def test_it_is_seen_while_it_runs_and_removed_when_it_is_told_to_end(engine: Engine) -> None:
+    seen: list[tuple[str, str]] = []
+
+    def look() -> bool:
+        (container,) = engine.containers.values()
+        labels = container["Config"]["Labels"]
+        assert (labels[RUN_LABEL], labels[NODE_LABEL]) == ("ear-1", "container")
+        nodes = Records().get("ear-1").record.nodes
+        seen.extend((node.name, node.status) for node in nodes)
+        return ("container", "running") in seen
+
+    record = launch(engine, look)
+    assert seen[-1] == ("container", "running")
+    assert (record.exit_code, record.nodes, record.left) == (0, (), False)
+    assert engine.names() == []
+
+
+def test_what_it_ended_with_is_told(engine: Engine) -> None:
+    def end() -> bool:
+        engine.end("throwcollect-ear-1-container", 7)
+        return False
+
+    record = launch(engine, end)
+    assert record.exit_code == WorkerError.exit_code
+    assert record.failure is not None
+    assert record.failure.message == "the container of nodes has ended: exit code 7"
+    assert engine.names() == []
+
+
+def test_it_ends_with_the_run_that_it_has_joined(engine: Engine, session: OpenRun) -> None:
+    def end() -> bool:
+        (container,) = engine.containers.values()
+        assert container["Config"]["Labels"][JOINED_LABEL] == "talos"
+        session.close()
+        return False
+
+    record = launch(engine, end, replace(ORDER, joins="talos"))
+    assert (record.exit_code, record.failure) == (0, None)
+    assert engine.names() == []
+
+
+def test_it_fails_if_it_ends_before_the_run_that_it_has_joined(engine: Engine, session: OpenRun) -> None:
+    def end() -> bool:
+        engine.end("throwcollect-ear-1-container", 7)
+        return False
+
+    assert launch(engine, end, replace(ORDER, joins="talos")).exit_code == WorkerError.exit_code
+
+
+def test_down_ends_what_a_launcher_that_died_has_left(engine: Engine) -> None:
+    run = remember("ear-1", "container", "docker")
+    engine.create("throwcollect-ear-1-container", {RUN_LABEL: "ear-1", NODE_LABEL: "container"})
+    run.close()
+    assert down(Records().get("ear-1")) == ("ear-1", ["throwcollect-ear-1-container"])
+    assert engine.names() == []
+
+
+def test_what_cannot_be_is_refused_at_once(session: OpenRun, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    check_order(replace(ORDER, joins="talos"))
+    with pytest.raises(NotFoundError, match="no run nobody"):
+        check_order(replace(ORDER, joins="nobody"))
+    other = remember("ear-0", "container", "docker")
+    with pytest.raises(ConflictError, match="no router that a container could join"):
+        check_order(replace(ORDER, joins="ear-0"))
+    other.close()
+    ports = ContainerSpec("nodes", None, NodeContainerConfig(ports={"80": 8081}))
+    with pytest.raises(ConfigError, match="has this machine's network"):
+        check_order(ContainerOrder("ear", ports, joins="talos"))
+    session.update(ended=datetime.now(timezone.utc), exit_code=0)
+    with pytest.raises(ConflictError, match="run talos has ended"):
+        check_order(replace(ORDER, joins="talos"))
+    missing = ContainerSpec("nodes", None, NodeContainerConfig(networks=["lab"]))
+    with pytest.raises(ConfigError, match="no network lab"):
+        check_order(ContainerOrder("ear", missing))
+    monkeypatch.setenv("DOCKER_HOST", f"unix://{tmp_path}/none.sock")
+    with pytest.raises(WorkerError, match="no Docker engine answers"):
+        check_order(ORDER)
+
+
+def test_the_way_into_a_run_of_containers_is_its_own_network(tmp_path: Path) -> None:
+    connection = Connection("tls/172.18.0.2:7447", RunKey(tmp_path), 7)
+    way = find_way("talos", "docker", connection, SPEC)
+    assert (way.network, way.key["Source"], way.key["ReadOnly"]) == (
+        "throwcollect-talos",
+        "throwcollect-talos-key",
+        True,
+    )
+    assert "tls/router:7447" in way.environment["ZENOH_CONFIG_OVERRIDE"]
+    assert (way.environment["ROS_DOMAIN_ID"], way.environment["RMW_IMPLEMENTATION"]) == ("7", "rmw_zenoh_cpp")
+    way = find_way("talos", "local", connection, SPEC)
+    assert (way.network, way.key["Source"], way.key["Target"]) == (None, str(tmp_path), "/key")
+    assert "tls/172.18.0.2:7447" in way.environment["ZENOH_CONFIG_OVERRIDE"]
+
+
+def test_no_container_joins_what_it_cannot_reach(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    fast_dds = Connection("udp/127.0.0.1:11811", RunKey(tmp_path), 0, Middleware("rclpy", "rmw_fastrtps_cpp"))
+    with pytest.raises(ConfigError, match="is on Fast DDS"):
+        find_way("talos", "local", fast_dds, SPEC)
+    monkeypatch.setenv("DOCKER_HOST", "tcp://far.example:2376")
+    with pytest.raises(ConfigError, match="is of processes of this machine"):
+        find_way("talos", "local", Connection("tls/127.0.0.1:7447", RunKey(tmp_path)), SPEC)

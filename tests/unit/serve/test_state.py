@@ -1,0 +1,37 @@
+"""What the state tells of the catalogue."""
+
+from pathlib import Path
+
+import pytest
+from tests.unit.serve.conftest import CONFIG
+
+from throwcollect.serve.catalogue import Catalogue
+from throwcollect.serve.state import Lookout
+
+_SWEPT = "sweep: {{sampler: {sampler}, parameters: {{{parameters}}}}}\n"
+_DURATION = "task.duration_s: {min: 1.0, max: 1.2}"
+_HEIGHT = "scene.landing_height_m: {min: 0, max: 0.5}"
+
+
+@pytest.mark.parametrize(
+    ("sweep", "targets"),
+    [
+        ("", []),
+        (_SWEPT.format(sampler="uniform", parameters=_DURATION), []),
+        (_SWEPT.format(sampler="sobol", parameters=_DURATION), ["distance_m", "hit_angle_rad"]),
+        (
+            _SWEPT.format(sampler="sobol", parameters=f"{_DURATION}, {_HEIGHT}"),
+            ["distance_m", "height_m", "hit_angle_rad"],
+        ),
+    ],
+)
+def test_a_collection_tells_what_its_throws_can_be_aimed_at(tmp_path: Path, sweep: str, targets: list[str]) -> None:
+    config = tmp_path / "small.yaml"
+    config.write_text(CONFIG + sweep)
+    catalogue = tmp_path / "catalogue.yaml"
+    catalogue.write_text("components: {throws: {config: small.yaml}, talos: {session: small.yaml}}\n")
+    lookout = Lookout(Catalogue.read(catalogue))
+    assert [each.targets for each in lookout.look().components] == [targets, []]
+    # Its file may get worse, and is then told of when an instance is started.
+    config.write_text("name: [")
+    assert lookout.look().components[0].targets == []
