@@ -70,7 +70,7 @@ class Adapted(_Entry):
     errors: Errors
 
 
-class Shot(_Entry):
+class ThrowAtTarget(_Entry):
     """A throw at a target.
 
     Attributes:
@@ -89,17 +89,17 @@ class Score(_Entry):
         targets: Number of targets.
         seed: Seed of their choice.
         trained: By the number of throws that a model was learned from; the model itself comes last.
-        shots: Its throws.
+        throws: Its throws.
         scatter: Noise on what was measured of throws in the other world, in the unit of the targets.
         adapted: By the number of throws in the other world; empty if there was none.
-        adapted_shots: Throws in the other world after the most of them.
+        adapted_throws: Throws in the other world after the most of them.
     """
 
     format: Literal["1"] = "1"
     targets: int
     seed: int
     trained: list[Trained]
-    shots: list[Shot]
+    throws: list[ThrowAtTarget]
     scatter: FiniteFloat
     adapted: list[Adapted]
-    adapted_shots: list[Shot]
+    adapted_throws: list[ThrowAtTarget]

@@ -14,7 +14,7 @@ from throwcollect.learning.adapting import Adaptation, adapt, adapt_by_nothing
 from throwcollect.learning.aiming import Choice, aim
 from throwcollect.learning.fitting import enough_throws, fit_throws
 from throwcollect.learning.learned_map import LearnedMap, Role
-from throwcollect.learning.score import Adapted, Errors, Score, Shot, Trained
+from throwcollect.learning.score import Adapted, Errors, Score, ThrowAtTarget, Trained
 
 Array = NDArray[np.float64]
 
@@ -74,7 +74,7 @@ def score_model(
         for size, (_, places) in zip(maps, loops, strict=True)
     ]
     adapted: list[Adapted] = []
-    adapted_shots: list[Shot] = []
+    adapted_throws: list[ThrowAtTarget] = []
     if world is not None:
         tries = draw_targets(learned.carry_over(context), REAL_THROWS[-1], seed + 1)
         [(parameters, places)] = _throw_at([learned], tries, context, world, processes)
@@ -96,15 +96,15 @@ def score_model(
                 Adapted(real_throws=number, method=each.method, errors=Errors.of(_distances(places, reachable)))
                 for (number, each), (_, places) in zip(adaptations.items(), found, strict=True)
             ]
-            adapted_shots = _list_shots(reachable, found[-1][1])
+            adapted_throws = _list_throws(reachable, found[-1][1])
     return Score(
         targets=count,
         seed=seed,
         trained=trained,
-        shots=_list_shots(targets, loops[-1][1]),
+        throws=_list_throws(targets, loops[-1][1]),
         scatter=scatter,
         adapted=adapted,
-        adapted_shots=adapted_shots,
+        adapted_throws=adapted_throws,
     )
 
 
@@ -212,8 +212,8 @@ def _distances(places: Array, targets: Array) -> Array:
     return np.where(np.isfinite(away), away, np.inf)
 
 
-def _list_shots(targets: Array, places: Array) -> list[Shot]:
+def _list_throws(targets: Array, places: Array) -> list[ThrowAtTarget]:
     return [
-        Shot(target=target, place=place if np.isfinite(place).all() else None)
+        ThrowAtTarget(target=target, place=place if np.isfinite(place).all() else None)
         for target, place in zip(targets.tolist(), places.tolist(), strict=True)
     ]
