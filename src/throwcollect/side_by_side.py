@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 import threading
@@ -117,6 +118,8 @@ def _begin(make: Callable[[], Callable[[Any], Any]], parent: int) -> None:
     if os.getppid() != parent:
         # It died before it could take this process along.
         os._exit(1)
+    # What is here now stays until the end; the garbage collector need not go through it again and again.
+    gc.freeze()
     # It is made for the first piece and not here, where an error would not reach whoever wants the work done.
     _make[:] = [cache(make)]
 

@@ -19,9 +19,9 @@ from throwcollect.coordinator.growth import Growth
 from throwcollect.coordinator.leases import Leases
 from throwcollect.coordinator.lookahead import Lookahead
 from throwcollect.coordinator.progress import Progress
-from throwcollect.coordinator.replay_check import check_by_replay
+from throwcollect.coordinator.replay_check import ReplayCheck
 from throwcollect.dataset.directory import find_known_directory
-from throwcollect.dataset.inspect import info, loss
+from throwcollect.dataset.inspect import loss
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.episode.message import Delivery, Episode
 from throwcollect.errors import DatasetError, Interrupted, WorkerError
@@ -32,8 +32,10 @@ from throwcollect.wording import command, format_count
 _RATE_WINDOW_S = 10.0
 """Throws per second are averaged over this time."""
 _SYNC_EVERY_S = 1.0
-_TELL_EVERY_S = 2.0
 """Real time of collecting that a power cut may cost."""
+_TELL_EVERY_S = 2.0
+_REPLAY_AHEAD_S = 3.0
+"""Real time before the last trial ends, as it seems, at which the process is begun that simulates some again."""
 
 
 class TrialCollection:
@@ -50,9 +52,10 @@ class TrialCollection:
 
     Args:
         writer: A dataset that is open.
+        directory: Its directory.
     """
 
-    def __init__(self, writer: DatasetWriter) -> None:
+    def __init__(self, writer: DatasetWriter, directory: Path) -> None:
         self.writer = writer
         self.warn: Callable[[str], object] = lambda _: None
         self.on_change: Callable[[], None] = lambda: None
@@ -71,6 +74,8 @@ class TrialCollection:
         self._draining = False
         self._drain_deadline = math.inf
         self._synced_at = time.monotonic()
+        self._directory = directory
+        self._replay = ReplayCheck(directory, count=self._config.run.replay, seed=self._config.seed)
 
     @classmethod
     def open(cls, directory: Path, *, say: Callable[[str], object], processes: int = 1) -> TrialCollection:
@@ -85,23 +90,21 @@ class TrialCollection:
             DatasetError: If the directory holds no plan, or another process collects into it.
             ConfigError: If its ``config.yaml`` is wrong.
         """
-        writer = DatasetWriter.open(directory)
-        there: list[tuple[int, Result]] = []
+        collection = cls(DatasetWriter.open(directory), directory)
+        found = 0
         told = time.monotonic()
 
         def tell(trial: int, result: Result) -> None:
-            nonlocal told
+            nonlocal found, told
             # Episodes come file by file, so these are all of some files.
-            if there and time.monotonic() >= told + _TELL_EVERY_S:
+            if found and time.monotonic() >= told + _TELL_EVERY_S:
                 told = time.monotonic()
-                say(f"has found {format_count(len(there), 'episode')} of an earlier collection so far")
-            there.append((trial, result))
-
-        if found := writer.recover(tell, processes=processes):
-            say(f"keeps {format_count(found, 'episode')} of an earlier collection")
-        collection = cls(writer)
-        for trial, result in there:
+                say(f"has found {format_count(found, 'episode')} of an earlier collection so far")
+            found += 1
             collection.recall(trial, result)
+
+        if collection.writer.recover(tell, processes=processes):
+            say(f"keeps {format_count(found, 'episode')} of an earlier collection")
         return collection
 
     def __enter__(self) -> TrialCollection:
@@ -110,6 +113,7 @@ class TrialCollection:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        self._replay.close()
         self.writer.close()
 
     @property
@@ -276,6 +280,10 @@ class TrialCollection:
         if time.monotonic() >= self._synced_at + _SYNC_EVERY_S:
             self._synced_at = time.monotonic()
             self.writer.sync()
+        left = self._leases.total - self._leases.ended
+        settled = self._growth is None and not self._draining
+        if settled and not self._replay.begun and left <= _REPLAY_AHEAD_S * self._rate:
+            self._replay.begin(list(self.writer.plan.trials.numbers_to_run))
 
     def progress(self, hung: Iterable[str] = ()) -> Progress:
         """How far the collection has come.
@@ -288,7 +296,6 @@ class TrialCollection:
         self._ends.append((now, ended))
         while self._ends[0][0] < now - _RATE_WINDOW_S:
             self._ends.popleft()
-        since, before = self._ends[0]
         # Of a plan that ends when enough trials have succeeded, nobody knows how many trials it will have.
         expected = self._growth.most if self._growth is not None and self._config.until is None else 0
         return Progress(
@@ -296,7 +303,7 @@ class TrialCollection:
             ended=ended,
             outcomes=dict(self._outcomes),
             simulations=len(self._names),
-            throws_per_s=(ended - before) / (now - since) if now > since else 0.0,
+            throws_per_s=self._rate,
             hung=sorted(hung),
             wanted=self._config.until.wanted if self._config.until else None,
             success=self._config.task.success,
@@ -304,11 +311,10 @@ class TrialCollection:
             set_aside={self.name_of(simulation): reason for simulation, reason in self._set_aside.items()},
         )
 
-    def finish(self, directory: Path, *, meanwhile: Callable[[], None], say: Callable[[str], object]) -> None:
+    def finish(self, *, meanwhile: Callable[[], None], say: Callable[[str], object]) -> None:
         """Simulate some trials again in a fresh process, and write what describes the dataset as a whole.
 
         Args:
-            directory: Directory of the dataset.
             meanwhile: Called again and again while that process works.
             say: Is told what was simulated again.
 
@@ -318,29 +324,28 @@ class TrialCollection:
             WorkerError: If trials cannot be simulated again.
             LossError: If the dataset is finished, and trials of it are lost.
         """
-        known = find_known_directory(directory)
+        known = find_known_directory(self._directory)
         if not self.complete:
             raise Interrupted(
                 f"interrupted; what is finished is in {known or 'the volume'}",
                 hint=command("resume", known) if known else None,
             )
-        said = check_by_replay(
-            directory,
-            self.writer.digests(),
-            count=self._config.run.replay,
-            seed=self._config.seed,
-            meanwhile=meanwhile,
-        )
-        if said is not None:
+        if (said := self._replay.compare(self.writer.digests(), meanwhile=meanwhile)) is not None:
             say(said)
-        self.writer.finish()
-        lost = loss(info(directory).outcomes, hint=f"{command('resume', known)} runs them again" if known else None)
+        outcomes = self.writer.finish()
+        lost = loss(outcomes, hint=f"{command('resume', known)} runs them again" if known else None)
         if lost is not None:
             raise lost
 
     def name_of(self, simulation: str) -> str:
         """Name of a simulation's node, also when it has left."""
         return self._names.get(simulation, simulation.strip("/"))
+
+    @property
+    def _rate(self) -> float:
+        """Trials that end in a second of real time, when it was last asked how far the collection has come."""
+        (since, before), (now, ended) = self._ends[0], self._ends[-1]
+        return (ended - before) / (now - since) if now > since else 0.0
 
     def _grow(self, growth: Growth) -> bool:
         if growth.over:

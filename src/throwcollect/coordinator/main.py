@@ -62,7 +62,7 @@ def run(directory: Path) -> None:
 
         try:
             _collect(node, collection, executor, heartbeat)
-            collection.finish(directory, meanwhile=go_on, say=_say)
+            collection.finish(meanwhile=go_on, say=_say)
         finally:
             node.destroy_node()
             ros.shutdown()

@@ -6,6 +6,7 @@ import shutil
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -30,6 +31,9 @@ _MANY_TRIALS = 500
 _TRIALS_A_PIECE = 100
 _MOST_PIECES = 10_000
 """To hand over many more takes a minute, in which nothing is found and Ctrl-C has to wait."""
+_TOLD_TRIALS = 20_000
+"""From here on it is told at once what goes on, as seconds pass until the first trials are checked."""
+_TELL_FIRST_S = 2.0
 _TELL_EVERY_S = 10.0
 _LEAST_BYTES = 40
 """Of a trial in the file of a plan: its digest and its seed, which nothing compresses."""
@@ -51,14 +55,29 @@ def draw_plan(config: Config, *, directory: Path, processes: int = 1, say: Say =
         ConfigError: If the sweep cannot be drawn, or no trial is left.
         WorkerError: If a process that checks trials is killed.
     """
-    return _check_trials(config, draw_first_points(config, directory=directory), processes=processes, say=say)
+    return _check_trials(config, _draw_points(config, directory, say), processes=processes, say=say)
+
+
+def _draw_points(config: Config, directory: Path, say: Say) -> Points:
+    if (count := _count_before(config)) >= _TOLD_TRIALS:
+        say(f"plan: draws {count} trials")
+    return draw_first_points(config, directory=directory)
+
+
+def _count_before(config: Config) -> int:
+    """Number of trials as far as it is known before they are drawn."""
+    return 0 if config.grows else config.trials or 0
 
 
 def _check_trials(config: Config, points: Points, *, processes: int, say: Say) -> Plan:
     """The plan of points, in which trials are refused that the robot cannot do; as `draw_plan`."""
     count = len(points.values)
     size = max(_TRIALS_A_PIECE, count // _MOST_PIECES)
-    pieces = [(first, points.values[first : first + size]) for first in range(0, count, size)]
+    if count >= _TOLD_TRIALS:
+        say(f"plan: checks {count} trials")
+    # The first ones are small, so that something can be told soon.
+    firsts = [*range(0, min(size, count), _TRIALS_A_PIECE), *range(size, count, size)]
+    pieces = [(first, points.values[first:stop]) for first, stop in pairwise([*firsts, count])]
     found = work_side_by_side(
         pieces,
         _make_checked_trials,
@@ -66,12 +85,12 @@ def _check_trials(config: Config, points: Points, *, processes: int, say: Say) -
         processes=processes if count >= _MANY_TRIALS else 1,
         doing="checks trials",
     )
+    tell_at = time.monotonic() + _TELL_FIRST_S
     trials = next(found)
-    told = time.monotonic()
     for piece in found:
         trials.extend(piece)
-        if time.monotonic() >= told + _TELL_EVERY_S:
-            told = time.monotonic()
+        if time.monotonic() >= tell_at:
+            tell_at = time.monotonic() + _TELL_EVERY_S
             say(f"plan: {len(trials)} of {count} trials checked")
     check_some_left(trials)
     return Plan(config, trials)
@@ -161,7 +180,8 @@ def prepare(
         ConfigError: If the sweep or the directory cannot be used; nothing is left behind then.
         WorkerError: If a process that checks trials is killed.
     """
-    points = draw_first_points(config, directory=sweep_directory)
+    _check_room(directory, _count_before(config))
+    points = _draw_points(config, sweep_directory, say)
     _check_room(directory, len(points.values))
     plan = _check_trials(config, points, processes=processes, say=say)
     plan = replace(plan, config=make_self_contained(config))

@@ -3,57 +3,162 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from tempfile import TemporaryFile
+from typing import IO
 
 from throwcollect.errors import DatasetError, WorkerError
+from throwcollect.interruption import die_with_parent
 from throwcollect.trial.choice import choose_trials
 from throwcollect.wording import format_count
 
 
-def check_by_replay(
-    directory: Path, digests: Mapping[int, str], *, count: int, seed: int, meanwhile: Callable[[], None]
-) -> str | None:
-    """Compare episodes with what a process that knows nothing but configuration and plan makes of their trials.
+class ReplayCheck:
+    """Compares episodes with what a process that knows nothing but configuration and plan makes of their trials.
+
+    Such a process takes a second before its first trial. So it can be begun while the last trials are still with
+    simulations, by a guess at which will be chosen. What is compared in the end does not depend on that guess.
+
+    Attributes:
+        begun: Whether `begin` has been called.
 
     Args:
         directory: Directory of the dataset.
-        digests: Digest of each episode, by trial.
         count: How many trials are simulated again.
         seed: Root seed of the collection, by which they are chosen.
-        meanwhile: Called again and again while the process works.
+    """
 
-    Returns:
-        What was done, in words; None if nothing was to be done.
+    def __init__(self, directory: Path, *, count: int, seed: int) -> None:
+        self._directory = directory
+        self._count = count
+        self._seed = seed
+        self.begun = False
+        self._early: _Process | None = None
+
+    def begin(self, trials: Sequence[int]) -> None:
+        """Begin with the trials that are chosen if all of these get an episode.
+
+        Args:
+            trials: Numbers of trials of the plan, which is complete.
+
+        Raises:
+            OSError: If no process can be started.
+        """
+        self.begun = True
+        if chosen := choose_trials(trials, count=self._count, seed=self._seed):
+            self._early = _Process(self._directory, chosen)
+
+    def compare(self, digests: Mapping[int, str], *, meanwhile: Callable[[], None]) -> str | None:
+        """Compare some of the episodes.
+
+        Args:
+            digests: Digest of each episode, by trial.
+            meanwhile: Called again and again while a process works.
+
+        Returns:
+            What was done, in words; None if nothing was to be done.
+
+        Raises:
+            DatasetError: If an episode came out otherwise.
+            WorkerError: If the process failed.
+        """
+        trials = choose_trials(sorted(digests), count=self._count, seed=self._seed)
+        again: dict[int, str] = {}
+        if self._early is not None:
+            # A trial that was lost may well never end there, either.
+            if self._early.trials == trials:
+                self._early.wait(meanwhile)
+            self._early.end()
+            again = dict(self._early.digests)
+        if missing := [trial for trial in trials if trial not in again]:
+            again |= _simulate(self._directory, missing, meanwhile)
+        wrong = [trial for trial in trials if again.get(trial) != digests[trial]]
+        if wrong:
+            counted = f"{len(wrong)} of {format_count(len(trials), 'trial')}"
+            raise DatasetError(
+                f"{self._directory}: {counted} came out otherwise in a fresh process: "
+                f"trial {', '.join(map(str, wrong))}",
+                evidence="\n".join(
+                    f"trial {trial}: {digests[trial]} in the dataset, {again.get(trial)}" for trial in wrong
+                ),
+                hint="this machine does not compute alike each time, or something has changed what was simulated",
+            )
+        if not trials:
+            return None
+        return f"{format_count(len(trials), 'trial')} simulated again in a fresh process: the same bit for bit"
+
+    def close(self) -> None:
+        """End the process, if one runs."""
+        if self._early is not None:
+            self._early.end()
+
+
+class _Process:
+    """A process that simulates trials and prints their digests.
+
+    Attributes:
+        trials: The trials.
+        digests: What it has printed, by trial; empty until `end`.
+    """
+
+    def __init__(self, directory: Path, trials: Sequence[int]) -> None:
+        self.trials = trials
+        self.digests: dict[int, str] = {}
+        self._errors = ""
+        # Files, as nobody reads while it works, and a pipe that is full would stop it.
+        self._printed, self._said = TemporaryFile(), TemporaryFile()  # noqa: SIM115 - closed at its end
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "throwcollect", "simulate", str(directory), *map(str, trials)],
+            stdin=subprocess.DEVNULL,
+            stdout=self._printed,
+            stderr=self._said,
+            preexec_fn=die_with_parent,  # noqa: PLW1509 - it calls nothing that takes a lock
+        )
+
+    def wait(self, meanwhile: Callable[[], None]) -> None:
+        """Wait until it has simulated all of them, or ends."""
+        while self._process.poll() is None and _contents(self._printed).count("\n") < len(self.trials):
+            meanwhile()
+
+    def end(self) -> None:
+        """End it, whatever it does; more than once is not needed, and does no harm."""
+        self._process.kill()
+        self._process.wait()
+        if not self._printed.closed:
+            with self._printed, self._said:
+                lines = _contents(self._printed).splitlines(keepends=True)
+                self._errors = _contents(self._said).strip()
+            self.digests = {each["trial"]: each["digest"] for each in (json.loads(x) for x in lines if x[-1] == "\n")}
+
+    def failure(self) -> WorkerError:
+        """Why trials are missing, once it has ended."""
+        counted = format_count(len(self.trials), "trial")
+        return WorkerError(
+            f"{counted} could not be simulated again (exit code {self._process.returncode})",
+            evidence=self._errors or None,
+        )
+
+
+def _simulate(directory: Path, trials: Sequence[int], meanwhile: Callable[[], None]) -> Mapping[int, str]:
+    """Digests of trials, by number.
 
     Raises:
-        DatasetError: If an episode came out otherwise.
         WorkerError: If the process failed.
     """
-    trials = choose_trials(sorted(digests), count=count, seed=seed)
-    if not trials:
-        return None
-    command = [sys.executable, "-m", "throwcollect", "simulate", str(directory), *map(str, trials)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        while process.poll() is None:
-            meanwhile()
-        output, errors = process.communicate()
-    if process.returncode:
-        raise WorkerError(
-            f"{format_count(len(trials), 'trial')} could not be simulated again (exit code {process.returncode})",
-            evidence=errors.strip() or None,
-        )
-    again = {each["trial"]: each["digest"] for each in map(json.loads, output.splitlines())}
-    wrong = [trial for trial in trials if again.get(trial) != digests[trial]]
-    if wrong:
-        raise DatasetError(
-            f"{directory}: {len(wrong)} of {format_count(len(trials), 'trial')} came out otherwise in a fresh process: "
-            f"trial {', '.join(map(str, wrong))}",
-            evidence="\n".join(
-                f"trial {trial}: {digests[trial]} in the dataset, {again.get(trial)}" for trial in wrong
-            ),
-            hint="this machine does not compute alike each time, or something has changed what was simulated",
-        )
-    return f"{format_count(len(trials), 'trial')} simulated again in a fresh process: the same bit for bit"
+    process = _Process(directory, trials)
+    try:
+        process.wait(meanwhile)
+    finally:
+        process.end()
+    if len(process.digests) < len(trials):
+        raise process.failure()
+    return process.digests
+
+
+def _contents(file: IO[bytes]) -> str:
+    # The process writes where the two of them stand in the file, so that stays where it is.
+    return os.pread(file.fileno(), os.fstat(file.fileno()).st_size, 0).decode(errors="replace")

@@ -73,7 +73,7 @@ def resume(
             # It is drawn again; one that grew with the results cannot be, and stays if its trials are what they were.
             old = None
         remove_unfinished(directory)
-        plan = _write(config, directory, sweep_directory, stored, old, damaged)
+        plan = _write(config, directory, sweep_directory, stored, old, damaged, say)
         _announce_search(directory, say)
         return plan
 
@@ -101,10 +101,11 @@ def _write(
     stored: Config | None,
     old: Plan | None,
     damaged: Collection[str],
+    say: Say,
 ) -> Plan:
     config = make_self_contained(given)
     if old is None or TRIALS in damaged or old.config.without_run() != config.without_run():
-        drawn = replace(draw_plan(given, directory=sweep_directory), config=config)
+        drawn = replace(draw_plan(given, directory=sweep_directory, say=say), config=config)
         plan = _extend(directory, old, drawn)
         if (listed := read_listed_points(given, directory=sweep_directory)) is not None:
             write_file(directory / TRIALS, encode_points(listed))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import pyarrow as pa
@@ -12,11 +12,12 @@ from throwcollect.dataset.digest import combine_digests
 from throwcollect.dataset.directory import CONFIG, MANIFEST, METADATA, PLAN, SOURCES, THROWS, TRIALS
 from throwcollect.dataset.manifest import FileEntry, entry_of, entry_of_file, manifest_text
 from throwcollect.episode.channels import Channels
-from throwcollect.files import write_file
-from throwcollect.sweep.parquet_file import encode_table
+from throwcollect.files import replacing, write_all, write_file
+from throwcollect.sweep.parquet_file import encode_pieces
 
 WRITTEN = (THROWS, MANIFEST, METADATA)
 """Names of the files, in the order in which they are written: ``metadata.yaml`` marks a finished dataset."""
+_ROWS_AT_ONCE = 1 << 16
 
 
 def write_description(
@@ -25,6 +26,8 @@ def write_description(
     throws: pa.Table,
     channels: Channels,
     recordings: Sequence[tuple[FileSummary, FileEntry]],
+    *,
+    on_piece: Callable[[], object] = lambda: None,
 ) -> None:
     """Write the files; they follow from those that are there already.
 
@@ -34,20 +37,32 @@ def write_description(
         throws: The table of throws, one row a trial and in order of trials.
         channels: What is recorded.
         recordings: What bag's metadata and manifest say of each MCAP file, in order of files.
+        on_piece: Called when a piece of the table has been looked at, which happens column by column.
 
     Raises:
         DatasetError: If a file cannot be read or written.
     """
-    digest = combine_digests(throws["digest"].drop_null().to_pylist())
-    table = encode_table(throws)
+    digest = combine_digests(_digests(throws, on_piece))
     metadata = dataset_metadata([summary for summary, _ in recordings], channels.all, digest).encode()
-    others = (directory / each for each in (CONFIG, PLAN, TRIALS, SOURCES))
+    with replacing(directory / THROWS) as descriptor:
+
+        def put(data: bytes) -> None:
+            write_all(descriptor, data)
+            on_piece()
+
+        encode_pieces(throws, put)
+    others = (directory / each for each in (THROWS, CONFIG, PLAN, TRIALS, SOURCES))
     entries = [
-        entry_of(THROWS, table),
         entry_of(METADATA, metadata),
         *(entry_of_file(path) for path in others if path.exists()),
         *(entry for _, entry in recordings),
     ]
-    contents = {THROWS: table, MANIFEST: manifest_text(name, entries).encode(), METADATA: metadata}
-    for each in WRITTEN:
-        write_file(directory / each, contents[each])
+    write_file(directory / MANIFEST, manifest_text(name, entries).encode())
+    write_file(directory / METADATA, metadata)
+
+
+def _digests(throws: pa.Table, on_piece: Callable[[], object]) -> Iterator[str]:
+    """Digests of the episodes, in order; as texts of Python, those of a million would fill 100 MB."""
+    for first in range(0, len(throws), _ROWS_AT_ONCE):
+        yield from throws["digest"].slice(first, _ROWS_AT_ONCE).drop_null().to_pylist()
+        on_piece()

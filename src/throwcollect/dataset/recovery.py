@@ -8,8 +8,9 @@ be appended as if nothing had happened.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import compress
 from pathlib import Path
 
 from throwcollect.dataset.directory import CARD, CONFIG, MANIFEST, METADATA, PLAN, PROVENANCE, SOURCES, THROWS, TRIALS
@@ -17,7 +18,7 @@ from throwcollect.dataset.judging import judge_episode
 from throwcollect.dataset.mcap_contents import Run
 from throwcollect.dataset.mcap_reader import map_file
 from throwcollect.dataset.scan import scan_whole
-from throwcollect.dataset.shard import FinishedShard, OpenShard, write_in_order
+from throwcollect.dataset.shard import FinishedShard, OpenShard, path_of_part, write_in_order
 from throwcollect.episode.channels import Channels
 from throwcollect.errors import DatasetError
 from throwcollect.files import is_there, remove, unwritable
@@ -84,14 +85,18 @@ class LeftOfShard:
 
 
 @dataclass(frozen=True)
-class _Piece:
-    """A shard to be looked through: its files, its trials, those that are waited for, and whether it may be whole."""
+class Part:
+    """A shard of which something may be left.
+
+    Attributes:
+        path: Its final path.
+        plan: Its trials; those that are not refused are waited for.
+        settled: Whether no trial will be added to it, so that its final file may stay if it has an episode of each.
+    """
 
     path: Path
-    part: Path
     plan: Plan
-    wanted: frozenset[int]
-    keep: bool
+    settled: bool
 
 
 def remove_unfinished(directory: Path) -> None:
@@ -106,22 +111,12 @@ def remove_unfinished(directory: Path) -> None:
     remove(directory / f"{PLAN}.part")
 
 
-def find_left(
-    shards: Mapping[int, OpenShard],
-    plan: Plan,
-    channels: Channels,
-    *,
-    settled: Callable[[int], bool],
-    processes: int = 1,
-) -> Iterator[LeftOfShard]:
+def find_left(parts: Sequence[Part], channels: Channels, *, processes: int = 1) -> Iterator[LeftOfShard]:
     """Look for what is left of shards, in several of them at a time if there is much to look through.
 
     Args:
-        shards: By number; each waits for all its trials. Nothing is changed.
-        plan: Their trials.
+        parts: The shards. Nothing is changed.
         channels: What is recorded.
-        settled: Whether no trial will be added to the shard of a number, so that its final file may stay if it has an
-            episode of each.
         processes: How many processes may look; more than one import the program that calls this, as those of
             `multiprocessing` do.
 
@@ -132,31 +127,27 @@ def find_left(
         DatasetError: If files cannot be read.
         WorkerError: If a process that looks is killed.
     """
-    first = plan.trials[0].number
-    pieces = []
-    for number, shard in shards.items():
-        wanted = frozenset(shard.missing)
-        # Every process gets the trials that it needs, and not a whole plan.
-        trials = plan.trials[min(wanted, default=first) - first : max(wanted, default=first) - first + 1]
-        pieces.append(_Piece(shard.path, shard.part, Plan(plan.config, trials), wanted, settled(number)))
-    there = [piece for piece in pieces if is_there(piece.path) or is_there(piece.part)]
-    if sum(len(piece.wanted) for piece in there) < _MANY_EPISODES:
+    there = [is_there(part.path) or is_there(path_of_part(part.path)) for part in parts]
+    # Every process gets the trials that it needs, and not a whole plan.
+    pieces = [*compress(parts, there)]
+    if sum(len(piece.plan.trials) for piece in pieces) < _MANY_EPISODES:
         processes = 1
     found = work_side_by_side(
-        there, _look_with, (channels,), processes=processes, doing="looks through recordings", fork=True
+        pieces, _look_with, (channels,), processes=processes, doing="looks through recordings", fork=True
     )
-    for piece in pieces:
-        yield next(found) if piece in there else LeftOfShard({}, {}, None)
+    for is_here in there:
+        yield next(found) if is_here else LeftOfShard({}, {}, None)
 
 
-def _look_with(channels: Channels) -> Callable[[_Piece], LeftOfShard]:
-    def look(piece: _Piece) -> LeftOfShard:
-        final = _find_episodes(piece.path, piece.plan, channels, piece.wanted)
-        if piece.keep and final and final.keys() == piece.wanted:
-            finished = _check_finished(piece.path, channels, final)
+def _look_with(channels: Channels) -> Callable[[Part], LeftOfShard]:
+    def look(part: Part) -> LeftOfShard:
+        wanted = frozenset(part.plan.trials.numbers_to_run)
+        final = _find_episodes(part.path, part.plan, channels, wanted)
+        if part.settled and final and final.keys() == wanted:
+            finished = _check_finished(part.path, channels, final)
             if finished is not None:
                 return LeftOfShard(final, {}, finished)
-        return LeftOfShard(final, _find_episodes(piece.part, piece.plan, channels, piece.wanted), None)
+        return LeftOfShard(final, _find_episodes(path_of_part(part.path), part.plan, channels, wanted), None)
 
     return look
 

@@ -73,6 +73,11 @@ def write_in_order(
     return FinishedShard(summary, offsets, FileEntry(name, file.size, sha256.hexdigest()))
 
 
+def path_of_part(path: Path) -> Path:
+    """Path of a shard while it is filled; `path` is its final one."""
+    return path.with_name(f"{path.name}.part")
+
+
 class OpenShard:
     """A shard that still waits for episodes.
 
@@ -89,7 +94,7 @@ class OpenShard:
     def __init__(self, path: Path, channels: Channels) -> None:
         self.missing: set[int] = set()
         self.path = path
-        self.part = path.with_name(f"{path.name}.part")
+        self.part = path_of_part(path)
         self._channels = channels
         self._descriptor: int | None = None
         self._size = 0

@@ -2,8 +2,8 @@
 
 A directory that holds ``config.yaml`` and ``plan.parquet`` is a created dataset; one that also holds ``metadata.yaml``
 is finished, as that file is written last. While a dataset is filled, each open shard lies beside its final name (see
-`shard`), and each finished shard's rows are kept for ``throws.parquet``. Whatever ends that, the next writer takes in
-what is there (see `recovery`) and goes on.
+`shard`), and the rows of finished shards lie on the disk for ``throws.parquet`` (see `row_store`). Whatever ends that,
+the next writer takes in what is there (see `recovery`) and goes on.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from throwcollect.config.loader import dump_yaml, load
 from throwcollect.config.schema import Config
 from throwcollect.dataset.bag import FileSummary
 from throwcollect.dataset.creation import create
-from throwcollect.dataset.data_card import data_card
+from throwcollect.dataset.data_card import count_outcomes, data_card
 from throwcollect.dataset.description import write_description
 from throwcollect.dataset.directory import (
     CARD,
@@ -36,7 +36,8 @@ from throwcollect.dataset.journal import Event, Journal, was_open
 from throwcollect.dataset.lock import hold_together
 from throwcollect.dataset.manifest import FileEntry
 from throwcollect.dataset.provenance import Provenance, write_provenance
-from throwcollect.dataset.recovery import find_left, recover_shard, remove_unfinished
+from throwcollect.dataset.recovery import Part, find_left, recover_shard, remove_unfinished
+from throwcollect.dataset.row_store import Digests, RowStore
 from throwcollect.dataset.shard import FinishedShard, OpenShard
 from throwcollect.dataset.throws_table import Place, Row, ThrowsTable
 from throwcollect.episode.channels import Channels
@@ -61,7 +62,6 @@ class _Finished(NamedTuple):
 
     summary: FileSummary | None
     entry: FileEntry | None
-    rows: pa.Table
 
 
 class DatasetWriter:
@@ -103,6 +103,7 @@ class DatasetWriter:
         self._rows: dict[int, dict[int, Row]] = {}
         """Rows of their trials that have ended."""
         self._finished: dict[int, _Finished] = {}
+        self._finished_rows = RowStore(directory, self._table.schema)
         self._held = ExitStack()
         self._expect(self.plan.trials)
 
@@ -157,9 +158,10 @@ class DatasetWriter:
         for name in (METADATA, MANIFEST, THROWS):
             remove(self._directory / name)
         found = 0
-        shards = {number: self._shard(number) for number in sorted(self._unfinished)}
-        all_left = find_left(shards, self.plan, self._channels, settled=self._settled, processes=processes)
-        for (number, shard), left in zip(shards.items(), all_left, strict=True):
+        numbers = sorted(self._unfinished)
+        all_left = find_left([*map(self._part, numbers)], self._channels, processes=processes)
+        for number, left in zip(numbers, all_left, strict=True):
+            shard = self._shard(number)
             recovered = recover_shard(shard, left)
             for each in recovered.episodes:
                 place = Place(shard.path.name, -1, each.samples, each.digest)
@@ -210,9 +212,13 @@ class DatasetWriter:
             summary: What the bag's metadata say of its file; None if there is none, as no trial of it has an episode.
             entry: What the manifest says of its file.
             rows: The rows of its trials in the table of throws.
+
+        Raises:
+            DatasetError: If the disk fails.
         """
         self._unfinished.discard(number)
-        self._finished[number] = _Finished(summary, entry, rows)
+        self._finished_rows.put(number, rows)
+        self._finished[number] = _Finished(summary, entry)
 
     def append(self, episode: Episode, result: Result) -> None:
         """Write an episode.
@@ -267,20 +273,23 @@ class DatasetWriter:
         for shard in self._shards.values():
             shard.sync()
 
-    def digests(self) -> dict[int, str]:
-        """Digest of each episode of the shards that are finished, by trial."""
-        digests: dict[int, str] = {}
-        for shard in self._finished.values():
-            pairs = zip(shard.rows["trial"].to_pylist(), shard.rows["digest"].to_pylist(), strict=True)
-            digests |= {trial: digest for trial, digest in pairs if digest is not None}
-        return digests
+    def digests(self) -> Digests:
+        """Digest of each episode, by trial; all shards must be finished.
 
-    def finish(self, *, wall_s: float | None = None, simulations: int | None = None) -> None:
+        Raises:
+            DatasetError: If the disk fails.
+        """
+        return Digests(self._finished_rows.table)
+
+    def finish(self, *, wall_s: float | None = None, simulations: int | None = None) -> dict[str, int]:
         """Write everything that describes the dataset as a whole.
 
         Args:
             wall_s: Real time that the dataset took [s], for the data card; None if not known, or if a journal tells.
             simulations: Number of simulations that took part, for the data card; None if that is not known.
+
+        Returns:
+            Number of trials of each outcome.
 
         Raises:
             DatasetError: If trials are missing, or a file cannot be written.
@@ -290,7 +299,7 @@ class DatasetWriter:
             example = f", such as {missing[0]}" if missing else ""
             raise DatasetError(f"lacks {format_count(len(missing), 'trial')}{example}", path=self._directory)
         finished = [self._finished[shard] for shard in sorted(self._finished)]
-        throws = pa.concat_tables([each.rows for each in finished])
+        throws = self._finished_rows.table
         if self._journal is not None:
             wall_s = self._journal.measure_collected_s()
         provenance = Provenance.of_this_machine(
@@ -302,13 +311,16 @@ class DatasetWriter:
         write_file(self._directory / CARD, data_card(config, throws, provenance).encode())
         write_file(self._directory / CONFIG, dump_yaml(config).encode())
         recordings = [(each.summary, each.entry) for each in finished if each.summary and each.entry]
-        write_description(self._directory, config.name, throws, self._channels, recordings)
+        let_go = self._finished_rows.let_go
+        write_description(self._directory, config.name, throws, self._channels, recordings, on_piece=let_go)
         self.note("finished", wall_s=wall_s)
+        return count_outcomes(throws)
 
     def close(self) -> None:
         """Close all files; what is written stays."""
         for shard in self._shards.values():
             shard.close()
+        self._finished_rows.close()
         self._held.close()
         self._journal = None
 
@@ -330,10 +342,19 @@ class DatasetWriter:
         """Numbers of the trials of a shard that are not refused."""
         return (each for each in self._members(number) if each not in self.plan.trials.refused)
 
+    def _part(self, number: int) -> Part:
+        """What is known of a shard without a look into its files."""
+        members, first = self._members(number), self.plan.trials.first
+        trials = self.plan.trials[members.start - first : members.stop - first]
+        return Part(self._path(number), Plan(self._config, trials), self._settled(number))
+
+    def _path(self, number: int) -> Path:
+        return self._directory / shard_name(self._config.name, number)
+
     def _shard(self, number: int) -> OpenShard:
         """An unfinished shard; what is known of it is held in memory only from when it is first asked for."""
         if number not in self._shards:
-            shard = OpenShard(self._directory / shard_name(self._config.name, number), self._channels)
+            shard = OpenShard(self._path(number), self._channels)
             shard.expect(self._to_run(number))
             self._shards[number], self._rows[number] = shard, {}
         return self._shards[number]
@@ -362,7 +383,8 @@ class DatasetWriter:
         for row in rows:
             row["chunk_offset"] = finished.offsets.get(row["trial"])
         self._unfinished.remove(number)
-        self._finished[number] = _Finished(finished.summary, finished.entry, self._table.table(rows))
+        self._finished_rows.put(number, self._table.table(rows))
+        self._finished[number] = _Finished(finished.summary, finished.entry)
         shard = self._shards.pop(number)
         if finished.summary is not None:
             self.note("shard", name=shard.path.name)

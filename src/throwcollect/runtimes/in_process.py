@@ -87,7 +87,7 @@ class InProcess:
                 raise Interrupted(message, hint=self._place.way_on)
             # The dataset is finished even if trials are lost; whoever reads its summary says so.
             with suppress(LossError):
-                collection.finish(directory, meanwhile=lambda: time.sleep(_IDLE_S), say=session.say)
+                collection.finish(meanwhile=lambda: time.sleep(_IDLE_S), say=session.say)
         return info(directory)
 
     def _simulate(self, collection: TrialCollection, simulation: Replayer, session: Session) -> None:

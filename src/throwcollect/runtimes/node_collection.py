@@ -120,6 +120,8 @@ class NodeCollection:
             if not self._host.place.collects:
                 return None
             self._check(end)
+            # They end while the dataset is read once more.
+            self._supervisor.dismiss()
             return self._host.info()
 
     def _follow(self) -> NodeExit | None:

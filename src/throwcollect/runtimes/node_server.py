@@ -9,6 +9,7 @@ killed, stopped, bound to a core and looked at like any other.
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import gc
 import importlib
@@ -24,11 +25,12 @@ import time
 import warnings
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
-from typing import BinaryIO
+from typing import BinaryIO, NoReturn
 
 from throwcollect.config import shape
 from throwcollect.errors import ThrowcollectError
 from throwcollect.interruption import die_with_parent
+from throwcollect.ros.middleware import Middleware
 
 _MESSAGE_BYTES = 1 << 16
 _ANSWER_S = 60.0
@@ -295,7 +297,26 @@ def main() -> None:
     # What `ps` shows; the interpreter's own command line would be that of the server.
     setproctitle.setproctitle(" ".join([sys.executable, "-m", "throwcollect", *arguments]))
     sys.argv[1:] = arguments
-    runpy.run_module("throwcollect", run_name="__main__", alter_sys=True)
+    try:
+        runpy.run_module("throwcollect", run_name="__main__", alter_sys=True)
+    except SystemExit as end:
+        if Middleware.of_process().backend != "embedded" or not isinstance(end.code, int):
+            raise
+        _leave(end.code)
+
+
+def _leave(code: int) -> NoReturn:
+    """End this process without taking the interpreter apart: it writes to all memory that is shared with other nodes.
+
+    Nodes have closed their files and sessions before. Libraries of genuine ROS 2 tidy up behind Python, so theirs end
+    in the usual way.
+    """
+    # As `multiprocessing` ends what it forks.
+    atexit._run_exitfuncs()
+    for stream in (sys.stdout, sys.stderr):
+        with contextlib.suppress(OSError, ValueError):
+            stream.flush()
+    os._exit(code)
 
 
 def _import_libraries() -> None:

@@ -158,6 +158,11 @@ class Supervisor:
         self.host.stop([main], grace_s=0.0)
         return None
 
+    def dismiss(self) -> None:
+        """Ask nodes to end that the run can do without, and do not wait for it."""
+        for name in self._expendables:
+            self.host.signal(name, signal.SIGTERM)
+
     @property
     def _expendables(self) -> list[str]:
         return self._list_names(Role.EXPENDABLE)

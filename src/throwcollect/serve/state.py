@@ -166,10 +166,10 @@ class Lookout:
 
 def _find_targets(component: Component) -> list[str]:
     """Landing targets that a collection of a component can be spread over."""
-    if component.kind != "collection":
+    if component.kind != "collection" or not isinstance(component.source, Path):
         return []
     try:
-        return _read_targets(component.config, component.config.stat().st_mtime_ns)
+        return _read_targets(component.source, component.source.stat().st_mtime_ns)
     except (ConfigError, OSError):
         # Whoever starts an instance is told what is wrong with the file.
         return []

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.extras import lazily
 from throwcollect.reproducible_math import matmul, solve
-
-spatial = lazily("scipy.spatial")
+from throwcollect.sweep.neighbours import Neighbours
+from throwcollect.sweep.rows import Rows
 
 _BASES = 8
 """Number of landed throws near a goal from each of which a way to it is looked for."""
@@ -39,31 +36,41 @@ _FAILURE_BINS = 2.0
 class InverseModel:
     """Proposes parameters by local linear models around throws that landed.
 
-    Parameters are places in the unit cube, targets are in bins. Args hold the throws so far, in order of trials.
+    Parameters are places in the unit cube, targets are in bins.
 
     Args:
-        tried: Parameters of all throws, shape ``(n_throws, n_parameters)``.
-        landed: Which of them landed, shape ``(n_throws,)``.
-        places: Where those that landed did, shape ``(n_landed, n_targets)``.
+        parameters: Number of parameters.
+        targets: Number of targets.
     """
 
-    def __init__(self, tried: NDArray[np.float64], landed: NDArray[np.bool_], places: NDArray[np.float64]) -> None:
-        self._success = landed.astype(np.float64)
-        self._parameters = tried[landed]
-        self._places = places
-        self._by_all_parameters = spatial.cKDTree(tried)
-        self._by_parameters = spatial.cKDTree(self._parameters)
-        self._by_place = spatial.cKDTree(places)
+    def __init__(self, parameters: int, targets: int) -> None:
+        self._success = Rows(np.empty(0))
+        self._all = Neighbours(parameters)
+        self._landed = Neighbours(parameters)
+        self._landings = Neighbours(targets)
 
-    @staticmethod
-    def enough(landed: int, parameters: int) -> bool:
-        """Whether so many throws that landed make a model of so many parameters."""
-        return landed >= parameters + 2
+    def learn(self, tried: NDArray[np.float64], landed: NDArray[np.bool_], places: NDArray[np.float64]) -> None:
+        """Take in further throws, in order of trials.
+
+        Args:
+            tried: Their parameters, shape ``(n_throws, n_parameters)``.
+            landed: Which of them landed, shape ``(n_throws,)``.
+            places: Where those that landed did, shape ``(n_landed, n_targets)``.
+        """
+        self._success.append(landed)
+        self._all.append(tried)
+        self._landed.append(tried[landed])
+        self._landings.append(places)
+
+    @property
+    def usable(self) -> bool:
+        """Whether enough throws have landed to make a model of so many parameters."""
+        landed, parameters = self._landed.points.shape
+        return bool(landed >= parameters + 2)
 
     def away(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
         """Distance of places from the nearest landing [bins], shape ``(n_places,)``."""
-        distances: NDArray[np.float64] = self._by_place.query(places)[0]
-        return distances
+        return self._landings.find(places, 1)[0][:, 0]
 
     def propose(
         self, goals: NDArray[np.float64], randomness: np.random.Generator
@@ -84,12 +91,12 @@ class InverseModel:
             to land at their goal, or clearly nearer to it than any throw before.
         """
         flat = goals.reshape(-1, goals.shape[-1])
-        bases = _nearest(self._by_place, flat, _BASES)
+        bases = self._landings.find(flat, _BASES)[1]
         distinct, which = np.unique(bases, return_inverse=True)
         which = which.reshape(bases.shape)
         slopes, inverses = self._linear_models(distinct)
         slope, inverse = slopes[which], inverses[which]
-        start, landing, goal = self._parameters[bases], self._places[bases], flat[:, np.newaxis]
+        start, landing, goal = self._landed.points[bases], self._landings.points[bases], flat[:, np.newaxis]
         step = _product(inverse, goal - landing)
         length = np.sqrt((step**2).sum(axis=-1, keepdims=True))
         step *= _LONGEST_STEP / np.maximum(length, _LONGEST_STEP)
@@ -99,8 +106,8 @@ class InverseModel:
         ends = np.clip(ends, 0.0, 1.0 - 1e-9)
         missing = landing + _product(slope, ends - start) - goal
         error = np.sqrt((missing**2).sum(axis=-1))
-        near = _nearest(self._by_all_parameters, ends.reshape(-1, ends.shape[-1]), _JUDGES)
-        failing = 1.0 - self._success[near].mean(axis=-1).reshape(error.shape)
+        near = self._all.find(ends.reshape(-1, ends.shape[-1]), _JUDGES)[1]
+        failing = 1.0 - self._success.all[near].mean(axis=-1).reshape(error.shape)
         promising = error <= np.maximum(_CLOSE_BINS, _PROGRESS * self.away(flat)[:, np.newaxis])
         best = (error + _FAILURE_BINS * failing).reshape(len(goals), -1).argmin(axis=1)
         proposals = np.arange(len(goals))
@@ -113,12 +120,12 @@ class InverseModel:
         Returns:
             Shapes ``(n_bases, n_targets, n_parameters)`` and ``(n_bases, n_parameters, n_targets)``.
         """
-        dimensions = self._parameters.shape[1]
-        neighbours = _nearest(
-            self._by_parameters, self._parameters[bases], _NEIGHBOURS_PER_PARAMETER * (dimensions + 1)
-        )
-        moved = self._parameters[neighbours] - self._parameters[bases][:, np.newaxis]
-        caused = self._places[neighbours] - self._places[bases][:, np.newaxis]
+        parameters, landings = self._landed.points, self._landings.points
+        dimensions = parameters.shape[1]
+        count = _NEIGHBOURS_PER_PARAMETER * (dimensions + 1)
+        neighbours = self._landed.find(parameters[bases], count)[1]
+        moved = parameters[neighbours] - parameters[bases][:, np.newaxis]
+        caused = landings[neighbours] - landings[bases][:, np.newaxis]
         transposed = np.swapaxes(moved, 1, 2)
         spread = matmul(transposed, moved)
         ridge = _RIDGE * np.trace(spread, axis1=1, axis2=2) / dimensions + _LEAST
@@ -126,12 +133,6 @@ class InverseModel:
         slopes = np.swapaxes(solve(ridged, matmul(transposed, caused)), 1, 2)
         damped = matmul(slopes, np.swapaxes(slopes, 1, 2)) + _DAMPING_BINS**2 * np.eye(slopes.shape[1])
         return slopes, np.swapaxes(solve(damped, slopes), 1, 2)
-
-
-def _nearest(tree: Any, points: NDArray[np.float64], count: int) -> NDArray[np.int64]:
-    """Indices of the nearest members of a tree, nearest first, shape ``(n_points, count)`` or as many as there are."""
-    found: NDArray[np.int64] = tree.query(points, range(1, min(count, tree.n) + 1))[1]
-    return found
 
 
 def _product(matrices: NDArray[np.float64], vectors: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -20,11 +20,35 @@ _BUFFER_BYTES = 1 << 20
 
 def encode_table(table: Any) -> bytes:
     """Parquet bytes of an Arrow table; equal tables give equal bytes."""
+    pieces: list[bytes] = []
+    encode_pieces(table, pieces.append)
+    return b"".join(pieces)
+
+
+def encode_pieces(table: Any, put: Callable[[bytes], object]) -> None:
+    """Encode an Arrow table as `encode_table` does, piece by piece and one column of a million rows after the other.
+
+    Args:
+        table: The table; of columns that are in one piece, no copy is made.
+        put: Called with the bytes, in order.
+    """
     import pyarrow.parquet as pq
 
-    buffer = io.BytesIO()
-    pq.write_table(table.combine_chunks(), buffer, compression="zstd", write_page_checksum=True)
-    return buffer.getvalue()
+    pq.write_table(table.combine_chunks(), _Sink(put), compression="zstd", write_page_checksum=True)
+
+
+class _Sink(io.RawIOBase):
+    """A file that Arrow writes to."""
+
+    def __init__(self, put: Callable[[bytes], object]) -> None:
+        self._put = put
+
+    def writable(self) -> bool:
+        return True
+
+    def write(self, data: Any, /) -> int:
+        self._put(data)
+        return len(data)
 
 
 def read_parquet(path: Path) -> Any:

@@ -40,7 +40,14 @@ class TargetSampler:
         self._seed = config.seed
         self._parameters: Mapping[str, Parameter] = config.sweep.parameters
         self._cells = Cells(target)
+        self._model = InverseModel(len(self._parameters), self.dimensions)
         self._aims = np.full(first * ROUND_TRIALS, NOWHERE)
+        """Cells of the throws that `draw` was not told the end of."""
+        self._known = 0
+        """Number of trials that it was told the end of."""
+        self._landed = np.zeros(self._cells.count, dtype=np.int64)
+        self._missed = np.zeros(self._cells.count, dtype=np.int64)
+        """Of each cell, throws at it that landed elsewhere or not at all, since the last landing in it."""
 
     @property
     def dimensions(self) -> int:
@@ -66,7 +73,8 @@ class TargetSampler:
         Args:
             otherwise: Points to take while too few throws have landed, shape ``(n_trials, n_parameters)``: of a whole
                 round or, if it is the last one, of as many trials as it has.
-            tried: Values of the trials of all rounds but the one before, shape ``(n_tried, n_parameters)``.
+            tried: Values of the trials of all rounds but the one before, shape ``(n_tried, n_parameters)``; they begin
+                with those of the time before.
             ended: What `place` says of each of them, shape ``(n_tried, n_targets)``.
 
         Returns:
@@ -75,19 +83,18 @@ class TargetSampler:
         key = (_RANDOMNESS, self.next_round)
         randomness = np.random.default_rng(np.random.SeedSequence(self._seed, spawn_key=key))
         self.next_round += 1
-        landed = np.isfinite(ended[:, 0])
-        if not InverseModel.enough(int(landed.sum()), tried.shape[1]):
+        self._learn(self._unit(tried[self._known :]), ended[self._known :])
+        if not self._model.usable:
             self._aims = np.append(self._aims, np.full(ROUND_TRIALS, NOWHERE))
             return otherwise
-        model = InverseModel(self._unit(tried), landed, ended[landed])
-        thinness = self._thinness(model, self._cells.cells_of(ended), randomness)
+        thinness = self._thinness(randomness)
         aims = np.empty(0, dtype=np.int64)
         unit = np.empty((0, tried.shape[1]))
         while len(aims) < ROUND_TRIALS:
             cells = thinness.take(ROUND_TRIALS - len(aims))
             corners = self._cells.corners(cells)[:, np.newaxis]
             places_inside = randomness.random((len(cells), _GOALS, self.dimensions))
-            proposed, promising = model.propose(corners + places_inside, randomness)
+            proposed, promising = self._model.propose(corners + places_inside, randomness)
             given_back = np.zeros(len(cells), dtype=np.bool_)
             given_back[~promising] = thinness.doubt(cells[~promising])
             aims = np.append(aims, cells[~given_back])
@@ -97,26 +104,31 @@ class TargetSampler:
         # A round that is cut short begins as a whole one does, so that it can be made whole later.
         return np.column_stack(columns)[: len(otherwise)]
 
-    def _thinness(self, model: InverseModel, reached: NDArray[np.int64], randomness: np.random.Generator) -> Thinness:
+    def _learn(self, tried: NDArray[np.float64], ended: NDArray[np.float64]) -> None:
+        """Take in what came of further trials, whose parameters are places in the unit cube."""
+        aimed, self._aims = self._aims[: len(ended)], self._aims[len(ended) :]
+        self._known += len(ended)
+        landed = np.isfinite(ended[:, 0])
+        self._model.learn(tried, landed, ended[landed])
+        for aim, cell in zip(aimed, self._cells.cells_of(ended), strict=True):
+            if aim != NOWHERE:
+                self._missed[aim] += 1
+            if cell != NOWHERE:
+                self._landed[cell] += 1
+                self._missed[cell] = 0
+
+    def _thinness(self, randomness: np.random.Generator) -> Thinness:
         """How thin the cells are.
 
         Args:
-            model: What is known of the way to them.
-            reached: Cell of each trial that has ended, shape ``(n_tried,)``.
             randomness: Decides between equals.
         """
         cells = self._cells.count
-        aimed, under_way = self._aims[: len(reached)], self._aims[len(reached) :]
-        latest = np.full(cells, NOWHERE)
-        inside = np.flatnonzero(reached != NOWHERE)
-        np.maximum.at(latest, reached[inside], inside)
-        at_cells = np.flatnonzero(aimed != NOWHERE)
-        missed = at_cells[at_cells > latest[aimed[at_cells]]]
         return Thinness(
-            landed=np.bincount(reached[inside], minlength=cells),
-            asked=np.bincount(under_way[under_way != NOWHERE], minlength=cells),
-            missed=np.bincount(aimed[missed], minlength=cells),
-            away=model.away(self._cells.corners(np.arange(cells)) + 0.5),
+            landed=self._landed,
+            asked=np.bincount(self._aims[self._aims != NOWHERE], minlength=cells),
+            missed=self._missed,
+            away=self._model.away(self._cells.corners(np.arange(cells)) + 0.5),
             randomness=randomness,
         )
 

@@ -116,7 +116,7 @@ class Trials(Sequence[Trial]):
         if chosen.step != 1:
             raise ValueError(f"trials have no gaps: {which}")
         rows = slice(chosen.start - self.first, chosen.stop - self.first)
-        refused = {number: reason for number, reason in self._refused.items() if number in chosen}
+        refused = {number: self._refused[number] for number in chosen if number in self._refused}
         columns = self.values[rows], self.seeds[rows], self.digests[rows]
         return Trials(self.keys, *columns, first=chosen.start, refused=refused)
 

@@ -38,10 +38,10 @@ def refuse_nothing(_: Config) -> None:
     return None
 
 
-def test_a_disk_that_is_too_small_at_any_rate_is_told_of_before_a_trial_is_checked(
+def test_a_disk_that_is_too_small_at_any_rate_is_told_of_before_a_trial_is_drawn(
     disk: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.delattr("throwcollect.coordinator.prepare.feasibility_check")
+    monkeypatch.delattr("throwcollect.coordinator.prepare.draw_first_points")
     with pytest.raises(
         ConfigError, match=r"a plan of 10000 trials takes 0\.4 MB or more, and 0\.3 MB are free\n  try: free"
     ):

@@ -31,3 +31,17 @@ def test_a_plan_of_which_no_trial_is_left_is_refused(monkeypatch: pytest.MonkeyP
     impossible = {**CONFIG, "sweep": {"parameters": {"task.duration_s": {"min": 0.1, "max": 0.12}}}}
     with pytest.raises(PlanError, match=r"60 trials, all refused"):
         prepare.draw_plan(Config.model_validate(impossible), directory=Path(), processes=2)
+
+
+def test_of_a_large_plan_it_is_told_at_once_what_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(prepare, "_TOLD_TRIALS", 400)
+    monkeypatch.setattr(prepare, "_MOST_PIECES", 1)
+    monkeypatch.setattr(prepare, "_TELL_FIRST_S", 0.0)
+    monkeypatch.setattr(prepare, "feasibility_check", lambda _: lambda _: None)
+    said: list[str] = []
+    config = Config.model_validate({**CONFIG, "trials": 450})
+    assert len(prepare.draw_plan(config, directory=Path(), say=said.append).trials) == 450
+    assert said == ["plan: draws 450 trials", "plan: checks 450 trials", "plan: 200 of 450 trials checked"]
+    said.clear()
+    prepare.draw_plan(Config.model_validate({**CONFIG, "trials": 399}), directory=Path(), say=said.append)
+    assert said[0].endswith("of 399 trials checked")

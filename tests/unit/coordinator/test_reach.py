@@ -34,7 +34,7 @@ class Bench:
         plan = make_plan(load(directory / "reach.yaml"))
         create(directory / "data", plan)
         self.writer = DatasetWriter.open(directory / "data")
-        self.coordinator = Coordinator(TrialCollection(self.writer))
+        self.coordinator = Coordinator(TrialCollection(self.writer, directory / "data"))
         self.executor = ros.SingleThreadedExecutor()
         self.executor.add_node(self.coordinator)
 

@@ -24,8 +24,21 @@ from throwcollect.sweep.round_file import append_round
 from throwcollect.tasks.throw.outcome import ThrowResult
 
 from .conftest import Collection
+from .mutations import KINDS, Mutation, mutate
 
 TRIALS = 4
+SHARDS = ("quick_00000.mcap", "quick_00001.mcap")
+
+damages = st.lists(
+    st.builds(
+        Mutation,
+        kind=st.sampled_from(KINDS),
+        place=st.floats(0, 1),
+        span=st.integers(1, 4096),
+        number=st.integers(0, 2**32 - 1),
+    ),
+    max_size=3,
+)
 
 
 class Killed(BaseException):
@@ -208,6 +221,38 @@ def test_any_interleaving_of_episodes_crashes_and_power_cuts_ends_in_the_same_fi
         shards = sorted(directory.glob("*.mcap*"))
         for path in data.draw(st.lists(st.sampled_from(shards), unique=True) if shards else st.just([]), label="cut"):
             os.truncate(path, data.draw(st.integers(0, path.stat().st_size), label="to"))
+    trials.go_on(directory)
+    assert files_of(directory) == expected
+
+
+@settings(
+    max_examples=15,
+    deadline=None,
+    derandomize=True,
+    phases=[Phase.generate],
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
+@given(
+    damage=st.dictionaries(st.sampled_from(SHARDS), damages, min_size=1),
+    unfinished=st.dictionaries(st.sampled_from(SHARDS), st.booleans()),
+)
+def test_any_damage_to_recordings_costs_trials_and_changes_no_file(
+    damage: dict[str, list[Mutation]],
+    unfinished: dict[str, bool],
+    trials: Trials,
+    expected: dict[str, bytes],
+    tmp_path: Path,
+) -> None:
+    """Final files and those that are filled, damaged in any way: what stays is what would be collected again."""
+    directory = tmp_path / "dataset"
+    shutil.rmtree(directory, ignore_errors=True)
+    create(directory, trials.plan)
+    for name in SHARDS:
+        damaged = mutate(expected[name], damage.get(name, []))
+        if unfinished.get(name) is not None:
+            (directory / f"{name}.part").write_bytes(damaged)
+        if unfinished.get(name) is not True:
+            (directory / name).write_bytes(damaged)
     trials.go_on(directory)
     assert files_of(directory) == expected
 

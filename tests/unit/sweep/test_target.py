@@ -1,5 +1,6 @@
 """Throws that are spread over landing targets."""
 
+import hashlib
 import math
 import subprocess
 import sys
@@ -116,6 +117,11 @@ def test_while_almost_nothing_lands_sobol_goes_on() -> None:
 
     sobol = make_plan(configuration(trials=320, target=None)).trials
     assert collected(config, throw=unlucky) == list(sobol)
+
+
+def test_trials_are_those_of_every_version(spread: list[Trial]) -> None:
+    digest = hashlib.sha256("".join(trial.digest for trial in spread).encode())
+    assert digest.hexdigest().startswith("64cb783eb30cac70"), "datasets of earlier versions could not be gone on with"
 
 
 def test_another_seed_gives_other_trials(spread: list[Trial]) -> None:

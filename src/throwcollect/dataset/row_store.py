@@ -1,0 +1,198 @@
+"""Rows of the table of throws until it is written: on disk, as those of a million trials fill half a gigabyte."""
+
+from __future__ import annotations
+
+import mmap
+import tempfile
+from collections.abc import Iterable, Iterator, Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from throwcollect.dataset.directory import THROWS
+from throwcollect.files import unwritable, write_all
+from throwcollect.sweep.arrow_column import read_numbers
+
+_ALIGNED_BYTES = 64
+"""Buffers of Arrow begin at multiples of this."""
+
+_SHARDS_AT_ONCE = 50
+"""So many are looked at before memory is let go of; the kernel maps what lies around a value along with it."""
+
+_Place = tuple[int, int]
+"""First byte and number of bytes."""
+
+
+class _NamelessFile:
+    """A file that has no name, so whatever ends this process, nothing of it is left.
+
+    Args:
+        directory: Directory of the dataset, whose disk it is on.
+    """
+
+    def __init__(self, directory: Path) -> None:
+        self._path = directory / THROWS
+        self._file: BinaryIO | None = None
+        self._size = 0
+        self._map: mmap.mmap | None = None
+
+    def append(self, parts: Iterable[pa.Buffer]) -> _Place:
+        """Append bytes, those of each part right behind those of the one before.
+
+        Raises:
+            DatasetError: If they cannot be written.
+        """
+        first = self._size
+        for part in parts:
+            self._write(part)
+        place = first, self._size - first
+        self._write(bytes(-self._size % _ALIGNED_BYTES))
+        return place
+
+    def _write(self, data: pa.Buffer | bytes) -> None:
+        try:
+            if self._file is None:
+                self._file = tempfile.TemporaryFile(dir=self._path.parent, buffering=0)  # noqa: SIM115
+            write_all(self._file.fileno(), data)
+        except OSError as error:
+            raise unwritable(self._path, error) from error
+        self._size += len(data)
+
+    def map(self) -> None:
+        """Map what was appended so far, so that it can be read."""
+        if self._file is not None:
+            self._map = mmap.mmap(self._file.fileno(), self._size, prot=mmap.PROT_READ)
+
+    def read(self, place: _Place) -> pa.Buffer:
+        """What was appended; it is read from the disk when it is looked at."""
+        return pa.py_buffer(self._map).slice(*place)
+
+    def let_go(self) -> None:
+        """Have nothing in memory; what is looked at again is read again."""
+        if self._map is not None:
+            self._map.madvise(mmap.MADV_DONTNEED)
+
+    def close(self) -> None:
+        """Close the file; what was read stays readable."""
+        if self._file is not None:
+            self._file.close()
+
+
+class RowStore:
+    """Rows of shards, put down in any order and read in order of trials.
+
+    Args:
+        directory: Directory of the dataset.
+        schema: Columns of the table of throws.
+    """
+
+    def __init__(self, directory: Path, schema: pa.Schema) -> None:
+        self._schema = schema
+        self._by_shards = _NamelessFile(directory)
+        self._by_columns = _NamelessFile(directory)
+        self._places: dict[int, _Place] = {}
+
+    def put(self, number: int, rows: pa.Table) -> None:
+        """Put down the rows of a shard; `table` must not have been asked for yet.
+
+        Args:
+            number: Number of the shard.
+            rows: Its rows, in order of trials.
+
+        Raises:
+            DatasetError: If they cannot be written.
+        """
+        sink = pa.BufferOutputStream()
+        with pa.ipc.new_stream(sink, self._schema) as stream:
+            stream.write_table(rows)
+        self._places[number] = self._by_shards.append([sink.getvalue()])
+
+    @cached_property
+    def table(self) -> pa.Table:
+        """All rows in order of trials, each column in one piece; values come from the disk when they are looked at.
+
+        Raises:
+            DatasetError: If the columns cannot be written.
+        """
+        self._by_shards.map()
+        places = [place for _, place in sorted(self._places.items())]
+        rows = pa.concat_tables([pa.ipc.open_stream(self._by_shards.read(place)).read_all() for place in places])
+        columns = [self._put_column(column.chunks) for column in rows.columns]
+        self._by_columns.map()
+        pairs = zip(self._schema.types, columns, strict=True)
+        arrays = [self._read_column(kind, len(rows), places) for kind, places in pairs]
+        return pa.Table.from_arrays(arrays, schema=self._schema)
+
+    def _put_column(self, chunks: list[pa.Array]) -> tuple[_Place | None, ...]:
+        """Put a column down in one piece; returns where the buffers of the array are, as Arrow has them."""
+        valid: list[NDArray[np.bool_]] = []
+        ends = [np.zeros(1, np.int32)]
+
+        def values() -> Iterator[pa.Buffer]:
+            for first in range(0, len(chunks), _SHARDS_AT_ONCE):
+                some = pa.concat_arrays(chunks[first : first + _SHARDS_AT_ONCE])
+                valid.append(some.is_valid().to_numpy(zero_copy_only=False))
+                if some.type == pa.string():
+                    # As numbers of bytes, where texts end; of an array that nothing was cut off from.
+                    within = np.frombuffer(some.buffers()[1], np.int32, len(some) + 1)
+                    ends.append(within[1:] + ends[-1][-1])
+                    yield (some.buffers()[2] or pa.py_buffer(b"")).slice(0, int(within[-1]))
+                else:
+                    yield some.buffers()[1].slice(0, len(some) * some.type.byte_width)
+                self._by_shards.let_go()
+
+        places = [self._by_columns.append(values())]
+        if chunks[0].type == pa.string():
+            places.insert(0, self._by_columns.append([pa.py_buffer(np.concatenate(ends))]))
+        all_valid = np.concatenate(valid)
+        bits = None if all_valid.all() else pa.py_buffer(np.packbits(all_valid, bitorder="little"))
+        return (None if bits is None else self._by_columns.append([bits]), *places)
+
+    def _read_column(self, kind: pa.DataType, count: int, places: Iterable[_Place | None]) -> pa.Array:
+        buffers = [None if place is None else self._by_columns.read(place) for place in places]
+        return pa.Array.from_buffers(kind, count, buffers)
+
+    def let_go(self) -> None:
+        """Have no values of `table` in memory that nobody looks at any more."""
+        self._by_columns.let_go()
+
+    def close(self) -> None:
+        """Let go of the disk, as soon as nobody has the table any more."""
+        self._by_shards.close()
+        self._by_columns.close()
+
+
+class Digests(Mapping[int, str]):
+    """Digest of each episode by trial, in order of trials, of which one is read when it is asked for.
+
+    Args:
+        throws: The table of throws, in order of trials.
+    """
+
+    def __init__(self, throws: pa.Table) -> None:
+        recorded = throws["digest"].is_valid().to_numpy()
+        self._rows = np.flatnonzero(recorded)
+        self._trials = np.concatenate([read_numbers(chunk) for chunk in throws["trial"].chunks])[self._rows]
+        self._digests = throws["digest"]
+
+    def __getitem__(self, trial: int) -> str:
+        """The digest of a trial's episode.
+
+        Raises:
+            KeyError: If it has none.
+        """
+        place = int(np.searchsorted(self._trials, trial))
+        if place == len(self) or self._trials[place] != trial:
+            raise KeyError(trial)
+        digest: str = self._digests[int(self._rows[place])].as_py()
+        return digest
+
+    def __iter__(self) -> Iterator[int]:
+        return map(int, self._trials)
+
+    def __len__(self) -> int:
+        return len(self._trials)

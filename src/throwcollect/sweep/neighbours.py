@@ -1,0 +1,82 @@
+"""Nearest neighbours among points to which others are appended, without all that are there being sorted each time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from throwcollect.extras import lazily
+from throwcollect.sweep.rows import Rows
+
+spatial = lazily("scipy.spatial")
+
+_FEW = 1 << 16
+"""So many points are sorted into one tree each time, which takes some milliseconds."""
+_GROWTH = 8
+
+
+class Neighbours:
+    """Points in order, and which of them are near to others.
+
+    They lie in a few trees of consecutive points, each several times as large as the next one: when points are
+    appended, most often the smallest tree alone is made anew. Which trees there are follows from the number of points.
+
+    Args:
+        dimensions: Number of coordinates of a point.
+    """
+
+    def __init__(self, dimensions: int) -> None:
+        self._points = Rows(np.empty((0, dimensions)))
+        self._trees: dict[tuple[int, int], Any] = {}
+
+    @property
+    def points(self) -> NDArray[np.float64]:
+        """All points, shape ``(n_points, n_dimensions)``."""
+        return self._points.all
+
+    def append(self, points: NDArray[np.float64]) -> None:
+        """Append points, shape ``(n_added, n_dimensions)``."""
+        self._points.append(points)
+        known, self._trees = self._trees, {}
+        for first, stop in _spans(len(self.points)):
+            tree = known.get((first, stop))
+            self._trees[first, stop] = spatial.cKDTree(self.points[first:stop]) if tree is None else tree
+
+    def find(self, places: NDArray[np.float64], count: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """The points that are nearest to some places; of those that are equally far in different trees, the first.
+
+        Args:
+            places: Shape ``(n_places, n_dimensions)``.
+            count: How many are wanted of each.
+
+        Returns:
+            Their distances, nearest first, and their indices; both of shape ``(n_places, count)``, or with as many
+            columns as there are points.
+        """
+        distances, indices = [], []
+        for (first, stop), tree in self._trees.items():
+            far, which = tree.query(places, range(1, min(count, stop - first) + 1))
+            distances.append(far)
+            indices.append(which + first)
+        if len(distances) == 1:
+            return distances[0], indices[0]
+        far, which = np.concatenate(distances, axis=1), np.concatenate(indices, axis=1)
+        nearest = np.argsort(far, axis=1, kind="stable")[:, :count]
+        return np.take_along_axis(far, nearest, axis=1), np.take_along_axis(which, nearest, axis=1)
+
+
+def _spans(count: int) -> Iterator[tuple[int, int]]:
+    """First and last but one of the points of each tree, the largest first."""
+    size = _FEW
+    while size * _GROWTH <= count:
+        size *= _GROWTH
+    first = 0
+    while first < count:
+        # The last points, fewer than `_FEW`, have a tree of their own.
+        stop = count if size < _FEW else count - (count - first) % size
+        if stop > first:
+            yield first, stop
+        first, size = stop, size // _GROWTH

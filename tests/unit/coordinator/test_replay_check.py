@@ -1,0 +1,124 @@
+"""Trials that are simulated again in a fresh process, which may be begun before it is known which ones are compared."""
+
+import json
+import subprocess
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from throwcollect.config.schema import Config
+from throwcollect.coordinator import replay_check
+from throwcollect.coordinator.replay_check import ReplayCheck
+from throwcollect.dataset.creation import create
+from throwcollect.errors import DatasetError, WorkerError
+from throwcollect.replay.throw import Replayer
+from throwcollect.sweep.plan import Plan, make_plan
+from throwcollect.trial.choice import choose_trials
+
+PLAN: Plan = make_plan(
+    Config.model_validate(
+        {
+            "name": "again",
+            "trials": 6,
+            "sweep": {"sampler": "uniform", "parameters": {"ball.mass_kg": {"min": 0.03, "max": 0.06}}},
+            "sim": {"engine": "ballistic"},
+        }
+    )
+)
+NUMBERS = list(PLAN.trials.numbers_to_run)
+CHOSEN = choose_trials(NUMBERS, count=2, seed=PLAN.config.seed)
+
+
+@pytest.fixture(scope="module")
+def digests() -> dict[int, str]:
+    replayer = Replayer(PLAN.config)
+    found = {trial.number: replayer.run(trial).digest for trial in PLAN.trials}
+    replayer.close()
+    return found
+
+
+@pytest.fixture
+def started(monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
+    """Trials of each process that is started."""
+    found: list[list[str]] = []
+    popen = subprocess.Popen
+
+    def note(command: list[str], **kwargs: object) -> object:
+        found.append(command[command.index("simulate") + 2 :])
+        return popen(command, **kwargs)
+
+    monkeypatch.setattr(replay_check.subprocess, "Popen", note)
+    return found
+
+
+@pytest.fixture
+def check(tmp_path: Path) -> Iterator[ReplayCheck]:
+    create(tmp_path / "data", PLAN)
+    check = ReplayCheck(tmp_path / "data", count=2, seed=PLAN.config.seed)
+    yield check
+    check.close()
+
+
+def words(trials: list[int]) -> list[str]:
+    return [str(trial) for trial in trials]
+
+
+def compare(check: ReplayCheck, digests: dict[int, str]) -> str | None:
+    return check.compare(digests, meanwhile=lambda: time.sleep(0.01))
+
+
+def test_trials_that_were_begun_early_are_not_simulated_twice(check, digests, started) -> None:
+    check.begin(NUMBERS)
+    assert compare(check, digests) == "2 trials simulated again in a fresh process: the same bit for bit"
+    assert started == [words(CHOSEN)]
+
+
+def test_what_is_compared_does_not_depend_on_the_guess(check, digests, started) -> None:
+    check.begin(NUMBERS)
+    kept = {trial: digest for trial, digest in digests.items() if trial not in CHOSEN}
+    compare(check, kept)
+    assert started == [words(CHOSEN), words(choose_trials(sorted(kept), count=2, seed=PLAN.config.seed))]
+
+
+def test_an_early_process_that_fails_is_replaced(check, digests, started) -> None:
+    check.begin([10**6, 10**6 + 1])
+    assert compare(check, digests) is not None
+    assert started == [words([10**6, 10**6 + 1]), words(CHOSEN)]
+
+
+@pytest.mark.parametrize("early", [False, True])
+def test_a_trial_that_came_out_otherwise_is_an_error(check, digests, early) -> None:
+    if early:
+        check.begin(NUMBERS)
+    with pytest.raises(DatasetError, match=f"1 of 2 trials came out otherwise in a fresh process: trial {CHOSEN[1]}"):
+        compare(check, {**digests, CHOSEN[1]: "0" * 64})
+
+
+def test_a_process_that_fails_is_an_error(check, digests, tmp_path) -> None:
+    (tmp_path / "data" / "plan.parquet").unlink()
+    with pytest.raises(WorkerError, match="2 trials could not be simulated again \\(exit code") as caught:
+        compare(check, digests)
+    assert "plan.parquet" in (caught.value.evidence or "")
+
+
+def test_nothing_is_left_of_a_check_that_is_given_up(check, monkeypatch) -> None:
+    begun: list[subprocess.Popen[bytes]] = []
+    popen = subprocess.Popen
+
+    def note(*arguments: object, **kwargs: object) -> object:
+        begun.append(popen(*arguments, **kwargs))
+        return begun[0]
+
+    monkeypatch.setattr(replay_check.subprocess, "Popen", note)
+    check.begin(NUMBERS)
+    check.close()
+    assert begun[0].poll() is not None
+
+
+def test_without_trials_there_is_nothing_to_do(tmp_path, started) -> None:
+    check = ReplayCheck(tmp_path, count=0, seed=1)
+    check.begin(NUMBERS)
+    assert compare(check, {1: json.dumps(1)}) is None
+    assert started == []

@@ -1,0 +1,138 @@
+"""Rows of the table of throws wait on the disk: how many there are has next to no effect on memory."""
+
+import gc
+import itertools
+import tracemalloc
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from throwcollect.dataset import writer
+from throwcollect.dataset.bag import FileSummary
+from throwcollect.dataset.manifest import FileEntry
+from throwcollect.dataset.row_store import Digests, RowStore
+from throwcollect.dataset.shard import FinishedShard
+from throwcollect.errors import DatasetError
+from throwcollect.sweep.parquet_file import encode_pieces, encode_table
+from throwcollect.tasks.measures import BallState
+from throwcollect.tasks.throw.outcome import ThrowOutcome, ThrowResult
+
+TRIALS = 4000
+PER_SHARD = 200
+MOST_BYTES = 60
+"""Memory that a trial whose shard is finished may take [bytes]; its row alone has 500 in the columns of a table."""
+SCHEMA = pa.schema({"trial": pa.int64(), "reason": pa.string(), "speed": pa.float64(), "digest": pa.string()})
+
+
+class ShardWithoutFile:
+    """Stands for `OpenShard` and writes nothing."""
+
+    def __init__(self, path: Path, _channels: object) -> None:
+        self.path = path
+        self.missing: set[int] = set()
+        self.offsets: dict[int, int] = {}
+
+    def expect(self, trials: Any) -> None:
+        self.missing.update(trials)
+
+    def append(self, episode: Any) -> None:
+        self.missing.remove(episode.header.trial)
+        self.offsets[episode.header.trial] = 1000 * len(self.offsets)
+
+    def finish(self) -> FinishedShard:
+        name = self.path.name
+        return FinishedShard(FileSummary(name, 0, 1, {}), self.offsets, FileEntry(name, 1, "0" * 64))
+
+
+def rows(first: int, count: int) -> pa.Table:
+    random = np.random.default_rng(first)
+    lost = random.random(count) < 0.1
+    digests = [None if none else random.bytes(32).hex() for none in lost]
+    columns = [
+        pa.array(range(first, first + count)),
+        pa.array([f"{number} fell" if number % 7 else None for number in range(count)]),
+        pa.array(random.random(count), mask=lost),
+        pa.array(digests, pa.string()),
+    ]
+    return pa.Table.from_arrays(columns, schema=SCHEMA)
+
+
+def append(filled: writer.DatasetWriter, trial: int) -> None:
+    random = np.random.default_rng(trial)
+    time_s, *numbers = random.random(7).tolist()
+    ball = BallState(time_s, tuple(numbers[:3]), tuple(numbers[3:]))
+    result = ThrowResult(ThrowOutcome.LANDED, reason=f"it was trial {trial}", release=ball, apex=ball, landing=ball)
+    header = SimpleNamespace(trial=trial, samples=300)
+    filled.append(SimpleNamespace(header=header, digest=random.bytes(32).hex()), result)  # type: ignore[arg-type]
+
+
+def test_a_trial_whose_shard_is_finished_takes_next_to_no_memory(
+    make_collection: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(writer, "OpenShard", ShardWithoutFile)
+    plan = make_collection({"trials": TRIALS, "record": {"trials_per_shard": PER_SHARD}}).plan
+    filled = writer.DatasetWriter.create(tmp_path / "dataset", plan)
+    used = []
+    tracemalloc.start()
+    try:
+        for trial in range(TRIALS):
+            append(filled, trial)
+            if trial + 1 in (PER_SHARD, TRIALS):
+                gc.collect()
+                used.append(tracemalloc.get_traced_memory()[0] + pa.total_allocated_bytes())
+    finally:
+        tracemalloc.stop()
+    assert (used[1] - used[0]) / (TRIALS - PER_SHARD) < MOST_BYTES
+    assert filled.finish() == {"landed": TRIALS}
+    assert pq.read_table(tmp_path / "dataset" / "throws.parquet")["trial"].to_pylist() == list(range(TRIALS))
+    filled.close()
+
+
+def test_the_table_is_that_of_rows_which_were_never_put_down(tmp_path: Path) -> None:
+    store = RowStore(tmp_path, SCHEMA)
+    # Dictionaries of a column end in the middle of it, and its pages where those of shards do not.
+    pieces = [rows(first, 21_000) for first in range(0, 168_000, 21_000)]
+    for number in (3, 0, 7, 1, 2, 6, 5, 4):
+        store.put(number, pieces[number])
+    whole = pa.concat_tables(pieces)
+    assert store.table.equals(whole)
+    assert store.table.schema.equals(SCHEMA, check_metadata=True)
+    store.let_go()
+    store.close()
+    assert encode_table(store.table) == encode_table(whole)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_table_is_encoded_in_small_pieces() -> None:
+    table = pa.table(
+        {"one": np.random.default_rng(1).random(400_000), "other": np.random.default_rng(2).random(400_000)}
+    )
+    sizes: list[int] = []
+    encode_pieces(table, lambda data: sizes.append(len(data)))
+    assert max(sizes) < sum(sizes) / 5
+
+
+def test_digests_are_those_of_trials_with_an_episode(tmp_path: Path) -> None:
+    store = RowStore(tmp_path, SCHEMA)
+    for number, first in enumerate((0, 500)):
+        store.put(number, rows(first, 500))
+    pairs = zip(store.table["trial"].to_pylist(), store.table["digest"].to_pylist(), strict=True)
+    expected = {trial: digest for trial, digest in pairs if digest is not None}
+    found = Digests(store.table)
+    assert dict(found) == expected
+    assert list(found) == sorted(expected)
+    missing = next(trial for trial in itertools.count() if trial not in expected)
+    for trial in (missing, -1, 1000):
+        with pytest.raises(KeyError):
+            found[trial]
+
+
+def test_a_disk_that_takes_no_rows_is_told_of(tmp_path: Path) -> None:
+    store = RowStore(tmp_path / "gone", SCHEMA)
+    with pytest.raises(DatasetError, match=r"gone/throws\.parquet: cannot be written: No such file or directory"):
+        store.put(0, rows(0, 5))
