@@ -155,7 +155,7 @@ def throw(
                 typer.echo(jsonlib.dumps(found.row, default=str))
                 continue
             ends = ", ".join(
-                f"{name} {found.row[name]:.6f}" for name in _measured(found.row, simulator.config.task.targets)
+                f"{name} {found.row[name]:.6f}" for name in _list_measured(found.row, simulator.config.task.targets)
             )
             typer.echo(f"throw {number}: {found.outcome}" + (f": {ends}" if ends else f": {found.reason}"))
     if refused:
@@ -332,7 +332,7 @@ def _write_table(path: Path, rows: Sequence[dict[str, float]]) -> None:
         raise ConfigError(f"{path}: cannot be written: {error.strerror}") from error
 
 
-def _measured(row: dict[str, object], names: Sequence[str]) -> list[str]:
+def _list_measured(row: dict[str, object], names: Sequence[str]) -> list[str]:
     return [name for name in names if isinstance(row.get(name), float)]
 
 

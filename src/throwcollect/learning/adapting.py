@@ -121,7 +121,7 @@ def _leave_out(
     )
     correction, _ = _find(learned, method, others, scatter)
     one = slice(which, which + 1)
-    return float(_distances(learned.corrected(correction), throws[0][one], throws[1][one], throws[2][one])[0])
+    return float(_distances(learned.correct(correction), throws[0][one], throws[1][one], throws[2][one])[0])
 
 
 def _find(
@@ -144,7 +144,7 @@ def _find(
     found = np.zeros(width + targets)
     precision = np.eye(len(found)) / spread**2
     for _ in range(_STEPS):
-        current = learned.corrected(_shift(begun, method, found, width))
+        current = learned.correct(_shift(begun, method, found, width))
         missing = places - current.predict(parameters, context)
         slopes = np.zeros((len(places), targets, len(found)))
         slopes[:, :, :width] = current.forward.slopes(current.in_world(parameters, context))[:, :, columns]

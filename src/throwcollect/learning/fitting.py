@@ -12,7 +12,7 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
-from throwcollect.config.values import values_by_key
+from throwcollect.config.values import leaves
 from throwcollect.dataset.reader import Dataset
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.learning.learned_map import Axis, Kind, LearnedMap, Role, no_correction, scale_values
@@ -143,7 +143,7 @@ def _find_axes(
     for key in (*parameters, *context):
         if key not in swept:
             raise ConfigError(f"{key} was not swept", expected=f"one of {', '.join(swept)}")
-    nominal = values_by_key(dataset.config)
+    nominal = {leaf.name: leaf.value for leaf in leaves(dataset.config)}
     axes = []
     for key in swept:
         ends = pc.min_max(throws[key]).as_py()

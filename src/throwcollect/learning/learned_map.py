@@ -174,7 +174,7 @@ class LearnedMap:
         moved = self.in_world(parameters, np.repeat(context[np.newaxis], len(parameters), axis=0))
         return self.residuals + self.forward.predict(moved) + self.correction.offset
 
-    def corrected(self, correction: Correction) -> LearnedMap:
+    def correct(self, correction: Correction) -> LearnedMap:
         """The map of another world."""
         return replace(self, correction=correction)
 

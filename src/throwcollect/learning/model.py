@@ -230,7 +230,7 @@ class Model:
             scatter=deviation,
             latents_count=self.file.trained_on.latents_count,
         )
-        learned = self.learned.corrected(adapted.correction)
+        learned = self.learned.correct(adapted.correction)
         entry = AdaptationEntry(
             method=adapted.method,
             throws=len(measured),

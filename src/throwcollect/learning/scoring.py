@@ -67,7 +67,7 @@ def score_model(
     context = _nominal_context(learned)
     targets = draw_targets(learned.carry_over(context), count, seed)
     sizes = [*(size for size in SIZES if size < len(learned.values)), len(learned.values)]
-    maps = {size: smaller for size in sizes if (smaller := _learned_from(learned, size)) is not None}
+    maps = {size: smaller for size in sizes if (smaller := _learn_from(learned, size)) is not None}
     loops = _throw_at(list(maps.values()), targets, context, simulator, processes)
     trained = [
         Trained(trained_on=size, errors=Errors.of(_distances(places, targets)))
@@ -87,7 +87,7 @@ def score_model(
             scatter=float(np.hypot(scatter, error)),
             latents_count=latents_count,
         )
-        worlds = [learned.corrected(each.correction) for each in adaptations.values()]
+        worlds = [learned.correct(each.correction) for each in adaptations.values()]
         given = np.repeat(context[np.newaxis], len(targets), axis=0)
         reachable = targets[aim(worlds[-1], targets, given).reachable]
         if len(reachable):
@@ -161,7 +161,7 @@ def _nominal_context(learned: LearnedMap) -> Array:
     return inside
 
 
-def _learned_from(learned: LearnedMap, size: int) -> LearnedMap | None:
+def _learn_from(learned: LearnedMap, size: int) -> LearnedMap | None:
     """The map that the first throws of the dataset give; None if they are too few."""
     if size == len(learned.inputs):
         return learned

@@ -22,7 +22,7 @@ def elsewhere(learned: LearnedMap, count: int, world, *, noise_m: float = 0.0, s
 def off(learned: LearnedMap, found: Adaptation, world) -> float:
     """Median distance of new throws from where the adapted map has them."""
     values = draw(50, seed=11)
-    predicted = learned.corrected(found.correction).predict(learned.scale(Role.PARAMETER, values), np.zeros((50, 0)))
+    predicted = learned.correct(found.correction).predict(learned.scale(Role.PARAMETER, values), np.zeros((50, 0)))
     return float(np.median(np.linalg.norm(predicted - world(values), axis=1)))
 
 

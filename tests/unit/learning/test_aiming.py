@@ -58,7 +58,7 @@ def test_of_several_ways_the_wanted_one_is_taken(targets: np.ndarray) -> None:
 
 def test_in_another_world_aiming_makes_up_for_what_differs(targets: np.ndarray) -> None:
     learned = learn()
-    shifted = learned.corrected(Correction(np.array([0.1, -0.2, 0.05]), np.zeros(0), np.array([0.03, -0.02])))
+    shifted = learned.correct(Correction(np.array([0.1, -0.2, 0.05]), np.zeros(0), np.array([0.03, -0.02])))
     found = aim(shifted, targets, np.zeros((len(targets), 0)))
     bias = np.array([0.1, -0.2, 0.05]) * (HIGH - LOW) / 2
     values = learned.unscale(Role.PARAMETER, found.parameters) + bias

@@ -172,7 +172,7 @@ def test_a_target_that_is_none_is_refused(model: Model, target: tuple[float, ...
 
 
 def test_points_without_all_parameters_are_refused(model: Model) -> None:
-    with pytest.raises(ConfigError, match="throw 0: task.duration_s is missing"):
+    with pytest.raises(ConfigError, match=r"throw 0: task\.duration_s is missing"):
         model.predict([{KEYS[1]: 0.0, KEYS[2]: 0.0}])
     with pytest.raises(ConfigError, match="is no key of this model"):
         model.predict([dict.fromkeys(KEYS, 1.0) | {"ball.mass_kg": 1.0}])
@@ -196,7 +196,7 @@ def test_adapting_wants_a_place_for_each_throw(model: Model) -> None:
         ("model.json", lambda text: text[:100], "Invalid JSON"),
         ("model.json", lambda text: text.replace('"bias": [', '"bias": [1.0,'), "do not belong together"),
         ("model.json", lambda text: text.replace('"format": "1"', '"format": "2"'), "format"),
-        ("points.parquet", lambda text: "PAR1", "is damaged"),
+        ("points.parquet", lambda _: "PAR1", "is damaged"),
         ("points.parquet", None, "is missing"),
     ],
 )
