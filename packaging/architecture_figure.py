@@ -23,6 +23,7 @@ PLACES: dict[str, tuple[float, int, str]] = {
     "simulator": (1.5, 2, "throws for Python"),
     "runtimes": (0.3, 3, "where nodes live"),
     "replay": (0.3, 4, "throws once more"),
+    "learning": (4.2, 4, "targets to parameters"),
     "sim": (-0.3, 5, "a node: simulates trials"),
     "coordinator": (1.1, 5, "a node: leases trials"),
     "derive": (2.2, 5, "other datasets"),

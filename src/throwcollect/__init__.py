@@ -21,16 +21,21 @@ if TYPE_CHECKING:
     from throwcollect.errors import ConfigError, DatasetError, PlanError, ThrowcollectError, WorkerError
     from throwcollect.export.formats import export as export_dataset
     from throwcollect.extras import MissingExtraError
+    from throwcollect.learning.model import Aim, Model, fit, load_model
+    from throwcollect.learning.score import Score
     from throwcollect.replay.verification import verify_dataset
     from throwcollect.simulator import Simulator
 
 __all__ = [
+    "Aim",
     "Config",
     "ConfigError",
     "Dataset",
     "DatasetError",
     "MissingExtraError",
+    "Model",
     "PlanError",
+    "Score",
     "Simulator",
     "Throw",
     "ThrowcollectError",
@@ -39,8 +44,10 @@ __all__ = [
     "compute_statistics",
     "export_dataset",
     "filter_dataset",
+    "fit",
     "load",
     "load_config",
+    "load_model",
     "merge_datasets",
     "sample_dataset",
     "split_dataset",
@@ -48,12 +55,15 @@ __all__ = [
 ]
 
 _PLACES = {
+    "Aim": "learning.model:Aim",
     "Config": "config.schema:Config",
     "ConfigError": "errors:ConfigError",
     "Dataset": "dataset.reader:Dataset",
     "DatasetError": "errors:DatasetError",
     "MissingExtraError": "extras:MissingExtraError",
+    "Model": "learning.model:Model",
     "PlanError": "errors:PlanError",
+    "Score": "learning.score:Score",
     "Simulator": "simulator:Simulator",
     "Throw": "dataset.throw:Throw",
     "ThrowcollectError": "errors:ThrowcollectError",
@@ -61,8 +71,10 @@ _PLACES = {
     "compute_statistics": "derive.statistics:statistics",
     "export_dataset": "export.formats:export",
     "filter_dataset": "derive.selection:filter_trials",
+    "fit": "learning.model:fit",
     "load": "dataset.reader:load",
     "load_config": "config.loader:load",
+    "load_model": "learning.model:load_model",
     "merge_datasets": "derive.selection:merge",
     "sample_dataset": "derive.selection:sample",
     "split_dataset": "derive.split:split",

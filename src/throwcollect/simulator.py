@@ -91,18 +91,29 @@ class Simulator:
             ConfigError: If a key cannot vary, or a value is out of its range.
             PlanError: If the plan of a collection would refuse it, for the reason that it would have.
         """
-        point = dict(values or {})
-        wrong = {key: reason for key in point if (reason := reason_not_sweepable(self.config, key)) is not None}
-        if wrong:
-            raise ConfigError([Problem(reason, key=key) for key, reason in wrong.items()])
         if trial < 0:
             raise ConfigError(f"trial {trial}: there is no such trial", expected="a number from 0")
+        point = dict(values or {})
+        refused = self.find_refusal(point)
         points = Points(tuple(point), np.array([list(point.values())], np.float64).reshape(1, len(point)))
         (planned,) = make_trials(self.config, points, first=trial)
-        refused = refusal(with_values(self.config, point), self._check)
         if refused is not None:
             raise PlanError([Problem(refused)], hint="a collection would leave this trial out, as refused")
         return self._throw(planned)
+
+    def find_refusal(self, values: Point) -> str | None:
+        """Say why the plan of a collection would refuse a throw; None if it would not.
+
+        Args:
+            values: What differs from the configuration.
+
+        Raises:
+            ConfigError: If a key cannot vary, or a value is out of its range.
+        """
+        wrong = {key: reason for key in values if (reason := reason_not_sweepable(self.config, key)) is not None}
+        if wrong:
+            raise ConfigError([Problem(reason, key=key) for key, reason in wrong.items()])
+        return refusal(with_values(self.config, values), self._check)
 
     def throw_many(self, points: Iterable[Point], *, processes: int = 1) -> Iterator[Throw]:
         """Simulate many throws, which are the trials 0, 1, 2 and so on.

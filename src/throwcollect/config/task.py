@@ -22,11 +22,16 @@ class TaskConfig(Section):
         until: The section `until` of a configuration of this task; its key is the outcome of a trial that succeeded.
         throws: Whether the ball is thrown: then the tool has to move, and `sweep.target` can ask for landings, as
             results are `ThrowResult`.
+        targets: Columns of its results that say where a trial ended, which is what others aim at; none if there is
+            nothing to aim at.
+        given: Keys whose values belong to a target, in the order in which they follow it: aiming does not choose them.
     """
 
     implementation: ClassVar[str]
     until: ClassVar[type[UntilConfig]]
     throws: ClassVar[bool] = False
+    targets: ClassVar[tuple[str, ...]] = ()
+    given: ClassVar[tuple[str, ...]] = ()
 
     name: str
     """Task."""

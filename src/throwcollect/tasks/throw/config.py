@@ -26,6 +26,8 @@ class ThrowConfig(TaskConfig):
     implementation: ClassVar[str] = "throwcollect.tasks.throw.throw_task:ThrowTask"
     until: ClassVar[type[UntilConfig]] = UntilLanded
     throws: ClassVar[bool] = True
+    targets: ClassVar[tuple[str, ...]] = ("landing_x_m", "landing_y_m")
+    given: ClassVar[tuple[str, ...]] = ("scene.landing_height_m",)
 
     name: Literal["throw"] = "throw"
     """Task."""

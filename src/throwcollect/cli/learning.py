@@ -1,0 +1,368 @@
+"""`throwcollect fit`, `aim`, `throw`, `score` and `adapt`: from a dataset to a throw at a target."""
+
+from __future__ import annotations
+
+import csv
+import json as jsonlib
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from throwcollect.cli.options import ConfigArgument, DatasetArgument, JsonOption, SetOption, overrides
+from throwcollect.errors import ConfigError, PlanError
+from throwcollect.side_by_side import count_cores
+from throwcollect.wording import command, format_count, join_names
+
+if TYPE_CHECKING:
+    from throwcollect.learning.model import Aim, Model
+    from throwcollect.learning.score import Errors, Score
+
+ModelArgument = Annotated[Path, typer.Argument(metavar="MODEL", help="Directory of the model.", readable=False)]
+ModelOption = Annotated[
+    Path, typer.Option("--output", "-o", metavar="MODEL", help="Directory to write; must be new or empty.")
+]
+ScatterOption = Annotated[
+    float, typer.Option("--scatter", help="Standard deviation of what is measured of a throw, in the targets' unit.")
+]
+
+
+def fit(
+    dataset: DatasetArgument,
+    output: ModelOption,
+    targets: Annotated[
+        str | None,
+        typer.Option("--targets", metavar="COLUMN,...", help="Where a trial ended; by default, as the task says."),
+    ] = None,
+    parameters: Annotated[
+        str | None,
+        typer.Option("--parameters", metavar="KEY,...", help="What aiming chooses; by default, all of task."),
+    ] = None,
+    given: Annotated[
+        str | None,
+        typer.Option("--given", metavar="KEY,...", help="What is given with a target; by default, as the task says."),
+    ] = None,
+    kind: Annotated[str, typer.Option("--kind", help="local, or polynomial: without the nearest throws.")] = "local",
+    where: Annotated[
+        str | None, typer.Option("--where", metavar="CONDITION", help="Learn from throws of this kind alone.")
+    ] = None,
+    json: JsonOption = False,
+) -> None:
+    """Learn from a dataset where throws end, and which parameters lead to a target."""
+    from throwcollect.dataset.reader import load
+    from throwcollect.learning.model import fit
+
+    model = fit(
+        load(dataset),
+        kind=kind,
+        targets=_split(targets),
+        parameters=_split(parameters),
+        given=_split(given),
+        where=where,
+    )
+    model.save(output)
+    trained = model.file.trained_on
+    if json:
+        typer.echo(model.file.model_dump_json(include={"kind", "targets", "axes", "trained_on"}, indent=2))
+        return
+    typer.echo(
+        f"learned from {format_count(trained.throws, 'throw')}, {trained.ignored} ignored as they did not succeed"
+    )
+    typer.echo(f"parameters: {', '.join(model.parameters)}")
+    for names, what in ((model.given, "given with a target"), (model.latents, "of the world")):
+        if names:
+            typer.echo(f"{what}: {', '.join(names)}")
+    errors = ", ".join(f"degree {degree}: {error:.4f}" for degree, error in trained.folds_error.items())
+    typer.echo(f"error for throws that it was not fitted to, in simulation, median: {errors}")
+    typer.echo(f"model: {output}\naim with it: {command('aim', output, '--at', _example(model))}")
+
+
+def aim(
+    directory: ModelArgument,
+    at: Annotated[
+        list[str] | None,
+        typer.Option("--at", metavar="X,Y", help="A target, and what is given with it; may be repeated."),
+    ] = None,
+    targets: Annotated[
+        Path | None, typer.Option("--targets", metavar="FILE", help="CSV file of targets, with a header line.")
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="FILE", help="CSV file to write, for the sampler `list`.")
+    ] = None,
+    choose: Annotated[
+        str, typer.Option("--choose", help="Of several ways: nearest, least-effort or least-sensitive.")
+    ] = "nearest",
+    json: JsonOption = False,
+) -> None:
+    """Find parameters of throws at targets."""
+    from throwcollect.learning.model import load_model
+
+    model = load_model(directory)
+    names = (*model.targets, *model.given)
+    wanted = [_read_target(text, names) for text in at or ()]
+    if targets is not None:
+        wanted += [[row[name] for name in names] for row in _read_table(targets, names)]
+    if not wanted:
+        raise ConfigError(
+            "no target", expected="--at, or --targets FILE", hint=command("aim", directory, "--at", _example(model))
+        )
+    aims = model.aim(wanted, choose=choose)
+    if json:
+        typer.echo(jsonlib.dumps([_aim_as_json(each) for each in aims], indent=2))
+    elif output is None:
+        for each in aims:
+            typer.echo(" ".join(f"--set {key}={value!r}" for key, value in each.parameters.items()))
+    if output is not None:
+        _write_table(output, [each.parameters for each in aims])
+    if unreached := [each for each in aims if not each.reachable]:
+        for each in unreached:
+            typer.echo(
+                f"out of reach: {_numbers(each.target)}; the nearest point that was reached: {_numbers(each.nearest)}",
+                err=True,
+            )
+        raise typer.Exit(1)
+
+
+def throw(
+    path: ConfigArgument,
+    settings: SetOption = None,
+    points: Annotated[
+        Path | None, typer.Option("--list", metavar="FILE", help="CSV or Parquet file: a throw for each row.")
+    ] = None,
+    json: JsonOption = False,
+) -> None:
+    """Simulate throws in this process, without nodes and files."""
+    from throwcollect.simulator import Simulator
+    from throwcollect.sweep.point_file import read_points
+
+    with Simulator(path, overrides=overrides(settings)) as simulator:
+        rows: Sequence[dict[str, float]] = [{}]
+        if points is not None:
+            read = read_points(points, simulator.config)
+            rows = [dict(zip(read.keys, values, strict=True)) for values in read.values.tolist()]
+        refused = 0
+        for number, values in enumerate(rows):
+            try:
+                found = simulator.throw(values, trial=number)
+            except PlanError as error:
+                if points is None:
+                    raise
+                refused += 1
+                typer.echo(f"throw {number}: refused: {error.problems[0]}", err=True)
+                continue
+            if json:
+                typer.echo(jsonlib.dumps(found.row, default=str))
+                continue
+            ends = ", ".join(
+                f"{name} {found.row[name]:.6f}" for name in _list_measured(found.row, simulator.config.task.targets)
+            )
+            typer.echo(f"throw {number}: {found.outcome}" + (f": {ends}" if ends else f": {found.reason}"))
+    if refused:
+        raise typer.Exit(1)
+
+
+def score(
+    directory: ModelArgument,
+    targets: Annotated[int, typer.Option("--targets", metavar="N", help="Number of targets.")] = 100,
+    seed: Annotated[int, typer.Option("--seed", help="Seed of their choice.")] = 0,
+    world: Annotated[
+        Path | None,
+        typer.Option(
+            "--config", metavar="CONFIG", help="Another world, in which the model is adapted by a few throws."
+        ),
+    ] = None,
+    settings: SetOption = None,
+    scatter: ScatterOption = 0.0,
+    json: JsonOption = False,
+) -> None:
+    """Throw at targets in simulation, and put into the model how it hits."""
+    from contextlib import ExitStack
+
+    from throwcollect.learning.model import load_model
+    from throwcollect.learning.model_directory import CONFIG, write_score
+    from throwcollect.simulator import Simulator
+
+    model = load_model(directory)
+    if settings and world is None:
+        raise ConfigError("--set: there is no other world", expected="--config CONFIG")
+    with ExitStack() as opened:
+        simulator = opened.enter_context(Simulator(directory / CONFIG))
+        other = None if world is None else opened.enter_context(Simulator(world, overrides=overrides(settings)))
+        found = model.score(
+            simulator, targets=targets, seed=seed, world=other, scatter=scatter, processes=count_cores()
+        )
+    write_score(directory, found)
+    typer.echo(found.model_dump_json(indent=2) if json else "\n".join(_score_lines(found)))
+
+
+def adapt(
+    directory: ModelArgument,
+    throws: Annotated[
+        Path, typer.Argument(metavar="THROWS", help="CSV file with what was thrown and where it ended, or a dataset.")
+    ],
+    output: ModelOption,
+    method: Annotated[
+        str, typer.Option("--method", help="What the world may differ by: auto, offset, bias, latent or none.")
+    ] = "auto",
+    scatter: ScatterOption = 0.0,
+    json: JsonOption = False,
+) -> None:
+    """Make the model of another world, of a few throws there."""
+    from throwcollect.learning.model import load_model
+
+    model = load_model(directory)
+    keys = (*model.parameters, *model.given)
+    rows = _read_dataset(throws, keys, model) if throws.is_dir() else _read_table(throws, (*keys, *model.targets))
+    adapted = model.adapt(
+        [{key: row[key] for key in keys} for row in rows],
+        [[row[target] for target in model.targets] for row in rows],
+        method=None if method == "auto" else method,
+        scatter=scatter,
+    )
+    adapted.save(output)
+    entry = adapted.file.adaptation
+    if entry is None:
+        return
+    if json:
+        typer.echo(entry.model_dump_json(indent=2))
+        return
+    typer.echo(f"{format_count(entry.throws, 'throw')}; what differs: {entry.method.value}")
+    for each in entry.found:
+        typer.echo(f"{each.name}: {each.value:.4g} (standard deviation {each.deviation:.2g})")
+    before, after = (sorted(each)[len(each) // 2] if each else None for each in (entry.before, entry.after))
+    typer.echo(
+        f"throws were off by {before:.4f} before, median"
+        + ("" if after is None else f"; {after:.4f} by a model of the others")
+    )
+
+
+def _split(names: str | None) -> tuple[str, ...]:
+    return tuple(name.strip() for name in names.split(",")) if names else ()
+
+
+def _example(model: Model) -> str:
+    middle = model.learned.outputs[len(model.learned.outputs) // 2]
+    given = [axis.nominal for axis in model.learned.axes if axis.key in model.given]
+    return ",".join(f"{value:.2f}" for value in (*middle.tolist(), *given))
+
+
+def _read_target(text: str, names: Sequence[str]) -> list[float]:
+    """The numbers of an option --at.
+
+    Raises:
+        ConfigError: If they are none, or not as many as names.
+    """
+    try:
+        values = [float(part) for part in text.split(",")]
+    except ValueError:
+        values = []
+    if len(values) != len(names):
+        raise ConfigError(f"--at {text}", expected=f"{format_count(len(names), 'number')}: {','.join(names)}")
+    return values
+
+
+def _read_table(path: Path, names: Sequence[str]) -> list[dict[str, float]]:
+    """Rows of a CSV file with a header line; further columns are left out.
+
+    Raises:
+        ConfigError: If it cannot be read, a column is missing, or a cell is no finite number.
+    """
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            reader = csv.DictReader(file)
+            header = reader.fieldnames or []
+            if missing := [name for name in names if name not in header]:
+                raise ConfigError(f"{path}:1: no column {join_names(missing)}", expected=f"columns {', '.join(names)}")
+            rows = []
+            for row in reader:
+                try:
+                    rows.append({name: float(row[name]) for name in names})
+                except (TypeError, ValueError):
+                    wrong = next(name for name in names if not _is_number(row[name]))
+                    raise ConfigError(
+                        f"{path}:{reader.line_num}: {wrong}: {row[wrong]!r}", expected="a number"
+                    ) from None
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise ConfigError(f"{path}: cannot be read: {error}") from error
+    if not rows:
+        raise ConfigError(f"{path}: has no rows", expected=f"columns {', '.join(names)}")
+    return rows
+
+
+def _is_number(text: str | None) -> bool:
+    try:
+        float(text or "")
+    except ValueError:
+        return False
+    return True
+
+
+def _read_dataset(directory: Path, keys: Sequence[str], model: Model) -> list[dict[str, float]]:
+    """Throws of a dataset that succeeded.
+
+    Raises:
+        ConfigError: If it does not vary a key of the model, or is one of another robot.
+        DatasetError: If it is damaged.
+    """
+    from throwcollect.dataset.reader import load
+
+    dataset = load(directory)
+    throws = dataset.select(f"outcome == '{dataset.config.task.success}'").throws
+    if missing := [name for name in (*keys, *model.targets) if name not in throws.column_names]:
+        raise ConfigError(
+            f"{directory}: has no {join_names(missing)}", expected="throws with all parameters of the model"
+        )
+    rows: list[dict[str, float]] = throws.select([*keys, *model.targets]).to_pylist()
+    return rows
+
+
+def _write_table(path: Path, rows: Sequence[dict[str, float]]) -> None:
+    """Write a CSV file that the sampler `list` reads.
+
+    Raises:
+        ConfigError: If it cannot be written.
+    """
+    try:
+        with path.open("w", encoding="utf-8", newline="") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(rows[0])
+            writer.writerows([map(repr, row.values()) for row in rows])
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be written: {error.strerror}") from error
+
+
+def _list_measured(row: dict[str, object], names: Sequence[str]) -> list[str]:
+    return [name for name in names if isinstance(row.get(name), float)]
+
+
+def _aim_as_json(aim: Aim) -> dict[str, object]:
+    return {
+        "target": aim.target.tolist(),
+        "parameters": aim.parameters,
+        "predicted": aim.predicted.tolist(),
+        "reachable": aim.reachable,
+        "nearest": aim.nearest.tolist(),
+    }
+
+
+def _numbers(values: Iterable[float]) -> str:
+    return ",".join(f"{value:.3f}" for value in values)
+
+
+def _score_lines(score: Score) -> list[str]:
+    lines = [
+        f"throws at {format_count(score.targets, 'target')}, in simulation: median, 9 of 10 below, largest; not landed"
+    ]
+    lines += [f"  learned from {each.trained_on:5} throws:  {_error_cells(each.errors)}" for each in score.trained]
+    if score.adapted:
+        lines.append("in the other world, by the number of throws there:")
+        lines += [
+            f"  {each.real_throws:3} ({each.method.value}):  {_error_cells(each.errors)}" for each in score.adapted
+        ]
+    return lines
+
+
+def _error_cells(errors: Errors) -> str:
+    cells = ("       -" if each is None else f"{each:8.4f}" for each in (errors.median, errors.share90, errors.largest))
+    return "  ".join([*cells, str(errors.missed)])

@@ -1,0 +1,181 @@
+"""Adapting a learned map to another world by a few throws in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from throwcollect.learning.learned_map import Correction, LearnedMap, Role
+from throwcollect.reproducible_math import matmul, solve
+
+Array = NDArray[np.float64]
+
+_OFFSET = 0.1
+"""What the place where a trial ends is expected to be off by [m or rad], as a standard deviation."""
+_SMALL_OFFSET = 0.02
+"""The same where something else explains most of the difference."""
+_BIAS = 0.2
+"""What a parameter is expected to be off by, scaled: a tenth of its range."""
+_LATENT = 0.6
+"""Standard deviation of a latent, scaled: about that of numbers that are spread evenly over the range."""
+_STEPS = 30
+_SMALL_STEP = 1e-9
+"""After a step that is smaller [scaled, or m or rad], nothing would change any more."""
+_THROWS_FOR_BIAS = 3
+_CLEARLY = 3.0
+"""A single miss that is so many times as large as what is expected is no accident."""
+
+
+class Method(str, Enum):
+    """What a world is taken to differ by."""
+
+    NONE = "none"
+    """Nothing."""
+    OFFSET = "offset"
+    """All trials end elsewhere, by the same distance."""
+    BIAS = "bias"
+    """The robot does not do what it is told: parameters are shifted, and the end, too."""
+    LATENT = "latent"
+    """What the dataset varied from trial to trial: the latents have other values, and the end is shifted."""
+
+
+@dataclass(frozen=True, eq=False)
+class Adaptation:
+    """What a few throws said of a world.
+
+    Attributes:
+        method: What the world is taken to differ by.
+        correction: The difference.
+        deviations: Standard deviations of the numbers that were found: of the biases or latents, scaled, then of the
+            offset; shape ``(n_found,)``.
+        before: Distance of each throw from where the map had it, shape ``(n_throws,)``.
+        after: The same by a map that was adapted to all other throws; empty for a single throw.
+    """
+
+    method: Method
+    correction: Correction
+    deviations: Array
+    before: Array
+    after: Array
+
+
+def adapt(
+    learned: LearnedMap,
+    parameters: Array,
+    context: Array,
+    places: Array,
+    *,
+    method: Method | None = None,
+    scatter: float,
+    latents_count: bool,
+) -> Adaptation:
+    """Find out how a world differs from the one of a map.
+
+    The difference is the most probable one, by what is expected before any throw, and by the throws.
+
+    Args:
+        learned: The map, corrected or not: its latents are where the search begins.
+        parameters: Scaled parameters of the throws, shape ``(n_throws, n_parameters)``.
+        context: Scaled context of the throws, shape ``(n_throws, n_context)``.
+        places: Where they ended, shape ``(n_throws, n_targets)``.
+        method: What the world may differ by; None to choose by the number of throws, and by whether it helps.
+        scatter: Standard deviation of each measured coordinate from its prediction [m or rad]: of repeated throws, and
+            of the map.
+        latents_count: Whether latents have an effect that is worth knowing.
+    """
+    throws = (parameters, context, places)
+    before = _distances(learned, *throws)
+    chosen = method or _choose(len(places), latents_count=latents_count)
+    correction, deviations = _find(learned, chosen, throws, scatter)
+    after = np.empty(0)
+    if len(places) > 1:
+        after = np.array([_leave_out(learned, chosen, throws, each, scatter) for each in range(len(places))])
+    helps = _mean_square(after) < _mean_square(before) if len(after) else before[0] > _CLEARLY * scatter
+    if method is None and not helps:
+        return Adaptation(Method.NONE, learned.correction, np.empty(0), before, before if len(after) else after)
+    return Adaptation(chosen, correction, deviations, before, after)
+
+
+def adapt_by_nothing(learned: LearnedMap) -> Adaptation:
+    """Leave a map as it is, as there are no throws."""
+    return Adaptation(Method.NONE, learned.correction, np.empty(0), np.empty(0), np.empty(0))
+
+
+def _choose(throws: int, *, latents_count: bool) -> Method:
+    if latents_count:
+        return Method.LATENT
+    return Method.BIAS if throws >= _THROWS_FOR_BIAS else Method.OFFSET
+
+
+def _leave_out(
+    learned: LearnedMap, method: Method, throws: tuple[Array, Array, Array], which: int, scatter: float
+) -> float:
+    """Distance of one throw from where a map has it that was adapted to all others."""
+    others = (
+        np.delete(throws[0], which, axis=0),
+        np.delete(throws[1], which, axis=0),
+        np.delete(throws[2], which, axis=0),
+    )
+    correction, _ = _find(learned, method, others, scatter)
+    one = slice(which, which + 1)
+    return float(_distances(learned.correct(correction), throws[0][one], throws[1][one], throws[2][one])[0])
+
+
+def _find(
+    learned: LearnedMap, method: Method, throws: tuple[Array, Array, Array], scatter: float
+) -> tuple[Correction, Array]:
+    """The most probable difference, and standard deviations of its numbers."""
+    if method is Method.NONE:
+        return learned.correction, np.empty(0)
+    parameters, context, places = throws
+    begun, targets = learned.correction, places.shape[1]
+    role = {Method.BIAS: Role.PARAMETER, Method.LATENT: Role.LATENT}.get(method)
+    columns = learned.columns_of(role) if role else slice(0, 0)
+    width = columns.stop - columns.start
+    spread = np.concatenate(
+        [
+            np.full(width, _BIAS if method is Method.BIAS else _LATENT),
+            np.full(targets, _SMALL_OFFSET if width else _OFFSET),
+        ]
+    )
+    found = np.zeros(width + targets)
+    precision = np.eye(len(found)) / spread**2
+    for _ in range(_STEPS):
+        current = learned.correct(_shift(begun, method, found, width))
+        missing = places - current.predict(parameters, context)
+        slopes = np.zeros((len(places), targets, len(found)))
+        slopes[:, :, :width] = current.forward.slopes(current.in_world(parameters, context))[:, :, columns]
+        slopes[:, :, width:] = np.eye(targets)
+        flat = slopes.reshape(-1, len(found))
+        transposed = np.ascontiguousarray(flat.T)
+        normal = matmul(transposed, flat) / scatter**2 + precision
+        right = matmul(transposed, missing.reshape(-1, 1))[:, 0] / scatter**2 - found / spread**2
+        before = found
+        found = before + solve(normal, right[:, np.newaxis])[:, 0]
+        if method is Method.LATENT:
+            found[:width] = np.clip(begun.latents + found[:width], -1.0, 1.0) - begun.latents
+        if np.abs(found - before).max() < _SMALL_STEP:
+            break
+    covariance = solve(normal, np.eye(len(found)))
+    return _shift(begun, method, found, width), np.sqrt(np.diagonal(covariance))
+
+
+def _shift(begun: Correction, method: Method, found: Array, width: int) -> Correction:
+    offset = begun.offset + found[width:]
+    if method is Method.BIAS:
+        return Correction(begun.bias + found[:width], begun.latents, offset)
+    if method is Method.LATENT:
+        return Correction(begun.bias, begun.latents + found[:width], offset)
+    return Correction(begun.bias, begun.latents, offset)
+
+
+def _distances(learned: LearnedMap, parameters: Array, context: Array, places: Array) -> Array:
+    distances: Array = np.sqrt(((learned.predict(parameters, context) - places) ** 2).sum(axis=1))
+    return distances
+
+
+def _mean_square(distances: Array) -> float:
+    return float((distances**2).mean())

@@ -1,0 +1,214 @@
+"""Learns from the throws of a dataset where trials end."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+from numpy.typing import NDArray
+
+from throwcollect.config.schema import Config
+from throwcollect.config.values import leaves
+from throwcollect.dataset.reader import Dataset
+from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.learning.learned_map import Axis, Kind, LearnedMap, Role, no_correction, scale_values
+from throwcollect.learning.polynomial import Validation, cross_validate, fit_polynomial
+from throwcollect.wording import format_count, join_names
+
+Array = NDArray[np.float64]
+
+MOST_PARAMETERS = 20
+_EFFORT = "effort_peak_share"
+_THROWS_PER_PARAMETER = 3
+_EFFORT_DEGREE = 2
+_FOLDS = 5
+_CELL = 0.05
+"""Width of the cells [m or rad] whose throws are in one fold."""
+_WORTH_KNOWING = 2.0
+"""Latents are worth knowing if predictions are so many times worse without them."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """What was learned.
+
+    Attributes:
+        learned: The map.
+        trials: Numbers of the trials that it was learned from, shape ``(n,)``.
+        ignored: Number of the dataset's throws that did not succeed.
+        validation: How polynomials of several degrees predict throws that they were not fitted to.
+        without_latents: Median of the same error with the latents left out; None if there are none.
+    """
+
+    learned: LearnedMap
+    trials: NDArray[np.int64]
+    ignored: int
+    validation: Validation
+    without_latents: float | None
+
+    @property
+    def error(self) -> float:
+        """Median distance of a throw from its prediction by a polynomial that it was not fitted to [m or rad]."""
+        return float(np.median(self.validation.best))
+
+    @property
+    def latents_count(self) -> bool:
+        """Whether latents have an effect that is worth knowing."""
+        return self.without_latents is not None and self.without_latents >= _WORTH_KNOWING * self.error
+
+
+def fit_map(
+    dataset: Dataset,
+    *,
+    kind: Kind = Kind.LOCAL,
+    targets: Sequence[str] = (),
+    parameters: Sequence[str] = (),
+    context: Sequence[str] = (),
+) -> Fit:
+    """Learn from the trials of a dataset that succeeded.
+
+    Args:
+        dataset: The dataset, or a selection of its throws.
+        kind: How predictions are made.
+        targets: Columns that say where a trial ended; those of the task by default.
+        parameters: Swept keys that are chosen when aiming; those of the task by default.
+        context: Swept keys that are given with a target; those that the task names by default.
+
+    Raises:
+        ConfigError: If there is nothing to aim at, a key was not swept, or too few throws succeeded.
+        DatasetError: If a column is missing, or holds no numbers.
+    """
+    config = dataset.config
+    columns = tuple(targets) or config.task.targets
+    if not columns:
+        raise ConfigError(
+            f"the task {config.task.name} names no targets", expected="columns of the table of throws, by --targets"
+        )
+    throws = dataset.throws.filter(pc.equal(dataset.throws["outcome"], config.task.success))
+    axes = _find_axes(dataset, throws, parameters, context)
+    _check_amount(dataset, throws, axes)
+    outputs = np.column_stack([_numbers(throws, column, dataset) for column in columns])
+    values = np.column_stack([_numbers(throws, axis.key, dataset) for axis in axes])
+    trials: NDArray[np.int64] = throws["trial"].to_numpy()
+    fit = fit_throws(kind, axes, columns, values, outputs, _numbers(throws, _EFFORT, dataset))
+    return replace(fit, trials=trials, ignored=len(dataset) - len(throws))
+
+
+def fit_throws(
+    kind: Kind, axes: tuple[Axis, ...], targets: tuple[str, ...], values: Array, outputs: Array, efforts: Array
+) -> Fit:
+    """Learn from throws that succeeded.
+
+    Args:
+        kind: How predictions are made.
+        axes: The inputs.
+        targets: Columns that say where a trial ended.
+        values: Inputs in the units of their keys, shape ``(n, n_axes)``.
+        outputs: Where the trials ended, shape ``(n, n_targets)``.
+        efforts: Largest shares of a joint's torque limit, shape ``(n,)``.
+    """
+    inputs, folds = scale_values(axes, values), _folds(outputs)
+    validation = cross_validate(inputs, outputs, folds)
+    known = [axis.role is not Role.LATENT for axis in axes]
+    blind = None if all(known) else float(np.median(cross_validate(inputs[:, known], outputs, folds).best))
+    forward = fit_polynomial(inputs, outputs, validation.degree)
+    effort = fit_polynomial(inputs, efforts[:, np.newaxis], min(_EFFORT_DEGREE, validation.degree))
+    correction = no_correction(axes, targets)
+    learned = LearnedMap(kind, axes, targets, forward, effort, values, outputs, efforts, correction)
+    return Fit(learned, np.arange(len(inputs)), 0, validation, blind)
+
+
+def enough_throws(throws: int, parameters: int) -> bool:
+    """Whether so many throws are enough for a model of so many parameters."""
+    return throws >= _least_throws(parameters)
+
+
+def _least_throws(parameters: int) -> int:
+    return _THROWS_PER_PARAMETER * (parameters + 1)
+
+
+def _find_axes(
+    dataset: Dataset, throws: pa.Table, parameters: Sequence[str], context: Sequence[str]
+) -> tuple[Axis, ...]:
+    """The swept keys as inputs: parameters, context, latents.
+
+    Raises:
+        ConfigError: If a key was not swept, or has one value alone.
+    """
+    swept = dataset.parameters
+    for key in (*parameters, *context):
+        if key not in swept:
+            raise ConfigError(f"{key} was not swept", expected=f"one of {', '.join(swept)}")
+    nominal = {leaf.name: leaf.value for leaf in leaves(dataset.config)}
+    axes = []
+    for key in swept:
+        ends = pc.min_max(throws[key]).as_py()
+        low, high = ends["min"], ends["max"]
+        role = _role(dataset.config, key, parameters, context)
+        if low == high and low is not None:
+            if key in parameters:
+                raise ConfigError(f"{key} has the value {low:g} in all throws", expected="a key that varies")
+            continue
+        axes.append(Axis(key, role, low, high, float(nominal[key])))
+    return tuple(sorted(axes, key=lambda axis: list(Role).index(axis.role)))
+
+
+def _role(config: Config, key: str, parameters: Sequence[str], context: Sequence[str]) -> Role:
+    if key in context or (not context and key in config.task.given):
+        return Role.CONTEXT
+    chosen = key in parameters if parameters else key.startswith("task.")
+    return Role.PARAMETER if chosen else Role.LATENT
+
+
+def _check_amount(dataset: Dataset, throws: pa.Table, axes: tuple[Axis, ...]) -> None:
+    """Refuse what cannot be learned.
+
+    Raises:
+        ConfigError: If no parameter varies, too many do, or too few throws succeeded.
+    """
+    chosen = [axis.key for axis in axes if axis.role is Role.PARAMETER]
+    if not chosen:
+        raise ConfigError(
+            f"{dataset.directory}: no parameter of the task varies", expected="a sweep of task.… keys, or --parameters"
+        )
+    if len(chosen) > MOST_PARAMETERS:
+        raise ConfigError(
+            f"{len(chosen)} parameters: {join_names(chosen)}",
+            expected=f"at most {MOST_PARAMETERS}",
+            hint="choose some of them by --parameters; the others count as unknown",
+        )
+    if not enough_throws(len(throws), len(chosen)):
+        raise ConfigError(
+            f"{dataset.directory}: {format_count(len(throws), dataset.config.task.noun)} of {len(dataset)} "
+            f"{dataset.config.task.success}",
+            expected=f"at least {_least_throws(len(chosen))} for {format_count(len(chosen), 'parameter')}",
+        )
+
+
+def _numbers(throws: pa.Table, column: str, dataset: Dataset) -> Array:
+    """A column as finite numbers.
+
+    Raises:
+        ConfigError: If there is no such column of numbers.
+        DatasetError: If a number is missing, or not finite.
+    """
+    if column not in throws.column_names or not pa.types.is_floating(throws.schema.field(column).type):
+        numbers = [field.name for field in throws.schema if pa.types.is_floating(field.type)]
+        raise ConfigError(f"no column of numbers {column!r}", expected=f"one of {', '.join(numbers)}")
+    values: Array = throws[column].to_numpy()
+    wrong = np.flatnonzero(~np.isfinite(values))
+    if len(wrong):
+        trial = throws["trial"][int(wrong[0])].as_py()
+        raise DatasetError(f"{column} of trial {trial} is {values[wrong[0]]}", path=dataset.directory)
+    return values
+
+
+def _folds(outputs: Array) -> NDArray[np.int64]:
+    """Number of the fold of each throw; those that ended in one cell are in one fold."""
+    cells = np.floor(outputs / _CELL).astype(np.int64)
+    numbers = [hashlib.sha256(cell.tobytes()).digest()[0] % _FOLDS for cell in cells]
+    return np.array(numbers, np.int64)

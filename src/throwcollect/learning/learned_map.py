@@ -1,0 +1,211 @@
+"""The learned map: where a trial with given parameters ends, in a world that may differ from that of the dataset."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import Enum
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from throwcollect.learning.polynomial import Polynomial
+from throwcollect.units import unit_of_name
+
+Array = NDArray[np.float64]
+
+_NEIGHBOURS = 8
+"""Number of throws near a point whose distance from the polynomial corrects it there."""
+
+
+class Kind(str, Enum):
+    """How a prediction is made."""
+
+    LOCAL = "local"
+    """By what the nearest throws did, and the polynomial's difference from there."""
+    POLYNOMIAL = "polynomial"
+    """By the polynomial alone: it can be written down."""
+
+
+class Role(str, Enum):
+    """What a swept key is to whoever aims."""
+
+    PARAMETER = "parameter"
+    """It is chosen: a number of the task."""
+    CONTEXT = "context"
+    """It is given with the target, as the height of the plane to land on."""
+    LATENT = "latent"
+    """It belongs to the world, and nobody knows it but by throwing there."""
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A swept key, and the range that the dataset covers.
+
+    Attributes:
+        key: Dotted key.
+        role: What it is to whoever aims.
+        minimum: Smallest value in the dataset, in the key's unit.
+        maximum: Largest value.
+        nominal: Value of the configuration, which holds for the world as long as nothing else is known.
+    """
+
+    key: str
+    role: Role
+    minimum: float
+    maximum: float
+    nominal: float
+
+    @property
+    def unit(self) -> str:
+        """Unit of the values; empty for a pure number."""
+        return "rad" if self.key.endswith("_joint") else unit_of_name(self.key)
+
+
+@dataclass(frozen=True, eq=False)
+class Correction:
+    """How a world differs from the one of the dataset. Without a difference, all numbers but the latents are 0.
+
+    Attributes:
+        bias: What parameters have to be shifted by to be those of the dataset's world, scaled, ``(n_parameters,)``.
+        latents: Values of the latents in this world, scaled, ``(n_latents,)``.
+        offset: What is added to where a trial ends, in the units of the targets, ``(n_targets,)``.
+    """
+
+    bias: Array
+    latents: Array
+    offset: Array
+
+
+@dataclass(frozen=True, eq=False)
+class LearnedMap:
+    """Maps parameters to where a trial ends.
+
+    Inputs are scaled: -1 is the minimum of an axis, 1 its maximum.
+
+    Attributes:
+        kind: How predictions are made.
+        axes: The inputs: parameters, then context, then latents.
+        targets: Columns of the table of throws that say where a trial ended.
+        forward: The polynomial: all inputs to targets.
+        effort: The polynomial of the largest share of a joint's torque limit.
+        values: Inputs of the throws that it was learned from, in the units of their keys, shape ``(n, n_axes)``.
+        outputs: Where those ended, shape ``(n, n_targets)``.
+        efforts: Their largest shares of a joint's torque limit, shape ``(n,)``.
+        correction: How the world differs from the dataset's.
+    """
+
+    kind: Kind
+    axes: tuple[Axis, ...]
+    targets: tuple[str, ...]
+    forward: Polynomial
+    effort: Polynomial
+    values: Array
+    outputs: Array
+    efforts: Array
+    correction: Correction
+
+    @cached_property
+    def inputs(self) -> Array:
+        """The same inputs, scaled."""
+        return scale_values(self.axes, self.values)
+
+    @cached_property
+    def residuals(self) -> Array:
+        """What the polynomial leaves of the throws of the dataset, ``(n, n_targets)``; 0 where it stands for itself."""
+        if self.kind is Kind.POLYNOMIAL:
+            return np.zeros_like(self.outputs)
+        return self.outputs - self.forward.predict(self.inputs)
+
+    def axes_of(self, role: Role) -> tuple[Axis, ...]:
+        """The axes of a role."""
+        return tuple(axis for axis in self.axes if axis.role is role)
+
+    def columns_of(self, role: Role) -> slice:
+        """Where the inputs of a role stand."""
+        before = [axis.role for axis in self.axes].index(role) if self.axes_of(role) else 0
+        return slice(before, before + len(self.axes_of(role)))
+
+    def scale(self, role: Role, values: Array) -> Array:
+        """Scale values of the axes of a role, shape ``(n, n_axes of the role)``."""
+        return scale_values(self.axes_of(role), values)
+
+    def unscale(self, role: Role, inputs: Array) -> Array:
+        """Values of scaled inputs of a role, in the units of their keys."""
+        low, high = _bounds(self.axes_of(role))
+        return low + (inputs + 1.0) / 2.0 * (high - low)
+
+    def in_world(self, parameters: Array, context: Array) -> Array:
+        """All inputs of trials in the corrected world.
+
+        Args:
+            parameters: Scaled, shape ``(n, n_parameters)``.
+            context: Scaled, shape ``(n, n_context)``.
+
+        Returns:
+            Shape ``(n, n_axes)``.
+        """
+        latents = np.repeat(self.correction.latents[np.newaxis], len(parameters), axis=0)
+        return np.hstack([parameters + self.correction.bias, context, latents])
+
+    def predict(self, parameters: Array, context: Array) -> Array:
+        """Where trials end in the corrected world.
+
+        Args:
+            parameters: Scaled, shape ``(n, n_parameters)``.
+            context: Scaled, shape ``(n, n_context)``.
+
+        Returns:
+            In the units of the targets, shape ``(n, n_targets)``.
+        """
+        inputs = self.in_world(parameters, context)
+        return self.forward.predict(inputs) + self._local(inputs) + self.correction.offset
+
+    def carry_over(self, context: Array) -> Array:
+        """Where the throws of the dataset would have ended in the corrected world.
+
+        Args:
+            context: Scaled, the same for all, shape ``(n_context,)``.
+
+        Returns:
+            Shape ``(n, n_targets)``.
+        """
+        parameters = self.inputs[:, self.columns_of(Role.PARAMETER)]
+        moved = self.in_world(parameters, np.repeat(context[np.newaxis], len(parameters), axis=0))
+        return self.residuals + self.forward.predict(moved) + self.correction.offset
+
+    def correct(self, correction: Correction) -> LearnedMap:
+        """The map of another world."""
+        return replace(self, correction=correction)
+
+    def _local(self, inputs: Array) -> Array:
+        """What the nearest throws say beside the polynomial, shape ``(n, n_targets)``."""
+        if self.kind is Kind.POLYNOMIAL:
+            return np.zeros((len(inputs), len(self.targets)))
+        residuals = self.residuals
+        found = np.empty((len(inputs), len(self.targets)))
+        for row, place in enumerate(inputs):
+            squares = ((self.inputs - place) ** 2).sum(axis=1)
+            near = np.argsort(squares, kind="stable")[:_NEIGHBOURS]
+            weights = 1.0 / (squares[near] + 1e-12)
+            found[row] = (weights[:, np.newaxis] * residuals[near]).sum(axis=0) / weights.sum()
+        return found
+
+
+def no_correction(axes: tuple[Axis, ...], targets: tuple[str, ...]) -> Correction:
+    """Make the correction of the dataset's own world, whose latents are those of its configuration."""
+    latents = tuple(axis for axis in axes if axis.role is Role.LATENT)
+    nominal = np.array([axis.nominal for axis in latents], np.float64)
+    scaled = np.clip(scale_values(latents, nominal), -1.0, 1.0)
+    parameters = sum(axis.role is Role.PARAMETER for axis in axes)
+    return Correction(np.zeros(parameters), scaled, np.zeros(len(targets)))
+
+
+def scale_values(axes: tuple[Axis, ...], values: Array) -> Array:
+    """Scale values of axes, shape ``(..., n_axes)``: -1 is the minimum of an axis, 1 its maximum."""
+    low, high = _bounds(axes)
+    return (values - low) / (high - low) * 2.0 - 1.0
+
+
+def _bounds(axes: tuple[Axis, ...]) -> tuple[Array, Array]:
+    return np.array([axis.minimum for axis in axes], np.float64), np.array([axis.maximum for axis in axes], np.float64)

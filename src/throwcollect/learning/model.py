@@ -1,0 +1,390 @@
+"""A model: from a target to the parameters of a throw, learned from a dataset, scored and adapted in simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from throwcollect.config.loader import dump_yaml
+from throwcollect.errors import ConfigError
+from throwcollect.files import StrPath
+from throwcollect.learning.adapting import Method, adapt
+from throwcollect.learning.aiming import Choice, aim
+from throwcollect.learning.fitting import Fit, fit_map
+from throwcollect.learning.learned_map import Kind, LearnedMap, Role
+from throwcollect.learning.model_directory import read_model, write_model
+from throwcollect.learning.model_file import (
+    AdaptationEntry,
+    AxisEntry,
+    CorrectionEntry,
+    Found,
+    ModelFile,
+    PolynomialEntry,
+    TrainedOn,
+)
+from throwcollect.learning.score import Score
+from throwcollect.learning.scoring import Simulates, score_model
+from throwcollect.version import __version__
+
+if TYPE_CHECKING:
+    from throwcollect.dataset.reader import Dataset
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Aim:
+    """How to reach a target.
+
+    Attributes:
+        target: Where to: the targets of the model, then what is given with them.
+        parameters: Values by dotted key, as `Simulator.throw` takes them; those that are given with the target, too.
+        predicted: Where the trial should end, shape ``(n_targets,)``.
+        reachable: Whether throws have come near enough, and the prediction does.
+        nearest: Where the nearest throw of the dataset ended, shape ``(n_targets,)``.
+    """
+
+    target: Array
+    parameters: dict[str, float]
+    predicted: Array
+    reachable: bool
+    nearest: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """Where throws with given parameters end, and which parameters lead to a target.
+
+    A model is a pure function of the dataset and of what was asked for, byte for byte.
+
+    Attributes:
+        file: All that it is but for the throws that it was learned from.
+        learned: The map itself, with these throws.
+        trials: Numbers of their trials, shape ``(n,)``.
+        config: YAML of the dataset's configuration.
+    """
+
+    file: ModelFile
+    learned: LearnedMap
+    trials: NDArray[np.int64]
+    config: str
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Keys that aiming chooses."""
+        return tuple(axis.key for axis in self.learned.axes_of(Role.PARAMETER))
+
+    @property
+    def given(self) -> tuple[str, ...]:
+        """Keys whose values are given with a target, behind it."""
+        return tuple(axis.key for axis in self.learned.axes_of(Role.CONTEXT))
+
+    @property
+    def latents(self) -> tuple[str, ...]:
+        """Keys of the world, whose values nobody knows but by throwing."""
+        return tuple(axis.key for axis in self.learned.axes_of(Role.LATENT))
+
+    @property
+    def targets(self) -> tuple[str, ...]:
+        """Columns of the table of throws that say where a trial ended."""
+        return self.learned.targets
+
+    def predict(self, points: Sequence[Mapping[str, float]]) -> Array:
+        """Where throws should end.
+
+        Args:
+            points: Values by key, of all `parameters` and all `given` each.
+
+        Returns:
+            In the units of the targets, shape ``(n_points, n_targets)``.
+
+        Raises:
+            ConfigError: If a key is missing or unknown, or a value is not finite.
+        """
+        parameters, context = self._inputs(points)
+        return self.learned.predict(parameters, context)
+
+    def aim(self, targets: Iterable[Sequence[float]], *, choose: str = Choice.NEAREST.value) -> list[Aim]:
+        """Find parameters for targets, inside of the ranges of the dataset.
+
+        Args:
+            targets: Where to, each of them `targets` and then `given`, such as ``[(1.4, -0.2)]``.
+            choose: Which of several ways is taken: ``nearest``, ``least-effort`` or ``least-sensitive``.
+
+        Raises:
+            ConfigError: If a target has another number of values, or one is not finite, or there is no such choice.
+        """
+        names = (*self.targets, *self.given)
+        rows = np.array([self._check_target(target, names) for target in targets], np.float64).reshape(-1, len(names))
+        ends, values = rows[:, : len(self.targets)], rows[:, len(self.targets) :]
+        try:
+            choice = Choice(choose)
+        except ValueError:
+            raise ConfigError(
+                f"choose: {choose!r}", expected=f"one of {', '.join(each.value for each in Choice)}"
+            ) from None
+        context = self.learned.scale(Role.CONTEXT, values)
+        found = aim(self.learned, ends, context, choice)
+        chosen = self.learned.unscale(Role.PARAMETER, found.parameters)
+        inside = np.all(np.abs(context) <= 1.0, axis=1).tolist()
+        return [
+            Aim(
+                row,
+                dict(zip((*self.parameters, *self.given), (*chosen[at].tolist(), *values[at].tolist()), strict=True)),
+                found.predicted[at],
+                bool(found.reachable[at]) and inside[at],
+                found.nearest_place[at],
+            )
+            for at, row in enumerate(rows)
+        ]
+
+    def score(
+        self,
+        simulator: Simulates,
+        *,
+        targets: int = 100,
+        seed: int = 0,
+        world: Simulates | None = None,
+        scatter: float = 0.0,
+        processes: int = 1,
+    ) -> Score:
+        """Throw at targets in simulation, and measure by how much they are missed.
+
+        Args:
+            simulator: Simulates the world of the dataset.
+            targets: Number of targets.
+            seed: Seed of their choice; models of one dataset get the same ones.
+            world: Simulates another world, in which the model is adapted by a few throws; None for none.
+            scatter: Standard deviation of noise on what is measured of those throws, in the unit of the targets.
+            processes: How many processes simulate.
+
+        Raises:
+            ConfigError: If a number is out of its range.
+            WorkerError: If a process of a simulator ends.
+        """
+        if targets < 1:
+            raise ConfigError(f"targets: got {targets}", expected="1 or more")
+        _check_scatter(scatter)
+        error, counts = self.file.trained_on.error, self.file.trained_on.latents_count
+        return score_model(
+            self.learned,
+            simulator,
+            count=targets,
+            seed=seed,
+            world=world,
+            scatter=scatter,
+            error=error,
+            latents_count=counts,
+            processes=processes,
+        )
+
+    def adapt(
+        self,
+        points: Sequence[Mapping[str, float]],
+        places: Sequence[Sequence[float]],
+        *,
+        method: str | None = None,
+        scatter: float = 0.0,
+    ) -> Model:
+        """Make the model of another world, of a few throws in it.
+
+        Args:
+            points: What was thrown: values by key, of all `parameters` and all `given` each.
+            places: Where these throws ended, each as many numbers as `targets`.
+            method: What the world may differ by: ``offset``, ``bias``, ``latent`` or ``none``; None to choose.
+            scatter: Standard deviation of what is measured, in the unit of the targets.
+
+        Raises:
+            ConfigError: If there are no throws, or not as many places; a key is missing or unknown, a value not finite,
+                or there is no such method.
+        """
+        parameters, context = self._inputs(points)
+        measured = np.array([self._check_target(place, self.targets) for place in places], np.float64)
+        if not len(measured) or len(measured) != len(parameters):
+            raise ConfigError(
+                f"{len(parameters)} throws and {len(measured)} places", expected="one place for each throw"
+            )
+        _check_scatter(scatter)
+        try:
+            wanted = None if method is None else Method(method)
+        except ValueError:
+            raise ConfigError(
+                f"method: {method!r}", expected=f"one of {', '.join(each.value for each in Method)}"
+            ) from None
+        if wanted is Method.LATENT and not self.latents:
+            raise ConfigError(
+                "method: the dataset has no latents", expected="a dataset whose sweep varies the world", hint="try bias"
+            )
+        deviation = float(np.hypot(scatter, self.file.trained_on.error))
+        adapted = adapt(
+            self.learned,
+            parameters,
+            context,
+            measured,
+            method=wanted,
+            scatter=deviation,
+            latents_count=self.file.trained_on.latents_count,
+        )
+        learned = self.learned.correct(adapted.correction)
+        entry = AdaptationEntry(
+            method=adapted.method,
+            throws=len(measured),
+            scatter=deviation,
+            before=adapted.before.tolist(),
+            after=adapted.after.tolist(),
+            found=_describe_found(learned, adapted.method, adapted.deviations),
+        )
+        file = self.file.model_copy(
+            update={"correction": CorrectionEntry.of(adapted.correction), "adaptation": entry, "version": __version__}
+        )
+        return replace(self, file=file, learned=learned)
+
+    def save(self, directory: StrPath) -> None:
+        """Write the model.
+
+        Args:
+            directory: A directory that is new or empty.
+
+        Raises:
+            ConfigError: If there is something already.
+            DatasetError: If it cannot be written.
+        """
+        write_model(Path(directory), self.file, self.learned, self.trials, self.config)
+
+    def _inputs(self, points: Sequence[Mapping[str, float]]) -> tuple[Array, Array]:
+        """Scaled parameters and context of points.
+
+        Raises:
+            ConfigError: If a key is missing or unknown, or a value is not finite.
+        """
+        names = (*self.parameters, *self.given)
+        rows = []
+        for number, point in enumerate(points):
+            if wrong := sorted(set(point) ^ set(names)):
+                state = "is missing" if wrong[0] in names else "is no key of this model"
+                raise ConfigError(f"throw {number}: {wrong[0]} {state}", expected=f"values of {', '.join(names)}")
+            rows.append([float(point[name]) for name in names])
+        values = np.array(rows, np.float64).reshape(-1, len(names))
+        if not np.isfinite(values).all():
+            number, column = (int(each[0]) for each in np.nonzero(~np.isfinite(values)))
+            raise ConfigError(
+                f"throw {number}: {names[column]} is {values[number, column]}", expected="a finite number"
+            )
+        split = len(self.parameters)
+        return self.learned.scale(Role.PARAMETER, values[:, :split]), self.learned.scale(
+            Role.CONTEXT, values[:, split:]
+        )
+
+    @staticmethod
+    def _check_target(values: Sequence[float], names: Sequence[str]) -> list[float]:
+        """The numbers of a target.
+
+        Raises:
+            ConfigError: If there are not as many as names, or one is not finite.
+        """
+        row = [float(value) for value in values]
+        if len(row) != len(names) or not np.isfinite(row).all():
+            raise ConfigError(f"got {', '.join(map(str, row))}", expected=f"finite numbers: {', '.join(names)}")
+        return row
+
+
+def fit(
+    dataset: Dataset,
+    *,
+    kind: str = Kind.LOCAL.value,
+    targets: Sequence[str] = (),
+    parameters: Sequence[str] = (),
+    given: Sequence[str] = (),
+    where: str | None = None,
+) -> Model:
+    """Learn a model from the throws of a dataset that succeeded.
+
+    Args:
+        dataset: The dataset.
+        kind: ``local``: by the nearest throws, and the difference that a polynomial predicts from there; or
+            ``polynomial``: by the polynomial alone.
+        targets: Columns that say where a trial ended; those of the task by default.
+        parameters: Swept keys that aiming chooses; all of the task by default. Others belong to the world.
+        given: Swept keys whose values are given with a target; those that the task names by default.
+        where: A condition on throws, as `Dataset.select` takes it.
+
+    Raises:
+        ConfigError: If there is no such kind, nothing to aim at, a key was not swept, or too few throws succeeded.
+        DatasetError: If the dataset is damaged.
+    """
+    try:
+        chosen = Kind(kind)
+    except ValueError:
+        raise ConfigError(f"kind: {kind!r}", expected=f"one of {', '.join(each.value for each in Kind)}") from None
+    throws = dataset if where is None else dataset.select(where)
+    found = fit_map(throws, kind=chosen, targets=targets, parameters=parameters, context=given)
+    return Model(_describe(found, dataset, where), found.learned, found.trials, dump_yaml(dataset.config))
+
+
+def load_model(directory: StrPath) -> Model:
+    """Read a model.
+
+    Args:
+        directory: Its directory.
+
+    Raises:
+        DatasetError: If there is none, or it is damaged.
+    """
+    return Model(*read_model(Path(directory)))
+
+
+def _describe(found: Fit, dataset: Dataset, where: str | None) -> ModelFile:
+    learned, validation = found.learned, found.validation
+    return ModelFile(
+        version=__version__,
+        kind=learned.kind,
+        axes=[AxisEntry(**vars(axis)) for axis in learned.axes],
+        targets=list(learned.targets),
+        forward=PolynomialEntry.of(learned.forward),
+        effort=PolynomialEntry.of(learned.effort),
+        correction=CorrectionEntry.of(learned.correction),
+        trained_on=TrainedOn(
+            name=dataset.config.name,
+            digest=dataset.digest,
+            throws=len(found.trials),
+            ignored=found.ignored,
+            selection=where,
+            folds_error={degree: float(np.median(errors)) for degree, errors in validation.errors.items()},
+            without_latents=found.without_latents,
+            latents_count=found.latents_count,
+        ),
+        adaptation=None,
+    )
+
+
+def _describe_found(learned: LearnedMap, method: Method, deviations: Array) -> list[Found]:
+    """The numbers that adaptation found, in their units."""
+    if method is Method.NONE:
+        return []
+    role = {Method.BIAS: Role.PARAMETER, Method.LATENT: Role.LATENT}.get(method)
+    axes = learned.axes_of(role) if role else ()
+    found = []
+    for number, axis in enumerate(axes):
+        half = (axis.maximum - axis.minimum) / 2
+        if role is Role.LATENT:
+            value = axis.minimum + (float(learned.correction.latents[number]) + 1) * half
+        else:
+            value = float(learned.correction.bias[number]) * half
+        found.append(Found(name=axis.key, value=value, deviation=float(deviations[number]) * half))
+    offsets = zip(learned.targets, learned.correction.offset.tolist(), deviations[len(axes) :].tolist(), strict=True)
+    return [*found, *(Found(name=name, value=value, deviation=spread) for name, value, spread in offsets)]
+
+
+def _check_scatter(scatter: float) -> None:
+    """Refuse what is no standard deviation.
+
+    Raises:
+        ConfigError: If it is negative, or not finite.
+    """
+    if not 0.0 <= scatter < np.inf:
+        raise ConfigError(f"scatter: got {scatter}", expected="0 or more, in the unit of the targets")

@@ -1,0 +1,164 @@
+"""The card of a model: what it maps, how well it hits, what it was not tested on, and how a robot's program uses it."""
+
+from __future__ import annotations
+
+from throwcollect.learning.adapting import Method
+from throwcollect.learning.learned_map import Axis
+from throwcollect.learning.model_file import AdaptationEntry, ModelFile
+from throwcollect.learning.score import Errors, Score
+from throwcollect.units import unit_of_name
+from throwcollect.wording import format_count
+
+PROGRAM = """\
+import json
+import numpy as np
+
+model = json.load(open("model.json"))
+axes, correction = model["axes"], model["correction"]
+powers, factors = np.array(model["forward"]["exponents"]), np.array(model["forward"]["coefficients"])
+chosen = np.array([axis["role"] == "parameter" for axis in axes])
+low, high = (np.array([axis[end] for axis in axes]) for end in ("minimum", "maximum"))
+x = np.where(chosen, 0.0, (np.array([axis["nominal"] for axis in axes]) - low) / (high - low) * 2 - 1)
+x[[axis["role"] == "latent" for axis in axes]] = correction["latents"]
+bias = np.zeros(len(axes))
+bias[chosen] = correction["bias"]
+land = lambda x: np.prod((x + bias) ** powers, axis=1) @ factors + correction["offset"]
+for _ in range(50):  # Gauss-Newton steps, inside of the ranges
+    slopes = np.array([(land(x + step) - land(x - step)) / 2e-4 for step in 1e-4 * np.eye(len(x))]) * chosen[:, None]
+    step = np.linalg.pinv(slopes.T, rcond=1e-3) @ (target - land(x))
+    x = np.where(chosen, np.clip(x + step, -1, 1), x)
+values = low + (x + 1) / 2 * (high - low)
+parameters = {axis["key"]: value for axis, value in zip(axes, values) if axis["role"] == "parameter"}
+"""
+"""Finds parameters for ``target`` with ``model.json`` alone; the card shows it, and a test runs it."""
+
+
+def describe_model(file: ModelFile, score: Score | None) -> str:
+    """README.md of a model.
+
+    Args:
+        file: All of the model but its throws.
+        score: What throwing at targets has shown; None if nobody has.
+    """
+    trained = file.trained_on
+    axes = [axis.to_axis() for axis in file.axes]
+    lines = [
+        f"# A model of {trained.name}",
+        "",
+        f"It maps the parameters of a trial to where it ends ({', '.join(file.targets)}), and back: from a target to "
+        f"parameters. Learned from {format_count(trained.throws, 'throw')} of the dataset with the digest "
+        f"`{trained.digest}`" + (f" (those with `{trained.selection}`)" if trained.selection else "") + "; "
+        f"{trained.ignored} that did not succeed were left out. Made with throwcollect {file.version}.",
+        "",
+        "| key | it is | from | to | configured | unit |",
+        "|---|---|---|---|---|---|",
+        *map(_describe_axis, axes),
+        "",
+        "Parameters are chosen when aiming, context is given with the target, latents belong to the world. Nothing is "
+        "extrapolated beyond the ranges.",
+        "",
+        f"Predictions for throws that polynomials were not fitted to are off by {_length(trained.error, file)} "
+        "(median, in simulation); by degree: "
+        + ", ".join(f"{degree}: {_length(error, file)}" for degree, error in trained.folds_error.items())
+        + (
+            f"; without latents: {_length(trained.without_latents, file)}"
+            if trained.without_latents is not None
+            else ""
+        )
+        + ".",
+        "",
+    ]
+    if file.adaptation is not None:
+        lines += _describe_adaptation(file.adaptation, file)
+    if score is not None:
+        lines += _describe_score(score, file)
+    lines += [
+        "## What it was not tested on",
+        "",
+        "A real robot; balls, tools, surfaces and postures other than the dataset's; throws that scatter. Every number "
+        "on this page is one in simulation.",
+        "",
+        "## In a program of a robot",
+        "",
+        "`model.json` alone is enough. For a `target`, in the order and the units above:",
+        "",
+        "```python",
+        PROGRAM.rstrip(),
+        "```",
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def _describe_axis(axis: Axis) -> str:
+    unit = axis.unit or "-"
+    return (
+        f"| `{axis.key}` | {axis.role.value} | {axis.minimum:.6g} | {axis.maximum:.6g} | {axis.nominal:.6g} | {unit} |"
+    )
+
+
+def _describe_adaptation(adaptation: AdaptationEntry, file: ModelFile) -> list[str]:
+    throws = format_count(adaptation.throws, "throw")
+    if adaptation.method is Method.NONE:
+        return ["## Adapted to another world", "", f"{throws} there did not speak for any difference.", ""]
+    lines = [
+        "## Adapted to another world",
+        "",
+        f"By {throws} there; what differs was taken to be: {adaptation.method.value}.",
+        "",
+        "| | found | standard deviation |",
+        "|---|---|---|",
+        *(f"| `{each.name}` | {each.value:.4g} | {each.deviation:.2g} |" for each in adaptation.found),
+        "",
+    ]
+    if adaptation.after:
+        before, after = (sorted(each)[len(each) // 2] for each in (adaptation.before, adaptation.after))
+        lines += [
+            f"The throws were off by {_length(before, file)} before (median), and by {_length(after, file)} after, "
+            "each predicted by a model that was adapted to the others.",
+            "",
+        ]
+    return lines
+
+
+def _describe_score(score: Score, file: ModelFile) -> list[str]:
+    targets = format_count(score.targets, "target")
+    lines = [
+        "## How it hits",
+        "",
+        f"Distance from {targets} (seed {score.seed}), in simulation:",
+        "",
+        "| learned from | median | 9 of 10 below | largest | did not succeed |",
+        "|---|---|---|---|---|",
+        *(
+            f"| {format_count(each.trained_on, 'throw')} | {_describe_errors(each.errors, file)} |"
+            for each in score.trained
+        ),
+        "",
+    ]
+    if score.adapted:
+        scatter = f", with a scatter of {_length(score.scatter, file)} of what is measured" if score.scatter else ""
+        lines += [
+            f"In another world{scatter}, at the {score.adapted[0].errors.throws} of these targets that can be reached "
+            "there, in simulation:",
+            "",
+            "| throws there | differs by | median | 9 of 10 below | largest | did not succeed |",
+            "|---|---|---|---|---|---|",
+            *(
+                f"| {each.real_throws} | {each.method.value} | {_describe_errors(each.errors, file)} |"
+                for each in score.adapted
+            ),
+            "",
+        ]
+    return lines
+
+
+def _describe_errors(errors: Errors, file: ModelFile) -> str:
+    lengths = ("-" if each is None else _length(each, file) for each in (errors.median, errors.share90, errors.largest))
+    return " | ".join([*lengths, str(errors.missed)])
+
+
+def _length(value: float, file: ModelFile) -> str:
+    """A distance between targets; in centimetres if all of them are lengths."""
+    units = {unit_of_name(target) for target in file.targets}
+    return f"{value * 100:.2f} cm" if units == {"m"} else f"{value:.3g}"

@@ -1,0 +1,122 @@
+"""The directory of a model: what was learned, the throws that it was learned from, and a card for people."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+from pydantic import ValidationError
+
+from throwcollect.errors import DatasetError
+from throwcollect.files import new_directory, read_text, write_file
+from throwcollect.learning.learned_map import LearnedMap
+from throwcollect.learning.model_card import describe_model
+from throwcollect.learning.model_file import MODEL, ModelFile, read_model_file
+from throwcollect.learning.score import Score
+from throwcollect.sweep.parquet_file import encode_table, read_parquet
+
+POINTS = "points.parquet"
+"""Parameters, ends and efforts of the throws: aiming begins at them, and they are what is reached."""
+CONFIG = "config.yaml"
+SCORE = "score.json"
+CARD = "README.md"
+_EFFORT = "effort_peak_share"
+_MOST_BYTES = 10_000_000
+
+
+def write_model(directory: Path, file: ModelFile, learned: LearnedMap, trials: NDArray[np.int64], config: str) -> None:
+    """Write a model into a directory of its own.
+
+    Args:
+        directory: A directory that is new or empty.
+        file: All of the model but its throws.
+        learned: The map, with its throws.
+        trials: Numbers of their trials, shape ``(n,)``.
+        config: YAML of the dataset's configuration.
+
+    Raises:
+        ConfigError: If there is something already.
+        DatasetError: If it cannot be written.
+    """
+    columns: dict[str, NDArray[Any]] = {"trial": trials}
+    columns |= {axis.key: learned.values[:, number] for number, axis in enumerate(learned.axes)}
+    columns |= {target: learned.outputs[:, number] for number, target in enumerate(learned.targets)}
+    with new_directory(directory) as beside:
+        write_file(beside / MODEL, (file.model_dump_json(indent=1) + "\n").encode())
+        write_file(beside / POINTS, encode_table(pa.table({**columns, _EFFORT: learned.efforts})))
+        write_file(beside / CONFIG, config.encode())
+        write_file(beside / CARD, describe_model(file, None).encode())
+
+
+def read_model(directory: Path) -> tuple[ModelFile, LearnedMap, NDArray[np.int64], str]:
+    """Read a model.
+
+    Args:
+        directory: Its directory.
+
+    Returns:
+        All of it but its throws; the map; numbers of the trials; YAML of the dataset's configuration.
+
+    Raises:
+        DatasetError: If there is none, or it is damaged.
+    """
+    file = read_model_file(directory)
+    path = directory / POINTS
+    table = read_parquet(path)
+    names = ["trial", *(axis.key for axis in file.axes), *file.targets, _EFFORT]
+    if table.column_names != names or not all(
+        pa.types.is_floating(field.type) or (field.name == "trial" and pa.types.is_integer(field.type))
+        for field in table.schema
+    ):
+        raise DatasetError("has not the columns of this model", path=path, expected=", ".join(names))
+    columns = {name: table[name].to_numpy() for name in names}
+    if not len(table) or not all(np.isfinite(column).all() for column in columns.values()):
+        raise DatasetError("has rows without finite numbers, or no rows", path=path)
+    learned = LearnedMap(
+        file.kind,
+        tuple(axis.to_axis() for axis in file.axes),
+        tuple(file.targets),
+        file.forward.to_polynomial(),
+        file.effort.to_polynomial(),
+        np.column_stack([columns[axis.key] for axis in file.axes]),
+        np.column_stack([columns[target] for target in file.targets]),
+        columns[_EFFORT],
+        file.correction.to_correction(),
+    )
+    return file, learned, columns["trial"], read_text(directory / CONFIG, most_bytes=_MOST_BYTES)
+
+
+def write_score(directory: Path, score: Score) -> None:
+    """Put a score into the directory of a model, in place of an earlier one, and into its card.
+
+    Args:
+        directory: Directory of the model.
+        score: The score.
+
+    Raises:
+        DatasetError: If there is no model, or the score cannot be written.
+    """
+    file = read_model_file(directory)
+    write_file(directory / SCORE, (score.model_dump_json(indent=1) + "\n").encode())
+    write_file(directory / CARD, describe_model(file, score).encode())
+
+
+def read_score(directory: Path) -> Score | None:
+    """Read the score of a model; None if it has none.
+
+    Args:
+        directory: Directory of the model.
+
+    Raises:
+        DatasetError: If it cannot be read, or is no score.
+    """
+    path = directory / SCORE
+    if not path.exists():
+        return None
+    try:
+        return Score.model_validate_json(read_text(path, most_bytes=_MOST_BYTES))
+    except ValidationError as error:
+        raise DatasetError(f"is no score of a model: {error.errors()[0]['msg']}", path=path) from error

@@ -1,0 +1,175 @@
+"""Polynomials of several inputs, fitted to samples with the same result on every processor."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations_with_replacement
+
+import numpy as np
+from numpy.typing import NDArray
+
+from throwcollect.reproducible_math import matmul, solve
+
+Array = NDArray[np.float64]
+
+DEGREES = (1, 2, 3, 4)
+"""Degrees that are tried."""
+SAMPLES_PER_TERM = 1.5
+"""A degree is tried only where there are so many samples for each of its terms."""
+_RIDGE = 1e-7
+"""Ridge, as a share of the number of samples: it keeps terms small that the samples say nothing about."""
+
+
+@dataclass(frozen=True, eq=False)
+class Polynomial:
+    """A polynomial of inputs that are scaled to [-1, 1].
+
+    Attributes:
+        exponents: Of each input in each term, shape ``(n_terms, n_inputs)``.
+        coefficients: Of each term for each output, shape ``(n_terms, n_outputs)``.
+    """
+
+    exponents: NDArray[np.int64]
+    coefficients: Array
+
+    @property
+    def degree(self) -> int:
+        """Highest sum of the exponents of a term."""
+        return int(self.exponents.sum(axis=1).max())
+
+    def predict(self, inputs: Array) -> Array:
+        """Values of the outputs.
+
+        Args:
+            inputs: Shape ``(n, n_inputs)``.
+
+        Returns:
+            Shape ``(n, n_outputs)``.
+        """
+        return matmul(_terms(inputs, self.exponents), self.coefficients)
+
+    def slopes(self, inputs: Array) -> Array:
+        """Change of each output with each input.
+
+        Args:
+            inputs: Shape ``(n, n_inputs)``.
+
+        Returns:
+            Shape ``(n, n_outputs, n_inputs)``.
+        """
+        columns = []
+        for each in range(inputs.shape[1]):
+            factors = self.exponents[:, each : each + 1].astype(np.float64)
+            lowered = self.exponents.copy()
+            lowered[:, each] = np.maximum(lowered[:, each] - 1, 0)
+            columns.append(matmul(_terms(inputs, lowered), factors * self.coefficients))
+        return np.stack(columns, axis=-1)
+
+
+@dataclass(frozen=True, eq=False)
+class Validation:
+    """How well polynomials predict samples that they were not fitted to.
+
+    Attributes:
+        errors: By degree: distance of each sample from its prediction, shape ``(n,)``.
+    """
+
+    errors: dict[int, Array]
+
+    @property
+    def degree(self) -> int:
+        """The degree with the smallest median error."""
+        return min(self.errors, key=lambda degree: float(np.median(self.errors[degree])))
+
+    @property
+    def best(self) -> Array:
+        """Errors of that degree, shape ``(n,)``."""
+        return self.errors[self.degree]
+
+
+def fit_polynomial(inputs: Array, outputs: Array, degree: int) -> Polynomial:
+    """Fit a polynomial by least squares.
+
+    Args:
+        inputs: Shape ``(n, n_inputs)``, in [-1, 1].
+        outputs: Shape ``(n, n_outputs)``.
+        degree: Highest sum of the exponents of a term.
+    """
+    exponents = list_exponents(inputs.shape[1], degree)
+    return _solve(exponents, _Sums.of(inputs, outputs, exponents))
+
+
+def cross_validate(inputs: Array, outputs: Array, folds: NDArray[np.int64]) -> Validation:
+    """Predict each sample by polynomials that were fitted to the other folds.
+
+    Args:
+        inputs: Shape ``(n, n_inputs)``, in [-1, 1].
+        outputs: Shape ``(n, n_outputs)``.
+        folds: Number of the fold of each sample, shape ``(n,)``.
+    """
+    errors = {}
+    numbers = np.unique(folds)
+    for degree in DEGREES:
+        exponents = list_exponents(inputs.shape[1], degree)
+        if degree > 1 and len(exponents) * SAMPLES_PER_TERM > len(inputs):
+            break
+        parts = [_Sums.of(inputs[folds == each], outputs[folds == each], exponents) for each in numbers]
+        away = np.empty(len(inputs))
+        for number, left_out in zip(numbers, parts, strict=True):
+            others = _Sums.add([part for part in parts if part is not left_out])
+            held = folds == number
+            missed = _solve(exponents, others).predict(inputs[held]) - outputs[held]
+            away[held] = np.sqrt((missed**2).sum(axis=1))
+        errors[degree] = away
+    return Validation(errors)
+
+
+def list_exponents(inputs: int, degree: int) -> NDArray[np.int64]:
+    """Exponents of all terms up to a degree, shape ``(n_terms, inputs)``; the constant is the first."""
+    rows = [
+        [chosen.count(each) for each in range(inputs)]
+        for total in range(degree + 1)
+        for chosen in combinations_with_replacement(range(inputs), total)
+    ]
+    return np.array(rows, np.int64)
+
+
+@dataclass(frozen=True, eq=False)
+class _Sums:
+    """What least squares has to know of samples; that of several groups is the sum of theirs."""
+
+    samples: int
+    squares: Array
+    products: Array
+
+    @classmethod
+    def of(cls, inputs: Array, outputs: Array, exponents: NDArray[np.int64]) -> _Sums:
+        terms = _terms(inputs, exponents)
+        transposed = np.ascontiguousarray(terms.T)
+        return cls(len(inputs), matmul(transposed, terms), matmul(transposed, outputs))
+
+    @classmethod
+    def add(cls, parts: Sequence[_Sums]) -> _Sums:
+        squares, products = parts[0].squares.copy(), parts[0].products.copy()
+        for part in parts[1:]:
+            squares += part.squares
+            products += part.products
+        return cls(sum(part.samples for part in parts), squares, products)
+
+
+def _solve(exponents: NDArray[np.int64], sums: _Sums) -> Polynomial:
+    ridge = _RIDGE * sums.samples * np.eye(len(exponents))
+    return Polynomial(exponents, solve(sums.squares + ridge, sums.products))
+
+
+def _terms(inputs: Array, exponents: NDArray[np.int64]) -> Array:
+    """Value of each term without its coefficient, shape ``(n, n_terms)``."""
+    powers = [np.ones_like(inputs)]
+    for _ in range(int(exponents.max(initial=0))):
+        powers.append(powers[-1] * inputs)
+    table = np.stack(powers)
+    terms = np.ones((len(inputs), len(exponents)))
+    for each in range(inputs.shape[1]):
+        terms *= table[exponents[:, each], :, each].T
+    return terms

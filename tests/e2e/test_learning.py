@@ -1,0 +1,122 @@
+"""From a dataset to a throw at a target, as a user does it: by commands, and by the program of the documents."""
+
+import csv
+import json
+import re
+import runpy
+from pathlib import Path
+
+import pytest
+
+from tests.e2e.collection import call_here
+
+ROOT = Path(__file__).parents[2]
+PAGE = (ROOT / "docs" / "learning.md").read_text(encoding="utf-8")
+TRIALS = 60
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A directory with the dataset `data`, whose throws an engine in closed form made, and the model `model`."""
+    path = tmp_path_factory.mktemp("learning")
+    text = (ROOT / "configs" / "quickstart.yaml").read_text(encoding="utf-8")
+    (path / "throws.yaml").write_text(text + "\nsim: {engine: ballistic}\n")
+    settings = ["--set", f"trials={TRIALS}", "--set", "run.replay=0", "--runtime", "inprocess"]
+    up = call_here("up", path / "throws.yaml", *settings, "--output", path / "data")
+    assert up.returncode == 0, up.stderr
+    fit = call_here("fit", path / "data", "-o", path / "model")
+    assert fit.returncode == 0, fit.stderr
+    assert re.search(r"learned from \d+ throws, \d+ ignored", fit.stdout)
+    return path
+
+
+def middle(place: Path) -> str:
+    """A target amid the throws, as --at takes it."""
+    said = call_here("aim", place / "model", "--at", "0,0").stderr
+    found = re.search(r"reached: (\S+)", said)
+    assert found is not None
+    return found[1]
+
+
+def test_what_aiming_prints_throws_there(place: Path) -> None:
+    target = middle(place)
+    aim = call_here("aim", place / "model", "--at", target)
+    assert aim.returncode == 0, aim.stderr
+    throw = call_here("throw", place / "throws.yaml", "--json", *aim.stdout.split())
+    assert throw.returncode == 0, throw.stderr
+    row = json.loads(throw.stdout)
+    x, y = map(float, target.split(","))
+    assert row["landing_x_m"] == pytest.approx(x, abs=0.03)
+    assert row["landing_y_m"] == pytest.approx(y, abs=0.03)
+
+
+def test_targets_become_a_list_of_throws_and_these_adapt_a_model(place: Path) -> None:
+    x, y = middle(place).split(",")
+    (place / "targets.csv").write_text(f"landing_x_m,landing_y_m\n{x},{y}\n{x},{y}\n")
+    aim = call_here("aim", place / "model", "--targets", place / "targets.csv", "-o", place / "throws.csv")
+    assert aim.returncode == 0, aim.stderr
+    throws = call_here("throw", place / "throws.yaml", "--list", place / "throws.csv")
+    assert throws.stdout.count("landed: landing_x_m") == 2, throws.stderr
+    with (place / "throws.csv").open() as file:
+        thrown = list(csv.reader(file))
+    measured = [[*thrown[0], "landing_x_m", "landing_y_m"], *([*row, float(x) + 0.2, y] for row in thrown[1:])]
+    (place / "measured.csv").write_text("\n".join(",".join(map(str, row)) for row in measured))
+    adapt = call_here("adapt", place / "model", place / "measured.csv", "-o", place / "real", "--method", "offset")
+    assert adapt.returncode == 0, adapt.stderr
+    assert re.search(r"landing_x_m: 0\.(1[5-9]|2[0-4])", adapt.stdout)
+    same = call_here("adapt", place / "model", place / "data", "-o", place / "same")
+    assert re.match(r"\d\d throws; what differs: none", same.stdout), same.stdout + same.stderr
+
+
+def test_a_score_tells_how_throws_hit_here_and_elsewhere(place: Path) -> None:
+    other = ["--config", place / "throws.yaml", "--set", "scene.gravity_mps2=8.5"]
+    found = call_here("score", place / "model", "--targets", "5", *other, "--json")
+    assert found.returncode == 0, found.stderr
+    score = json.loads(found.stdout)
+    assert score["trained"][-1]["errors"]["median"] < 0.03
+    before, *_, after = (each["errors"]["median"] for each in score["adapted"])
+    assert after < before
+    assert json.loads((place / "model" / "score.json").read_text()) == score
+    assert "## How it hits" in (place / "model" / "README.md").read_text()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["aim", "model"], "no target"),
+        (["aim", "model", "--at", "1.4"], "--at 1.4\n  expected: 2 numbers: landing_x_m,landing_y_m"),
+        (["aim", "model", "--at", "1,nan"], "finite numbers"),
+        (["aim", "model", "--at", "1,0", "--choose", "best"], "choose: 'best'"),
+        (["aim", "model", "--targets", "throws.yaml"], "throws.yaml:1: no column landing_x_m and landing_y_m"),
+        (["aim", "data", "--at", "1,0"], "model.json"),
+        (["fit", "data", "-o", "data"], "exists"),
+        (["fit", "data", "-o", "new", "--where", "trial < 5"], "at least 18 for 5 parameters"),
+        (["adapt", "model", "model/config.yaml", "-o", "new"], "no column"),
+        (["score", "model", "--targets", "0"], "targets: got 0"),
+        (["score", "model", "--set", "ball.mass_kg=1"], "--config CONFIG"),
+        (["throw", "throws.yaml", "--set", "task.duration_s=0.2"], "its limit is 1.76 rad/s"),
+    ],
+)
+def test_what_cannot_be_done_is_one_message(place: Path, arguments: list[str], message: str) -> None:
+    files = {"model", "data", "throws.yaml", "new", "model/config.yaml"}
+    said = call_here(*(place / each if each in files else each for each in arguments))
+    assert said.returncode == 2 or "model.json" in message, said.stderr
+    assert message in said.stderr
+    assert "Traceback" not in said.stderr
+    assert not (place / "new").exists()
+
+
+def test_a_target_out_of_reach_is_told_with_the_nearest_point(place: Path) -> None:
+    said = call_here("aim", place / "model", "--at", "9,0")
+    assert said.returncode == 1
+    assert re.search(r"out of reach: 9\.000,0\.000; the nearest point that was reached: \d\.\d+,-?\d\.\d+", said.stderr)
+
+
+def test_the_program_of_the_documents_runs(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (program,) = re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL)
+    program = program.replace('"datasets/quick"', '"data"').replace('"configs/quickstart.yaml"', '"throws.yaml"')
+    x, y = middle(place).split(",")
+    (place / "program.py").write_text(program.replace("(1.4, -0.2)", f"({x}, {y})"))
+    monkeypatch.chdir(place)
+    runpy.run_path("program.py", run_name="__main__")
+    assert (place / "models" / "real" / "model.json").exists()

@@ -1,0 +1,100 @@
+"""Adapting to worlds in closed form that differ from the one that was learned."""
+
+import numpy as np
+import pytest
+from tests.unit.learning.worlds import KEYS, draw, land, learn, learn_with_drag
+
+from throwcollect.learning.adapting import Adaptation, Method, adapt
+from throwcollect.learning.learned_map import LearnedMap, Role
+
+BIAS = np.array([0.02, 0.06, -0.04])
+OFFSET = np.array([0.08, -0.05])
+
+
+def elsewhere(learned: LearnedMap, count: int, world, *, noise_m: float = 0.0, seed: int = 3, **options) -> Adaptation:
+    """Adapt by some throws in another world."""
+    values = draw(count, seed)
+    places = world(values) + noise_m * np.random.default_rng(seed).standard_normal((count, 2))
+    options = {"latents_count": False, "scatter": float(np.hypot(noise_m, 0.002)), **options}
+    return adapt(learned, learned.scale(Role.PARAMETER, values), np.zeros((count, 0)), places, **options)
+
+
+def off(learned: LearnedMap, found: Adaptation, world) -> float:
+    """Median distance of new throws from where the adapted map has them."""
+    values = draw(50, seed=11)
+    predicted = learned.correct(found.correction).predict(learned.scale(Role.PARAMETER, values), np.zeros((50, 0)))
+    return float(np.median(np.linalg.norm(predicted - world(values), axis=1)))
+
+
+def shifted(values):
+    return land(values) + OFFSET
+
+
+def biased(values):
+    return land(values + BIAS)
+
+
+def heavy_drag(values):
+    return land(values, 0.8)
+
+
+def test_one_throw_says_how_far_all_end_elsewhere() -> None:
+    learned = learn()
+    found = elsewhere(learned, 1, shifted)
+    assert found.method is Method.OFFSET
+    assert found.correction.offset == pytest.approx(OFFSET, abs=0.005)
+    assert off(learned, found, shifted) < 0.005 < found.before[0]
+
+
+def test_some_throws_say_which_parameters_are_shifted() -> None:
+    learned = learn()
+    found = elsewhere(learned, 8, biased)
+    half = np.array([0.2, 0.4, 0.3])
+    assert found.method is Method.BIAS
+    assert found.correction.bias * half == pytest.approx(BIAS, abs=0.02)
+    assert off(learned, found, biased) < 0.004
+    assert np.median(found.after) < 0.01 < np.median(found.before)
+    assert len(found.deviations) == len(KEYS) + 2
+
+
+def test_latents_that_count_are_found() -> None:
+    learned = learn_with_drag()
+    found = elsewhere(learned, 4, heavy_drag, latents_count=True)
+    assert found.method is Method.LATENT
+    assert learned.unscale(Role.LATENT, found.correction.latents) == pytest.approx([0.8], abs=0.1)
+    assert off(learned, found, heavy_drag) < 0.01
+
+
+def test_a_latent_stays_inside_of_what_was_collected() -> None:
+    found = elsewhere(learn_with_drag(), 4, lambda values: land(values, 1.6), latents_count=True, method=Method.LATENT)
+    assert found.correction.latents.tolist() == [1.0]
+
+
+@pytest.mark.parametrize(("count", "most_m"), [(1, 0.02), (3, 0.008), (5, 0.008), (10, 0.008)])
+def test_where_nothing_differs_little_gets_worse(count: int, most_m: float) -> None:
+    learned = learn()
+    for seed in range(5):
+        found = elsewhere(learned, count, land, noise_m=0.005, seed=seed)
+        assert off(learned, found, land) < most_m
+
+
+def test_throws_that_speak_for_no_difference_leave_the_map_alone() -> None:
+    learned = learn()
+    found = elsewhere(learned, 1, land, noise_m=0.001)
+    assert found.method is Method.NONE
+    assert found.correction is learned.correction
+
+
+def test_with_scatter_more_throws_say_more() -> None:
+    learned = learn()
+    errors = [
+        np.median(
+            [off(learned, elsewhere(learned, count, biased, noise_m=0.02, seed=seed), biased) for seed in range(8)]
+        )
+        for count in (3, 20)
+    ]
+    assert errors[1] < errors[0] < off(learned, elsewhere(learned, 3, biased, method=Method.NONE), biased)
+
+
+def test_what_is_wanted_is_done_even_if_it_does_not_help() -> None:
+    assert elsewhere(learn(), 5, land, method=Method.OFFSET).method is Method.OFFSET

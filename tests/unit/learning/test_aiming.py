@@ -1,0 +1,68 @@
+"""Aiming at targets in a world in closed form."""
+
+import numpy as np
+import pytest
+from tests.unit.learning.worlds import HIGH, KEYS, LOW, draw, effort, land, learn
+
+from throwcollect.learning.aiming import Choice, aim
+from throwcollect.learning.learned_map import Correction, Kind, LearnedMap, Role
+
+
+def throw(learned: LearnedMap, targets: np.ndarray, choice: Choice = Choice.NEAREST):
+    """Aim, and throw; returns the values and how far each throw was off."""
+    found = aim(learned, targets, np.zeros((len(targets), 0)), choice)
+    values = learned.unscale(Role.PARAMETER, found.parameters)
+    return found, values, np.linalg.norm(land(values) - targets, axis=1)
+
+
+@pytest.fixture(scope="module")
+def targets() -> np.ndarray:
+    return land(draw(40, seed=5, inside=0.6))
+
+
+@pytest.mark.parametrize(("kind", "off_m"), [(Kind.LOCAL, 0.002), (Kind.POLYNOMIAL, 0.005)])
+def test_throws_end_at_their_targets(kind: Kind, off_m: float, targets: np.ndarray) -> None:
+    found, _, off = throw(learn(kind=kind), targets)
+    assert found.reachable.all()
+    assert np.linalg.norm(found.predicted - targets, axis=1).max() < 1e-3
+    assert np.median(off) < off_m / 4
+    assert off.max() < off_m
+
+
+def test_parameters_stay_inside_of_their_ranges(targets: np.ndarray) -> None:
+    learned = learn(60)
+    far = np.concatenate([targets, targets * 3])
+    assert np.abs(throw(learned, far)[0].parameters).max() <= 1.0
+
+
+def test_what_no_throw_came_near_to_is_out_of_reach() -> None:
+    learned = learn()
+    found = aim(learned, np.array([[9.0, 0.0], [1.3, -0.2]]), np.zeros((2, 0)))
+    assert found.reachable.tolist() == [False, True]
+    nearest = found.nearest_place[0]
+    assert any(np.array_equal(nearest, place) for place in learned.outputs)
+    assert np.linalg.norm(nearest - [9.0, 0.0]) == np.linalg.norm(learned.outputs - [9.0, 0.0], axis=1).min()
+
+
+def test_of_several_ways_the_wanted_one_is_taken(targets: np.ndarray) -> None:
+    learned = learn()
+    by = {choice: throw(learned, targets, choice) for choice in Choice}
+    assert all(off.max() < 0.01 for _, _, off in by.values())
+    efforts = {choice: effort(values).mean() for choice, (_, values, _) in by.items()}
+    assert efforts[Choice.LEAST_EFFORT] == min(efforts.values()) < efforts[Choice.NEAREST] - 0.005
+    sensitivities = {
+        choice: (learned.forward.slopes(found.parameters) ** 2).sum() for choice, (found, _, _) in by.items()
+    }
+    assert sensitivities[Choice.LEAST_SENSITIVE] < 0.98 * sensitivities[Choice.NEAREST]
+
+
+def test_in_another_world_aiming_makes_up_for_what_differs(targets: np.ndarray) -> None:
+    learned = learn()
+    shifted = learned.correct(Correction(np.array([0.1, -0.2, 0.05]), np.zeros(0), np.array([0.03, -0.02])))
+    found = aim(shifted, targets, np.zeros((len(targets), 0)))
+    bias = np.array([0.1, -0.2, 0.05]) * (HIGH - LOW) / 2
+    values = learned.unscale(Role.PARAMETER, found.parameters) + bias
+    off = np.linalg.norm(land(values) + np.array([0.03, -0.02]) - targets, axis=1)
+    assert len(KEYS) == values.shape[1]
+    assert off[found.reachable].max() < 0.004
+    assert found.reachable.sum() > 25

@@ -1,0 +1,217 @@
+"""Models: learned from datasets, written, read, and used by programs that have nothing but a file."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pytest
+from tests.unit.dataset.conftest import Collection
+from tests.unit.learning.worlds import DRAG, KEYS, TARGETS, draw, effort, land
+
+from throwcollect import ConfigError, DatasetError, Model, fit, load, load_model
+from throwcollect.dataset.reader import Dataset
+from throwcollect.learning.model_card import PROGRAM
+from throwcollect.learning.model_directory import read_score, write_score
+from throwcollect.learning.score import Adapted, Errors, Score, ThrowAtTarget, Trained
+
+COUNT = 120
+SWEEP = {key: {"min": -0.3, "max": 1.3} for key in KEYS} | {"task.duration_s": {"min": 0.9, "max": 1.3}}
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
+    """A dataset whose table tells of throws in closed form."""
+    settings = {
+        "sweep": {"sampler": "uniform", "parameters": {**SWEEP, DRAG.key: {"min": 0.0, "max": 1.0}}},
+        "trials": 7,
+    }
+    found = load(Collection(settings).collect(tmp_path_factory.mktemp("data") / "data"))
+    values = draw(COUNT)
+    drag = np.random.default_rng(1).random(COUNT)
+    columns = dict(zip(KEYS, values.T, strict=True)) | {DRAG.key: drag}
+    columns |= dict(zip(TARGETS, land(values, drag).T, strict=True))
+    columns |= {"trial": np.arange(COUNT), "outcome": ["landed"] * COUNT, "effort_peak_share": effort(values)}
+    throws = pa.concat_tables([found.throws.slice(0, 1)] * COUNT)
+    for name, column in columns.items():
+        field = throws.schema.field(name)
+        throws = throws.set_column(throws.schema.get_field_index(name), field, pa.array(column, field.type))
+    return replace(found, throws=throws)
+
+
+@pytest.fixture(scope="module")
+def model(dataset: Dataset) -> Model:
+    return fit(dataset)
+
+
+def change(dataset: Dataset, column: str, values: object) -> Dataset:
+    field = dataset.throws.schema.field(column)
+    at = dataset.throws.schema.get_field_index(column)
+    return replace(dataset, throws=dataset.throws.set_column(at, field, pa.array(values, field.type)))
+
+
+def test_keys_have_the_role_that_they_play(model: Model) -> None:
+    assert sorted(model.parameters) == sorted(KEYS)
+    assert (model.given, model.latents, model.targets) == ((), (DRAG.key,), TARGETS)
+    assert model.file.trained_on.throws == COUNT
+
+
+def test_roles_can_be_chosen(dataset: Dataset) -> None:
+    model = fit(dataset, parameters=KEYS[:2], given=KEYS[2:])
+    assert (sorted(model.parameters), model.given, model.latents) == (sorted(KEYS[:2]), KEYS[2:], (DRAG.key,))
+    (aim,) = model.aim([(1.2, -0.2, 0.0)])
+    assert aim.parameters[KEYS[2]] == 0.0
+    assert not model.aim([(1.2, -0.2, 3.0)])[0].reachable
+
+
+def test_a_model_is_the_same_bytes_each_time_and_after_reading(dataset: Dataset, model: Model, tmp_path: Path) -> None:
+    for name, each in (("one", model), ("two", fit(dataset))):
+        each.save(tmp_path / name)
+    load_model(tmp_path / "one").save(tmp_path / "three")
+    files = {path.name: path.read_bytes() for path in (tmp_path / "one").iterdir()}
+    assert sorted(files) == ["README.md", "config.yaml", "model.json", "points.parquet"]
+    for name in ("two", "three"):
+        assert {path.name: path.read_bytes() for path in (tmp_path / name).iterdir()} == files
+    point = [model.aim([(1.2, -0.2)])[0].parameters]
+    assert load_model(tmp_path / "one").predict(point).tolist() == model.predict(point).tolist()
+
+
+def test_the_program_of_the_card_hits_with_the_file_alone(dataset: Dataset, tmp_path: Path) -> None:
+    fit(dataset, kind="polynomial").save(tmp_path / "model")
+    assert PROGRAM.rstrip() in (tmp_path / "model" / "README.md").read_text()
+    script = f"target = [1.2, -0.2]\n{PROGRAM}\nprint(json.dumps(parameters))"
+    said = subprocess.run(
+        [sys.executable, "-c", script], cwd=tmp_path / "model", capture_output=True, text=True, check=True
+    )
+    found = json.loads(said.stdout)
+    values = np.array([[found[key] for key in KEYS]])
+    assert land(values, 0.0)[0] == pytest.approx([1.2, -0.2], abs=0.03)
+
+
+def test_adapting_is_kept_in_the_file_and_in_the_card(model: Model, tmp_path: Path) -> None:
+    points = [dict(zip(KEYS, row, strict=True)) for row in draw(4, 8).tolist()]
+    adapted = model.adapt(points, land(draw(4, 8), 0.9).tolist(), method="latent")
+    (found,) = (each for each in adapted.file.adaptation.found if each.name == DRAG.key)
+    assert found.value == pytest.approx(0.9, abs=0.15)
+    adapted.save(tmp_path / "real")
+    again = load_model(tmp_path / "real")
+    assert again.predict(points).tolist() == adapted.predict(points).tolist() != model.predict(points).tolist()
+    assert f"| `{DRAG.key}` |" in (tmp_path / "real" / "README.md").read_text().split("## Adapted")[1]
+
+
+def test_a_score_is_put_into_the_model_and_its_card(model: Model, tmp_path: Path) -> None:
+    errors = Errors(throws=2, missed=1, median=0.0012, share90=None, largest=None)
+    score = Score(
+        targets=2,
+        seed=0,
+        trained=[Trained(trained_on=120, errors=errors)],
+        throws=[ThrowAtTarget(target=[1.0, 0.0], place=[1.0, 0.0012]), ThrowAtTarget(target=[1.1, 0.0], place=None)],
+        scatter=0.02,
+        adapted=[Adapted(real_throws=0, method="none", errors=errors)],
+        adapted_throws=[],
+    )
+    model.save(tmp_path / "model")
+    assert read_score(tmp_path / "model") is None
+    write_score(tmp_path / "model", score)
+    assert read_score(tmp_path / "model") == score
+    card = (tmp_path / "model" / "README.md").read_text()
+    assert "| 120 throws | 0.12 cm | - | - | 1 |" in card
+    assert "with a scatter of 2.00 cm" in card
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"kind": "network"}, "kind: 'network'"),
+        ({"targets": ["place"]}, "no column of numbers 'place'"),
+        ({"parameters": ["task.points_hz"]}, "task.points_hz was not swept"),
+        ({"where": "trial < 5"}, "5 throws of 5 landed"),
+        ({"where": "trial >="}, "cannot be understood"),
+    ],
+)
+def test_what_cannot_be_learned_is_refused(dataset: Dataset, options: dict[str, object], message: str) -> None:
+    with pytest.raises(ConfigError, match=message.replace("(", r"\(")):
+        fit(dataset, **options)
+
+
+def test_throws_that_did_not_land_are_left_out(dataset: Dataset) -> None:
+    found = fit(change(dataset, "outcome", ["self_hit"] * 20 + ["landed"] * (COUNT - 20)))
+    assert (found.file.trained_on.throws, found.file.trained_on.ignored) == (COUNT - 20, 20)
+    assert found.trials[0] == 20
+
+
+def test_a_constant_parameter_is_left_out_or_refused_by_name(dataset: Dataset) -> None:
+    constant = change(dataset, KEYS[2], [0.1] * COUNT)
+    assert KEYS[2] not in fit(constant).parameters
+    with pytest.raises(ConfigError, match=r"torso_1_joint has the value 0\.1 in all throws"):
+        fit(constant, parameters=KEYS)
+
+
+def test_numbers_that_are_not_finite_are_named(dataset: Dataset) -> None:
+    values = dataset.throws[TARGETS[0]].to_pylist()
+    with pytest.raises(DatasetError, match="landing_x_m of trial 3 is nan"):
+        fit(change(dataset, TARGETS[0], [*values[:3], float("nan"), *values[4:]]))
+
+
+def test_too_many_parameters_are_refused(dataset: Dataset, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("throwcollect.learning.fitting.MOST_PARAMETERS", 2)
+    with pytest.raises(ConfigError, match="3 parameters: "):
+        fit(dataset)
+
+
+@pytest.mark.parametrize("target", [(1.0,), (1.0, 2.0, 3.0), (float("nan"), 0.0)])
+def test_a_target_that_is_none_is_refused(model: Model, target: tuple[float, ...]) -> None:
+    with pytest.raises(ConfigError) as caught:
+        model.aim([target])
+    assert caught.value.expected == "finite numbers: landing_x_m, landing_y_m"
+
+
+def test_points_without_all_parameters_are_refused(model: Model) -> None:
+    with pytest.raises(ConfigError, match=r"throw 0: task\.duration_s is missing"):
+        model.predict([{KEYS[1]: 0.0, KEYS[2]: 0.0}])
+    with pytest.raises(ConfigError, match="is no key of this model"):
+        model.predict([dict.fromkeys(KEYS, 1.0) | {"ball.mass_kg": 1.0}])
+    with pytest.raises(ConfigError, match="is inf"):
+        model.predict([dict.fromkeys(KEYS, float("inf"))])
+
+
+def test_adapting_wants_a_place_for_each_throw(model: Model) -> None:
+    point = dict.fromkeys(KEYS, 0.0)
+    with pytest.raises(ConfigError, match="1 throws and 0 places"):
+        model.adapt([point], [])
+    with pytest.raises(ConfigError, match="method: 'magic'"):
+        model.adapt([point], [(1.0, 0.0)], method="magic")
+    with pytest.raises(ConfigError, match="scatter"):
+        model.adapt([point], [(1.0, 0.0)], scatter=-1.0)
+
+
+@pytest.mark.parametrize(
+    ("file", "change", "message"),
+    [
+        ("model.json", lambda text: text[:100], "Invalid JSON"),
+        ("model.json", lambda text: text.replace('"bias": [', '"bias": [1.0,'), "do not belong together"),
+        ("model.json", lambda text: text.replace('"format": "1"', '"format": "2"'), "format"),
+        ("points.parquet", lambda _: "PAR1", "is damaged"),
+        ("points.parquet", None, "is missing"),
+    ],
+)
+def test_a_damaged_model_is_told_in_words(model: Model, tmp_path: Path, file: str, change, message: str) -> None:
+    model.save(tmp_path / "model")
+    path = tmp_path / "model" / file
+    if change is None:
+        path.unlink()
+    else:
+        path.write_text(change(path.read_text() if path.suffix == ".json" else ""))
+    with pytest.raises(DatasetError, match=message) as caught:
+        load_model(tmp_path / "model")
+    assert caught.value.path == path
+
+
+def test_another_directory_is_no_model(tmp_path: Path) -> None:
+    with pytest.raises(DatasetError, match=r"model\.json"):
+        load_model(tmp_path)

@@ -1,0 +1,106 @@
+"""Throws at targets, by simulators in closed form."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.unit.learning.worlds import KEYS, TARGETS, land, learn
+
+from throwcollect.config.schema import Config
+from throwcollect.learning.adapting import Method
+from throwcollect.learning.score import Errors, Score
+from throwcollect.learning.scoring import draw_targets, score_model
+
+SHIFT = np.array([0.1, 0.12])
+
+
+class World:
+    """Throws as `land` says, somewhere else; refuses fast throws and loses some others."""
+
+    def __init__(self, shift: Any = (0.0, 0.0), *, refused_below_s: float = 0.0, lost_below_s: float = 0.0) -> None:
+        self.config = Config()
+        self.calls = 0
+        self._shift = np.array(shift)
+        self._refused, self._lost = refused_below_s, lost_below_s
+
+    def find_refusal(self, values: Mapping[str, float]) -> str | None:
+        return "too fast" if values[KEYS[0]] < self._refused else None
+
+    def throw_many(self, points: Iterable[Mapping[str, float]], *, processes: int = 1) -> Iterator[Any]:
+        self.calls += 1
+        for point in points:
+            assert self.find_refusal(point) is None
+            place = (land(np.array([[point[key] for key in KEYS]])) + self._shift)[0]
+            lost = point[KEYS[0]] < self._lost
+            yield SimpleNamespace(
+                outcome="self_hit" if lost else "landed", row=dict(zip(TARGETS, place.tolist(), strict=True))
+            )
+
+
+def score(world: World, other: World | None = None, *, seed: int = 0, scatter: float = 0.0) -> Score:
+    options = {"count": 25, "error": 0.002, "latents_count": False, "processes": 1}
+    return score_model(learn(), world, seed=seed, world=other, scatter=scatter, **options)
+
+
+def test_more_throws_hit_better() -> None:
+    world = World()
+    found = score(world)
+    assert [each.trained_on for each in found.trained] == [30, 100, 300, 800]
+    medians = [each.errors.median for each in found.trained]
+    assert medians[0] > medians[1] > medians[-1]
+    assert medians[-1] < 0.001
+    assert world.calls == 1
+    assert [each.target for each in found.throws] != []
+    errors = [np.linalg.norm(np.subtract(each.place, each.target)) for each in found.throws]
+    assert sorted(errors)[12] == pytest.approx(medians[-1])
+
+
+def test_the_same_seed_gives_the_same_score() -> None:
+    assert score(World()) == score(World())
+    assert score(World()).throws != score(World(), seed=1).throws
+
+
+def test_throws_that_are_refused_or_do_not_land_are_counted_as_missed() -> None:
+    errors = score(World(refused_below_s=0.95, lost_below_s=1.0)).trained[-1].errors
+    assert 0 < errors.missed < 25
+    assert errors.largest is None
+    assert errors.throws == 25
+
+
+def test_in_another_world_a_few_throws_close_the_gap() -> None:
+    found = score(World(), World(SHIFT))
+    assert [each.real_throws for each in found.adapted] == [0, 1, 3, 5, 10]
+    before, *after = (each.errors.median for each in found.adapted)
+    assert before == pytest.approx(np.hypot(*SHIFT), rel=0.1)
+    assert max(after) < before / 4
+    assert found.adapted[0].method is Method.NONE
+    assert len(found.adapted_throws) == found.adapted[0].errors.throws
+
+
+def test_scatter_costs_something() -> None:
+    exact, scattered = (score(World(), World(SHIFT), scatter=scatter).adapted[1] for scatter in (0.0, 0.03))
+    assert exact.errors.median < scattered.errors.median
+
+
+def test_where_nothing_can_be_reached_there_is_nothing_to_tell() -> None:
+    assert score(World(), World((5.0, 0.0))).adapted == []
+
+
+def test_targets_lie_between_throws_that_are_near_each_other() -> None:
+    landings = learn().outputs
+    targets = draw_targets(landings, 200, 3)
+    away = np.array([np.linalg.norm(landings - target, axis=1).min() for target in targets])
+    assert away.max() < 0.05
+    assert (targets != landings[:200]).all()
+    # Crowded cells get no more of them than others.
+    share = (np.linalg.norm(targets - np.median(landings, axis=0), axis=1) > 0.4).mean()
+    assert share > (np.linalg.norm(landings - np.median(landings, axis=0), axis=1) > 0.4).mean()
+
+
+def test_errors_are_summed_up_in_order() -> None:
+    found = Errors.of(np.array([0.3, 0.1, np.inf, 0.2]))
+    assert (found.throws, found.missed, found.median, found.share90, found.largest) == (4, 1, 0.2, None, None)

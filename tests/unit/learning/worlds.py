@@ -1,0 +1,60 @@
+"""Worlds in closed form that throw like a robot, and maps that were learned in them."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from throwcollect.learning.fitting import fit_throws
+from throwcollect.learning.learned_map import Axis, Kind, LearnedMap, Role
+
+Array = NDArray[np.float64]
+
+KEYS = ("task.duration_s", "task.end.arm_right_4_joint", "task.end.torso_1_joint")
+TARGETS = ("landing_x_m", "landing_y_m")
+LOW, HIGH = np.array([0.9, -1.0, -0.3]), np.array([1.3, -0.2, 0.3])
+DRAG = Axis("ball.drag_coefficient", Role.LATENT, 0.0, 1.0, 0.2)
+
+
+def land(values: Array, drag: Array | float = 0.2) -> Array:
+    """Where throws end, shape ``(n, 2)``, for values of `KEYS`, shape ``(n, 3)``."""
+    speed = 1.2 / values[:, 0] * (1.0 + 0.5 * (values[:, 1] + 1.0))
+    reach = speed * (1.0 - 0.15 * np.asarray(drag) * speed / 2.0)
+    return np.stack([reach * np.cos(values[:, 2]), reach * np.sin(values[:, 2]) - 0.2], axis=1)
+
+
+def draw(count: int, seed: int = 0, *, inside: float = 1.0) -> Array:
+    """Values of `KEYS` in the middle of their ranges, of which a share is taken, shape ``(count, 3)``."""
+    places = 0.5 + inside * (np.random.default_rng(seed).random((count, 3)) - 0.5)
+    return LOW + (HIGH - LOW) * places
+
+
+def parameter_axes() -> tuple[Axis, ...]:
+    """The axes of `KEYS`."""
+    middle = (LOW + HIGH) / 2
+    rows = zip(KEYS, LOW.tolist(), HIGH.tolist(), middle.tolist(), strict=True)
+    return tuple(Axis(key, Role.PARAMETER, low, high, nominal) for key, low, high, nominal in rows)
+
+
+def effort(values: Array) -> Array:
+    """Largest shares of a torque limit, shape ``(n,)``: faster throws need more."""
+    return 0.5 + 0.4 * (1.3 - values[:, 0]) + 0.1 * (values[:, 1] + 1.0) ** 2
+
+
+@cache
+def learn(count: int = 800, kind: Kind = Kind.LOCAL) -> LearnedMap:
+    """A map of a world that is the same in all throws."""
+    values = draw(count)
+    return fit_throws(kind, parameter_axes(), TARGETS, values, land(values), effort(values)).learned
+
+
+@cache
+def learn_with_drag(count: int = 600) -> LearnedMap:
+    """A map of worlds that differ in the ball's drag."""
+    values = draw(count)
+    drag = np.random.default_rng(9).random(count)
+    inputs = np.column_stack([values, drag])
+    axes = (*parameter_axes(), DRAG)
+    return fit_throws(Kind.LOCAL, axes, TARGETS, inputs, land(values, drag), effort(values)).learned
