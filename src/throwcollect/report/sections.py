@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 from markupsafe import Markup
 
@@ -17,6 +18,7 @@ from throwcollect.report.amounts import format_duration, format_share, format_si
 from throwcollect.report.contents import Listing, Panel, Row, Section, Table, TaskReport, Tile
 from throwcollect.report.failures import Failure, group_failures
 from throwcollect.report.limits import KINDS, JointPeaks, summarise_peaks
+from throwcollect.report.model_section import show_model
 from throwcollect.report.outcomes import LANDED, Outcomes, in_words
 from throwcollect.report.provenance import config_text, provenance
 from throwcollect.report.swept_keys import Parameter, read_parameters
@@ -49,11 +51,16 @@ class Report:
     noun: str = "throw"
 
 
-def report_dataset(dataset: Dataset) -> Report:
+def report_dataset(dataset: Dataset, *, model: Path | None = None) -> Report:
     """Gather what there is to say of a dataset.
 
+    Args:
+        dataset: The dataset.
+        model: Directory of a model that was learned from it; None for none.
+
     Raises:
-        DatasetError: If a table or an episode is damaged.
+        ConfigError: If the model was learned from another dataset.
+        DatasetError: If a table or an episode is damaged, or the model.
     """
     throws, info = dataset.throws, summary(dataset)
     outcomes = Outcomes.of(throws["outcome"].to_pylist(), success=dataset.config.task.success)
@@ -73,6 +80,7 @@ def report_dataset(dataset: Dataset) -> Report:
         outcomes=outcomes,
         sections=(
             *task.results,
+            *(() if model is None else (show_model(model, dataset),)),
             _show_parameters(parameters, outcomes),
             _show_outcomes(outcomes, parameters, group_failures(reasons), noun),
             _show_limits({kind: summarise_peaks(throws, kind) for kind in KINDS}, noun),

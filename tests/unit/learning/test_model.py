@@ -11,37 +11,20 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 import pytest
-from tests.unit.dataset.conftest import Collection
-from tests.unit.learning.worlds import DRAG, KEYS, TARGETS, draw, effort, land
+from tests.unit.learning.worlds import DRAG, KEYS, TARGETS, draw, land, make_dataset
 
-from throwcollect import ConfigError, DatasetError, Model, fit, load, load_model
+from throwcollect import ConfigError, DatasetError, Model, fit, load_model
 from throwcollect.dataset.reader import Dataset
 from throwcollect.learning.model_card import PROGRAM
 from throwcollect.learning.model_directory import read_score, write_score
 from throwcollect.learning.score import Adapted, Errors, Score, ThrowAtTarget, Trained
 
 COUNT = 120
-SWEEP = {key: {"min": -0.3, "max": 1.3} for key in KEYS} | {"task.duration_s": {"min": 0.9, "max": 1.3}}
 
 
 @pytest.fixture(scope="module")
 def dataset(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
-    """A dataset whose table tells of throws in closed form."""
-    settings = {
-        "sweep": {"sampler": "uniform", "parameters": {**SWEEP, DRAG.key: {"min": 0.0, "max": 1.0}}},
-        "trials": 7,
-    }
-    found = load(Collection(settings).collect(tmp_path_factory.mktemp("data") / "data"))
-    values = draw(COUNT)
-    drag = np.random.default_rng(1).random(COUNT)
-    columns = dict(zip(KEYS, values.T, strict=True)) | {DRAG.key: drag}
-    columns |= dict(zip(TARGETS, land(values, drag).T, strict=True))
-    columns |= {"trial": np.arange(COUNT), "outcome": ["landed"] * COUNT, "effort_peak_share": effort(values)}
-    throws = pa.concat_tables([found.throws.slice(0, 1)] * COUNT)
-    for name, column in columns.items():
-        field = throws.schema.field(name)
-        throws = throws.set_column(throws.schema.get_field_index(name), field, pa.array(column, field.type))
-    return replace(found, throws=throws)
+    return make_dataset(tmp_path_factory.mktemp("data") / "data", COUNT)
 
 
 @pytest.fixture(scope="module")

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 from numpy.typing import NDArray
+from tests.unit.dataset.conftest import Collection
 
+from throwcollect.dataset.reader import Dataset, load
 from throwcollect.learning.fitting import fit_throws
 from throwcollect.learning.learned_map import Axis, Kind, LearnedMap, Role
 
@@ -58,3 +63,19 @@ def learn_with_drag(count: int = 600) -> LearnedMap:
     inputs = np.column_stack([values, drag])
     axes = (*parameter_axes(), DRAG)
     return fit_throws(Kind.LOCAL, axes, TARGETS, inputs, land(values, drag), effort(values)).learned
+
+
+def make_dataset(directory: Path, count: int) -> Dataset:
+    """A dataset whose table tells of throws in worlds that differ in the ball's drag; its recordings do not matter."""
+    ends = zip(KEYS, LOW.tolist(), HIGH.tolist(), strict=True)
+    sweep = {key: {"min": low, "max": high} for key, low, high in ends} | {DRAG.key: {"min": 0.0, "max": 1.0}}
+    found = load(Collection({"sweep": {"sampler": "uniform", "parameters": sweep}}).collect(directory))
+    values = draw(count)
+    drag = np.random.default_rng(1).random(count)
+    columns = dict(zip(KEYS, values.T, strict=True)) | dict(zip(TARGETS, land(values, drag).T, strict=True))
+    columns |= {DRAG.key: drag, "trial": np.arange(count), "outcome": ["landed"] * count}
+    throws = pa.concat_tables([found.throws.slice(0, 1)] * count)
+    for name, column in (columns | {"effort_peak_share": effort(values)}).items():
+        field = throws.schema.field(name)
+        throws = throws.set_column(throws.schema.get_field_index(name), field, pa.array(column, field.type))
+    return replace(found, throws=throws)

@@ -21,6 +21,9 @@ def report_dataset(
         Path | None,
         typer.Option("--png", metavar="DIR", help="Also write the main plots as pictures; must be new or empty."),
     ] = None,
+    model: Annotated[
+        Path | None, typer.Option("--model", metavar="MODEL", help="A model of the dataset, and how it hits.")
+    ] = None,
     json: JsonOption = False,
 ) -> None:
     """Write a page that shows what a dataset holds, and pictures for papers."""
@@ -28,7 +31,7 @@ def report_dataset(
 
     resolved = directory.resolve()
     page = output or resolved.with_name(f"{resolved.name}.html")
-    written = write_report(directory, page, pictures=png)
+    written = write_report(directory, page, pictures=png, model=model)
     size = written.page.stat().st_size
     if json:
         found = {"page": str(written.page), "size_bytes": size, "pictures": [str(path) for path in written.pictures]}

@@ -1,0 +1,147 @@
+"""The section of a report on a model of the dataset: targets, how they are missed, what adapting did."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import plotly.graph_objects as go
+
+from throwcollect.dataset.reader import Dataset
+from throwcollect.errors import ConfigError
+from throwcollect.learning.model import Model, load_model
+from throwcollect.learning.model_directory import read_score
+from throwcollect.learning.score import Errors, Score, ThrowAtTarget
+from throwcollect.report.contents import Panel, Row, Section, Table
+from throwcollect.report.figures import BLUE, LEGEND_ABOVE, LIMIT_LINE, NEUTRAL
+from throwcollect.wording import command
+
+_TITLE = "How a model of it hits"
+_ARROWS = 10
+"""Misses are drawn so many times as long."""
+_CENTIMETRES = 100.0
+
+
+def show_model(directory: Path, dataset: Dataset) -> Section:
+    """Show what throwing at targets has shown of a model.
+
+    Args:
+        directory: Directory of the model.
+        dataset: The dataset that it was learned from.
+
+    Raises:
+        ConfigError: If the model was learned from another dataset.
+        DatasetError: If there is no model, or it is damaged.
+    """
+    model, score = load_model(directory), read_score(directory)
+    trained = model.file.trained_on
+    if trained.digest != dataset.digest:
+        raise ConfigError(
+            f"{directory}: was learned from {trained.name}, digest {trained.digest[:10]}",
+            expected=f"a model of this dataset, digest {dataset.digest[:10]}",
+            hint=command("fit", dataset.directory, "-o", "MODEL"),
+        )
+    text = (
+        f"Learned from {trained.throws:,} throws: {', '.join(model.parameters)} to {', '.join(model.targets)}. "
+        f"Throws that polynomials were not fitted to are predicted to {_centimetres(trained.error)} (median)."
+    )
+    if score is None:
+        hint = command("score", directory)
+        return Section("model", "Model", _TITLE, f"{text} Nobody has thrown with it yet; {hint} does, in simulation.")
+    text += f" All distances are those of throws in simulation, at {score.targets} targets."
+    panels = [
+        Panel(
+            "targets",
+            f"Targets, and misses drawn {_ARROWS} times as long",
+            _draw_misses(model, score.throws),
+            picture="targets",
+        ),
+        Panel("training", "Misses by number of throws learned from", _draw_training(score), picture="training"),
+    ]
+    rows: list[Row | Table] = [tuple(panels), _tabulate(score)]
+    if score.adapted:
+        adapted = Panel(
+            "adapting", "In another world, by number of throws there", _draw_adapting(score), picture="adapting"
+        )
+        there = Panel(
+            "elsewhere",
+            f"Targets there after the last of them, misses {_ARROWS} times as long",
+            _draw_misses(model, score.adapted_throws),
+        )
+        rows.append((adapted, there))
+    return Section("model", "Model", _TITLE, text, tuple(rows))
+
+
+def _draw_misses(model: Model, throws: Sequence[ThrowAtTarget]) -> go.Figure:
+    """Draw targets amid what the dataset reached, in the first two columns, and an arrow for each miss."""
+    landings = model.learned.outputs
+    figure = go.Figure()
+    if landings.shape[1] < 2:
+        landings = np.column_stack([landings, np.zeros(len(landings))])
+    grey = {"color": NEUTRAL, "size": 3, "opacity": 0.5, "symbol": "circle"}
+    figure.add_scatter(x=landings[:, 0], y=landings[:, 1], mode="markers", marker=grey, name="throws of the dataset")
+    hit = [throw for throw in throws if throw.place is not None]
+    lost = [throw for throw in throws if throw.place is None]
+    for some, name, colour in ((hit, "targets", BLUE), (lost, "targets where no throw landed", LIMIT_LINE["color"])):
+        if some:
+            points = np.array([[*throw.target, 0.0][:2] for throw in some])
+            marker = {"color": colour, "size": 7, "symbol": "cross"}
+            figure.add_scatter(x=points[:, 0], y=points[:, 1], mode="markers", marker=marker, name=name)
+    x: list[float | None] = []
+    y: list[float | None] = []
+    for throw in hit:
+        target, place = np.array([*throw.target, 0.0][:2]), np.array([*(throw.place or ()), 0.0][:2])
+        end = target + _ARROWS * (place - target)
+        x += [target[0], end[0], None]
+        y += [target[1], end[1], None]
+    if hit:
+        line = {"color": LIMIT_LINE["color"], "width": 1.5}
+        figure.add_scatter(x=x, y=y, mode="lines", line=line, name=f"misses × {_ARROWS}")
+    names = [*model.targets, ""]
+    figure.update_xaxes(title=names[0]).update_yaxes(title=names[1], scaleanchor="x")
+    return figure.update_layout(height=420, legend=LEGEND_ABOVE)
+
+
+def _draw_training(score: Score) -> go.Figure:
+    figure = _draw_errors([each.trained_on for each in score.trained], [each.errors for each in score.trained])
+    figure.update_xaxes(title="throws learned from", type="log").update_yaxes(type="log")
+    return figure
+
+
+def _draw_adapting(score: Score) -> go.Figure:
+    figure = _draw_errors([each.real_throws for each in score.adapted], [each.errors for each in score.adapted])
+    return figure.update_xaxes(title="throws in the other world").update_yaxes(rangemode="tozero")
+
+
+def _draw_errors(numbers: Sequence[int], errors: Sequence[Errors]) -> go.Figure:
+    """Draw median and ninth decile of misses [cm] over a number of throws."""
+    figure = go.Figure()
+    lines = (
+        ("median", [each.median for each in errors], {"color": BLUE, "width": 2}),
+        ("9 of 10 below", [each.share90 for each in errors], {"color": BLUE, "width": 1.5, "dash": "dash"}),
+    )
+    for name, values, line in lines:
+        scaled = [None if value is None else value * _CENTIMETRES for value in values]
+        marker = {"color": BLUE, "size": 5, "symbol": "circle"}
+        figure.add_scatter(x=list(numbers), y=scaled, mode="lines+markers", line=line, marker=marker, name=name)
+    return figure.update_yaxes(title="distance from the target [cm]").update_layout(height=420, legend=LEGEND_ABOVE)
+
+
+def _tabulate(score: Score) -> Table:
+    rows = [(f"learned from {each.trained_on:,} throws", *_cells(each.errors)) for each in score.trained]
+    rows += [
+        (f"in the other world after {each.real_throws} throws ({each.method.value})", *_cells(each.errors))
+        for each in score.adapted
+    ]
+    head = ("", "median", "9 of 10 below", "largest", "throws", "did not succeed")
+    return Table(head=head, rows=tuple(rows), number_columns=(1, 2, 3, 4, 5))
+
+
+def _cells(errors: Errors) -> tuple[str, ...]:
+    lengths = ("-" if each is None else _centimetres(each) for each in (errors.median, errors.share90, errors.largest))
+    return (*lengths, str(errors.throws), str(errors.missed))
+
+
+def _centimetres(length: float) -> str:
+    return f"{length * _CENTIMETRES:.2f} cm"

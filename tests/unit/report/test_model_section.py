@@ -1,0 +1,92 @@
+"""The section of a report on a model."""
+
+from pathlib import Path
+
+import pytest
+from tests.unit.learning.worlds import make_dataset
+
+from throwcollect import ConfigError, DatasetError, fit
+from throwcollect.dataset.reader import Dataset
+from throwcollect.learning.model_directory import write_score
+from throwcollect.learning.score import Adapted, Errors, Score, ThrowAtTarget, Trained
+from throwcollect.report.model_section import show_model
+from throwcollect.report.pictures import write_pictures
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
+    return make_dataset(tmp_path_factory.mktemp("data") / "data", 80)
+
+
+@pytest.fixture
+def model(dataset: Dataset, tmp_path: Path) -> Path:
+    fit(dataset).save(tmp_path / "model")
+    return tmp_path / "model"
+
+
+def score() -> Score:
+    errors = [Errors(throws=3, missed=1, median=each, share90=2 * each, largest=None) for each in (0.02, 0.001)]
+    throws = [
+        ThrowAtTarget(target=[1.0, 0.1], place=[1.01, 0.1]),
+        ThrowAtTarget(target=[1.2, 0.0], place=[1.2, -0.02]),
+        ThrowAtTarget(target=[1.1, -0.1], place=None),
+    ]
+    return Score(
+        targets=3,
+        seed=0,
+        trained=[Trained(trained_on=number, errors=each) for number, each in zip((30, 80), errors, strict=True)],
+        throws=throws,
+        scatter=0.0,
+        adapted=[
+            Adapted(real_throws=number, method=method, errors=each)
+            for number, method, each in zip((0, 5), ("none", "bias"), errors, strict=True)
+        ],
+        adapted_throws=throws[:2],
+    )
+
+
+def test_a_model_that_nobody_has_thrown_with_says_how_to(dataset: Dataset, model: Path) -> None:
+    section = show_model(model, dataset)
+    assert not list(section.panels)
+    assert f"throwcollect score {model}" in section.text
+
+
+def test_misses_are_arrows_from_their_targets(dataset: Dataset, model: Path) -> None:
+    write_score(model, score())
+    panels = {panel.key: panel.figure for panel in show_model(model, dataset).panels}
+    assert list(panels) == ["targets", "training", "adapting", "elsewhere"]
+    traces = {trace.name: trace for trace in panels["targets"].data}
+    assert len(traces["throws of the dataset"].x) == 80
+    assert list(traces["targets"].x) == [1.0, 1.2]
+    assert list(traces["targets where no throw landed"].x) == [1.1]
+    arrows = traces["misses × 10"]
+    assert arrows.x[:2] == pytest.approx([1.0, 1.1])
+    assert arrows.y[3:5] == pytest.approx([0.0, -0.2])
+    assert arrows.x[2] is None
+
+
+def test_curves_show_centimetres_over_numbers_of_throws(dataset: Dataset, model: Path) -> None:
+    write_score(model, score())
+    section = show_model(model, dataset)
+    panels = {panel.key: panel.figure for panel in section.panels}
+    median = panels["adapting"].data[0]
+    assert list(median.x) == [0, 5]
+    assert median.y == pytest.approx([2.0, 0.1])
+    (table,) = (block for block in section.blocks if hasattr(block, "rows"))
+    assert table.rows[-1] == ("in the other world after 5 throws (bias)", "0.10 cm", "0.20 cm", "-", "3", "1")
+
+
+def test_its_pictures_can_be_printed(dataset: Dataset, model: Path, tmp_path: Path) -> None:
+    write_score(model, score())
+    written = write_pictures([show_model(model, dataset)], tmp_path)
+    assert [path.name for path in written] == ["targets.png", "training.png", "adapting.png"]
+    assert all(path.stat().st_size > 5000 for path in written)
+
+
+def test_a_model_of_another_dataset_is_refused(dataset: Dataset, model: Path) -> None:
+    text = (model / "model.json").read_text()
+    (model / "model.json").write_text(text.replace(dataset.digest, "0" * 64))
+    with pytest.raises(ConfigError, match="was learned from quick, digest 0000000000"):
+        show_model(model, dataset)
+    with pytest.raises(DatasetError, match=r"model\.json"):
+        show_model(model / "none", dataset)
