@@ -6,7 +6,8 @@ import json
 import os
 import signal
 import subprocess
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -53,3 +54,12 @@ def press(tab: Tab, button: str) -> None:
 def unexpected(tab: Tab) -> list[str]:
     """Errors of a page that are its own."""
     return [error for error in tab.errors if CHANGED not in error]
+
+
+def wait_for(condition: Callable[[], Any], seconds: float = 60) -> Any:
+    """Wait until something is so, and return what the condition found."""
+    deadline = time.monotonic() + seconds
+    while not (found := condition()):
+        assert time.monotonic() < deadline, "did not happen"
+        time.sleep(0.1)
+    return found

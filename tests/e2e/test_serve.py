@@ -8,7 +8,7 @@ import signal
 import socket
 import subprocess
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, suppress
 from dataclasses import dataclass, field
@@ -22,6 +22,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
 from tests.e2e.collection import FAST, call_here, collect_here, command, fingerprints, write_config
+from tests.e2e.page import wait_for
 from throwcollect import ros
 from throwcollect.ros.srv import GetParameters
 from throwcollect.run_key import RunKey
@@ -36,14 +37,6 @@ components:
   throws: {config: small.yaml, max_instances: 2}
   talos: {session: small.yaml}
 """
-
-
-def wait_for(condition: Callable[[], Any], seconds: float = 60) -> Any:
-    deadline = time.monotonic() + seconds
-    while not (found := condition()):
-        assert time.monotonic() < deadline, "did not happen"
-        time.sleep(0.1)
-    return found
 
 
 @dataclass

@@ -14,7 +14,7 @@ import pytest
 
 from tests.e2e.chromium import Tab, browse, chromium
 from tests.e2e.collection import FAST, write_config
-from tests.e2e.page import load, press, served, unexpected
+from tests.e2e.page import load, press, served, unexpected, wait_for
 from tests.npm import install
 from throwcollect import ros
 from throwcollect.config.loader import load as load_config
@@ -184,7 +184,9 @@ def test_a_target_is_set_by_hand_and_collected_for(server: dict[str, Any], emula
         tab.evaluate(_POINT_AT_COLLECT)
         tab.evaluate("pull()")
         tab.wait_for(f"throwcollect.watching.id !== {json.dumps(run)}")
-        found = load_config(config_path(Path(Records().get(tab.evaluate("throwcollect.watching.id")).record.directory)))
+        config = config_path(Path(Records().get(tab.evaluate("throwcollect.watching.id")).record.directory))
+        wait_for(config.exists)
+        found = load_config(config)
         assert found.sweep.target is not None
         assert found.sweep.target.distance_m is not None
         aimed = found.sweep.target.distance_m

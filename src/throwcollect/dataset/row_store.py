@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from throwcollect.dataset.directory import THROWS
 from throwcollect.files import unwritable, write_all
-from throwcollect.sweep.arrow_column import read_numbers
+from throwcollect.sweep.arrow_column import read_numbers, read_validity
 
 _ALIGNED_BYTES = 64
 """Buffers of Arrow begin at multiples of this."""
@@ -135,7 +135,7 @@ class RowStore:
         def values() -> Iterator[pa.Buffer]:
             for first in range(0, len(chunks), _SHARDS_AT_ONCE):
                 some = pa.concat_arrays(chunks[first : first + _SHARDS_AT_ONCE])
-                valid.append(some.is_valid().to_numpy(zero_copy_only=False))
+                valid.append(read_validity(some))
                 if some.type == pa.string():
                     # As numbers of bytes, where texts end; of an array that nothing was cut off from.
                     within = np.frombuffer(some.buffers()[1], np.int32, len(some) + 1)
@@ -174,8 +174,7 @@ class Digests(Mapping[int, str]):
     """
 
     def __init__(self, throws: pa.Table) -> None:
-        recorded = throws["digest"].is_valid().to_numpy()
-        self._rows = np.flatnonzero(recorded)
+        self._rows = np.flatnonzero(np.concatenate([read_validity(chunk) for chunk in throws["digest"].chunks]))
         self._trials = np.concatenate([read_numbers(chunk) for chunk in throws["trial"].chunks])[self._rows]
         self._digests = throws["digest"]
 

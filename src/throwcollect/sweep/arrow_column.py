@@ -59,6 +59,15 @@ def read_numbers(column: pa.Array) -> NDArray[Any]:
     return np.frombuffer(column.buffers()[1], dtype, len(column), dtype.itemsize * column.offset)
 
 
+def read_validity(column: pa.Array) -> NDArray[np.bool_]:
+    """Which values of a column are not null, ``(n_rows,)``."""
+    bits = column.buffers()[0]
+    if bits is None:
+        return np.ones(len(column), np.bool_)
+    ends = column.offset, column.offset + len(column)
+    return np.unpackbits(np.frombuffer(bits, np.uint8), bitorder="little")[slice(*ends)].astype(np.bool_)
+
+
 def make_table(columns: Sequence[Sequence[Any] | NDArray[Any]], schema: pa.Schema) -> pa.Table:
     """The Arrow table of columns of Python values.
 

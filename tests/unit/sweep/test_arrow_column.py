@@ -8,7 +8,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from throwcollect.sweep.arrow_column import make_column, make_table
+from throwcollect.sweep.arrow_column import make_column, make_table, read_validity
 
 _COLUMNS: list[tuple[pa.DataType, list[Any]]] = [
     (pa.int64(), [3, -(2**63), 2**63 - 1, np.int64(7), 0, 1, 2, 3, 4]),
@@ -53,3 +53,10 @@ def _encode(table: pa.Table) -> bytes:
     buffer = io.BytesIO()
     pq.write_table(table, buffer)
     return buffer.getvalue()
+
+
+@pytest.mark.parametrize(("kind", "values"), _COLUMNS)
+@pytest.mark.parametrize("cut", [0, 1, 3])
+def test_validity_is_that_of_arrow(kind: pa.DataType, values: list[Any], cut: int) -> None:
+    column = make_column(values, kind).slice(cut)
+    assert read_validity(column).tolist() == [value is not None for value in values[cut:]]
