@@ -110,6 +110,12 @@ class RobotConfig(Section):
     """Share of the velocity error that a motor removes in one step [-]."""
     effort_scale: Annotated[float, Field(gt=0, le=10), Key(swept=True)] = 1.0
     """Factor on the effort limits of all joints [-]."""
+    joint_offsets: Annotated[dict[Joint, Angle], Key(swept=True, later=True)] = {}
+    """Errors of the joints' zeros: such a joint stands by so much farther than it is told to, and than it says."""
+    speed_scale: Annotated[float, Field(gt=0.5, lt=2), Key(swept=True, later=True)] = 1.0
+    """Speed of the clock by which controllers follow trajectories [-]: below 1, motions take longer than planned."""
+    motor_lag_s: Annotated[float, Field(ge=0, le=0.2), Key(swept=True, later=True)] = 0.0
+    """Time constant with which motors go after their commands; 0: at once."""
 
 
 class BallConfig(Section):
@@ -246,6 +252,9 @@ class Config(Section):
             wrong["record.rate_hz"] = f"should divide sim.physics_hz, {self.sim.physics_hz}, got {self.record.rate_hz}"
         if isinstance(self.robot.locked, list) and (moving := [j for j in self.robot.locked if j in self.task.end]):
             wrong["robot.locked"] = f"should not hold joints that task.end moves, got {', '.join(moving)}"
+        for joint in self.robot.joint_offsets:
+            if joint not in self.task.end:
+                wrong[f"robot.joint_offsets.{joint}"] = "should be left out, as task.end does not move this joint"
         for joint in self.robot.posture:
             if joint in self.task.start:
                 wrong[f"robot.posture.{joint}"] = "should be left out, as task.start sets this joint"

@@ -124,6 +124,9 @@ class SweepConfig(Section):
     """CSV or Parquet file with one row a trial and dotted keys as columns; for the sampler `list`.
 
     A relative path starts at the directory of the configuration file."""
+    feasibility: Annotated[Literal["actual", "nominal"], Key(later=True)] = "actual"
+    """Which robot the plan is checked for: the one that throws, or the one that somebody believes to have who plans
+    motions for a robot he does not know: the keys of `robot`, `tool` and `ball` have their defaults then."""
     target: Annotated[TargetConfig | None, Key(later=True)] = None
     """Spreads throws over landing targets: trials are added to the plan where throws are few."""
 

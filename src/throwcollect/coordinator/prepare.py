@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.config.schema import Config
+from throwcollect.config.schema import Config, RobotConfig
 from throwcollect.config.values import with_values
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.directory import TRIALS
@@ -111,11 +111,25 @@ def _make_checked_trials(config: Config, keys: tuple[str, ...]) -> Callable[[tup
 def feasibility_check(config: Config) -> Check:
     """Says of trials of a configuration why the robot cannot do them, in 1 to 5 ms each.
 
+    With `sweep.feasibility` nominal, it is the robot that somebody believes to have: what differs is not known to him.
+
     Raises:
         ConfigError: If the robot's files cannot be read.
     """
     feasibility = Feasibility(config)
+    if config.sweep.feasibility == "nominal":
+        return lambda trial: feasibility.check(_believe(trial), task_of(trial).trajectory())
     return lambda trial: feasibility.check(trial, task_of(trial).trajectory())
+
+
+def _believe(config: Config) -> Config:
+    """The configuration with the robot, the tool and the ball that nobody has measured: all numbers are defaults."""
+    robot, defaults = config.robot, RobotConfig()
+    kept = {"name": robot.name, "posture": robot.posture, "locked": robot.locked, "base_height_m": robot.base_height_m}
+    tool = type(config.tool).model_validate({"name": config.tool.name})
+    return config.model_copy(
+        update={"robot": defaults.model_copy(update=kept), "tool": tool, "ball": type(config.ball)()}
+    )
 
 
 def more_trials(plan: Plan) -> str:

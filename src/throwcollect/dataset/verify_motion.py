@@ -15,6 +15,7 @@ from throwcollect.config.schema import Config
 from throwcollect.dataset.recorded_trial import RecordedTrial
 from throwcollect.robots.description import find_locked_joints, robot_of, start_posture
 from throwcollect.robots.limits import joint_limits
+from throwcollect.robots.motor_lag import lag_behind
 from throwcollect.robots.quintic_curve import sample_positions
 from throwcollect.tasks.free_flight import ballistic_steps
 
@@ -63,14 +64,27 @@ def find_joint_problems(trial: RecordedTrial) -> Iterator[str]:
         return
     saturated = (shares >= _AT_LIMIT).any(axis=1)
     followed = int(saturated.argmax()) if saturated.any() else len(samples)
-    times = trial.times_s[:followed] - config.sim.command_delay_s
-    wanted = sample_positions(trajectory, np.maximum(times, 0.0))
+    wanted = _where_motors_should_be(trial)[:followed]
     moving = [robot.joints.index(joint) for joint in trajectory.joints]
     errors = np.abs(samples.position[:followed, moving] - wanted)
     if followed and errors.max() > tolerance:
         joint = trajectory.joints[int(errors.max(axis=0).argmax())]
         said = f"departs from the trajectory of the trial by {errors.max():.3g} rad"
         yield f"{joint} {said}, although its torque is below its limit"
+
+
+def _where_motors_should_be(trial: RecordedTrial) -> NDArray[np.float64]:
+    """Where motors that follow their commands are at each sample [rad], shape ``(n_samples, n_moving)``."""
+    config, trajectory = trial.config, trial.trajectory
+    speed, lag_s, hz = config.robot.speed_scale, config.robot.motor_lag_s, config.sim.physics_hz
+    if not lag_s:
+        times = (trial.times_s - config.sim.command_delay_s) * speed
+        return sample_positions(trajectory, np.maximum(times, 0.0))
+    stride = hz // config.record.rate_hz
+    times = (np.arange(1, stride * (len(trial.samples) - 1) + 1) / hz - config.sim.command_delay_s) * speed
+    start = sample_positions(trajectory, np.zeros(1))
+    reached = lag_behind(sample_positions(trajectory, np.maximum(times, 0.0)), start[0], hz=hz, lag_s=lag_s)
+    return np.concatenate([start, reached[stride - 1 :: stride]])
 
 
 def _following_tolerance(config: Config) -> float:

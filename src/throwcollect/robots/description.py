@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
+from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError, Problem
@@ -64,6 +65,12 @@ def start_posture(config: Config) -> Mapping[str, float]:
         ConfigError: If the robot's files cannot be read.
     """
     return MappingProxyType({**robot_of(config).rest_posture, **config.robot.posture, **config.task.start})
+
+
+def joint_offsets(config: Config) -> NDArray[np.float64]:
+    """Tell by how much farther each joint stands than it says [rad], shape ``(n_joints,)``, as `Robot.joints`."""
+    offsets = config.robot.joint_offsets
+    return np.array([offsets.get(joint, 0.0) for joint in robot_of(config).joints])
 
 
 def find_locked_joints(config: Config) -> Mapping[str, float]:

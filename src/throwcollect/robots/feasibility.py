@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from throwcollect.config.schema import Config
 from throwcollect.pinocchio_library import pinocchio
 from throwcollect.robots.clearance import MARGIN_M, Clearance
-from throwcollect.robots.description import find_locked_joints, joint_model, robot_of, start_posture
+from throwcollect.robots.description import find_locked_joints, joint_model, joint_offsets, robot_of, start_posture
 from throwcollect.robots.dynamics import Dynamics, Motion
 from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.quintic_curve import sample_quintic
+from throwcollect.robots.robot import Robot
 from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.tools.tool import Tool, tool_of
 
@@ -65,8 +66,10 @@ class Feasibility:
         has gone on by 0.02 rad. Joints that the trajectory does not move rest at the trial's start posture. Torques are
         those of inverse dynamics plus viscous friction; the tool and the ball count as part of the hand throughout,
         also after the ball has left. The effort of locked joints is not limited, as they are simulated as rigid.
-        Collisions are those of the robot and the tool; what the ball hits is for the judge of the throw. The tool
-        has to move if the task throws, and to hold the ball in the start posture (see `Tool.way_out`).
+        Joints stand where they do and not where they say (`robot.joint_offsets`), and motions take the time that they
+        take (`robot.speed_scale`). Collisions are those of the robot and the tool; what the ball hits is for the judge
+        of the throw. The tool has to move if the task throws, and to hold the ball in the start posture (see
+        `Tool.way_out`).
 
         Args:
             config: Configuration of the trial.
@@ -80,11 +83,11 @@ class Feasibility:
         Raises:
             ConfigError: If the posture or the choice of locked joints is wrong, or the ball does not fit the tool.
         """
-        posture = np.array(list(start_posture(config).values()))
+        posture = np.array(list(start_posture(config).values())) + joint_offsets(config)
         joints, tool = self._robot.joints, self._tool_of(config)
         instants = max(_CHECKED_LEAST, math.ceil(trajectory.times[-1] * _CHECKED_HZ)) + 1
         times = np.linspace(0.0, trajectory.times[-1], instants)
-        motion = _whole_body(joints, trajectory, times, posture)
+        motion = _whole_body(self._robot, trajectory, times, posture, config)
         if violation := self._find_violation(config, times, motion):
             return violation
         positions = motion[0]
@@ -186,12 +189,14 @@ class Feasibility:
 
 
 def _whole_body(
-    joints: Sequence[str], trajectory: JointTrajectory, times: NDArray[np.float64], posture: NDArray[np.float64]
+    robot: Robot, trajectory: JointTrajectory, times: NDArray[np.float64], posture: NDArray[np.float64], config: Config
 ) -> Motion:
     """Motion of all joints, each array of shape ``(n, n_joints)``, in the order of `Robot.joints`."""
-    columns = [joints.index(joint) for joint in trajectory.joints]
+    columns = [robot.joints.index(joint) for joint in trajectory.joints]
+    offsets, speed = joint_offsets(config)[columns], config.robot.speed_scale
     whole = tuple(np.tile(rest, (len(times), 1)) for rest in (posture, np.zeros_like(posture), np.zeros_like(posture)))
-    for array, sampled in zip(whole, sample_quintic(trajectory, times), strict=True):
+    position, velocity, acceleration = sample_quintic(trajectory, times)
+    for array, sampled in zip(whole, (position + offsets, velocity * speed, acceleration * speed**2), strict=True):
         array[:, columns] = sampled
     return whole[0], whole[1], whole[2]
 

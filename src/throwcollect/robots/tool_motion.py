@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
 from throwcollect.pinocchio_library import pinocchio
-from throwcollect.robots.description import joint_model, robot_of
+from throwcollect.robots.description import joint_model, joint_offsets, robot_of
 from throwcollect.robots.robot import Robot
 from throwcollect.tools.tool import tool_of
 
@@ -28,6 +28,7 @@ class ToolMotion:
         tool = tool_of(config.tool)
         self._seat = tool.mount * pinocchio.SE3(np.eye(3), np.array(tool.ball_seat(config.ball.radius_m)))
         self._model = _MODELS.of(robot_of(config))
+        self._offsets = joint_offsets(config)
         self._base = np.array([0.0, 0.0, config.robot.base_height_m])
 
     def place(self, position: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -37,7 +38,7 @@ class ToolMotion:
             position: Of the joints [rad], shape ``(n_joints,)``, in the order of `Robot.joints`.
         """
         model = self._model
-        pinocchio.forwardKinematics(model.model, model.data, position[model.order])
+        pinocchio.forwardKinematics(model.model, model.data, (position + self._offsets)[model.order])
         hand = pinocchio.updateFramePlacement(model.model, model.data, model.hand)
         place: NDArray[np.float64] = self._base + (hand * self._seat).translation
         return place
@@ -50,7 +51,8 @@ class ToolMotion:
             velocity: Of the joints [rad/s], shape ``(n_joints,)``.
         """
         model = self._model
-        pinocchio.forwardKinematics(model.model, model.data, position[model.order], velocity[model.order])
+        actual = position + self._offsets
+        pinocchio.forwardKinematics(model.model, model.data, actual[model.order], velocity[model.order])
         hand = pinocchio.updateFramePlacement(model.model, model.data, model.hand)
         # Of the point, first along the axes of the seat, then along those of the world.
         along_seat = self._seat.actInv(pinocchio.getFrameVelocity(model.model, model.data, model.hand))

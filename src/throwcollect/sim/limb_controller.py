@@ -59,6 +59,7 @@ class LimbController:
         """Whether the state of every update is kept for `pop_states`."""
         self._states: list[ControllerState] = []
         self._start_ns: int | None = None
+        self._speed = 1.0
         self._joints = joints
         self._own = [index for index, joint in enumerate(joints) if joint in moving]
         self._worlds = [moving.index(joints[index]) for index in self._own]
@@ -78,13 +79,15 @@ class LimbController:
         """Whether the commands may still change, so that the limb must be driven."""
         return self._start_ns is None and not self._controller.at_rest
 
-    def reset(self, time_ns: int, posture: Mapping[str, float]) -> None:
+    def reset(self, time_ns: int, posture: Mapping[str, float], *, speed: float) -> None:
         """Hold a posture; a goal that is being executed is aborted.
 
         Args:
             time_ns: Time now [ns].
             posture: Angle of each joint [rad].
+            speed: Speed of the controller's clock [-].
         """
+        self._speed = speed
         self._posture = np.array([posture[joint] for joint in self._joints])
         # The controller itself is reset when somebody asks for it, as most limbs are idle in most trials.
         self._start_ns = time_ns
@@ -96,8 +99,8 @@ class LimbController:
         """Undo whatever clients have changed of the controller: its parameters and the speed of its clock."""
         if self._controller.parameters != self._configured:
             self._controller.parameters = self._configured
-        if self._controller.speed_scaling_factor != 1.0:
-            self._controller.scale_speed(1.0)
+        if self._controller.speed_scaling_factor != self._speed:
+            self._controller.scale_speed(self._speed)
 
     def pop_results(self) -> tuple[GoalResult, ...]:
         """Results of the goals that have ended since the last call, oldest first."""
@@ -183,6 +186,8 @@ class LimbController:
         still = np.zeros(len(self._joints)) if self._configured.measures_velocity else None
         measured = JointState(self._posture.copy(), still)
         self._controller.reset(start_ns, measured)
+        if self._speed != 1.0:
+            self._controller.scale_speed(self._speed)
         # This update begins the hold: from then on an idle limb has the same command and need not be driven.
         self._controller.update(start_ns, 0, measured)
 

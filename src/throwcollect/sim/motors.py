@@ -1,4 +1,4 @@
-"""How motors follow joint commands: exact feed-forward, and a delay of the commands."""
+"""How motors follow joint commands: exact feed-forward, a delay of the commands, and a lag behind them."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+
+from throwcollect.robots.motor_lag import lag_behind
 
 
 class Motors:
@@ -18,10 +20,12 @@ class Motors:
         start: Position that the joints hold before the first command [rad].
         hz: Physics steps per simulated second.
         delay_s: Time between a command and the motor acting on it [s].
+        lag_s: Time constant with which motors go after commands [s]; 0: at once.
     """
 
-    def __init__(self, start: Sequence[float], *, hz: int, delay_s: float) -> None:
+    def __init__(self, start: Sequence[float], *, hz: int, delay_s: float, lag_s: float) -> None:
         self._hz = float(hz)
+        self._lag_s = lag_s
         delay = delay_s * self._hz
         self._fraction = delay % 1
         # The commands that will still act: as many as the delay is long, and one more to interpolate from.
@@ -49,6 +53,8 @@ class Motors:
         targets = self._planned[1 : count + 1]
         if self._fraction:
             targets = (1 - self._fraction) * targets + self._fraction * self._planned[:count]
+        if self._lag_s:
+            targets = lag_behind(targets, self._targets[0], hz=self._hz, lag_s=self._lag_s)
         self._targets = np.concatenate((self._targets[:1], targets))
         return self._targets, np.diff(self._targets, axis=0) * self._hz
 

@@ -22,6 +22,7 @@ def to_samples(
     joints: Sequence[str],
     moving: Sequence[str],
     locked: Mapping[str, float],
+    offsets: NDArray[np.float64],
 ) -> Samples:
     """Lay samples out as arrays of all joints.
 
@@ -31,6 +32,7 @@ def to_samples(
         joints: All joints of the robot, in its order.
         moving: The joints of each sample.
         locked: Angle [rad] of each joint that is not in the samples.
+        offsets: By how much farther each joint of the samples stands than it says [rad], shape ``(n_moving,)``.
     """
     count, width = len(rows), 3 * len(moving) + BALL_NUMBERS
     table = np.fromiter(chain.from_iterable(rows), float, count * width).reshape(count, width)
@@ -39,6 +41,8 @@ def to_samples(
     columns = [joints.index(joint) for joint in moving]
     for array, values in zip((position, velocity, effort), np.split(table[:, :-BALL_NUMBERS], 3, axis=1), strict=True):
         array[:, columns] = values
+    if offsets.any():
+        position[:, columns] -= offsets
     return Samples(
         stamps_ns=stamps_ns,
         position=position,

@@ -164,7 +164,7 @@ class Simulation:
             self.world.restart_clock(start_ns)
             posture = self.world.posture()
         for limb in self.limbs.values():
-            limb.reset(start_ns, posture)
+            limb.reset(start_ns, posture, speed=setup.config.robot.speed_scale)
         self._collect_results()
         self._command = np.array([posture[joint] for joint in self.world.moving])
         self._in_trial = setup.number >= 0 and of_time and of_state

@@ -16,6 +16,7 @@ from throwcollect.members import load_member
 from throwcollect.robots.description import (
     Description,
     find_locked_joints,
+    joint_offsets,
     physics_description,
     robot_of,
     start_posture,
@@ -62,6 +63,7 @@ class World(Observer):
     _contacts: ContactLog
     _end_reason: EndReason | None
     _start: Sequence[float]
+    _offsets: NDArray[np.float64]
     _settled: State
     _touching: frozenset[str]
     _targets: NDArray[np.float64]
@@ -164,7 +166,7 @@ class World(Observer):
             return 0
         first, self._first_step = self._steps, self._steps
         self._stops_at_end = stop_at_end
-        self._targets, velocities = self._motors.plan(commands)
+        self._targets, velocities = self._motors.plan(commands + self._offsets)
         steps = Steps(
             self._targets,
             velocities,
@@ -200,7 +202,7 @@ class World(Observer):
         steps = np.arange(numbers.start, numbers.stop, dtype=np.int64) * self._stride
         stamps = self._start_ns + steps * NS_PER_S // self._hz
         rows = self._rows[numbers.start - self._forgotten : numbers.stop - self._forgotten]
-        return to_samples(rows, stamps, self._joints, self._moving, self._locked)
+        return to_samples(rows, stamps, self._joints, self._moving, self._locked, self._offsets)
 
     def forget_samples(self) -> None:
         """Drop the recorded samples but the last two, so that a world can go on for ever; numbers go on counting."""
@@ -212,12 +214,13 @@ class World(Observer):
         return self._contacts.intervals(self._stamp_ns)
 
     def joints(self) -> tuple[Sample, Sample]:
-        """Position [rad] and velocity [rad/s] of each moving joint now."""
+        """Position [rad] and velocity [rad/s] that each moving joint says to have now."""
         count, sample = len(self._moving), self.engine.state.sample
-        return sample[:count], sample[count : 2 * count]
+        said = tuple((np.array(sample[:count]) - self._offsets).tolist()) if self._offsets.any() else sample[:count]
+        return said, sample[count : 2 * count]
 
     def posture(self) -> Mapping[str, float]:
-        """Position of each joint of the robot now [rad]."""
+        """Position that each joint of the robot says to have now [rad]."""
         return {**self._locked, **dict(zip(self._moving, self.joints()[0], strict=True))}
 
     @property
@@ -257,7 +260,9 @@ class World(Observer):
             self.engine.load(scene_of(trial, description))
             self._moving, self._locked = description.moving, description.locked
             posture = start_posture(trial)
-            self._start = [posture[joint] for joint in self._moving]
+            offsets = dict(zip(self._joints, joint_offsets(trial).tolist(), strict=True))
+            self._offsets = np.array([offsets[joint] for joint in self._moving])
+            self._start = [posture[joint] + offsets[joint] for joint in self._moving]
             tool = tool_of(trial.tool)
             self._tool = tool.name
             seat = tool.ball_seat(trial.ball.radius_m)
@@ -279,7 +284,8 @@ class World(Observer):
         return self._described[1]
 
     def _make_motors(self, trial: Config) -> Motors:
-        return Motors(self._start, hz=trial.sim.physics_hz, delay_s=trial.sim.command_delay_s)
+        robot, sim = trial.robot, trial.sim
+        return Motors(self._start, hz=sim.physics_hz, delay_s=sim.command_delay_s, lag_s=robot.motor_lag_s)
 
     def _record_start(self) -> None:
         # The motor torques are those of the settled state, as engines have none before the first step.

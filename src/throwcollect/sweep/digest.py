@@ -51,7 +51,8 @@ def trial_digests(config: Config, points: Points, seeds: Iterable[int]) -> NDArr
     """Hash everything that determines the samples of each trial, SHA-256, shape ``(n_trials, 32)``.
 
     The hashed text has one line ``key=value`` for each effective key of the trial's configuration, sorted by key, so
-    it does not matter whether a value was swept or fixed.
+    it does not matter whether a value was swept or fixed. Keys that came later have a line where they differ from their
+    defaults.
 
     Args:
         config: Configuration that the trials vary.
@@ -64,13 +65,15 @@ def trial_digests(config: Config, points: Points, seeds: Iterable[int]) -> NDArr
         if leaf.key.determines_samples and not (leaf.key.later and leaf.is_default)
     }
     lines["seed"] = ""
+    lines |= dict.fromkeys(points.keys, "")
     lines = dict(sorted(lines.items()))
+    later = {leaf.name: leaf.value for leaf in leaves(Config()) if leaf.key.later and leaf.name in points.keys}
     digests = np.empty((len(points.values), hashlib.sha256().digest_size), np.uint8)
     for digest, seed, row in zip(digests, seeds, points.values, strict=True):
         lines["seed"] = _line("seed", int(seed))
         for key, value in zip(points.keys, row.tolist(), strict=True):
-            lines[key] = _line(key, value)
-        text = "\n".join([_FORMAT, *lines.values()])
+            lines[key] = "" if key in later and value == later[key] else _line(key, value)
+        text = "\n".join([_FORMAT, *filter(None, lines.values())])
         digest[:] = np.frombuffer(hashlib.sha256(text.encode()).digest(), np.uint8)
     return digests
 

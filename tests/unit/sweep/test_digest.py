@@ -16,6 +16,7 @@ from throwcollect.sweep.points import Points
 from throwcollect.tasks.throw.config import UntilLanded
 
 WITHOUT_EFFECT = {"name", "trials", "until", "sim.real_time_factor", "record.zstd_level", "record.trials_per_shard"}
+CAME_LATER = {"sim.engine", "robot.joint_offsets", "robot.speed_scale", "robot.motor_lag_s"}
 POINTS = Points(("ball.mass_kg", "task.duration_s"), np.array([[0.1, 1.0], [0.2, 1.0]]))
 
 TARGET = TargetConfig.model_validate({"distance_m": {"min": 1, "max": 2, "bins": 4}})
@@ -29,10 +30,8 @@ def digests(config: Config, points: Points = POINTS, seeds: tuple[int, ...] = (5
 def test_digests_are_sha_256_over_the_effective_keys_in_order():
     kept = values_by_key(with_values(Config(), {"ball.mass_kg": 0.1, "task.duration_s": 1.0})) | {"seed": 5}
     for key in list(kept):
-        if (
-            key.startswith(("sweep", "run.", "containers.", "cluster.", "controllers.", "sim.engine"))
-            or key in WITHOUT_EFFECT
-        ):
+        outside = key.startswith(("sweep", "run.", "containers.", "cluster.", "controllers."))
+        if outside or key in WITHOUT_EFFECT | CAME_LATER:
             del kept[key]
     text = "\n".join(["throwcollect trial 1", *(f"{key}={json.dumps(kept[key])}" for key in sorted(kept))])
     assert digests(Config())[0] == hashlib.sha256(text.encode()).hexdigest()
@@ -42,6 +41,15 @@ def test_it_does_not_matter_whether_a_value_was_swept_or_fixed():
     fixed = with_values(Config(), {"ball.mass_kg": 0.2, "task.duration_s": 1.0})
     no_points = Points((), np.empty((1, 0)))
     assert digests(fixed, no_points, (6,)) == digests(Config())[1:]
+
+
+def test_a_key_that_came_later_counts_where_it_is_not_the_default():
+    points = Points(("robot.motor_lag_s",), np.array([[0.0], [0.01]]))
+    default, late = digests(Config(), points, (5, 5))
+    no_points = Points((), np.empty((1, 0)))
+    assert [default] == digests(Config(), no_points, (5,))
+    assert [late] == digests(with_values(Config(), {"robot.motor_lag_s": 0.01}), no_points, (5,))
+    assert late != default
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
+from throwcollect.config.key import Key
 from throwcollect.config.kinds import ContradictionError
 from throwcollect.config.tool import ToolConfig
 
@@ -17,11 +18,11 @@ class SpoonConfig(ToolConfig):
 
     name: Literal["spoon"] = "spoon"
     """Tool model."""
-    handle_length_m: Annotated[float, Field(ge=0.05, le=0.5)] = 0.15
+    handle_length_m: Annotated[float, Field(ge=0.05, le=0.5), Key(swept=True)] = 0.15
     """Length of the handle, along -z of the gripper's base link."""
     handle_width_m: Annotated[float, Field(ge=0.004, le=0.05)] = 0.012
     """Width and thickness of the handle."""
-    mount_offset_m: Annotated[float, Field(ge=0.0, le=0.3)] = 0.10
+    mount_offset_m: Annotated[float, Field(ge=0.0, le=0.3), Key(swept=True)] = 0.10
     """Distance from the gripper's base link to the handle's upper end."""
     cup_walls: Annotated[int, Field(ge=4, le=24)] = 6
     """Number of flat walls that form the cone; each costs about 5 µs a step."""
