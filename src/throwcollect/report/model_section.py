@@ -15,7 +15,7 @@ from throwcollect.learning.model_directory import read_score
 from throwcollect.learning.score import Errors, Score, ThrowAtTarget
 from throwcollect.report.contents import Panel, Row, Section, Table
 from throwcollect.report.figures import BLUE, LEGEND_ABOVE, LIMIT_LINE, NEUTRAL
-from throwcollect.wording import command
+from throwcollect.wording import command, format_count
 
 _TITLE = "How a model of it hits"
 _ARROWS = 10
@@ -131,7 +131,10 @@ def _draw_errors(numbers: Sequence[int], errors: Sequence[Errors]) -> go.Figure:
 def _tabulate(score: Score) -> Table:
     rows = [(f"learned from {each.trained_on:,} throws", *_cells(each.errors)) for each in score.trained]
     rows += [
-        (f"in the other world after {each.real_throws} throws ({each.method.value})", *_cells(each.errors))
+        (
+            f"in the other world after {format_count(each.real_throws, 'throw')} ({each.method.value})",
+            *_cells(each.errors),
+        )
         for each in score.adapted
     ]
     head = ("", "median", "9 of 10 below", "largest", "throws", "did not succeed")
