@@ -120,3 +120,14 @@ def test_the_program_of_the_documents_runs(place: Path, monkeypatch: pytest.Monk
     monkeypatch.chdir(place)
     runpy.run_path("program.py", run_name="__main__")
     assert (place / "models" / "real" / "model.json").exists()
+
+
+def test_the_example_ends_nearer_to_its_target_than_it_began(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = (ROOT / "configs" / "real.yaml").read_text(encoding="utf-8")
+    (place / "real.yaml").write_text(text + "\nsim: {engine: ballistic}\n")
+    example = runpy.run_path(str(ROOT / "examples" / "learning.py"))
+    example["main"](*(str(place / name) for name in ("data", "throws.yaml", "real.yaml")))
+    said = capsys.readouterr().out
+    (before,) = re.findall(r"the other robot misses by ([\d.]+) cm", said)
+    after = re.findall(r"after 3: by ([\d.]+) cm", said)
+    assert float(after[0]) < float(before) / 2, said
