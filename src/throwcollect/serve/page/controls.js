@@ -115,7 +115,8 @@ class ComponentCard {
     for (const element of [this.count, this.more]) element.hidden = isContainer;
     this.run.hidden = !isContainer;
     const runs = ["", ...this.controls.joinable];
-    if (isContainer && runs.join(" ") !== [...this.joins.options].map(({ value }) => value).join(" ")) {
+    const offered = [...this.joins.options].map(({ value }) => value);
+    if (isContainer && JSON.stringify(runs) !== JSON.stringify(offered)) {
       const chosen = this.joins.value;
       this.joins.replaceChildren(...runs.map((id) => make("option", { value: id }, id || "no run")));
       this.joins.value = runs.includes(chosen) ? chosen : "";
