@@ -4,6 +4,7 @@ import csv
 import json
 import re
 import runpy
+import shutil
 from pathlib import Path
 
 import pytest
@@ -104,6 +105,15 @@ def test_what_cannot_be_done_is_one_message(place: Path, arguments: list[str], m
     assert message in said.stderr
     assert "Traceback" not in said.stderr
     assert not (place / "new").exists()
+
+
+def test_throws_of_another_robot_are_refused(place: Path) -> None:
+    shutil.copytree(place / "model", place / "other")
+    path = place / "other" / "model.json"
+    path.write_text(path.read_text().replace('"robot": "talos"', '"robot": "arm"'))
+    said = call_here("adapt", place / "other", place / "data", "-o", place / "new")
+    assert said.returncode == 2
+    assert "the task throw of the robot talos\n  expected: throw of arm, as the model has it" in said.stderr
 
 
 def test_a_target_out_of_reach_is_told_with_the_nearest_point(place: Path) -> None:

@@ -308,6 +308,12 @@ def _read_dataset(directory: Path, keys: Sequence[str], model: Model) -> list[di
     from throwcollect.dataset.reader import load
 
     dataset = load(directory)
+    trained, config = model.file.trained_on, dataset.config
+    if (config.robot.name, config.task.name) != (trained.robot, trained.task):
+        raise ConfigError(
+            f"{directory}: the task {config.task.name} of the robot {config.robot.name}",
+            expected=f"{trained.task} of {trained.robot}, as the model has it",
+        )
     throws = dataset.select(f"outcome == '{dataset.config.task.success}'").throws
     if missing := [name for name in (*keys, *model.targets) if name not in throws.column_names]:
         raise ConfigError(

@@ -350,6 +350,9 @@ def _describe(found: Fit, dataset: Dataset, where: str | None) -> ModelFile:
         correction=CorrectionEntry.of(learned.correction),
         trained_on=TrainedOn(
             name=dataset.config.name,
+            robot=dataset.config.robot.name,
+            task=dataset.config.task.name,
+            engine=dataset.config.sim.engine,
             digest=dataset.digest,
             throws=len(found.trials),
             ignored=found.ignored,

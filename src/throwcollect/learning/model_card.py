@@ -48,7 +48,8 @@ def describe_model(file: ModelFile, score: Score | None) -> str:
         f"It maps the parameters of a trial to where it ends ({', '.join(file.targets)}), and back: from a target to "
         f"parameters. Learned from {format_count(trained.throws, 'throw')} of the dataset with the digest "
         f"`{trained.digest}`" + (f" (those with `{trained.selection}`)" if trained.selection else "") + "; "
-        f"{trained.ignored} that did not succeed were left out. Made with throwcollect {file.version}.",
+        f"{trained.ignored} that did not succeed were left out. Robot: {trained.robot}; task: {trained.task}; physics "
+        f"engine: {trained.engine}. Made with throwcollect {file.version}.",
         "",
         "| key | it is | from | to | configured | unit |",
         "|---|---|---|---|---|---|",

@@ -122,6 +122,9 @@ class TrainedOn(_Entry):
 
     Attributes:
         name: Name of the collection.
+        robot: Name of the robot.
+        task: Name of the task.
+        engine: Name of the physics engine.
         digest: Digest of the dataset.
         throws: Number of throws that it was learned from.
         ignored: Number of throws that did not succeed.
@@ -132,6 +135,9 @@ class TrainedOn(_Entry):
     """
 
     name: str
+    robot: str
+    task: str
+    engine: str
     digest: str
     throws: int
     ignored: int
