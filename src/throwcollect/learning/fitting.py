@@ -112,10 +112,11 @@ def fit_throws(
         efforts: Largest shares of a joint's torque limit, shape ``(n,)``.
     """
     inputs, folds = scale_values(axes, values), _folds(outputs)
-    validation = cross_validate(inputs, outputs, folds)
+    minor = sum(axis.role is Role.LATENT for axis in axes)
+    validation = cross_validate(inputs, outputs, folds, minor=minor)
     known = [axis.role is not Role.LATENT for axis in axes]
     blind = None if all(known) else float(np.median(cross_validate(inputs[:, known], outputs, folds).best))
-    forward = fit_polynomial(inputs, outputs, validation.degree)
+    forward = fit_polynomial(inputs, outputs, validation.degree, minor=minor)
     effort = fit_polynomial(inputs, efforts[:, np.newaxis], min(_EFFORT_DEGREE, validation.degree))
     correction = no_correction(axes, targets)
     learned = LearnedMap(kind, axes, targets, forward, effort, values, outputs, efforts, correction)

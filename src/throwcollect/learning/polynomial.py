@@ -17,6 +17,8 @@ DEGREES = (1, 2, 3, 4)
 """Degrees that are tried."""
 SAMPLES_PER_TERM = 1.5
 """A degree is tried only where there are so many samples for each of its terms."""
+_ALL_TERMS = 2
+"""Up to this degree, minor inputs have all terms."""
 _RIDGE = 1e-7
 """Ridge, as a share of the number of samples: it keeps terms small that the samples say nothing about."""
 
@@ -88,30 +90,32 @@ class Validation:
         return self.errors[self.degree]
 
 
-def fit_polynomial(inputs: Array, outputs: Array, degree: int) -> Polynomial:
+def fit_polynomial(inputs: Array, outputs: Array, degree: int, *, minor: int = 0) -> Polynomial:
     """Fit a polynomial by least squares.
 
     Args:
         inputs: Shape ``(n, n_inputs)``, in [-1, 1].
         outputs: Shape ``(n, n_outputs)``.
         degree: Highest sum of the exponents of a term.
+        minor: Number of minor inputs, as `list_exponents` takes it.
     """
-    exponents = list_exponents(inputs.shape[1], degree)
+    exponents = list_exponents(inputs.shape[1], degree, minor=minor)
     return _solve(exponents, _Sums.of(inputs, outputs, exponents))
 
 
-def cross_validate(inputs: Array, outputs: Array, folds: NDArray[np.int64]) -> Validation:
+def cross_validate(inputs: Array, outputs: Array, folds: NDArray[np.int64], *, minor: int = 0) -> Validation:
     """Predict each sample by polynomials that were fitted to the other folds.
 
     Args:
         inputs: Shape ``(n, n_inputs)``, in [-1, 1].
         outputs: Shape ``(n, n_outputs)``.
         folds: Number of the fold of each sample, shape ``(n,)``.
+        minor: Number of minor inputs, as `list_exponents` takes it.
     """
     errors = {}
     numbers = np.unique(folds)
     for degree in DEGREES:
-        exponents = list_exponents(inputs.shape[1], degree)
+        exponents = list_exponents(inputs.shape[1], degree, minor=minor)
         if degree > 1 and len(exponents) * SAMPLES_PER_TERM > len(inputs):
             break
         parts = [_Sums.of(inputs[folds == each], outputs[folds == each], exponents) for each in numbers]
@@ -125,12 +129,21 @@ def cross_validate(inputs: Array, outputs: Array, folds: NDArray[np.int64]) -> V
     return Validation(errors)
 
 
-def list_exponents(inputs: int, degree: int) -> NDArray[np.int64]:
-    """Exponents of all terms up to a degree, shape ``(n_terms, inputs)``; the constant is the first."""
+def list_exponents(inputs: int, degree: int, *, minor: int = 0) -> NDArray[np.int64]:
+    """List the exponents of all terms up to a degree, shape ``(n_terms, inputs)``; the constant is the first.
+
+    Args:
+        inputs: Number of inputs.
+        degree: Highest sum of the exponents of a term.
+        minor: Number of inputs, the last ones, that change how the others act, and matter little beside one another:
+            a term above the second degree has one of them at most, and that once. All terms of 15 inputs up to the
+            third degree would take more samples than there are.
+    """
     rows = [
         [chosen.count(each) for each in range(inputs)]
         for total in range(degree + 1)
         for chosen in combinations_with_replacement(range(inputs), total)
+        if total <= _ALL_TERMS or sum(each >= inputs - minor for each in chosen) <= 1
     ]
     return np.array(rows, np.int64)
 

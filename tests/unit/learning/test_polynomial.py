@@ -56,3 +56,12 @@ def test_samples_are_predicted_by_others_alone(inputs):
 def test_terms_are_all_those_up_to_the_degree():
     assert list_exponents(5, 3).shape == (56, 5)
     assert list_exponents(2, 1).tolist() == [[0, 0], [1, 0], [0, 1]]
+
+
+def test_minor_inputs_are_alone_in_high_terms():
+    rows = list_exponents(3, 3, minor=2)
+    assert [0, 1, 1] in rows.tolist()
+    high = rows[rows.sum(axis=1) > 2]
+    assert high[:, 1:].sum(axis=1).max() == 1
+    assert {tuple(row) for row in high.tolist()} == {(3, 0, 0), (2, 1, 0), (2, 0, 1)}
+    assert list_exponents(15, 3, minor=10).shape == (321, 15)
