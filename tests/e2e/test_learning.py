@@ -94,6 +94,7 @@ def test_a_score_tells_how_throws_hit_here_and_elsewhere(place: Path) -> None:
         (["fit", "data", "-o", "new", "--where", "trial < 5"], "at least 18 for 5 parameters"),
         (["adapt", "model", "model/config.yaml", "-o", "new"], "no column"),
         (["score", "model", "--targets", "0"], "targets: got 0"),
+        (["score", "model", "--seed", "-1"], "seed: got -1"),
         (["score", "model", "--set", "ball.mass_kg=1"], "--config CONFIG"),
         (["throw", "throws.yaml", "--set", "task.duration_s=0.2"], "its limit is 1.76 rad/s"),
     ],
@@ -105,6 +106,13 @@ def test_what_cannot_be_done_is_one_message(place: Path, arguments: list[str], m
     assert message in said.stderr
     assert "Traceback" not in said.stderr
     assert not (place / "new").exists()
+
+
+def test_a_cell_that_is_no_number_is_told_with_its_line(place: Path) -> None:
+    (place / "cells.csv").write_text("landing_x_m,landing_y_m\n1,0\n1,nan\n")
+    said = call_here("aim", place / "model", "--targets", place / "cells.csv")
+    assert said.returncode == 2
+    assert "cells.csv:3: landing_y_m: 'nan'\n  expected: a finite number" in said.stderr
 
 
 def test_throws_of_another_robot_are_refused(place: Path) -> None:

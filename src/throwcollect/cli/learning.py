@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json as jsonlib
+import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -276,13 +277,12 @@ def _read_table(path: Path, names: Sequence[str]) -> list[dict[str, float]]:
                 raise ConfigError(f"{path}:1: no column {join_names(missing)}", expected=f"columns {', '.join(names)}")
             rows = []
             for row in reader:
-                try:
-                    rows.append({name: float(row[name]) for name in names})
-                except (TypeError, ValueError):
-                    wrong = next(name for name in names if not _is_number(row[name]))
+                numbers = {name: _to_number(row[name]) for name in names}
+                if wrong := [name for name in names if not math.isfinite(numbers[name])]:
                     raise ConfigError(
-                        f"{path}:{reader.line_num}: {wrong}: {row[wrong]!r}", expected="a number"
-                    ) from None
+                        f"{path}:{reader.line_num}: {wrong[0]}: {row[wrong[0]]!r}", expected="a finite number"
+                    )
+                rows.append(numbers)
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise ConfigError(f"{path}: cannot be read: {error}") from error
     if not rows:
@@ -290,12 +290,12 @@ def _read_table(path: Path, names: Sequence[str]) -> list[dict[str, float]]:
     return rows
 
 
-def _is_number(text: str | None) -> bool:
+def _to_number(text: str | None) -> float:
+    """The number that a cell holds; NaN if it holds none."""
     try:
-        float(text or "")
+        return float(text or "")
     except ValueError:
-        return False
-    return True
+        return math.nan
 
 
 def _read_dataset(directory: Path, keys: Sequence[str], model: Model) -> list[dict[str, float]]:

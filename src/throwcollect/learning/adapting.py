@@ -21,6 +21,8 @@ _BIAS = 0.2
 """What a parameter is expected to be off by, scaled: a tenth of its range."""
 _LATENT = 0.6
 """Standard deviation of a latent, scaled: about that of numbers that are spread evenly over the range."""
+_MOST_PARTS = 10
+"""So many maps are adapted to parts of the throws at most, to predict the others."""
 _STEPS = 30
 _SMALL_STEP = 1e-9
 """After a step that is smaller [scaled, or m or rad], nothing would change any more."""
@@ -52,7 +54,8 @@ class Adaptation:
         deviations: Standard deviations of the numbers that were found: of the biases or latents, scaled, then of the
             offset; shape ``(n_found,)``.
         before: Distance of each throw from where the map had it, shape ``(n_throws,)``.
-        after: The same by a map that was adapted to all other throws; empty for a single throw.
+        after: The same by a map that was adapted to other throws: up to ten throws, to all others, else to nine tenths
+            of them; empty for a single throw.
     """
 
     method: Method
@@ -92,7 +95,7 @@ def adapt(
     correction, deviations = _find(learned, chosen, throws, scatter)
     after = np.empty(0)
     if len(places) > 1:
-        after = np.array([_leave_out(learned, chosen, throws, each, scatter) for each in range(len(places))])
+        after = _predict_by_others(learned, chosen, throws, scatter)
     helps = _mean_square(after) < _mean_square(before) if len(after) else before[0] > _CLEARLY * scatter
     if method is None and not helps:
         return Adaptation(Method.NONE, learned.correction, np.empty(0), before, before if len(after) else after)
@@ -110,18 +113,17 @@ def _choose(throws: int, *, latents_count: bool) -> Method:
     return Method.BIAS if throws >= _THROWS_FOR_BIAS else Method.OFFSET
 
 
-def _leave_out(
-    learned: LearnedMap, method: Method, throws: tuple[Array, Array, Array], which: int, scatter: float
-) -> float:
-    """Distance of one throw from where a map has it that was adapted to all others."""
-    others = (
-        np.delete(throws[0], which, axis=0),
-        np.delete(throws[1], which, axis=0),
-        np.delete(throws[2], which, axis=0),
-    )
-    correction, _ = _find(learned, method, others, scatter)
-    one = slice(which, which + 1)
-    return float(_distances(learned.correct(correction), throws[0][one], throws[1][one], throws[2][one])[0])
+def _predict_by_others(
+    learned: LearnedMap, method: Method, throws: tuple[Array, Array, Array], scatter: float
+) -> Array:
+    """Distance of each throw from where a map has it that was adapted to others, shape ``(n_throws,)``."""
+    parts = np.arange(len(throws[2])) % _MOST_PARTS
+    distances = np.empty(len(parts))
+    for part in range(min(len(parts), _MOST_PARTS)):
+        held, others = parts == part, parts != part
+        correction, _ = _find(learned, method, (throws[0][others], throws[1][others], throws[2][others]), scatter)
+        distances[held] = _distances(learned.correct(correction), throws[0][held], throws[1][held], throws[2][held])
+    return distances
 
 
 def _find(

@@ -169,6 +169,8 @@ class Model:
         """
         if targets < 1:
             raise ConfigError(f"targets: got {targets}", expected="1 or more")
+        if seed < 0:
+            raise ConfigError(f"seed: got {seed}", expected="0 or more")
         _check_scatter(scatter)
         error, counts = self.file.trained_on.error, self.file.trained_on.latents_count
         return score_model(

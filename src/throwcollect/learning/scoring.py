@@ -13,7 +13,7 @@ from throwcollect.dataset.throw import Throw
 from throwcollect.learning.adapting import Adaptation, adapt, adapt_by_nothing
 from throwcollect.learning.aiming import Choice, aim
 from throwcollect.learning.fitting import enough_throws, fit_throws
-from throwcollect.learning.learned_map import LearnedMap, Role
+from throwcollect.learning.learned_map import LearnedMap, Role, no_correction
 from throwcollect.learning.score import Adapted, Errors, Score, ThrowAtTarget, Trained
 
 Array = NDArray[np.float64]
@@ -54,7 +54,8 @@ def score_model(
     """Throw at targets, in the world of the dataset and in another one.
 
     Args:
-        learned: The map.
+        learned: The map; of one that was adapted already, the throws in the other world begin with that, and those in
+            the world of the dataset leave it out.
         simulator: Simulates the world of the dataset.
         count: Number of targets.
         seed: Seed of their choice.
@@ -65,9 +66,10 @@ def score_model(
         processes: How many processes simulate.
     """
     context = _nominal_context(learned)
-    targets = draw_targets(learned.carry_over(context), count, seed)
+    plain = learned.correct(no_correction(learned.axes, learned.targets))
+    targets = draw_targets(plain.carry_over(context), count, seed)
     sizes = [*(size for size in SIZES if size < len(learned.values)), len(learned.values)]
-    maps = {size: smaller for size in sizes if (smaller := _learn_from(learned, size)) is not None}
+    maps = {size: smaller for size in sizes if (smaller := _learn_from(plain, size)) is not None}
     loops = _throw_at(list(maps.values()), targets, context, simulator, processes)
     trained = [
         Trained(trained_on=size, errors=Errors.of(_distances(places, targets)))

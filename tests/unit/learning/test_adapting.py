@@ -96,5 +96,11 @@ def test_with_scatter_more_throws_say_more() -> None:
     assert errors[1] < errors[0] < off(learned, elsewhere(learned, 3, biased, method=Method.NONE), biased)
 
 
+def test_of_many_throws_each_is_predicted_by_a_map_of_most_others() -> None:
+    found = elsewhere(learn(), 60, biased)
+    assert len(found.after) == 60
+    assert np.median(found.after) < 0.004 < np.median(found.before)
+
+
 def test_what_is_wanted_is_done_even_if_it_does_not_help() -> None:
     assert elsewhere(learn(), 5, land, method=Method.OFFSET).method is Method.OFFSET

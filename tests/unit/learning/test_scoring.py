@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -79,6 +80,15 @@ def test_in_another_world_a_few_throws_close_the_gap() -> None:
     assert max(after) < before / 4
     assert found.adapted[0].method is Method.NONE
     assert len(found.adapted_throws) == found.adapted[0].errors.throws
+
+
+def test_in_the_world_of_the_dataset_a_model_is_scored_as_if_it_had_not_been_adapted() -> None:
+    learned = learn()
+    shifted = learned.correct(replace(learned.correction, offset=SHIFT))
+    options = {"count": 25, "seed": 0, "scatter": 0.0, "error": 0.002, "latents_count": False, "processes": 1}
+    found = score_model(shifted, World(), world=World(SHIFT), **options)
+    assert found.trained == score(World()).trained
+    assert found.adapted[0].errors.median < 0.01
 
 
 def test_scatter_costs_something() -> None:
