@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from urllib.parse import urlsplit
@@ -104,3 +106,17 @@ def test_a_model_is_seen_and_aims_where_somebody_clicks(address: str) -> None:
         assert tab.evaluate(values) == ""
         assert tab.evaluate("document.documentElement.scrollWidth") == 390
         assert unexpected(tab) == []
+
+
+@pytest.mark.skipif(chromium() is None, reason="needs Chromium: apt-get install chromium")
+def test_the_page_works_without_a_network(tmp_path: Path) -> None:
+    unshare = ["unshare", "--net"]
+    if subprocess.run([*unshare, "true"], capture_output=True, check=False).returncode:
+        pytest.skip("may make no network namespace; root may")
+    write_config(tmp_path, trials=600, sim=f"{FAST}, real_time_factor: 1")
+    catalogue = tmp_path / "catalogue.yaml"
+    catalogue.write_text("components: {throws: {pretty_name: Throws, config: small.yaml}}\n")
+    command = [*unshare, sys.executable, "-m", "tests.e2e.offline_page", catalogue, tmp_path]
+    done = subprocess.run(command, stdout=subprocess.PIPE, text=True, timeout=240, check=False)
+    assert done.returncode == 0
+    assert json.loads(done.stdout) == {"networks": ["lo"], "meshes": _MESHES, "errors": []}

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from io import TextIOWrapper
 from pathlib import Path
 from types import FrameType
+from typing import Literal
 
 import uvicorn
 
@@ -27,6 +28,8 @@ from throwcollect.serve.models import Models
 
 PORT = 8080
 """Where to serve if nobody says otherwise, and it is free."""
+WEBSOCKETS: Literal["websockets-sansio"] = "websockets-sansio"
+"""The implementation of WebSockets; it waits for clients that read slowly, and keeps nothing for them meanwhile."""
 _MOST_FRAME = 10_000_000
 _MOST_CLIENTS = 256
 _LOG_BYTES = 1_000_000
@@ -84,7 +87,7 @@ def serve(
             app,
             log_config=None,
             access_log=False,
-            ws="websockets-sansio",
+            ws=WEBSOCKETS,
             ws_max_size=_MOST_FRAME,
             # On this machine it would cost time and spare nothing.
             ws_per_message_deflate=False,
