@@ -13,6 +13,7 @@ import typer
 
 from throwcollect.cli.options import ConfigArgument, DatasetArgument, JsonOption, SetOption, overrides
 from throwcollect.errors import ConfigError, PlanError
+from throwcollect.extras import require
 from throwcollect.side_by_side import count_cores
 from throwcollect.wording import command, format_count, join_names
 
@@ -48,12 +49,17 @@ def fit(
     where: Annotated[
         str | None, typer.Option("--where", metavar="CONDITION", help="Learn from throws of this kind alone.")
     ] = None,
+    onnx: Annotated[
+        bool, typer.Option("--onnx", help="Write model.onnx, too: target to parameters, for a robot's controller.")
+    ] = False,
     json: JsonOption = False,
 ) -> None:
     """Learn from a dataset where throws end, and which parameters lead to a target."""
     from throwcollect.dataset.reader import load
     from throwcollect.learning.model import fit
 
+    if onnx:
+        require("onnx")
     model = fit(
         load(dataset),
         kind=kind,
@@ -62,6 +68,8 @@ def fit(
         given=_split(given),
         where=where,
     )
+    if onnx:
+        model = model.distil()
     model.save(output)
     trained = model.file.trained_on
     if json:

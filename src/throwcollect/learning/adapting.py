@@ -25,7 +25,7 @@ _MOST_PARTS = 10
 """So many maps are adapted to parts of the throws at most, to predict the others."""
 _STEPS = 30
 _LOOKS = 4
-"""What the nearest throws say is looked up in so many steps; afterwards, another one would be nearest again and again."""
+"""What the nearest throws say is looked up in so many steps; later, others would be nearest again and again."""
 _SMALL_STEP = 1e-5
 """After a step that is smaller [scaled, or m or rad], nothing would change that anybody could measure."""
 _THROWS_FOR_BIAS = 3
@@ -46,7 +46,7 @@ class Method(str, Enum):
     """What the dataset varied from trial to trial: the latents have other values, and the end is shifted."""
 
 
-_ROLES = {Method.BIAS: Role.PARAMETER, Method.LATENT: Role.LATENT}
+ROLES = {Method.BIAS: Role.PARAMETER, Method.LATENT: Role.LATENT}
 """Which inputs differ, beside the place where trials end."""
 
 
@@ -144,7 +144,7 @@ def _find(
         return np.empty(0), np.empty(0)
     parameters, context, places = throws
     targets = places.shape[1]
-    role = _ROLES.get(method)
+    role = ROLES.get(method)
     columns = learned.columns_of(role) if role else slice(0, 0)
     width = columns.stop - columns.start
     spread = np.full(width + targets, _SMALL_OFFSET if width else _OFFSET)

@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 
 from throwcollect.config.loader import dump_yaml
 from throwcollect.errors import ConfigError
+from throwcollect.extras import require
 from throwcollect.files import StrPath
 from throwcollect.learning.adapting import Method, adapt
 from throwcollect.learning.aiming import Choice, aim
+from throwcollect.learning.distilling import distil
 from throwcollect.learning.fitting import Fit, fit_map
 from throwcollect.learning.learned_map import Kind, LearnedMap, Role
 from throwcollect.learning.model_directory import read_model, write_model
@@ -22,10 +24,11 @@ from throwcollect.learning.model_file import (
     AdaptationEntry,
     AxisEntry,
     CorrectionEntry,
-    Found,
+    DistilledEntry,
     ModelFile,
     PolynomialEntry,
     TrainedOn,
+    list_found,
 )
 from throwcollect.learning.score import Score
 from throwcollect.learning.scoring import Simulates, score_model
@@ -193,7 +196,7 @@ class Model:
         method: str | None = None,
         scatter: float = 0.0,
     ) -> Model:
-        """Make the model of another world, of a few throws in it.
+        """Make the model of another world, of a few throws in it; if this one was distilled, that one is, too.
 
         Args:
             points: What was thrown: values by key, of all `parameters` and all `given` each.
@@ -239,12 +242,28 @@ class Model:
             scatter=deviation,
             before=adapted.before.tolist(),
             after=adapted.after.tolist(),
-            found=_describe_found(learned, adapted.method, adapted.deviations),
+            found=list_found(learned, adapted.method, adapted.deviations),
         )
         file = self.file.model_copy(
-            update={"correction": CorrectionEntry.of(adapted.correction), "adaptation": entry, "version": __version__}
+            update={
+                "correction": CorrectionEntry.of(adapted.correction),
+                "adaptation": entry,
+                "version": __version__,
+                "distilled": None,
+            }
         )
-        return replace(self, file=file, learned=learned)
+        world = replace(self, file=file, learned=learned)
+        return world if self.file.distilled is None else world.distil()
+
+    def distil(self) -> Model:
+        """Add the way from a target to parameters as one polynomial, which `save` writes into ``model.onnx``, too.
+
+        Raises:
+            MissingExtraError: If the package ``onnx`` is not installed.
+        """
+        require("onnx")
+        entry = DistilledEntry.of(distil(self.learned))
+        return replace(self, file=self.file.model_copy(update={"distilled": entry}))
 
     def save(self, directory: StrPath) -> None:
         """Write the model.
@@ -255,6 +274,7 @@ class Model:
         Raises:
             ConfigError: If there is something already.
             DatasetError: If it cannot be written.
+            MissingExtraError: If the model was distilled, and the package ``onnx`` is not installed.
         """
         write_model(Path(directory), self.file, self.learned, self.trials, self.config)
 
@@ -365,24 +385,6 @@ def _describe(found: Fit, dataset: Dataset, where: str | None) -> ModelFile:
         ),
         adaptation=None,
     )
-
-
-def _describe_found(learned: LearnedMap, method: Method, deviations: Array) -> list[Found]:
-    """The numbers that adaptation found, in their units."""
-    if method is Method.NONE:
-        return []
-    role = {Method.BIAS: Role.PARAMETER, Method.LATENT: Role.LATENT}.get(method)
-    axes = learned.axes_of(role) if role else ()
-    found = []
-    for number, axis in enumerate(axes):
-        half = (axis.maximum - axis.minimum) / 2
-        if role is Role.LATENT:
-            value = axis.minimum + (float(learned.correction.latents[number]) + 1) * half
-        else:
-            value = float(learned.correction.bias[number]) * half
-        found.append(Found(name=axis.key, value=value, deviation=float(deviations[number]) * half))
-    offsets = zip(learned.targets, learned.correction.offset.tolist(), deviations[len(axes) :].tolist(), strict=True)
-    return [*found, *(Found(name=name, value=value, deviation=spread) for name, value, spread in offsets)]
 
 
 def _check_scatter(scatter: float) -> None:

@@ -33,6 +33,17 @@ parameters = {axis["key"]: value for axis, value in zip(axes, values) if axis["r
 """Finds parameters for ``target`` with ``model.json`` alone; the card shows it, and a test runs it."""
 
 
+ONNX_PROGRAM = """\
+import json
+import onnxruntime
+
+keys = [axis["key"] for axis in json.load(open("model.json"))["axes"] if axis["role"] == "parameter"]
+session = onnxruntime.InferenceSession("model.onnx")
+parameters = dict(zip(keys, session.run(None, {"target": [target]})[0][0].tolist()))
+"""
+"""The same with ``model.onnx``."""
+
+
 def describe_model(file: ModelFile, score: Score | None) -> str:
     """README.md of a model.
 
@@ -73,7 +84,11 @@ def describe_model(file: ModelFile, score: Score | None) -> str:
         lines += _describe_adaptation(file.adaptation, file)
     if score is not None:
         lines += _describe_score(score, file)
-    lines += [
+    return "\n".join([*lines, *_describe_use(file)])
+
+
+def _describe_use(file: ModelFile) -> list[str]:
+    lines = [
         "## What it was not tested on",
         "",
         "A real robot; balls, tools, surfaces and postures other than the dataset's; throws that scatter. Every number "
@@ -88,7 +103,17 @@ def describe_model(file: ModelFile, score: Score | None) -> str:
         "```",
         "",
     ]
-    return "\n".join(lines)
+    if file.distilled is not None:
+        lines += [
+            "`model.onnx` needs no NumPy in a controller: one polynomial, distilled from this model. Its parameters "
+            "stay inside of their ranges for any target, in reach or not. In Python:",
+            "",
+            "```python",
+            ONNX_PROGRAM.rstrip(),
+            "```",
+            "",
+        ]
+    return lines
 
 
 def _describe_axis(axis: Axis) -> str:
