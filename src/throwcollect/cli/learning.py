@@ -173,8 +173,9 @@ def throw(
 
 def score(
     directory: ModelArgument,
-    targets: Annotated[int, typer.Option("--targets", metavar="N", help="Number of targets.")] = 100,
-    seed: Annotated[int, typer.Option("--seed", help="Seed of their choice.")] = 0,
+    targets: Annotated[int, typer.Option("--targets", metavar="N", help="Number of targets of each seed.")] = 40,
+    seed: Annotated[int, typer.Option("--seed", help="The first seed of their choice.")] = 0,
+    seeds: Annotated[int, typer.Option("--seeds", metavar="N", help="Number of seeds, whose medians are taken.")] = 3,
     world: Annotated[
         Path | None,
         typer.Option(
@@ -199,7 +200,7 @@ def score(
         simulator = opened.enter_context(Simulator(directory / CONFIG))
         other = None if world is None else opened.enter_context(Simulator(world, overrides=overrides(settings)))
         found = model.score(
-            simulator, targets=targets, seed=seed, world=other, scatter=scatter, processes=count_cores()
+            simulator, targets=targets, seed=seed, seeds=seeds, world=other, scatter=scatter, processes=count_cores()
         )
     write_score(directory, found)
     typer.echo(found.model_dump_json(indent=2) if json else "\n".join(_score_lines(found)))
@@ -366,7 +367,8 @@ def _numbers(values: Iterable[float]) -> str:
 
 def _score_lines(score: Score) -> list[str]:
     lines = [
-        f"throws at {format_count(score.targets, 'target')}, in simulation: median, 9 of 10 below, largest; not landed"
+        f"throws at {format_count(score.targets, 'target')} for each of {format_count(score.seeds, 'seed')}, medians of "
+        "the seeds, in simulation: median, 9 of 10 below, largest; not landed"
     ]
     lines += [f"  learned from {each.trained_on:5} throws:  {_error_cells(each.errors)}" for each in score.trained]
     if score.adapted:

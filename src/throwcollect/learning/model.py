@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -30,7 +31,7 @@ from throwcollect.learning.model_file import (
     TrainedOn,
     list_found,
 )
-from throwcollect.learning.score import Score
+from throwcollect.learning.score import Score, pool_scores
 from throwcollect.learning.scoring import Simulates, score_model
 from throwcollect.version import __version__
 
@@ -150,8 +151,9 @@ class Model:
         self,
         simulator: Simulates,
         *,
-        targets: int = 100,
+        targets: int = 40,
         seed: int = 0,
+        seeds: int = 3,
         world: Simulates | None = None,
         scatter: float = 0.0,
         processes: int = 1,
@@ -160,8 +162,9 @@ class Model:
 
         Args:
             simulator: Simulates the world of the dataset.
-            targets: Number of targets.
-            seed: Seed of their choice; models of one dataset get the same ones.
+            targets: Number of targets of each seed.
+            seed: The first seed of their choice; models of one dataset get the same ones.
+            seeds: Number of seeds, whose medians are taken.
             world: Simulates another world, in which the model is adapted by a few throws; None for none.
             scatter: Standard deviation of noise on what is measured of those throws, in the unit of the targets.
             processes: How many processes simulate.
@@ -170,23 +173,14 @@ class Model:
             ConfigError: If a number is out of its range.
             WorkerError: If a process of a simulator ends.
         """
-        if targets < 1:
-            raise ConfigError(f"targets: got {targets}", expected="1 or more")
-        if seed < 0:
-            raise ConfigError(f"seed: got {seed}", expected="0 or more")
+        for name, number, least in (("targets", targets, 1), ("seeds", seeds, 1), ("seed", seed, 0)):
+            if number < least:
+                raise ConfigError(f"{name}: got {number}", expected=f"{least} or more")
         _check_scatter(scatter)
         error, counts = self.file.trained_on.error, self.file.trained_on.latents_count
-        return score_model(
-            self.learned,
-            simulator,
-            count=targets,
-            seed=seed,
-            world=world,
-            scatter=scatter,
-            error=error,
-            latents_count=counts,
-            processes=processes,
-        )
+        score = partial(score_model, self.learned, simulator, count=targets, world=world, scatter=scatter)
+        score = partial(score, error=error, latents_count=counts, processes=processes)
+        return pool_scores([score(seed=each) for each in range(seed, seed + seeds)])
 
     def adapt(
         self,

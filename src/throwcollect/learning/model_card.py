@@ -152,7 +152,8 @@ def _describe_score(score: Score, file: ModelFile) -> list[str]:
     lines = [
         "## How it hits",
         "",
-        f"Distance from {targets} (seed {score.seed}), in simulation:",
+        f"Distance from {targets} for each of {format_count(score.seeds, 'seed')} (from {score.seed} on), medians of "
+        "the seeds; each draws targets, the throws that were learned from, and those in another world; in simulation:",
         "",
         "| learned from | median | 9 of 10 below | largest | did not succeed |",
         "|---|---|---|---|---|",
@@ -165,8 +166,8 @@ def _describe_score(score: Score, file: ModelFile) -> list[str]:
     if score.adapted:
         scatter = f", with a scatter of {_length(score.scatter, file)} of what is measured" if score.scatter else ""
         lines += [
-            f"In another world{scatter}, at the {score.adapted[0].errors.throws} of these targets that can be reached "
-            "there, in simulation:",
+            f"In another world{scatter}, at those of these targets that can be reached there, "
+            f"{format_count(score.adapted[0].errors.throws, 'throw')} for each row, in simulation:",
             "",
             "| throws there | differs by | median | 9 of 10 below | largest | did not succeed |",
             "|---|---|---|---|---|---|",
