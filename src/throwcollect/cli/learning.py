@@ -367,8 +367,8 @@ def _numbers(values: Iterable[float]) -> str:
 
 def _score_lines(score: Score) -> list[str]:
     lines = [
-        f"throws at {format_count(score.targets, 'target')} for each of {format_count(score.seeds, 'seed')}, medians of "
-        "the seeds, in simulation: median, 9 of 10 below, largest; not landed"
+        f"throws at {format_count(score.targets, 'target')} for each of {format_count(score.seeds, 'seed')}, medians "
+        "of the seeds, in simulation: median, 9 of 10 below, largest; not landed"
     ]
     lines += [f"  learned from {each.trained_on:5} throws:  {_error_cells(each.errors)}" for each in score.trained]
     if score.adapted:
