@@ -110,7 +110,7 @@ def digest(directory: Path) -> str:
                 f"digest {episode.digest}", path=directory, place=f"trial {trial}", expected=f"{said[trial]}"
             )
         digests.append(episode.digest)
-    combined = combine_digests(digests)
+    combined = combine_digests(digests, dataset.plan.trials.targets)
     if combined != dataset.digest:
         raise DatasetError(f"digest {combined}", path=directory, expected=f"{dataset.digest} as metadata.yaml says")
     return combined
