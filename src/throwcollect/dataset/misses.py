@@ -12,6 +12,7 @@ import pyarrow as pa
 from throwcollect.config.schema import Config
 from throwcollect.config.target import is_target
 from throwcollect.config.values import leaves
+from throwcollect.dataset.summary import MissSummary
 from throwcollect.sweep.arrow_column import nan_where_null
 from throwcollect.sweep.points import Targets
 from throwcollect.units import unit_of_name
@@ -24,6 +25,27 @@ def read_targets(throws: pa.Table) -> Targets | None:
         return None
     columns = [nan_where_null(throws[name].combine_chunks()) for name in names]
     return Targets(names, np.column_stack(columns))
+
+
+def summarise_misses(config: Config, throws: pa.Table) -> dict[str, MissSummary]:
+    """By how much trials missed their targets, by column of misses; empty if they have no targets.
+
+    Args:
+        config: Configuration of the dataset.
+        throws: The table of throws, or some rows of it.
+    """
+    targets = read_targets(throws)
+    if targets is None:
+        return {}
+    misses = Misses(config, targets.names)
+    found = {}
+    for name in misses.descriptions:
+        columns = [number for number, each in enumerate(misses.targets) if each.miss == name]
+        wanted = int((~np.isnan(targets.values[:, columns])).any(axis=1).sum())
+        values = throws[name].drop_null().to_numpy()
+        median, share90, largest = np.quantile(values, (0.5, 0.9, 1.0)).tolist() if len(values) else (None,) * 3
+        found[name] = MissSummary(wanted, len(values), median, share90, largest)
+    return found
 
 
 class Misses:
