@@ -267,7 +267,7 @@ def _describe_dataset(source: Source, features: dict[str, Feature], *, frames: i
 
 
 def _say_task(source: Source, target: Mapping[str, float]) -> str:
-    """What the robot is to do, in words, such as ``Throw the ball to x 1.40 m, y -0.20 m.``"""
+    """What the robot is to do, in words, such as ``Throw the ball to x 1.40 m, y -0.20 m``."""
     task = source.dataset.config.task
     said = "Throw the ball" if task.throws else task.name.replace("_", " ").capitalize()
     goal = [f"{each.word} {target[each.name]:.2f} {unit_of(each.name)}" for each in source.targets]

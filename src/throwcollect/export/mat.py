@@ -64,8 +64,8 @@ _FIELDS = (
     "- `targets(k, :)`: what the throw achieved. `d`: distance of the ball's centre at its landing from the vertical "
     "axis through the world's origin [m]; `h`: height of the landing plane [m]; `alpha`: direction of flight at the "
     "landing below the horizontal [rad]. `d` and `alpha` are NaN if the ball did not land.",
-    "- `wanted(k, :)`: where the throw should have ended, in columns that `wanted_names` names; only if all throws have a "
-    "target.",
+    "- `wanted(k, :)`: where the throw should have ended, in columns that `wanted_names` names; only if all throws "
+    "have a target.",
     "- `DMP{k}`: `N`, `dt`, `a_z`, `a_x`, `c`, `sigma_2`, `w` (N × n), `tau`, `goal`, `y0`, with which each joint y "
     "follows `tau z' = a_z (a_z / 4 (goal - y) - z) + f(x)`, `tau y' = z`, `tau x' = -a_x x`, "
     "`f(x) = sum(psi_i w_i) / sum(psi_i) x`, `psi_i = exp(-(x - c_i)² / (2 sigma_2_i))`, x(0) = 1. `fitted` is 0 if "

@@ -116,7 +116,7 @@ def _explain_targets(source: Source) -> list[str]:
     if not source.targets:
         return ["Not every throw has a target, so targets are in the table of all trials alone."]
     names = _quote([each.name for each in source.targets])
-    return [f"Every throw has a target: {names} are the same in all samples of a throw, for policies to condition on."]
+    return [f"Every throw has a target, {names}, which is the same in all its samples, for policies to condition on."]
 
 
 def tabulate_signals(source: Source, *, columns: bool = False) -> list[str]:

@@ -150,6 +150,8 @@ def _read_parquet(path: Path, config: Config) -> _Rows:
         column = table[field.name]
         if not (pa.types.is_floating(field.type) or pa.types.is_integer(field.type)):
             problems.append(Problem(f"should be a column of numbers, got {field.type}", field.name, path))
+            # Without it no row would have a whole target, which is no further mistake.
+            good &= not is_target(field.name)
             continue
         valid = column.is_valid().to_numpy()
         columns[field.name] = column.to_numpy()
