@@ -75,7 +75,9 @@ def test_aimed_throws_become_a_dataset_with_targets_and_misses(place: Path) -> N
     aim = call_here("aim", place / "model", "--at", target, "-o", place / "aimed.csv")
     assert aim.returncode == 0, aim.stderr
     x, y = map(float, target.split(","))
-    settings = ["--set", "sweep={sampler: list, file: aimed.csv}", "--set", "trials=null", "--set", "run.replay=0"]
+    (setting,) = re.findall(r'--set "(sweep=.*?)"', PAGE)
+    setting = setting.replace("$PWD/throws.csv", str(place / "aimed.csv"))
+    settings = ["--set", setting, "--set", "trials=null", "--set", "run.replay=0"]
     up = call_here("up", place / "throws.yaml", *settings, "--runtime", "inprocess", "--output", place / "aimed")
     assert up.returncode == 0, up.stderr
     assert re.search(r"^miss_m +1 of 1 target: median ", up.stdout, re.MULTILINE)
