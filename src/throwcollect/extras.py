@@ -36,6 +36,7 @@ EXTRA_OF = MappingProxyType(
         "matplotlib": "report",
         "mujoco": "mujoco",
         "orjson": "serve",
+        "pandas": "pandas",
         "plotly": "report",
         "uvicorn": "serve",
         "websockets": "serve",

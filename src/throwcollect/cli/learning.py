@@ -51,11 +51,11 @@ def fit(
     json: JsonOption = False,
 ) -> None:
     """Learn from a dataset where throws end, and which parameters lead to a target."""
-    from throwcollect.dataset.reader import load
+    from throwcollect.dataset.reader import Dataset
     from throwcollect.learning.model import fit
 
     model = fit(
-        load(dataset),
+        Dataset.open(dataset),
         kind=kind,
         targets=_split(targets),
         parameters=_split(parameters),
@@ -309,9 +309,9 @@ def _read_dataset(directory: Path, keys: Sequence[str], model: Model) -> list[di
         ConfigError: If it does not vary a key of the model, or is one of another robot.
         DatasetError: If it is damaged.
     """
-    from throwcollect.dataset.reader import load
+    from throwcollect.dataset.reader import Dataset
 
-    dataset = load(directory)
+    dataset = Dataset.open(directory)
     trained, config = model.file.trained_on, dataset.config
     if (config.robot.name, config.task.name) != (trained.robot, trained.task):
         raise ConfigError(

@@ -47,7 +47,7 @@ def no_plan(config: object) -> Plan:
 
 def test_throws_have_their_targets_and_miss_them_by_the_distance(targeted: Path) -> None:
     dataset = Dataset.open(targeted)
-    assert dataset.parameters == ("task.duration_s",)
+    assert dataset.plan.keys == ("task.duration_s",)
     names = dataset.throws.column_names
     assert names[:5] == ["trial", "task.duration_s", "target_x_m", "target_y_m", "outcome"]
     assert [throw.target for throw in dataset] == [
