@@ -78,6 +78,10 @@ def test_aimed_throws_become_a_dataset_with_targets_and_misses(place: Path) -> N
     (setting,) = re.findall(r'--set "(sweep=.*?)"', PAGE)
     setting = setting.replace("$PWD/throws.csv", str(place / "aimed.csv"))
     settings = ["--set", setting, "--set", "trials=null", "--set", "run.replay=0"]
+    plan = call_here("plan", place / "throws.yaml", *settings)
+    header, row = plan.stdout.splitlines()
+    assert header.endswith("  target_x_m  target_y_m")
+    assert row.split()[-2:] == [f"{x:.6g}", f"{y:.6g}"]
     up = call_here("up", place / "throws.yaml", *settings, "--runtime", "inprocess", "--output", place / "aimed")
     assert up.returncode == 0, up.stderr
     assert re.search(r"^miss_m +1 of 1 target: median ", up.stdout, re.MULTILINE)

@@ -185,7 +185,8 @@ def _check_columns(names: tuple[str, ...], path: Path, config: Config, *, line: 
         sentence = "has no column of a key, only targets" if names else "the file is empty"
         problems.append(Problem(sentence, "sweep.file", path))
     if problems:
-        raise ConfigError(problems, expected="dotted configuration keys as columns")
+        also = ", and targets as the task names them" if targets else ""
+        raise ConfigError(problems, expected=f"dotted configuration keys as columns{also}")
 
 
 def _find_target_problems(rows: _Rows, path: Path, config: Config) -> Iterator[Problem]:

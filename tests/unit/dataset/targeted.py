@@ -21,18 +21,19 @@ task.duration_s,target_y_m,target_x_m
 WITHOUT_TARGETS = "task.duration_s\n0.9\n1.0\n1.1\n1.2\n"
 
 
-def plan_targeted(directory: Path, text: str = LIST) -> Collection:
-    """The collection of a list, whose CSV file lies beside a directory."""
+def plan_targeted(directory: Path, text: str = LIST, *, height_m: float = 0.0) -> Collection:
+    """The collection of a list, whose CSV file lies beside a directory; the landing plane is at a height."""
     path = directory.with_suffix(".csv")
     path.write_text(text)
-    collection = Collection({"trials": None, "sweep": {"sampler": "list", "file": str(path)}})
+    sweep, scene = {"sampler": "list", "file": str(path)}, {"landing_height_m": height_m}
+    collection = Collection({"trials": None, "sweep": sweep, "scene": scene})
     collection.plan = replace(collection.plan, config=make_self_contained(collection.config))
     return collection
 
 
-def collect_targeted(directory: Path, text: str = LIST, *, change: Change | None = None) -> Path:
+def collect_targeted(directory: Path, text: str = LIST, *, height_m: float = 0.0, change: Change | None = None) -> Path:
     """A finished dataset of a list."""
-    collection = plan_targeted(directory, text)
+    collection = plan_targeted(directory, text, height_m=height_m)
     listed = read_points(directory.with_suffix(".csv"), collection.config)
     writer = DatasetWriter.create(directory, collection.plan, listed=listed)
     collection.fill(writer, range(len(collection.plan.trials)), change=change)

@@ -63,6 +63,8 @@ def test_throws_have_their_targets_and_miss_them_by_the_distance(targeted: Path)
             assert throw.miss_m == pytest.approx(away, rel=1e-12)
         else:
             assert throw.miss_m is None
+    for name in ("plan.parquet", "trials.parquet", "throws.parquet"):
+        assert pq.read_table(targeted / name)["target_y_m"].to_pylist() == [-0.1, None, 0.2, 0.1]
     assert verify(targeted) == []
 
 
@@ -87,7 +89,8 @@ def test_height_and_hit_angle_are_targets_too(tmp_path: Path) -> None:
     angles = [row["miss_hit_angle_rad"] for row in rows]
     assert angles[1] is None
     assert [angles[0], angles[2]] == pytest.approx([abs(rows[n]["hit_angle_rad"] - 1.2) for n in (0, 2)], rel=1e-12)
-    fixed = collect_targeted(tmp_path / "fixed", "task.duration_s,target_x_m,target_y_m,target_z_m\n1,1.4,0,0.3\n")
+    text = "task.duration_s,target_x_m,target_y_m,target_z_m\n1,1.4,0,0.5\n"
+    fixed = collect_targeted(tmp_path / "fixed", text, height_m=0.2)
     (row,) = Dataset.open(fixed).throws.to_pylist()
     assert row["miss_m"] == pytest.approx(np.sqrt((row["landing_x_m"] - 1.4) ** 2 + row["landing_y_m"] ** 2 + 0.09))
 
