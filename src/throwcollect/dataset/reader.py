@@ -337,8 +337,8 @@ class Dataset(Sequence[Throw]):
 
     @property
     def moving_joints(self) -> tuple[str, ...]:
-        """Joints that the task moves; all others hold still."""
-        return tuple(self.config.task.end)
+        """Joints that the task moves, in the order of `joints`, as exports have them; all others hold still."""
+        return tuple(joint for joint in self.joints if joint in self.config.task.end)
 
     @cached_property
     def _stored(self) -> Sequence[StoredThrow | None]:
