@@ -26,7 +26,7 @@ from throwcollect.dataset.guesses import DATASET, refuse_attribute
 from throwcollect.dataset.mcap_reader import open_mcap
 from throwcollect.dataset.named_array import Bounds, NamedArray, read_column, refuse_name
 from throwcollect.dataset.throw import Throw
-from throwcollect.dataset.throws_table import read_throws
+from throwcollect.dataset.throws_table import name_alias, read_throws
 from throwcollect.dataset.trajectories import Trajectories, read_trajectories
 from throwcollect.episode.channels import ROBOT_DESCRIPTION_ID
 from throwcollect.episode.chunk import Chunk
@@ -152,6 +152,11 @@ class Dataset(Sequence[Throw]):
                     values = self.plan.trials.values[:, index]
                     bounds.append((values.min(), values.max()))
         return NamedArray.of(self.throws, self.plan.keys, bounds)
+
+    @property
+    def aliases(self) -> Mapping[str, str]:
+        """Name without dots and with its unit of each swept key, such as ``task_end_arm_right_4_joint_rad``."""
+        return {key: name_alias(key) for key in self.plan.keys}
 
     @property
     def landings(self) -> NamedArray:
@@ -337,8 +342,8 @@ class Dataset(Sequence[Throw]):
 
     @property
     def moving_joints(self) -> tuple[str, ...]:
-        """Joints that the task moves; all others hold still."""
-        return tuple(self.config.task.end)
+        """Joints that the task moves, in the order of `joints`, as exports have them; all others hold still."""
+        return tuple(joint for joint in self.joints if joint in self.config.task.end)
 
     @cached_property
     def _stored(self) -> Sequence[StoredThrow | None]:

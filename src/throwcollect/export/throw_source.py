@@ -112,7 +112,7 @@ class Source:
             raise DatasetError(f"{directory}: none of its {len(dataset.throws)} trials has an episode to export")
         rate_hz = rate_hz or recorded_hz
         joints = dataset.joints
-        moving = tuple(joint for joint in joints if joint in dataset.config.task.end)
+        moving = dataset.moving_joints
         targets = _list_targets(dataset)
         return cls(
             dataset,
