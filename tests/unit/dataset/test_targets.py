@@ -17,7 +17,10 @@ from tests.unit.dataset.mutations import fit_manifest
 from tests.unit.dataset.targeted import LIST, WITHOUT_TARGETS, collect_targeted, plan_targeted
 
 from throwcollect.cli.dataset.info import describe
+from throwcollect.config.schema import Config
+from throwcollect.config.target import TargetColumn
 from throwcollect.dataset.inspect import digest, info
+from throwcollect.dataset.misses import Misses
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.rebuild import rebuild
 from throwcollect.dataset.repair import repair
@@ -30,6 +33,7 @@ from throwcollect.errors import ConfigError
 from throwcollect.export.throw_source import Source
 from throwcollect.sweep.parquet_file import encode_table
 from throwcollect.sweep.plan import Plan
+from throwcollect.tasks.throw.config import ThrowConfig
 
 
 @pytest.fixture(scope="module")
@@ -93,6 +97,19 @@ def test_height_and_hit_angle_are_targets_too(tmp_path: Path) -> None:
     fixed = collect_targeted(tmp_path / "fixed", text, height_m=0.2)
     (row,) = Dataset.open(fixed).throws.to_pylist()
     assert row["miss_m"] == pytest.approx(np.sqrt((row["landing_x_m"] - 1.4) ** 2 + row["landing_y_m"] ** 2 + 0.09))
+
+
+def test_a_task_says_what_its_targets_are_and_what_they_are_compared_with() -> None:
+    class Timed(ThrowConfig):
+        target_columns = (
+            TargetColumn("target_flight_s", "flight_time_s", "miss_s", "flight", "Time [s].", required=True),
+        )
+
+    misses = Misses(Config().model_copy(update={"task": Timed()}), ["target_flight_s"])
+    assert misses.descriptions == {"miss_s": "Distance of where the trial ended from its target, in flight [s]."}
+    assert misses.measure({"target_flight_s": 0.75}, {"flight_time_s": 0.5}) == {"miss_s": 0.25}
+    assert misses.measure({"target_flight_s": 0.75}, {"flight_time_s": None}) == {"miss_s": None}
+    assert misses.measure({}, {"flight_time_s": 0.5}) == {"miss_s": None}
 
 
 def test_no_episode_depends_on_its_target_and_the_digest_of_the_dataset_does(targeted: Path, tmp_path: Path) -> None:
