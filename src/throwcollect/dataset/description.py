@@ -11,6 +11,7 @@ from throwcollect.dataset.bag import FileSummary, dataset_metadata
 from throwcollect.dataset.digest import combine_digests
 from throwcollect.dataset.directory import CONFIG, MANIFEST, METADATA, PLAN, SOURCES, THROWS, TRIALS
 from throwcollect.dataset.manifest import FileEntry, entry_of, entry_of_file, manifest_text
+from throwcollect.dataset.misses import read_targets
 from throwcollect.episode.channels import Channels
 from throwcollect.files import replacing, write_all, write_file
 from throwcollect.sweep.parquet_file import encode_pieces
@@ -43,7 +44,7 @@ def write_description(
     Raises:
         DatasetError: If a file cannot be read or written.
     """
-    digest = combine_digests(_digests(throws, on_piece))
+    digest = combine_digests(_digests(throws, on_piece), read_targets(throws))
     metadata = dataset_metadata([summary for summary, _ in recordings], channels.all, digest).encode()
     with replacing(directory / THROWS) as descriptor:
         waiting = bytearray()

@@ -12,6 +12,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from throwcollect.config.target import is_target
 from throwcollect.dataset.columns import COLUMNS, TIMES, Column, Recorded, empty_columns, fill, name_components
 from throwcollect.dataset.guesses import THROW, refuse_attribute
 from throwcollect.dataset.named_array import refuse_name
@@ -300,6 +301,17 @@ class Throw:
     def parameters(self) -> dict[str, float]:
         """Value of each swept key, in the key's unit."""
         return {key: self.row[key] for key in self._keys}
+
+    @property
+    def target(self) -> dict[str, float]:
+        """Where it should end, by column of the table such as ``target_x_m``; empty if nobody said so."""
+        return {name: value for name, value in self.row.items() if is_target(name) and value is not None}
+
+    @property
+    def miss_m(self) -> float | None:
+        """Distance of the landing from the target [m]; None if it has no target, or nothing landed."""
+        miss: float | None = self.row.get("miss_m")
+        return miss
 
     @property
     def outcome(self) -> str:

@@ -12,6 +12,7 @@ import pyarrow as pa
 from throwcollect.config.schema import Config
 from throwcollect.config.shape import unit_of_key
 from throwcollect.dataset.directory import THROWS
+from throwcollect.dataset.misses import Misses
 from throwcollect.errors import DatasetError
 from throwcollect.sweep.arrow_column import make_table
 from throwcollect.sweep.parquet_file import read_parquet
@@ -92,10 +93,12 @@ class ThrowsTable:
     Args:
         parameters: Swept dotted configuration keys, in the order of their columns.
         config: Configuration of the collection.
+        targets: Columns of targets.
     """
 
-    def __init__(self, parameters: Sequence[str], config: Config) -> None:
+    def __init__(self, parameters: Sequence[str], config: Config, targets: Sequence[str] = ()) -> None:
         self._parameters = tuple(parameters)
+        self._misses = Misses(config, targets)
         task = task_of(config)
         self._outcomes = task.outcomes
         self._columns = task.columns
@@ -104,9 +107,11 @@ class ThrowsTable:
             [
                 _field("trial", pa.int64(), "Number of the trial."),
                 *map(_describe_swept, parameters),
+                *(_field(each.name, pa.float64(), each.description) for each in self._misses.targets),
                 _field("outcome", pa.string(), f"{', '.join(each.value for each in task.outcomes)} or {REFUSED}."),
                 _field("reason", pa.string(), task.reasons),
                 *(_field(each.name, _KINDS[each.kind], each.description) for each in self._columns.columns),
+                *(_field(name, pa.float64(), text) for name, text in self._misses.descriptions.items()),
                 _field("shard", pa.string(), "MCAP file that holds the episode; null when there is none."),
                 _field("chunk_offset", pa.int64(), "Where the episode's chunk begins in that file [bytes]."),
                 _field("samples", pa.int64(), "Number of samples of the episode."),
@@ -117,7 +122,7 @@ class ThrowsTable:
     @classmethod
     def of(cls, plan: Plan) -> ThrowsTable:
         """The table of a plan's trials."""
-        return cls(plan.keys, plan.config)
+        return cls(plan.keys, plan.config, plan.trials.target_names)
 
     def row(self, trial: Trial, result: Result, place: Place | None) -> Row:
         """Row of a trial that was run.
@@ -129,6 +134,7 @@ class ThrowsTable:
         """
         row = self._start_row(trial, result.outcome.value, result.reason)
         row.update(self._columns.write(result))
+        row.update(self._misses.measure(trial.target, row))
         if place is not None:
             row.update(vars(place))
         return row
@@ -148,7 +154,7 @@ class ThrowsTable:
 
     def _start_row(self, trial: Trial, outcome: str, reason: str | None) -> Row:
         values = {key: trial.values[key] for key in self._parameters}
-        return {"trial": trial.number, **values, "outcome": outcome, "reason": reason}
+        return {"trial": trial.number, **values, **trial.target, "outcome": outcome, "reason": reason}
 
     def table(self, rows: Iterable[Row]) -> pa.Table:
         """Rows, in the given order, as an Arrow table; what a row lacks is null."""

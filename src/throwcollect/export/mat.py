@@ -65,6 +65,8 @@ _FIELDS = (
     "- `targets(k, :)`: what the throw achieved. `d`: distance of the ball's centre at its landing from the vertical "
     "axis through the world's origin [m]; `h`: height of the landing plane [m]; `alpha`: direction of flight at the "
     "landing below the horizontal [rad]. `d` and `alpha` are NaN if the ball did not land.",
+    "- `wanted(k, :)`: where the throw should have ended, in columns that `wanted_names` names; only if all throws "
+    "have a target.",
     "- `DMP{k}`: `N`, `dt`, `a_z`, `a_x`, `c`, `sigma_2`, `w` (N × n), `tau`, `goal`, `y0`, with which each joint y "
     "follows `tau z' = a_z (a_z / 4 (goal - y) - z) + f(x)`, `tau y' = z`, `tau x' = -a_x x`, "
     "`f(x) = sum(psi_i w_i) / sum(psi_i) x`, `psi_i = exp(-(x - c_i)² / (2 sigma_2_i))`, x(0) = 1. `fitted` is 0 if "
@@ -146,11 +148,13 @@ def _gather_throws(
     plan = source.dataset.plan
     moving = [source.joints.index(joint) for joint in source.moving]
     paths, motions, targets, measured, balls = [], [], [], [], []
+    wanted: list[Mapping[str, float]] = []
     for throw in source.throws(entries):
         config = plan.config_of(plan.trial(throw.trial))
         paths.append(_sample_path(throw.trajectory, source.rate_hz))
         motions.append((throw.trajectory, config.task))
         targets.append(_measure_target(landings[throw.trial], config))
+        wanted.append(throw.target)
         measured.append(
             _stack_signals(throw, "joint_position_rad", "joint_velocity_radps", "joint_effort_nm", of=moving)
         )
@@ -163,11 +167,20 @@ def _gather_throws(
         },
         "qPath": _to_cell(paths),
         "targets": np.array(targets),
+        **_list_wanted(source, wanted),
         "DMP": _to_cell(_describe_primitives(motions, source.rate_hz)),
         "trial": np.array([[float(entry.trial)] for entry in entries]),
         "measured": _to_cell(measured),
         "ball": _to_cell(balls),
     }
+
+
+def _list_wanted(source: Source, wanted: Sequence[Mapping[str, float]]) -> dict[str, Any]:
+    """Fields of the targets of throws; none if they have none."""
+    if not source.targets:
+        return {}
+    names = [each.name for each in source.targets]
+    return {"wanted": np.array([[each[name] for name in names] for each in wanted]), "wanted_names": _to_cell(names)}
 
 
 def _sample_path(trajectory: JointTrajectory, rate_hz: int) -> NDArray[np.float64]:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from throwcollect.config.shape import unit_of_key
+from throwcollect.config.target import TargetColumn
 from throwcollect.dataset.columns import name_components
 
 _ASCII = str.maketrans({"²": "^2", "³": "^3"})
@@ -54,12 +55,13 @@ class Signal:
         return self.components or (self.name,)
 
 
-def list_signals(joints: Sequence[str], moving: Sequence[str]) -> tuple[Signal, ...]:
+def list_signals(joints: Sequence[str], moving: Sequence[str], targets: Sequence[TargetColumn]) -> tuple[Signal, ...]:
     """Describe all signals of an exported throw.
 
     Args:
         joints: All joints of the robot.
         moving: Joints that the task moves.
+        targets: Columns of targets, which are the same in all samples of a throw.
     """
     every = f"{len(joints)} joints"
     return (
@@ -78,6 +80,7 @@ def list_signals(joints: Sequence[str], moving: Sequence[str]) -> tuple[Signal, 
         _describe_ball(
             "ball_angular_velocity_radps", "Angular velocity of the ball in world.", "ball.angular_velocity", "xyz"
         ),
+        *(Signal(each.name, each.description, (each.name,), "target", each.name) for each in targets),
     )
 
 
