@@ -68,7 +68,10 @@ def describe(found: Info) -> str:
     }
     if found.wall_s:
         speed = found.episodes / found.wall_s
-        lines["took"] = f"{found.wall_s:.1f} s, {speed:.1f} {found.noun}s/s, start-up included"
+        factor = found.duration_s / found.wall_s
+        lines["took"] = (
+            f"{found.wall_s:.1f} s, {speed:.1f} {found.noun}s/s, {factor:.1f} x real time, start-up included"
+        )
     if isinstance(found, Summary) and found.open:
         lines["open"] = "anybody who reached the router could join, read and disturb the run"
     width = max(map(len, lines))
