@@ -37,6 +37,7 @@ EXTRA_OF = MappingProxyType(
         "mujoco": "mujoco",
         "onnx": "onnx",
         "orjson": "serve",
+        "pandas": "pandas",
         "plotly": "report",
         "uvicorn": "serve",
         "websockets": "serve",

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+import throwcollect
 from tests.e2e.collection import call_here
 
 ROOT = Path(__file__).parents[2]
@@ -67,6 +68,28 @@ def test_targets_become_a_list_of_throws_and_these_adapt_a_model(place: Path) ->
     assert re.search(r"landing_x_m: 0\.(1[5-9]|2[0-4])", adapt.stdout)
     same = call_here("adapt", place / "model", place / "data", "-o", place / "same")
     assert re.match(r"\d\d throws; what differs: none", same.stdout), same.stdout + same.stderr
+
+
+def test_aimed_throws_become_a_dataset_with_targets_and_misses(place: Path) -> None:
+    target = middle(place)
+    aim = call_here("aim", place / "model", "--at", target, "-o", place / "aimed.csv")
+    assert aim.returncode == 0, aim.stderr
+    x, y = map(float, target.split(","))
+    (setting,) = re.findall(r'--set "(sweep=.*?)"', PAGE)
+    setting = setting.replace("$PWD/throws.csv", str(place / "aimed.csv"))
+    settings = ["--set", setting, "--set", "trials=null", "--set", "run.replay=0"]
+    plan = call_here("plan", place / "throws.yaml", *settings)
+    header, row = plan.stdout.splitlines()
+    assert header.endswith("  target_x_m  target_y_m")
+    assert row.split()[-2:] == [f"{x:.6g}", f"{y:.6g}"]
+    up = call_here("up", place / "throws.yaml", *settings, "--runtime", "inprocess", "--output", place / "aimed")
+    assert up.returncode == 0, up.stderr
+    assert re.search(r"^miss_m +1 of 1 target: median ", up.stdout, re.MULTILINE)
+    (throw,) = throwcollect.load(place / "aimed")
+    assert throw.target == {"target_x_m": x, "target_y_m": y}
+    alone = call_here("throw", place / "throws.yaml", "--list", place / "aimed.csv")
+    assert f"miss_m {throw.miss_m:.6f}" in alone.stdout
+    assert throw.miss_m < 0.03
 
 
 def test_a_score_tells_how_throws_hit_here_and_elsewhere(place: Path) -> None:

@@ -55,13 +55,13 @@ def fit(
     json: JsonOption = False,
 ) -> None:
     """Learn from a dataset where throws end, and which parameters lead to a target."""
-    from throwcollect.dataset.reader import load
+    from throwcollect.dataset.reader import Dataset
     from throwcollect.learning.model import fit
 
     if onnx:
         require("onnx")
     model = fit(
-        load(dataset),
+        Dataset.open(dataset),
         kind=kind,
         targets=_split(targets),
         parameters=_split(parameters),
@@ -105,7 +105,10 @@ def aim(
     json: JsonOption = False,
 ) -> None:
     """Find parameters of throws at targets."""
+    from throwcollect.cli.aimed_list import write_aims
+    from throwcollect.config.loader import load as load_config
     from throwcollect.learning.model import load_model
+    from throwcollect.learning.model_directory import CONFIG
 
     model = load_model(directory)
     names = (*model.targets, *model.given)
@@ -123,7 +126,7 @@ def aim(
         for each in aims:
             typer.echo(" ".join(f"--set {key}={value!r}" for key, value in each.parameters.items()))
     if output is not None:
-        _write_table(output, [each.parameters for each in aims])
+        write_aims(output, aims, names, load_config(directory / CONFIG).task)
     if unreached := [each for each in aims if not each.reachable]:
         for each in unreached:
             typer.echo(
@@ -146,14 +149,17 @@ def throw(
     from throwcollect.sweep.point_file import read_points
 
     with Simulator(path, overrides=overrides(settings)) as simulator:
-        rows: Sequence[dict[str, float]] = [{}]
+        rows: Sequence[tuple[dict[str, float], dict[str, float]]] = [({}, {})]
         if points is not None:
             read = read_points(points, simulator.config)
-            rows = [dict(zip(read.keys, values, strict=True)) for values in read.values.tolist()]
+            drawn = (dict(zip(read.keys, values, strict=True)) for values in read.values.tolist())
+            rows = [(row, read.targets.row(number) if read.targets else {}) for number, row in enumerate(drawn)]
+        measures = simulator.config.task.targets
+        measures += tuple(dict.fromkeys(each.miss for each in simulator.config.task.target_columns))
         refused = 0
-        for number, values in enumerate(rows):
+        for number, (values, target) in enumerate(rows):
             try:
-                found = simulator.throw(values, trial=number)
+                found = simulator.throw(values, trial=number, target=target)
             except PlanError as error:
                 if points is None:
                     raise
@@ -163,9 +169,7 @@ def throw(
             if json:
                 typer.echo(jsonlib.dumps(found.row, default=str))
                 continue
-            ends = ", ".join(
-                f"{name} {found.row[name]:.6f}" for name in _list_measured(found.row, simulator.config.task.targets)
-            )
+            ends = ", ".join(f"{name} {found.row[name]:.6f}" for name in _list_measured(found.row, measures))
             typer.echo(f"throw {number}: {found.outcome}" + (f": {ends}" if ends else f": {found.reason}"))
     if refused:
         raise typer.Exit(1)
@@ -314,9 +318,9 @@ def _read_dataset(directory: Path, keys: Sequence[str], model: Model) -> list[di
         ConfigError: If it does not vary a key of the model, or is one of another robot.
         DatasetError: If it is damaged.
     """
-    from throwcollect.dataset.reader import load
+    from throwcollect.dataset.reader import Dataset
 
-    dataset = load(directory)
+    dataset = Dataset.open(directory)
     trained, config = model.file.trained_on, dataset.config
     if (config.robot.name, config.task.name) != (trained.robot, trained.task):
         raise ConfigError(
@@ -330,21 +334,6 @@ def _read_dataset(directory: Path, keys: Sequence[str], model: Model) -> list[di
         )
     rows: list[dict[str, float]] = throws.select([*keys, *model.targets]).to_pylist()
     return rows
-
-
-def _write_table(path: Path, rows: Sequence[dict[str, float]]) -> None:
-    """Write a CSV file that the sampler `list` reads.
-
-    Raises:
-        ConfigError: If it cannot be written.
-    """
-    try:
-        with path.open("w", encoding="utf-8", newline="") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(rows[0])
-            writer.writerows([map(repr, row.values()) for row in rows])
-    except OSError as error:
-        raise ConfigError(f"{path}: cannot be written: {error.strerror}") from error
 
 
 def _list_measured(row: dict[str, object], names: Sequence[str]) -> list[str]:

@@ -30,7 +30,7 @@ _SMALL_STEP = 1e-5
 """After a step that is smaller [scaled, or m or rad], nothing would change that anybody could measure."""
 _THROWS_FOR_BIAS = 3
 _CLEARLY = 3.0
-"""A single miss that is so many times as large as what is expected is no accident."""
+"""Misses that get smaller by so much are no accident: in squares, by those of so many standard deviations."""
 
 
 class Method(str, Enum):
@@ -102,7 +102,7 @@ def adapt(
     after = np.empty(0)
     if len(places) > 1:
         after = _predict_by_others(learned, chosen, throws, scatter, found)
-    helps = _mean_square(after) < _mean_square(before) if len(after) else before[0] > _CLEARLY * scatter
+    helps = float((before**2).sum() - (after**2).sum()) > (_CLEARLY * scatter) ** 2
     if method is None and not helps:
         return Adaptation(Method.NONE, learned.correction, np.empty(0), before, before if len(after) else after)
     return Adaptation(chosen, _shift(learned.correction, chosen, found), deviations, before, after)
@@ -212,7 +212,3 @@ def _shift(begun: Correction, method: Method, found: Array) -> Correction:
 def _distances(learned: LearnedMap, parameters: Array, context: Array, places: Array) -> Array:
     distances: Array = np.sqrt(((learned.predict(parameters, context) - places) ** 2).sum(axis=1))
     return distances
-
-
-def _mean_square(distances: Array) -> float:
-    return float((distances**2).mean())
