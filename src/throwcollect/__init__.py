@@ -11,8 +11,9 @@ from throwcollect.version import __version__
 if TYPE_CHECKING:
     from throwcollect.config.loader import load as load_config
     from throwcollect.config.schema import Config
-    from throwcollect.dataset.reader import Dataset, load
+    from throwcollect.dataset.reader import Dataset
     from throwcollect.dataset.throw import Throw
+    from throwcollect.dataset.unfinished import UnfinishedDatasetWarning, load
     from throwcollect.derive.selection import filter_trials as filter_dataset
     from throwcollect.derive.selection import merge as merge_datasets
     from throwcollect.derive.selection import sample as sample_dataset
@@ -39,6 +40,7 @@ __all__ = [
     "Simulator",
     "Throw",
     "ThrowcollectError",
+    "UnfinishedDatasetWarning",
     "WorkerError",
     "__version__",
     "compute_statistics",
@@ -67,12 +69,13 @@ _PLACES = {
     "Simulator": "simulator:Simulator",
     "Throw": "dataset.throw:Throw",
     "ThrowcollectError": "errors:ThrowcollectError",
+    "UnfinishedDatasetWarning": "dataset.unfinished:UnfinishedDatasetWarning",
     "WorkerError": "errors:WorkerError",
     "compute_statistics": "derive.statistics:statistics",
     "export_dataset": "export.formats:export",
     "filter_dataset": "derive.selection:filter_trials",
     "fit": "learning.model:fit",
-    "load": "dataset.reader:load",
+    "load": "dataset.unfinished:load",
     "load_config": "config.loader:load",
     "load_model": "learning.model:load_model",
     "merge_datasets": "derive.selection:merge",

@@ -234,7 +234,7 @@ def sync_directory(directory: Path) -> None:
         os.close(descriptor)
 
 
-def write_all(descriptor: int, data: bytes) -> None:
+def write_all(descriptor: int, data: bytes | bytearray) -> None:
     """Write all bytes, however many calls it takes.
 
     Raises:

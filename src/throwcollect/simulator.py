@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
 from types import TracebackType
 
@@ -26,7 +27,7 @@ from throwcollect.files import StrPath
 from throwcollect.replay.throw import Replayer
 from throwcollect.side_by_side import work_side_by_side
 from throwcollect.sweep.plan import make_trials, refusal
-from throwcollect.sweep.points import Points
+from throwcollect.sweep.points import Points, Targets
 from throwcollect.sweep.trials import Trial
 
 # Whoever takes the name hears what is missing, and not who simulates with it later.
@@ -75,7 +76,7 @@ class Simulator:
         """Free the physics engine; nothing can be simulated afterwards."""
         self._replayer.close()
 
-    def throw(self, values: Point | None = None, *, trial: int = 0) -> Throw:
+    def throw(self, values: Point | None = None, *, trial: int = 0, target: Point | None = None) -> Throw:
         """Simulate one throw.
 
         Args:
@@ -83,19 +84,28 @@ class Simulator:
                 ``{"task.duration_s": 1.1}``.
             trial: Number of the trial, from 0. The clock of a later trial shows a later time, which is in the stamps
                 and in the digest; nothing else depends on the number.
+            target: Where it should end, such as ``{"target_x_m": 1.4, "target_y_m": -0.2}``; the throw then says by how
+                much it missed, and is the same otherwise.
 
         Returns:
             The throw, as `throwcollect.load` gives it; it is in no shard.
 
         Raises:
-            ConfigError: If a key cannot vary, or a value is out of its range.
+            ConfigError: If a key cannot vary, a value is out of its range, or the task has no such target.
             PlanError: If the plan of a collection would refuse it, for the reason that it would have.
         """
         if trial < 0:
             raise ConfigError(f"trial {trial}: there is no such trial", expected="a number from 0")
         point = dict(values or {})
+        wrong = self.config.task.find_wrong_targets(target or {})
+        wrong |= {
+            name: f"should be a number, got {each}" for name, each in (target or {}).items() if not isfinite(each)
+        }
+        if wrong:
+            raise ConfigError([Problem(reason, key=name) for name, reason in wrong.items()])
         refused = self.find_refusal(point)
-        points = Points(tuple(point), np.array([list(point.values())], np.float64).reshape(1, len(point)))
+        wanted = None if target is None else Targets(tuple(target), _row(target))
+        points = Points(tuple(point), _row(point), wanted)
         (planned,) = make_trials(self.config, points, first=trial)
         if refused is not None:
             raise PlanError([Problem(refused)], hint="a collection would leave this trial out, as refused")
@@ -150,10 +160,15 @@ class Simulator:
     def _throw(self, trial: Trial) -> Throw:
         episode = self._replayer.run(trial)
         keys = tuple(trial.values)
-        table = ThrowsTable(keys, self.config)
+        table = ThrowsTable(keys, self.config, tuple(trial.target))
         row = table.row(trial, judge_episode(with_values(self.config, trial.values), episode), None)
         row |= {"samples": episode.header.samples, "digest": episode.digest}
         return Throw(table.table([row]), 0, keys, _Simulated(episode), self._source)
+
+
+def _row(values: Point) -> NDArray[np.float64]:
+    """Values as the only row of a table, shape ``(1, n_values)``."""
+    return np.array([list(values.values())], np.float64).reshape(1, len(values))
 
 
 @dataclass(frozen=True)

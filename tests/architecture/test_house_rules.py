@@ -93,7 +93,6 @@ HARMLESS = {
     "sim/urdf.py": {"np.linalg.norm", "np.linalg.eigh", "@"},  # whether a model can be spawned
     "tasks/dmp.py": {"np.linalg.lstsq"},  # weights for a YAML file
     "tasks/free_flight.py": {"np.linalg.norm"},  # `verify` compares with it
-    "tasks/throw/flight.py": {"np.linalg.norm"},  # a distance that is compared with a tolerance
 }
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import random
 import signal
@@ -13,6 +14,7 @@ import docker
 import pytest
 
 from tests.e2e.collection import FAST, Running, call, call_here, collect_here, fingerprints, start, write_config
+from throwcollect.runtimes.docker.image import default_tag
 from throwcollect.runtimes.docker.options import KEY_LABEL
 
 pytestmark = [pytest.mark.docker, pytest.mark.usefixtures("client")]
@@ -120,6 +122,8 @@ def test_containers_get_nothing_that_they_do_not_need_and_the_files_are_those_of
     code, _, err = running.finish()
     assert code == 0, err
     assert fingerprints(directory) == expected
+    provenance = json.loads((directory / "provenance.json").read_text(encoding="utf-8"))
+    assert provenance["image"] == engine.images.get(default_tag()).id
     assert {path.stat().st_uid for path in directory.rglob("*")} == {os.getuid()}
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+import throwcollect
 from tests.e2e.collection import call_here
 
 ROOT = Path(__file__).parents[2]
@@ -69,9 +70,31 @@ def test_targets_become_a_list_of_throws_and_these_adapt_a_model(place: Path) ->
     assert re.match(r"\d\d throws; what differs: none", same.stdout), same.stdout + same.stderr
 
 
+def test_aimed_throws_become_a_dataset_with_targets_and_misses(place: Path) -> None:
+    target = middle(place)
+    aim = call_here("aim", place / "model", "--at", target, "-o", place / "aimed.csv")
+    assert aim.returncode == 0, aim.stderr
+    x, y = map(float, target.split(","))
+    (setting,) = re.findall(r'--set "(sweep=.*?)"', PAGE)
+    setting = setting.replace("$PWD/throws.csv", str(place / "aimed.csv"))
+    settings = ["--set", setting, "--set", "trials=null", "--set", "run.replay=0"]
+    plan = call_here("plan", place / "throws.yaml", *settings)
+    header, row = plan.stdout.splitlines()
+    assert header.endswith("  target_x_m  target_y_m")
+    assert row.split()[-2:] == [f"{x:.6g}", f"{y:.6g}"]
+    up = call_here("up", place / "throws.yaml", *settings, "--runtime", "inprocess", "--output", place / "aimed")
+    assert up.returncode == 0, up.stderr
+    assert re.search(r"^miss_m +1 of 1 target: median ", up.stdout, re.MULTILINE)
+    (throw,) = throwcollect.load(place / "aimed")
+    assert throw.target == {"target_x_m": x, "target_y_m": y}
+    alone = call_here("throw", place / "throws.yaml", "--list", place / "aimed.csv")
+    assert f"miss_m {throw.miss_m:.6f}" in alone.stdout
+    assert throw.miss_m < 0.03
+
+
 def test_a_score_tells_how_throws_hit_here_and_elsewhere(place: Path) -> None:
     other = ["--config", place / "throws.yaml", "--set", "scene.gravity_mps2=8.5"]
-    found = call_here("score", place / "model", "--targets", "5", *other, "--json")
+    found = call_here("score", place / "model", "--targets", "5", "--seeds", "2", *other, "--json")
     assert found.returncode == 0, found.stderr
     score = json.loads(found.stdout)
     assert score["trained"][-1]["errors"]["median"] < 0.03
@@ -94,6 +117,7 @@ def test_a_score_tells_how_throws_hit_here_and_elsewhere(place: Path) -> None:
         (["fit", "data", "-o", "new", "--where", "trial < 5"], "at least 18 for 5 parameters"),
         (["adapt", "model", "model/config.yaml", "-o", "new"], "no column"),
         (["score", "model", "--targets", "0"], "targets: got 0"),
+        (["score", "model", "--seeds", "0"], "seeds: got 0"),
         (["score", "model", "--seed", "-1"], "seed: got -1"),
         (["score", "model", "--set", "ball.mass_kg=1"], "--config CONFIG"),
         (["throw", "throws.yaml", "--set", "task.duration_s=0.2"], "its limit is 1.76 rad/s"),

@@ -70,12 +70,11 @@ def test_mixed_trials_in_any_order_equal_the_same_trials_in_a_new_world(trials, 
 
     rng = random.Random(6)
     one = thrower()
-    for _ in range(2):
-        # Some several times in a row: then the start state comes from what was kept of the trial before.
-        order = [number for number in range(TRIALS) for _ in range(rng.choice([1, 1, 3]))]
-        rng.shuffle(order)
-        for number in [*order, *sorted(order)]:
-            assert digest(one, trials[number]) == alone[number], f"trial {number} depends on what was before"
+    # Some several times in a row: then the start state comes from what was kept of the trial before.
+    order = [number for number in range(TRIALS) for _ in range(rng.choice([1, 1, 3]))]
+    rng.shuffle(order)
+    for number in [*order, *range(TRIALS)]:
+        assert digest(one, trials[number]) == alone[number], f"trial {number} depends on what was before"
 
 
 def test_other_tools_and_locked_joints_in_between_leave_no_trace(trials, thrower):

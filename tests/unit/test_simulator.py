@@ -49,6 +49,30 @@ def test_a_throw_has_all_that_one_of_a_dataset_has(simulator: Simulator) -> None
     assert repr(throw).startswith("Throw(0: landed at x = ")
 
 
+def test_a_throw_at_a_target_is_the_same_and_says_by_how_much_it_missed(simulator: Simulator) -> None:
+    plain = simulator.throw(POINT)
+    throw = simulator.throw(POINT, target={"target_x_m": 1.4, "target_y_m": -0.2})
+    assert throw.target == {"target_x_m": 1.4, "target_y_m": -0.2}
+    assert throw.miss_m == pytest.approx(
+        np.hypot(throw.row["landing_x_m"] - 1.4, throw.row["landing_y_m"] + 0.2), rel=1e-12
+    )
+    assert {name: value for name, value in throw.row.items() if name in plain.row} == plain.row
+    assert (plain.target, plain.miss_m) == ({}, None)
+
+
+@pytest.mark.parametrize(
+    ("target", "sentence"),
+    [
+        ({"target_x_m": 1.4}, "target_y_m: is missing beside target_x_m"),
+        ({"target_x_m": 1.4, "target_y_m": float("nan")}, "target_y_m: should be a number, got nan"),
+        ({"x": 1.4}, "x: the task throw has no such target"),
+    ],
+)
+def test_what_is_no_target_is_told(simulator: Simulator, target: dict[str, float], sentence: str) -> None:
+    with pytest.raises(ConfigError, match=sentence):
+        simulator.throw(POINT, target=target)
+
+
 def test_several_processes_give_the_same_throws(simulator: Simulator) -> None:
     points = [POINT, {}, {"task.duration_s": 1.2}]
     alone = [throw.row for throw in simulator.throw_many(points)]

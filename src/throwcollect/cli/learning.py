@@ -13,6 +13,7 @@ import typer
 
 from throwcollect.cli.options import ConfigArgument, DatasetArgument, JsonOption, SetOption, overrides
 from throwcollect.errors import ConfigError, PlanError
+from throwcollect.extras import require
 from throwcollect.side_by_side import count_cores
 from throwcollect.wording import command, format_count, join_names
 
@@ -48,20 +49,27 @@ def fit(
     where: Annotated[
         str | None, typer.Option("--where", metavar="CONDITION", help="Learn from throws of this kind alone.")
     ] = None,
+    onnx: Annotated[
+        bool, typer.Option("--onnx", help="Write model.onnx, too: target to parameters, for a robot's controller.")
+    ] = False,
     json: JsonOption = False,
 ) -> None:
     """Learn from a dataset where throws end, and which parameters lead to a target."""
-    from throwcollect.dataset.reader import load
+    from throwcollect.dataset.reader import Dataset
     from throwcollect.learning.model import fit
 
+    if onnx:
+        require("onnx")
     model = fit(
-        load(dataset),
+        Dataset.open(dataset),
         kind=kind,
         targets=_split(targets),
         parameters=_split(parameters),
         given=_split(given),
         where=where,
     )
+    if onnx:
+        model = model.distil()
     model.save(output)
     trained = model.file.trained_on
     if json:
@@ -97,7 +105,10 @@ def aim(
     json: JsonOption = False,
 ) -> None:
     """Find parameters of throws at targets."""
+    from throwcollect.cli.aimed_list import write_aims
+    from throwcollect.config.loader import load as load_config
     from throwcollect.learning.model import load_model
+    from throwcollect.learning.model_directory import CONFIG
 
     model = load_model(directory)
     names = (*model.targets, *model.given)
@@ -115,7 +126,7 @@ def aim(
         for each in aims:
             typer.echo(" ".join(f"--set {key}={value!r}" for key, value in each.parameters.items()))
     if output is not None:
-        _write_table(output, [each.parameters for each in aims])
+        write_aims(output, aims, names, load_config(directory / CONFIG).task)
     if unreached := [each for each in aims if not each.reachable]:
         for each in unreached:
             typer.echo(
@@ -138,14 +149,17 @@ def throw(
     from throwcollect.sweep.point_file import read_points
 
     with Simulator(path, overrides=overrides(settings)) as simulator:
-        rows: Sequence[dict[str, float]] = [{}]
+        rows: Sequence[tuple[dict[str, float], dict[str, float]]] = [({}, {})]
         if points is not None:
             read = read_points(points, simulator.config)
-            rows = [dict(zip(read.keys, values, strict=True)) for values in read.values.tolist()]
+            drawn = (dict(zip(read.keys, values, strict=True)) for values in read.values.tolist())
+            rows = [(row, read.targets.row(number) if read.targets else {}) for number, row in enumerate(drawn)]
+        measures = simulator.config.task.targets
+        measures += tuple(dict.fromkeys(each.miss for each in simulator.config.task.target_columns))
         refused = 0
-        for number, values in enumerate(rows):
+        for number, (values, target) in enumerate(rows):
             try:
-                found = simulator.throw(values, trial=number)
+                found = simulator.throw(values, trial=number, target=target)
             except PlanError as error:
                 if points is None:
                     raise
@@ -155,9 +169,7 @@ def throw(
             if json:
                 typer.echo(jsonlib.dumps(found.row, default=str))
                 continue
-            ends = ", ".join(
-                f"{name} {found.row[name]:.6f}" for name in _list_measured(found.row, simulator.config.task.targets)
-            )
+            ends = ", ".join(f"{name} {found.row[name]:.6f}" for name in _list_measured(found.row, measures))
             typer.echo(f"throw {number}: {found.outcome}" + (f": {ends}" if ends else f": {found.reason}"))
     if refused:
         raise typer.Exit(1)
@@ -165,8 +177,9 @@ def throw(
 
 def score(
     directory: ModelArgument,
-    targets: Annotated[int, typer.Option("--targets", metavar="N", help="Number of targets.")] = 100,
-    seed: Annotated[int, typer.Option("--seed", help="Seed of their choice.")] = 0,
+    targets: Annotated[int, typer.Option("--targets", metavar="N", help="Number of targets of each seed.")] = 40,
+    seed: Annotated[int, typer.Option("--seed", help="The first seed of their choice.")] = 0,
+    seeds: Annotated[int, typer.Option("--seeds", metavar="N", help="Number of seeds, whose medians are taken.")] = 3,
     world: Annotated[
         Path | None,
         typer.Option(
@@ -191,7 +204,7 @@ def score(
         simulator = opened.enter_context(Simulator(directory / CONFIG))
         other = None if world is None else opened.enter_context(Simulator(world, overrides=overrides(settings)))
         found = model.score(
-            simulator, targets=targets, seed=seed, world=other, scatter=scatter, processes=count_cores()
+            simulator, targets=targets, seed=seed, seeds=seeds, world=other, scatter=scatter, processes=count_cores()
         )
     write_score(directory, found)
     typer.echo(found.model_dump_json(indent=2) if json else "\n".join(_score_lines(found)))
@@ -305,9 +318,9 @@ def _read_dataset(directory: Path, keys: Sequence[str], model: Model) -> list[di
         ConfigError: If it does not vary a key of the model, or is one of another robot.
         DatasetError: If it is damaged.
     """
-    from throwcollect.dataset.reader import load
+    from throwcollect.dataset.reader import Dataset
 
-    dataset = load(directory)
+    dataset = Dataset.open(directory)
     trained, config = model.file.trained_on, dataset.config
     if (config.robot.name, config.task.name) != (trained.robot, trained.task):
         raise ConfigError(
@@ -321,21 +334,6 @@ def _read_dataset(directory: Path, keys: Sequence[str], model: Model) -> list[di
         )
     rows: list[dict[str, float]] = throws.select([*keys, *model.targets]).to_pylist()
     return rows
-
-
-def _write_table(path: Path, rows: Sequence[dict[str, float]]) -> None:
-    """Write a CSV file that the sampler `list` reads.
-
-    Raises:
-        ConfigError: If it cannot be written.
-    """
-    try:
-        with path.open("w", encoding="utf-8", newline="") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(rows[0])
-            writer.writerows([map(repr, row.values()) for row in rows])
-    except OSError as error:
-        raise ConfigError(f"{path}: cannot be written: {error.strerror}") from error
 
 
 def _list_measured(row: dict[str, object], names: Sequence[str]) -> list[str]:
@@ -358,7 +356,8 @@ def _numbers(values: Iterable[float]) -> str:
 
 def _score_lines(score: Score) -> list[str]:
     lines = [
-        f"throws at {format_count(score.targets, 'target')}, in simulation: median, 9 of 10 below, largest; not landed"
+        f"throws at {format_count(score.targets, 'target')} for each of {format_count(score.seeds, 'seed')}, medians "
+        "of the seeds, in simulation: median, 9 of 10 below, largest; not landed"
     ]
     lines += [f"  learned from {each.trained_on:5} throws:  {_error_cells(each.errors)}" for each in score.trained]
     if score.adapted:

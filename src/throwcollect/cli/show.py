@@ -71,21 +71,27 @@ def plan(
                 "seed": trial.seed,
                 "digest": trial.digest,
                 "refused": trial.refused,
+                **({"target": dict(trial.target)} if found.trials.target_names else {}),
             }
             for trial in found.trials
         ]
         typer.echo(jsonlib.dumps(rows, indent=2))
         return
-    columns = ["trial", *found.keys]
+    names = (*found.keys, *found.trials.target_names)
+    columns = ["trial", *names]
     shown = found.trials if output is None else ()
     if shown:
         typer.echo("  ".join(columns))
     for trial in shown:
-        numbers = [f"{trial.values[key]:.6g}".rjust(len(key)) for key in found.keys]
+        numbers = [_show(name, {**trial.values, **trial.target}.get(name)) for name in names]
         note = f"  refused: {trial.refused}" if trial.refused else ""
         typer.echo("  ".join([str(trial.number).rjust(len("trial")), *numbers]) + note)
     planned, refused = format_count(len(found.trials), "trial"), len(found.trials.refused)
     typer.echo(f"{planned}, {refused} refused{more_trials(found)}", err=True)
+
+
+def _show(name: str, value: float | None) -> str:
+    return ("-" if value is None else f"{value:.6g}").rjust(len(name))
 
 
 def doctor(json: JsonOption = False) -> None:

@@ -45,6 +45,12 @@ A set of `values` is drawn from in equal shares. Everything is drawn from `seed`
 With `sweep.target` or `until`, trials are added to the plan while it is collected: [targets.md](targets.md).
 """
 
+_TARGETS = """\
+A list may also say where each trial should end, in columns that the task names; those of `throw` are below. The trial
+does not depend on them: the table of throws has them, and by how much each throw missed
+([dataset.md](dataset.md#targets)). A row without a target has empty cells there (Parquet: null).
+`throwcollect aim -o FILE` writes such lists ([learning.md](learning.md)).
+"""
 
 _ANY = {"containers.": "<node>", "sweep.target.": "<target>"}
 """What stands for the name of any of the sections that hold the same."""
@@ -64,7 +70,8 @@ def _sections(shape: Shape, prefix: str) -> Iterator[str]:
             for parameter in child.child("").alternatives:
                 yield f"### `sweep.parameters.<key>`: {_sentence(parameter)}\n"
                 yield _table(parameter, "")
-            yield f"{_SAMPLERS}\n### Keys that may be swept\n\n{_list_sweepable()}\n"
+            yield f"{_SAMPLERS}\n### Targets in a list\n\n{_list_targets()}"
+            yield f"### Keys that may be swept\n\n{_list_sweepable()}\n"
         elif len(alternatives) > 1 and all(each.keys for each in alternatives):
             for each in alternatives:
                 family = each.child("family").choices[0]
@@ -118,6 +125,13 @@ def _default(child: Shape, name: str, holder: Shape) -> str:
     if "default" not in child.node:
         return "absent"
     return f"`{value_as_yaml(child.node['default'])}`"
+
+
+def _list_targets() -> str:
+    """The columns of targets that lists of the task throw may have."""
+    columns = Config().task.target_columns
+    rows = [f"| `{each.name}` | {each.description} | {'yes' if each.required else 'no'} |" for each in columns]
+    return "\n".join([_TARGETS, "| column | meaning | required |", "|---|---|---|", *rows, ""])
 
 
 def _list_sweepable() -> str:

@@ -121,7 +121,8 @@ class SweepConfig(Section):
     parameters: dict[str, Parameter] = {}
     """Dotted configuration keys (`task.duration_s`, `ball.mass_kg`, ...) and what they range over."""
     file: str | None = None
-    """CSV or Parquet file with one row a trial and dotted keys as columns; for the sampler `list`.
+    """CSV or Parquet file with one row a trial and dotted keys as columns, perhaps targets, too; for the sampler
+    `list`.
 
     A relative path starts at the directory of the configuration file."""
     feasibility: Annotated[Literal["actual", "nominal"], Key(later=True)] = "actual"

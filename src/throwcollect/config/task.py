@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Annotated, ClassVar
 
 from pydantic import Field, model_validator
@@ -10,7 +11,9 @@ from throwcollect.config.key import Effect, Key
 from throwcollect.config.kinds import Angle, ContradictionError, Joint
 from throwcollect.config.motion import DynamicMovementPrimitive, MinimumJerk, Trajectory
 from throwcollect.config.section import Section
+from throwcollect.config.target import TargetColumn
 from throwcollect.config.until import UntilConfig
+from throwcollect.wording import join_names
 
 
 class TaskConfig(Section):
@@ -25,6 +28,8 @@ class TaskConfig(Section):
         targets: Columns of its results that say where a trial ended, which is what others aim at; none if there is
             nothing to aim at.
         given: Keys whose values belong to a target, in the order in which they follow it: aiming does not choose them.
+        target_columns: Columns of targets that lists of its trials may have, in the order of the table of throws; none
+            if its trials have no targets.
     """
 
     implementation: ClassVar[str]
@@ -32,6 +37,7 @@ class TaskConfig(Section):
     throws: ClassVar[bool] = False
     targets: ClassVar[tuple[str, ...]] = ()
     given: ClassVar[tuple[str, ...]] = ()
+    target_columns: ClassVar[tuple[TargetColumn, ...]] = ()
 
     name: str
     """Task."""
@@ -65,6 +71,23 @@ class TaskConfig(Section):
     def subject(self) -> str:
         """What its trials are, in a sentence behind their number."""
         return "throws of a ball" if self.throws else f"trials of the task {self.name}"
+
+    def find_wrong_targets(self, columns: Collection[str]) -> dict[str, str]:
+        """Say what is wrong with the columns of targets of a list of its trials, or those that one trial has.
+
+        Args:
+            columns: Their names.
+
+        Returns:
+            What is wrong, by column; empty if they are targets of this task, or none at all.
+        """
+        known = {each.name: each for each in self.target_columns}
+        has = f"it has {', '.join(known)}" if known else "it has none"
+        wrong = {name: f"the task {self.name} has no such target; {has}" for name in columns if name not in known}
+        if there := [name for name in known if name in columns]:
+            missing = (name for name, each in known.items() if each.required and name not in columns)
+            wrong |= {name: f"is missing beside {join_names(there)}" for name in missing}
+        return wrong
 
     @model_validator(mode="after")
     def _moving_joints_start_somewhere(self) -> TaskConfig:

@@ -9,9 +9,6 @@ from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from throwcollect.config.schema import Config, RobotConfig
 from throwcollect.config.values import with_values
 from throwcollect.dataset.creation import create
@@ -77,11 +74,11 @@ def _check_trials(config: Config, points: Points, *, processes: int, say: Say) -
         say(f"plan: checks {count} trials")
     # The first ones are small, so that something can be told soon.
     firsts = [*range(0, min(size, count), _TRIALS_A_PIECE), *range(size, count, size)]
-    pieces = [(first, points.values[first:stop]) for first, stop in pairwise([*firsts, count])]
+    pieces = [(first, points[first:stop]) for first, stop in pairwise([*firsts, count])]
     found = work_side_by_side(
         pieces,
         _make_checked_trials,
-        (config, points.keys),
+        (config,),
         processes=processes if count >= _MANY_TRIALS else 1,
         doing="checks trials",
     )
@@ -96,13 +93,13 @@ def _check_trials(config: Config, points: Points, *, processes: int, say: Say) -
     return Plan(config, trials)
 
 
-def _make_checked_trials(config: Config, keys: tuple[str, ...]) -> Callable[[tuple[int, NDArray[np.float64]]], Trials]:
-    """Make what makes trials of the number of the first one and their values, refused where they cannot be run."""
+def _make_checked_trials(config: Config) -> Callable[[tuple[int, Points]], Trials]:
+    """Make what makes trials of the number of the first one and their points, refused where they cannot be run."""
     check = feasibility_check(config)
 
-    def make(piece: tuple[int, NDArray[np.float64]]) -> Trials:
-        first, values = piece
-        trials = make_trials(config, Points(keys, values), first=first)
+    def make(piece: tuple[int, Points]) -> Trials:
+        first, some = piece
+        trials = make_trials(config, some, first=first)
         return trials.refuse([refusal(with_values(config, trial.values), check) for trial in trials])
 
     return make

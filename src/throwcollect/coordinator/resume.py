@@ -238,6 +238,11 @@ def _extend(directory: Path, old: Plan | None, new: Plan) -> Plan:
             hint="throwcollect dataset sample takes some of them into a new dataset",
         )
     before, after = old.trials[:count], new.trials[:count]
+    if before.targets != after.targets:
+        raise ConfigError(
+            [Problem(f"the list has other targets than {directory} was begun with", key="sweep.file")],
+            expected="those for all trials that are in the plan",
+        )
     if not np.array_equal(before.digests, after.digests) or before.refused.keys() != after.refused.keys():
         raise ConfigError(
             [Problem(f"the sampler {new.config.sweep.sampler} draws other trials when there are more", key="trials")],

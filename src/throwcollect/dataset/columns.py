@@ -42,6 +42,14 @@ COLUMNS = (
 )
 """All columns of a trajectory; ``docs/reading.md`` describes them."""
 
+_JOINT_COMPONENTS = {"position": "position_rad", "velocity": "velocity_radps", "effort": "effort_nm"}
+_BALL_COMPONENTS = {
+    "position": ("x_m", "y_m", "z_m"),
+    "orientation_xyzw": ("qx", "qy", "qz", "qw"),
+    "velocity": ("vx_mps", "vy_mps", "vz_mps"),
+    "angular_velocity": ("wx_radps", "wy_radps", "wz_radps"),
+}
+
 Column = NDArray[Any]
 """float64, or int64 for stamps."""
 
@@ -149,6 +157,19 @@ def check_columns(columns: Sequence[str]) -> None:
     for column in columns:
         if column not in COLUMNS:
             raise ConfigError(f"a trajectory has no column {column!r}", expected=", ".join(COLUMNS))
+
+
+def name_components(column: str, joints: Sequence[str]) -> tuple[str, ...]:
+    """Names of the components of a column, with units, as they are called wherever each has a column of its own.
+
+    Args:
+        column: One of `COLUMNS` of joints or of the ball.
+        joints: Joints that columns of joints have.
+    """
+    series, _, quantity = column.partition(".")
+    if series == "joints":
+        return tuple(f"{joint}_{_JOINT_COMPONENTS[quantity]}" for joint in joints)
+    return tuple(f"ball_{component}" for component in _BALL_COMPONENTS[quantity])
 
 
 def empty_columns(columns: Iterable[str], samples: int, joints: int) -> dict[str, Column]:

@@ -8,6 +8,7 @@ import pyarrow.compute as pc
 from throwcollect.config.schema import Config
 from throwcollect.dataset.bag import to_yaml
 from throwcollect.dataset.directory import TRIALS
+from throwcollect.dataset.misses import summarise_misses
 from throwcollect.dataset.provenance import Provenance
 from throwcollect.robots.description import robot_of
 from throwcollect.sweep.plan import FIRST_TRIALS
@@ -67,6 +68,7 @@ def data_card(config: Config, throws: pa.Table, provenance: Provenance) -> str:
         *([f"- `{TRIALS}`: the list of points that the configuration reads."] if config.sweep.file else []),
         "",
         *_ranges(config, throws),
+        *_list_targets(config, throws),
         "## Limits",
         "",
         _limits(config.sim.engine) + f" {config.task.noun.capitalize()}s that failed are kept; `outcome` says how.",
@@ -112,6 +114,29 @@ def _ranges(config: Config, throws: pa.Table) -> list[str]:
         "",
         "| key | lowest | highest |",
         "|---|---|---|",
+        *rows,
+        "",
+    ]
+
+
+def _list_targets(config: Config, throws: pa.Table) -> list[str]:
+    """How trials missed their targets; nothing if they have none."""
+    found = summarise_misses(config, throws)
+    if not found:
+        return []
+    rows = [
+        f"| `{name}` | {each.targets} | {each.measured} | {each.median:.4g} | {each.share90:.4g} | {each.largest:.4g} |"
+        if each.measured
+        else f"| `{name}` | {each.targets} | 0 | | | |"
+        for name, each in found.items()
+    ]
+    return [
+        "## Targets",
+        "",
+        "Where trials should have ended, and by how much they missed, in simulation.",
+        "",
+        "| column | with a target | measured | median | 9 of 10 below | largest |",
+        "|---|---|---|---|---|---|",
         *rows,
         "",
     ]

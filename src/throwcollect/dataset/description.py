@@ -11,6 +11,7 @@ from throwcollect.dataset.bag import FileSummary, dataset_metadata
 from throwcollect.dataset.digest import combine_digests
 from throwcollect.dataset.directory import CONFIG, MANIFEST, METADATA, PLAN, SOURCES, THROWS, TRIALS
 from throwcollect.dataset.manifest import FileEntry, entry_of, entry_of_file, manifest_text
+from throwcollect.dataset.misses import read_targets
 from throwcollect.episode.channels import Channels
 from throwcollect.files import replacing, write_all, write_file
 from throwcollect.sweep.parquet_file import encode_pieces
@@ -18,6 +19,7 @@ from throwcollect.sweep.parquet_file import encode_pieces
 WRITTEN = (THROWS, MANIFEST, METADATA)
 """Names of the files, in the order in which they are written: ``metadata.yaml`` marks a finished dataset."""
 _ROWS_AT_ONCE = 1 << 16
+_BYTES_AT_ONCE = 1 << 20
 
 
 def write_description(
@@ -42,15 +44,20 @@ def write_description(
     Raises:
         DatasetError: If a file cannot be read or written.
     """
-    digest = combine_digests(_digests(throws, on_piece))
+    digest = combine_digests(_digests(throws, on_piece), read_targets(throws))
     metadata = dataset_metadata([summary for summary, _ in recordings], channels.all, digest).encode()
     with replacing(directory / THROWS) as descriptor:
+        waiting = bytearray()
 
         def put(data: bytes) -> None:
-            write_all(descriptor, data)
+            waiting.extend(data)
+            if len(waiting) >= _BYTES_AT_ONCE:
+                write_all(descriptor, waiting)
+                waiting.clear()
             on_piece()
 
         encode_pieces(throws, put)
+        write_all(descriptor, waiting)
     others = (directory / each for each in (THROWS, CONFIG, PLAN, TRIALS, SOURCES))
     entries = [
         entry_of(METADATA, metadata),

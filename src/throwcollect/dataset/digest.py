@@ -5,14 +5,25 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterable
 
+import numpy as np
 
-def combine_digests(digests: Iterable[str]) -> str:
+from throwcollect.sweep.points import Targets
+
+
+def combine_digests(digests: Iterable[str], targets: Targets | None) -> str:
     """SHA-256 over the digests of all episodes in order of trials, each as 32 bytes, in hexadecimal.
+
+    If trials have targets, which no episode knows of, these follow: of each column its name, a zero byte, and the
+    number of each trial as a little-endian double, the NaN 0x7ff8000000000000 where it has none.
 
     Args:
         digests: Digests of the episodes, in hexadecimal.
+        targets: Those of all trials, in order; None if they have none.
     """
     combined = hashlib.sha256()
     for digest in digests:
         combined.update(bytes.fromhex(digest))
+    for name, values in () if targets is None else zip(targets.names, targets.values.T, strict=True):
+        combined.update(name.encode() + b"\0")
+        combined.update(np.where(np.isnan(values), np.nan, values).astype("<f8").tobytes())
     return combined.hexdigest()

@@ -11,6 +11,7 @@ import pyarrow.compute as pc
 from throwcollect.dataset.data_card import count_outcomes
 from throwcollect.dataset.digest import combine_digests
 from throwcollect.dataset.journal import measure_collected_s
+from throwcollect.dataset.misses import summarise_misses
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.summary import Info
 from throwcollect.errors import DatasetError, LossError
@@ -62,6 +63,7 @@ def summary(dataset: Dataset) -> Info:
         wall_s=measure_collected_s(directory),
         success=dataset.config.task.success,
         noun=dataset.config.task.noun,
+        misses=summarise_misses(dataset.config, dataset.throws),
     )
 
 
@@ -87,7 +89,7 @@ def _landing(throws: pa.Table) -> Mapping[str, tuple[float, float]] | None:
 
 
 def digest(directory: Path) -> str:
-    """Hash over all episodes in order of trials, recomputed from their bytes.
+    """Hash over all episodes in order of trials, recomputed from their bytes, and over targets if trials have some.
 
     Args:
         directory: Directory of the dataset.
@@ -110,7 +112,7 @@ def digest(directory: Path) -> str:
                 f"digest {episode.digest}", path=directory, place=f"trial {trial}", expected=f"{said[trial]}"
             )
         digests.append(episode.digest)
-    combined = combine_digests(digests)
+    combined = combine_digests(digests, dataset.plan.trials.targets)
     if combined != dataset.digest:
         raise DatasetError(f"digest {combined}", path=directory, expected=f"{dataset.digest} as metadata.yaml says")
     return combined

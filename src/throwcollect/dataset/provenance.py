@@ -7,9 +7,11 @@ configuration.
 
 from __future__ import annotations
 
+import hashlib
 import os
 import platform
 import socket
+import subprocess
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
@@ -26,6 +28,8 @@ from throwcollect.version import __version__
 
 HOST_VARIABLE = "THROWCOLLECT_HOST"
 """Environment variable with the name of the machine, for containers, which cannot know it; empty if it is unknown."""
+IMAGE_VARIABLE = "THROWCOLLECT_IMAGE"
+"""Environment variable with the id of a container's image, which it cannot know either."""
 
 _LIBRARIES = (
     "pybullet",
@@ -39,6 +43,7 @@ _LIBRARIES = (
     "example-robot-data",
 )
 _MOST_BYTES = 1_000_000
+_GIT_S = 5.0
 
 
 @dataclass(frozen=True)
@@ -54,6 +59,10 @@ class Provenance:
         simulations: Number of simulations; None if not known.
         wall_s: Real time that it took [s]; None if not known.
         was_open: Whether anybody who reached its router could join it.
+        revision: Git revision of the sources that ran, with ``-dirty`` behind it if they were changed; None if they lie
+            in no clone.
+        image: Id of the image that ran; None without one.
+        robot_sha256: SHA-256 of the robot's description; None if not known, as in datasets of earlier versions.
     """
 
     finished: datetime
@@ -64,10 +73,15 @@ class Provenance:
     simulations: int | None
     wall_s: float | None
     was_open: bool
+    revision: str | None = None
+    image: str | None = None
+    robot_sha256: str | None = None
 
     @classmethod
-    def of_this_machine(cls, *, simulations: int | None, wall_s: float | None, was_open: bool) -> Provenance:
-        """Provenance of a collection that ends now, here."""
+    def of_this_machine(
+        cls, *, simulations: int | None, wall_s: float | None, was_open: bool, robot: str
+    ) -> Provenance:
+        """Provenance of a collection that ends now, here; `robot` is the robot's description."""
         return cls(
             finished=datetime.now(timezone.utc),
             # Of itself, a container knows nothing but a random id.
@@ -78,6 +92,9 @@ class Provenance:
             simulations=simulations,
             wall_s=wall_s,
             was_open=was_open,
+            revision=_read_revision(),
+            image=os.environ.get(IMAGE_VARIABLE) or None,
+            robot_sha256=hashlib.sha256(robot.encode()).hexdigest(),
         )
 
     def facts(self) -> dict[str, str]:
@@ -88,6 +105,9 @@ class Provenance:
             "platform": self.platform,
             "Python": self.python,
             **self.libraries,
+            **({"revision": self.revision} if self.revision else {}),
+            **({"image": self.image} if self.image else {}),
+            **({"robot description": f"SHA-256 {self.robot_sha256}"} if self.robot_sha256 else {}),
         }
         if self.simulations is not None:
             facts["simulations"] = str(self.simulations)
@@ -113,6 +133,20 @@ def read_provenance(directory: Path) -> Provenance | None:
         return _JSON.validate_json(read_text(directory / PROVENANCE, most_bytes=_MOST_BYTES))
     except (DatasetError, ValidationError):
         return None
+
+
+def _read_revision() -> str | None:
+    """Git revision of the clone that these sources lie in; None if there is none, or no git."""
+    root = Path(__file__).parents[3]
+    if not (root / ".git").exists():
+        return None
+    # Somebody else's clone may name programs that git would run.
+    words = ["git", "-C", str(root), "-c", "core.fsmonitor=false", "describe"]
+    words += ["--always", "--abbrev=40", "--dirty", "--exclude=*"]
+    with suppress(OSError, subprocess.SubprocessError):
+        said = subprocess.run(words, capture_output=True, text=True, timeout=_GIT_S, check=True)
+        return said.stdout.strip() or None
+    return None
 
 
 def _versions() -> dict[str, str]:

@@ -6,34 +6,46 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, overload
+from typing import TYPE_CHECKING, Any, overload
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
+from numpy.typing import NDArray
 
 from rclzenoh.interfaces import deserialize, get_message
 from throwcollect.config.loader import load as load_config
 from throwcollect.config.schema import Config
+from throwcollect.config.sweep import Range
 from throwcollect.dataset.bag import read_bag_metadata
 from throwcollect.dataset.columns import COLUMNS, StoredThrow
 from throwcollect.dataset.data_card import count_outcomes
 from throwcollect.dataset.directory import METADATA, PLAN, config_path
 from throwcollect.dataset.expression import Expression
+from throwcollect.dataset.guesses import DATASET, refuse_attribute
 from throwcollect.dataset.mcap_reader import open_mcap
+from throwcollect.dataset.named_array import Bounds, NamedArray, read_column, refuse_name
 from throwcollect.dataset.throw import Throw
-from throwcollect.dataset.throws_table import read_throws
+from throwcollect.dataset.throws_table import name_alias, read_throws
 from throwcollect.dataset.trajectories import Trajectories, read_trajectories
 from throwcollect.episode.channels import ROBOT_DESCRIPTION_ID
 from throwcollect.episode.chunk import Chunk
 from throwcollect.episode.message import Episode
 from throwcollect.episode.message_table import MessageTable
 from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.extras import lazily
 from throwcollect.files import StrPath
 from throwcollect.robots.description import robot_of
 from throwcollect.sweep.plan import Plan
 from throwcollect.wording import format_count
 
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+pd = lazily("pandas")
+
 _SELECTION = "a condition, an Arrow expression, a mask, or numbers of trials"
+_LANDING = ("landing_x_m", "landing_y_m", "landing_z_m")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -81,25 +93,37 @@ class Dataset(Sequence[Throw]):
     def __getitem__(self, which: int) -> Throw: ...
     @overload
     def __getitem__(self, which: slice) -> Dataset: ...
-    def __getitem__(self, which: int | slice) -> Throw | Dataset:
-        """A throw by its position, or the throws of a slice.
+    @overload
+    def __getitem__(self, which: str) -> NDArray[Any]: ...
+    def __getitem__(self, which: int | slice | str) -> Throw | Dataset | NDArray[Any]:
+        """A throw by its position, the throws of a slice, or a column of `throws` by its name.
+
+        A column is an array with one value a throw; a number that is missing is NaN, a text None.
 
         Raises:
-            IndexError: If there are not so many.
+            IndexError: If there are not so many throws.
+            ConfigError: If there is no such column; it is also a `KeyError`.
+            TypeError: If it is none of these.
         """
+        if isinstance(which, str):
+            if which not in self.throws.column_names:
+                raise refuse_name("no column", which, self.throws.column_names)
+            return read_column(self.throws[which])
         if isinstance(which, slice):
             return self._take(range(len(self))[which])
+        if not isinstance(which, int | np.integer):
+            raise TypeError(f"a position, a slice or the name of a column, not {type(which).__name__}; see select(...)")
         if not -len(self) <= which < len(self):
             raise IndexError(f"{self.directory}: no throw {which} of {len(self)}")
-        position = which % len(self)
-        return Throw(self.throws, position, self.parameters, self._stored[position], str(self.directory))
+        position = int(which) % len(self)
+        return Throw(self.throws, position, self.plan.keys, self._stored[position], str(self.directory))
 
     def __iter__(self) -> Iterator[Throw]:
         return (self[position] for position in range(len(self)))
 
     def __repr__(self) -> str:
         outcomes = ", ".join(f"{count} {outcome}" for outcome, count in count_outcomes(self.throws).items())
-        swept = ", ".join(self.parameters)
+        swept = ", ".join(self.plan.keys)
         return f"Dataset({str(self.directory)!r}: {format_count(len(self), 'throw')}: {outcomes}; swept: {swept})"
 
     @property
@@ -107,10 +131,54 @@ class Dataset(Sequence[Throw]):
         """Its configuration; that of a single trial has `Throw.parameters` in it."""
         return self.plan.config
 
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            raise refuse_attribute(self, name, DATASET)
+
     @property
-    def parameters(self) -> tuple[str, ...]:
-        """Swept dotted configuration keys, which are columns of `throws`."""
-        return self.plan.keys
+    def parameters(self) -> NamedArray:
+        """Swept values of all throws, in the units of their keys; the names are dotted configuration keys.
+
+        The bounds are those that the sweep draws between, or else the smallest and largest value of the plan.
+        """
+        swept = self.config.sweep.parameters
+        bounds: list[Bounds] = []
+        for index, key in enumerate(self.plan.keys):
+            match swept.get(key):
+                case Range(min=low, max=high):
+                    bounds.append((low, high))
+                case _:
+                    values = self.plan.trials.values[:, index]
+                    bounds.append((values.min(), values.max()))
+        return NamedArray.of(self.throws, self.plan.keys, bounds)
+
+    @property
+    def aliases(self) -> Mapping[str, str]:
+        """Name without dots and with its unit of each swept key, such as ``task_end_arm_right_4_joint_rad``."""
+        return {key: name_alias(key) for key in self.plan.keys}
+
+    @property
+    def landings(self) -> NamedArray:
+        """Where the ball of each throw landed, x, y and z of its centre in world [m]; NaN where it did not.
+
+        The bounds are the smallest and largest of these throws.
+
+        Raises:
+            ConfigError: If nothing lands in the task.
+        """
+        if not set(_LANDING) <= set(self.throws.column_names):
+            raise ConfigError(f"nothing lands in the task {self.config.task.name}", expected="a column of `throws`")
+        limits = [pc.min_max(self.throws[name]).as_py().values() for name in _LANDING]
+        return NamedArray.of(self.throws, _LANDING, [(low, high) for low, high in limits])
+
+    def to_pandas(self) -> DataFrame:
+        """The table of throws as a DataFrame, one row a throw, with the number of the trial as its index.
+
+        Raises:
+            MissingExtraError: If pandas is not installed.
+        """
+        return pd.DataFrame({name: self[name] for name in self.throws.column_names}).set_index("trial")
 
     @property
     def digest(self) -> str:
@@ -274,8 +342,8 @@ class Dataset(Sequence[Throw]):
 
     @property
     def moving_joints(self) -> tuple[str, ...]:
-        """Joints that the task moves; all others hold still."""
-        return tuple(self.config.task.end)
+        """Joints that the task moves, in the order of `joints`, as exports have them; all others hold still."""
+        return tuple(joint for joint in self.joints if joint in self.config.task.end)
 
     @cached_property
     def _stored(self) -> Sequence[StoredThrow | None]:
@@ -316,6 +384,3 @@ def _as_array(which: Any) -> pa.Array:
     if not (pa.types.is_boolean(values.type) or pa.types.is_integer(values.type)):
         raise ConfigError(f"select: values of type {values.type}", expected=_SELECTION)
     return values
-
-
-load = Dataset.open

@@ -123,11 +123,14 @@ def _rebuild(directory: Path) -> Rebuilt:
         for trial in plan.trials
     ]
     throws = table.table(rows)
+    channels = recordings.channels or Channels(config, full_description(config))
     written = [*WRITTEN]
     if not (directory / CARD).exists():
         provenance = read_provenance(directory)
         if provenance is None:
-            provenance = Provenance.of_this_machine(simulations=None, wall_s=None, was_open=was_open(directory))
+            provenance = Provenance.of_this_machine(
+                simulations=None, wall_s=None, was_open=was_open(directory), robot=channels.robot
+            )
             write_provenance(directory, provenance)
         write_file(directory / CARD, data_card(config.without_run(), throws, provenance).encode())
         written.append(CARD)
@@ -139,7 +142,6 @@ def _rebuild(directory: Path) -> Rebuilt:
     if rejudged and CARD not in written:
         _correct_card(directory / CARD, table.table(earlier.values()), throws)
         written.append(CARD)
-    channels = recordings.channels or Channels(config, full_description(config))
     files = [(summary, entry_of_file(directory / summary.path)) for summary in recordings.summaries]
     write_description(directory, config.name, throws, channels, files)
     lost = tuple(row["trial"] for row in rows if row["outcome"] == LOST)

@@ -10,9 +10,11 @@ import numpy as np
 
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
+from throwcollect.config.target import is_target
 from throwcollect.config.values import reason_not_sweepable
-from throwcollect.dataset.directory import CONFIG, PLAN, SHARD_SUFFIX, THROWS, config_path
+from throwcollect.dataset.directory import CONFIG, PLAN, SHARD_SUFFIX, THROWS, TRIALS, config_path
 from throwcollect.dataset.judging import judge_episode
+from throwcollect.dataset.misses import read_targets
 from throwcollect.dataset.rebuild import read_earlier_rows, reason_lost
 from throwcollect.dataset.scan import Found, scan_whole
 from throwcollect.dataset.throws_table import REFUSED, Row, ThrowsTable
@@ -26,6 +28,7 @@ from throwcollect.files import new_directory
 from throwcollect.robots.description import full_description
 from throwcollect.sweep.parquet_file import read_parquet
 from throwcollect.sweep.plan import Plan, make_trials
+from throwcollect.sweep.point_file import read_points
 from throwcollect.sweep.points import Points
 
 Remake = Callable[[Config], Plan]
@@ -108,7 +111,7 @@ def repair(directory: Path, output: Path, *, remake: Remake) -> Repaired:
     plan = _plan(directory, config, remake, remarks)
     earlier = read_earlier_rows(directory, plan)
     with new_directory(output) as beside:
-        writer = DatasetWriter.create(beside, plan)
+        writer = DatasetWriter.create(beside, plan, listed=_find_list(directory, plan, remarks))
         try:
             digests = {trial: row["digest"] for trial, row in earlier.items() if row["digest"] is not None}
             sorting = _Sorting(plan, writer, digests, remarks)
@@ -174,19 +177,38 @@ def _plan_of_table(path: Path, config: Config) -> Plan:
     """
     table = read_parquet(path)
     names = table.column_names
-    keys = tuple(names[1 : names.index("outcome")]) if "outcome" in names else ()
+    drawn = names[1 : names.index("outcome")] if "outcome" in names else []
+    keys = tuple(name for name in drawn if not is_target(name))
+    targets = tuple(name for name in drawn if is_target(name))
     rows = table.to_pylist()
     if (
         any(reason_not_sweepable(config, key) for key in keys)
-        or not table.schema.equals(ThrowsTable(keys, config).schema)
+        or config.task.find_wrong_targets(targets)
+        or not table.schema.equals(ThrowsTable(keys, config, targets).schema)
         or not rows
         or [row["trial"] for row in rows] != list(range(len(rows)))
         or any(row[key] is None for row in rows for key in keys)
     ):
         raise DatasetError("not the table of this configuration, or not of all trials in order", path=path)
-    points = Points(keys, np.array([[row[key] for key in keys] for row in rows]))
+    points = Points(keys, np.array([[row[key] for key in keys] for row in rows]), read_targets(table))
     reasons = [row["reason"] if row["outcome"] == REFUSED else None for row in rows]
     return Plan(config, make_trials(config, points).refuse(reasons))
+
+
+def _find_list(directory: Path, plan: Plan, remarks: list[str]) -> Points | None:
+    """The list of points that a configuration reads, or else those of the plan; None if it reads none."""
+    if plan.config.sweep.file is None:
+        return None
+    known = plan.trials.points
+    try:
+        listed = read_points(directory / TRIALS, plan.config)
+        if listed.first(len(known.values)) == known:
+            return listed
+        reason = f"begins with other points than those of {PLAN}"
+    except ConfigError as error:
+        reason = error.problems[0].message
+    remarks.append(f"{TRIALS}: {reason}; made again from {PLAN}")
+    return known
 
 
 @dataclass

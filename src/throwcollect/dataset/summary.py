@@ -3,7 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
+
+
+@dataclass(frozen=True)
+class MissSummary:
+    """By how much trials missed their targets, in the unit of the column of misses.
+
+    Attributes:
+        targets: Number of trials with such a target.
+        measured: Number of those that ended somewhere.
+        median: Median of their misses; None if there is none, like all that follow.
+        share90: What nine of ten are below.
+        largest: The largest one.
+    """
+
+    targets: int
+    measured: int
+    median: float | None
+    share90: float | None
+    largest: float | None
 
 
 @dataclass(frozen=True)
@@ -24,10 +43,11 @@ class Info:
         size_bytes: Size of all files of the dataset.
         recordings_bytes: Size of the MCAP files.
         topics: Number of messages of each topic.
-        digest: Hash over all episodes in order of trials, as it was written.
+        digest: Hash over all episodes in order of trials, and their targets, as it was written.
         wall_s: Real time for which it was collected, without pauses [s]; None if no journal tells.
         success: Outcome of trials that succeeded.
         noun: What a trial is called.
+        misses: By how much targets were missed, by column such as ``miss_m``; empty if trials have no targets.
     """
 
     name: str
@@ -46,6 +66,7 @@ class Info:
     wall_s: float | None = None
     success: str = "landed"
     noun: str = "throw"
+    misses: Mapping[str, MissSummary] = field(default_factory=dict)
 
     def as_dict(self) -> dict[str, object]:
         """The same for JSON."""

@@ -2,19 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from throwcollect.dataset.columns import TIMES, Column, Recorded, empty_columns, fill
+from throwcollect.config.target import is_target
+from throwcollect.dataset.columns import COLUMNS, TIMES, Column, Recorded, empty_columns, fill, name_components
+from throwcollect.dataset.guesses import THROW, refuse_attribute
+from throwcollect.dataset.named_array import refuse_name
 from throwcollect.dataset.throws_table import Row, ball_state
 from throwcollect.episode.trajectory_rows import STAMPS
 from throwcollect.errors import DatasetError
+from throwcollect.extras import lazily
 from throwcollect.units import NS_PER_S
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+pd = lazily("pandas")
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,10 +135,43 @@ class Ball(_Series):
         return self._column("angular_velocity")
 
 
+@dataclass(frozen=True)
+class Joint:
+    """One joint during a throw.
+
+    Attributes:
+        name: Its name.
+        time_s: Time since the start of the trial [s], shape ``(n_samples,)``, as all others.
+        position: [rad].
+        velocity: [rad/s].
+        effort: Torque of its motor [Nm]; 0 if it is locked.
+    """
+
+    name: str
+    time_s: NDArray[np.float64]
+    position: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+    effort: NDArray[np.float64]
+
+
 class Joints(_Series):
-    """The robot's joints during a throw."""
+    """The robot's joints during a throw; ``joints["arm_right_4_joint"]`` is one of them."""
 
     _prefix = "joints"
+
+    def __getitem__(self, name: str) -> Joint:
+        """One joint, whose arrays are columns of those of all.
+
+        Raises:
+            ConfigError: If the robot has none of this name; it is also a `KeyError`.
+        """
+        if name not in self.names:
+            raise refuse_name("no joint", name, self.names)
+        which = self.names.index(name)
+        return Joint(name, self.time_s, self.position[:, which], self.velocity[:, which], self.effort[:, which])
+
+    def __iter__(self) -> Iterator[Joint]:
+        return (self[name] for name in self.names)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -219,6 +263,24 @@ class Throw:
             text += f" at x = {x:.3f} m, y = {y:.3f} m after {landing.time_s:.3f} s"
         return f"{text}; {self._episode.samples} samples)" if self._episode else f"{text}; not recorded)"
 
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            raise refuse_attribute(self, name, THROW)
+
+    def __getitem__(self, column: str) -> Any:
+        """Its value in a column of the table of throws, such as ``throw["landing_x_m"]``; None if there is none.
+
+        Raises:
+            ConfigError: If there is no such column; it is also a `KeyError`.
+        """
+        if column not in self._table.column_names:
+            raise refuse_name("no column", column, self._table.column_names)
+        return self.row[column]
+
+    # Without it, an index would make the throw a sequence.
+    __iter__ = None
+
     def __reduce__(self) -> tuple[type[Throw], tuple[object, ...]]:
         # Neither the whole table nor what has been read travels with it.
         table = pa.Table.from_pylist([self.row], schema=self._table.schema)
@@ -239,6 +301,17 @@ class Throw:
     def parameters(self) -> dict[str, float]:
         """Value of each swept key, in the key's unit."""
         return {key: self.row[key] for key in self._keys}
+
+    @property
+    def target(self) -> dict[str, float]:
+        """Where it should end, by column of the table such as ``target_x_m``; empty if nobody said so."""
+        return {name: value for name, value in self.row.items() if is_target(name) and value is not None}
+
+    @property
+    def miss_m(self) -> float | None:
+        """Distance of the landing from the target [m]; None if it has no target, or nothing landed."""
+        miss: float | None = self.row.get("miss_m")
+        return miss
 
     @property
     def outcome(self) -> str:
@@ -298,3 +371,21 @@ class Throw:
             DatasetError: If the throw has no episode; its columns raise it if the episode is damaged.
         """
         return Joints(self._recording)
+
+    def to_pandas(self) -> DataFrame:
+        """What ball and joints did, as a DataFrame: one row a sample, by the time since the start of the trial.
+
+        Columns are named as those of `throwcollect dataset export --to parquet`, such as ``ball_x_m`` and
+        ``arm_right_4_joint_position_rad``.
+
+        Raises:
+            DatasetError: If the throw has no episode, or it is damaged.
+            MissingExtraError: If pandas is not installed.
+        """
+        parts = {name: self._recording.column(name) for name in COLUMNS if name not in (TIMES, STAMPS)}
+        columns = {
+            component: values[:, index]
+            for name, values in parts.items()
+            for index, component in enumerate(name_components(name, self._recording.joints))
+        }
+        return pd.DataFrame(columns, index=pd.Index(self._recording.column(TIMES), name=TIMES))

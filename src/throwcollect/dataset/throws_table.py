@@ -10,7 +10,9 @@ from typing import Any
 import pyarrow as pa
 
 from throwcollect.config.schema import Config
+from throwcollect.config.shape import unit_of_key
 from throwcollect.dataset.directory import THROWS
+from throwcollect.dataset.misses import Misses
 from throwcollect.errors import DatasetError
 from throwcollect.sweep.arrow_column import make_table
 from throwcollect.sweep.parquet_file import read_parquet
@@ -20,6 +22,7 @@ from throwcollect.tasks.columns import ball_columns, join_ball
 from throwcollect.tasks.measures import BallState
 from throwcollect.tasks.result import Result
 from throwcollect.tasks.task import task_of
+from throwcollect.units import unit_of_name
 
 REFUSED = "refused"
 """Outcome of a trial that the plan refused; all others are those of the task."""
@@ -52,6 +55,23 @@ def _field(name: str, kind: pa.DataType, description: str) -> pa.Field:
     return pa.field(name, kind, metadata={"description": description})
 
 
+def _describe_swept(key: str) -> pa.Field:
+    unit = unit_of_key(key)
+    description = f"Swept value of {key} [{unit or '-'}]."
+    return pa.field(key, pa.float64(), metadata={"description": description, "unit": unit, "alias": name_alias(key)})
+
+
+def name_alias(key: str) -> str:
+    """Name of a swept key without dots and with its unit at the end, for SQL and formulas.
+
+    Args:
+        key: The dotted key.
+    """
+    name = key.replace(".", "_")
+    unit = unit_of_key(key).replace("/", "p").replace("²", "2").replace("³", "3").replace(" ", "")
+    return name if not unit or unit_of_name(key) else f"{name}_{unit.lower()}"
+
+
 def ball_state(row: Row, name: str) -> BallState | None:
     """The ball as a row has it; None if the trial came to no such event, or its task knows none.
 
@@ -68,24 +88,30 @@ class ThrowsTable:
 
     Attributes:
         schema: Columns with their types and descriptions.
+        later: Names of the columns that datasets of earlier versions lack.
 
     Args:
         parameters: Swept dotted configuration keys, in the order of their columns.
         config: Configuration of the collection.
+        targets: Columns of targets.
     """
 
-    def __init__(self, parameters: Sequence[str], config: Config) -> None:
+    def __init__(self, parameters: Sequence[str], config: Config, targets: Sequence[str] = ()) -> None:
         self._parameters = tuple(parameters)
+        self._misses = Misses(config, targets)
         task = task_of(config)
         self._outcomes = task.outcomes
         self._columns = task.columns
+        self.later = frozenset(each.name for each in self._columns.columns if each.later)
         self.schema = pa.schema(
             [
                 _field("trial", pa.int64(), "Number of the trial."),
-                *(_field(key, pa.float64(), f"Swept value of {key}.") for key in parameters),
+                *map(_describe_swept, parameters),
+                *(_field(each.name, pa.float64(), each.description) for each in self._misses.targets),
                 _field("outcome", pa.string(), f"{', '.join(each.value for each in task.outcomes)} or {REFUSED}."),
                 _field("reason", pa.string(), task.reasons),
                 *(_field(each.name, _KINDS[each.kind], each.description) for each in self._columns.columns),
+                *(_field(name, pa.float64(), text) for name, text in self._misses.descriptions.items()),
                 _field("shard", pa.string(), "MCAP file that holds the episode; null when there is none."),
                 _field("chunk_offset", pa.int64(), "Where the episode's chunk begins in that file [bytes]."),
                 _field("samples", pa.int64(), "Number of samples of the episode."),
@@ -96,7 +122,7 @@ class ThrowsTable:
     @classmethod
     def of(cls, plan: Plan) -> ThrowsTable:
         """The table of a plan's trials."""
-        return cls(plan.keys, plan.config)
+        return cls(plan.keys, plan.config, plan.trials.target_names)
 
     def row(self, trial: Trial, result: Result, place: Place | None) -> Row:
         """Row of a trial that was run.
@@ -108,6 +134,7 @@ class ThrowsTable:
         """
         row = self._start_row(trial, result.outcome.value, result.reason)
         row.update(self._columns.write(result))
+        row.update(self._misses.measure(trial.target, row))
         if place is not None:
             row.update(vars(place))
         return row
@@ -127,7 +154,7 @@ class ThrowsTable:
 
     def _start_row(self, trial: Trial, outcome: str, reason: str | None) -> Row:
         values = {key: trial.values[key] for key in self._parameters}
-        return {"trial": trial.number, **values, "outcome": outcome, "reason": reason}
+        return {"trial": trial.number, **values, **trial.target, "outcome": outcome, "reason": reason}
 
     def table(self, rows: Iterable[Row]) -> pa.Table:
         """Rows, in the given order, as an Arrow table; what a row lacks is null."""
@@ -142,11 +169,16 @@ def read_throws_table(path: Path, plan: Plan) -> pa.Table:
         path: The file.
         plan: Its trials; they say which columns there are.
 
+    Returns:
+        The table; that of an earlier version lacks the columns that came later.
+
     Raises:
         DatasetError: If the table is missing or damaged, or has other columns.
     """
     table = read_parquet(path)
-    schema = ThrowsTable.of(plan).schema
+    wanted = ThrowsTable.of(plan)
+    lacking = wanted.later - set(table.schema.names)
+    schema = pa.schema([field for field in wanted.schema if field.name not in lacking])
     if not table.schema.equals(schema):
         wrong = sorted(set(table.schema.names) ^ set(schema.names)) or "types of columns"
         raise DatasetError(f"not the table of this plan: differs in {wrong}", path=path)

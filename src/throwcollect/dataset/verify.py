@@ -15,7 +15,7 @@ from typing import Any
 from throwcollect.config.schema import Config
 from throwcollect.dataset.bag import FileSummary, bag_information, read_bag_metadata
 from throwcollect.dataset.digest import combine_digests
-from throwcollect.dataset.directory import CARD, FORMAT, METADATA, SHARD_SUFFIX, THROWS
+from throwcollect.dataset.directory import CARD, FORMAT, METADATA, SHARD_SUFFIX, THROWS, TRIALS
 from throwcollect.dataset.findings import Finding
 from throwcollect.dataset.verify_episode import EpisodeCheck
 from throwcollect.dataset.verify_manifest import find_manifest_problems
@@ -83,7 +83,9 @@ def verify(
     findings += [finding for check in checks.values() for finding in check.findings]
     if bag is not None:
         findings += _find_bag_problems(bag, checks)
-        findings += _find_digest_problems(bag, tables, checks)
+        # Targets are part of the digest, and without a plan those of a list are not known.
+        if tables.plan is not None or not (directory / TRIALS).exists():
+            findings += _find_digest_problems(bag, tables, checks)
     findings += _find_stray_files(directory, checks)
     return findings
 
@@ -219,7 +221,9 @@ def _find_digest_problems(
             return
         # The table stands in for episodes that cannot be read.
         digests = {trial: row["digest"] for trial, row in tables.rows.items() if is_digest(row["digest"])} | digests
-    written, digest = said.get("throwcollect.digest"), combine_digests(digests[trial] for trial in sorted(digests))
+    targets = None if tables.plan is None else tables.plan.trials.targets
+    written = said.get("throwcollect.digest")
+    digest = combine_digests((digests[trial] for trial in sorted(digests)), targets)
     if written != digest:
         giver = THROWS if damaged else "the episodes"
         yield Finding(

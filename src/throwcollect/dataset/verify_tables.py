@@ -17,7 +17,6 @@ from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError
 from throwcollect.sweep.digest import trial_digests
 from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.point_file import read_points
-from throwcollect.sweep.points import Points
 from throwcollect.tasks.result import LOST
 
 WITHOUT_EPISODE = (REFUSED, LOST)
@@ -94,7 +93,7 @@ def _find_list_problems(directory: Path, plan: Plan) -> Iterator[Finding]:
     except ConfigError as error:
         yield Finding(TRIALS, "", error.problems[0].message)
         return
-    if points.keys != plan.keys or not np.array_equal(points.values, plan.trials.values):
+    if points != plan.trials.points:
         yield Finding(TRIALS, "", f"begins with other points than those of {PLAN}")
 
 
@@ -105,7 +104,7 @@ def find_wrong_trials(plan: Plan) -> dict[int, str]:
         plan: The plan.
     """
     trials = plan.trials
-    digests = trial_digests(plan.config, Points(plan.keys, trials.values), trials.seeds)
+    digests = trial_digests(plan.config, trials.points, trials.seeds)
     wrong = np.flatnonzero((digests != trials.digests).any(axis=1)).tolist()
     return {trials.first + row: digests[row].tobytes().hex() for row in wrong}
 
@@ -139,6 +138,9 @@ def _plan_findings(plan: Plan, rows: Mapping[int, Row], doubtful: Collection[int
         for key, value in trial.values.items():
             if row[key] != value and trial.number not in doubtful:
                 yield Finding(THROWS, place, f"has {key} = {row[key]!r}, the plan {value!r}")
+        for name in plan.trials.target_names:
+            if row[name] != (wanted := trial.target.get(name)):
+                yield Finding(THROWS, place, f"has {name} = {row[name]!r}, the plan {wanted!r}")
         if (row["outcome"] == REFUSED) != (trial.refused is not None):
             yield Finding(THROWS, place, f"is {row['outcome']}, the plan says {trial.refused or 'nothing against it'}")
         elif trial.refused is not None and row["reason"] != trial.refused:

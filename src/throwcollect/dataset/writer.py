@@ -304,7 +304,7 @@ class DatasetWriter:
         if self._journal is not None:
             wall_s = self._journal.measure_collected_s()
         provenance = Provenance.of_this_machine(
-            simulations=simulations, wall_s=wall_s, was_open=was_open(self._directory)
+            simulations=simulations, wall_s=wall_s, was_open=was_open(self._directory), robot=self._channels.robot
         )
         # How it was run may not change the dataset, so what is kept of that stands outside of what the manifest covers.
         config = self._config.without_run()

@@ -15,6 +15,7 @@ from typing import Any
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.directory import CARD, SOURCES
 from throwcollect.dataset.inspect import info
+from throwcollect.dataset.judging import judge_episode
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.throws_table import Row, ThrowsTable
 from throwcollect.dataset.writer import DatasetWriter
@@ -98,7 +99,12 @@ def write(sources: Sequence[Source], directory: Path, *, name: str | None = None
         write_file(directory / SOURCES, encode_sources(sources))
         table = ThrowsTable.of(plan)
         for episode, row in _episodes(sources, Restamper(config, channels)):
-            writer.append(episode, table.result(row))
+            if table.later <= row.keys():
+                result = table.result(row)
+            else:
+                # The row is one of an earlier version, which did not measure all of it.
+                result = judge_episode(plan.config_of(plan.trial(episode.header.trial)), episode)
+            writer.append(episode, result)
         writer.finish(wall_s=time.monotonic() - began)
     card = (directory / CARD).read_text(encoding="utf-8")
     write_file(directory / CARD, (card + sources_section(sources)).encode())

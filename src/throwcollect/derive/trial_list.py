@@ -14,7 +14,7 @@ from throwcollect.dataset.directory import TRIALS
 from throwcollect.dataset.reader import Dataset
 from throwcollect.derive.source import Source
 from throwcollect.errors import ConfigError, Problem
-from throwcollect.sweep.points import Points
+from throwcollect.sweep.points import Points, Targets
 
 _ABSENT = object()
 
@@ -55,9 +55,21 @@ def list_of_trials(sources: Sequence[Source]) -> tuple[Config, Points]:
         for source, values in zip(sources, fixed, strict=True)
         for number in source.trials
     ]
+    points = Points(tuple(keys), np.array(rows, np.float64), _gather_targets(sources))
     sweep = SweepConfig(sampler="list", file=TRIALS)
     config = first.config.without_run().model_copy(update={"sweep": sweep, "trials": None, "until": None})
-    return config, Points(tuple(keys), np.array(rows, np.float64))
+    return config, points
+
+
+def _gather_targets(sources: Sequence[Source]) -> Targets | None:
+    """The targets of all trials; those of a source that has none, or lacks a column of others, are none."""
+    task = sources[0].dataset.config.task
+    there = {name for source in sources for name in source.dataset.plan.trials.target_names}
+    names = tuple(each.name for each in task.target_columns if each.name in there)
+    if not names:
+        return None
+    trials = (source.dataset.plan.trial(number) for source in sources for number in source.trials)
+    return Targets(names, np.array([[trial.target.get(name, np.nan) for name in names] for trial in trials]))
 
 
 def _collect_fixed_values(dataset: Dataset) -> dict[str, Any]:

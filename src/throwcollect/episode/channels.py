@@ -107,6 +107,7 @@ class Channels:
         latched: Channels with one message a file: ``/robot_description`` and ``/tf_static``.
         recorded: Channels with one message a sample, in the order of their numbers, and what fills them.
         sensors: Channels of each chunk that follows the state chunk of an episode.
+        robot: URDF text of the robot.
 
     Args:
         config: The configuration.
@@ -122,7 +123,7 @@ class Channels:
     )
 
     def __init__(self, config: Config, urdf: str) -> None:
-        self._urdf = urdf
+        self.robot = urdf
         self._frames: FrameTree = read_frames(urdf, base_height=config.robot.base_height_m)
         topics = _topics(config, self._frames)
         self.sensors = tuple(SENSORS)
@@ -166,7 +167,7 @@ class Channels:
             for frame in self._frames.fixed
         ]
         return {
-            description: serialize(get_message(description.type_name)(data=self._urdf)),
+            description: serialize(get_message(description.type_name)(data=self.robot)),
             static: serialize(get_message(static.type_name)(transforms=fixed)),
         }
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from itertools import islice
@@ -14,11 +14,13 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from throwcollect.config.target import TargetColumn
 from throwcollect.dataset.directory import THROWS
 from throwcollect.dataset.moments import Moments
 from throwcollect.export.lerobot_statistics import Frames, summarise_all, summarise_episode
 from throwcollect.export.parquet_series import FILES_PER_CHUNK, MEGABYTES_PER_FILE, PATH, ParquetSeries
 from throwcollect.export.readme import Layout, list_joints
+from throwcollect.export.signals import unit_of
 from throwcollect.export.throw_source import Source, Throw
 from throwcollect.sweep.parquet_file import encode_table
 
@@ -51,19 +53,20 @@ class Feature:
         return {"dtype": self.dtype, "shape": [len(self.names or ("",))], "names": names}
 
 
-def list_features(moving: Sequence[str]) -> dict[str, Feature]:
+def list_features(moving: Sequence[str], targets: Sequence[TargetColumn]) -> dict[str, Feature]:
     """Features by name, in the order of their columns.
 
     Args:
         moving: Joints that the task moves.
+        targets: Columns of targets.
     """
     positions = tuple(f"{joint}.pos" for joint in moving)
+    ball = ("ball.x", "ball.y", "ball.z", "ball.vx", "ball.vy", "ball.vz")
+    goal = tuple(f"target.{each.word.replace(' ', '_')}" for each in targets)
     return {
         "observation.state": Feature("float32", (*positions, *(f"{joint}.vel" for joint in moving))),
         "observation.effort": Feature("float32", tuple(f"{joint}.effort" for joint in moving)),
-        "observation.environment_state": Feature(
-            "float32", ("ball.x", "ball.y", "ball.z", "ball.vx", "ball.vy", "ball.vz")
-        ),
+        "observation.environment_state": Feature("float32", (*ball, *goal)),
         "action": Feature("float32", positions),
         "next.reward": Feature("float32"),
         "next.success": Feature("bool"),
@@ -100,7 +103,8 @@ dataset = LeRobotDataset("me/throws", root=".")
             "|---|---|---|",
             "| `observation.state` | rad, rad/s | positions (`.pos`), velocities (`.vel`) of moving joints, measured |",
             "| `observation.effort` | N m | torques of their motors |",
-            "| `observation.environment_state` | m, m/s | position and velocity of the ball's centre, in world |",
+            "| `observation.environment_state` | m, m/s | position and velocity of the ball's centre, in world"
+            f"{_tell_goal(source)} |",
             "| `action` | rad | their commanded positions, on the trajectory that controllers were sent |",
             f"| `next.reward` | 1 | 1 in the last frame of a throw that {success}, 0 in all others |",
             f"| `next.success` | | true in the last frame of a throw that {success} |",
@@ -120,7 +124,8 @@ dataset = LeRobotDataset("me/throws", root=".")
 
 def write(source: Source, directory: Path) -> None:
     """Write a dataset in LeRobot's format; see `formats.Format.write`."""
-    features, task = list_features(source.moving), _say_task(source)
+    features = list_features(source.moving, source.targets)
+    tasks: dict[str, int] = {}
     table = _number_episodes(source)
     (directory / THROWS).write_bytes(encode_table(table))
     moments: dict[str, Moments] = {}
@@ -134,7 +139,9 @@ def write(source: Source, directory: Path) -> None:
         for start in range(0, len(episodes), _EPISODES_PER_GROUP):
             rows = []
             for number, throw in enumerate(islice(throws, _EPISODES_PER_GROUP), start=start):
-                frames = _compute_frames(throw, source, features, episode=number, first=first)
+                task = _say_task(source, throw.target)
+                index = tasks.setdefault(task, len(tasks))
+                frames = _compute_frames(throw, source, features, episode=number, first=first, task=index)
                 chunk, file = data.place()
                 data.append(_tabulate_frames(frames, features, source))
                 rows.append(_describe_episode(frames, task, number=number, first=first, chunk=chunk, file=file))
@@ -143,10 +150,10 @@ def write(source: Source, directory: Path) -> None:
                     moments[name] = moments[name].with_more(more) if name in moments else more
                 first += len(throw)
             _append_episodes(meta, rows, episodes.slice(start, len(rows)))
-    _write_json(directory / "meta" / "info.json", _describe_dataset(source, features, frames=first))
+    _write_json(directory / "meta" / "info.json", _describe_dataset(source, features, frames=first, tasks=len(tasks)))
     statistics = {name: summarise_all(moments[name], _read_feature(data.paths, name)) for name in features}
     _write_json(directory / "meta" / "stats.json", statistics)
-    pq.write_table(_tabulate_tasks(task), directory / "meta" / "tasks.parquet")
+    pq.write_table(_tabulate_tasks(tasks), directory / "meta" / "tasks.parquet")
 
 
 def _number_episodes(source: Source) -> pa.Table:
@@ -161,7 +168,7 @@ def _number_episodes(source: Source) -> pa.Table:
 
 
 def _compute_frames(
-    throw: Throw, source: Source, features: dict[str, Feature], *, episode: int, first: int
+    throw: Throw, source: Source, features: dict[str, Feature], *, episode: int, first: int, task: int
 ) -> dict[str, Frames]:
     """Values of each feature, in the types of the file, as numbers of shape ``(n_frames, n_components)``."""
     count = len(throw)
@@ -175,7 +182,9 @@ def _compute_frames(
             [signals[f"joint_{name}"][:, moving] for name in ("position_rad", "velocity_radps")]
         ),
         "observation.effort": signals["joint_effort_nm"][:, moving],
-        "observation.environment_state": np.hstack([signals["ball_position_m"], signals["ball_velocity_mps"]]),
+        "observation.environment_state": np.hstack(
+            [signals[name] for name in ("ball_position_m", "ball_velocity_mps", *throw.target)]
+        ),
         "action": signals["command_position_rad"],
         "next.reward": done * throw.succeeded,
         "next.success": done * throw.succeeded,
@@ -184,7 +193,7 @@ def _compute_frames(
         "frame_index": index,
         "episode_index": np.full(count, episode),
         "index": first + index,
-        "task_index": np.zeros(count),
+        "task_index": np.full(count, task),
     }
     # Statistics are those of the numbers as they are stored.
     return {
@@ -238,7 +247,7 @@ def _read_feature(paths: Sequence[Path], name: str) -> Iterator[Frames]:
                 yield column.cast(pa.float64()).to_numpy(zero_copy_only=False).reshape(len(batch), -1)
 
 
-def _describe_dataset(source: Source, features: dict[str, Feature], *, frames: int) -> dict[str, object]:
+def _describe_dataset(source: Source, features: dict[str, Feature], *, frames: int, tasks: int) -> dict[str, object]:
     episodes = len(source.entries)
     return {
         "codebase_version": _VERSION,
@@ -246,7 +255,7 @@ def _describe_dataset(source: Source, features: dict[str, Feature], *, frames: i
         "features": {name: feature.as_dict() for name, feature in features.items()},
         "total_episodes": episodes,
         "total_frames": frames,
-        "total_tasks": 1,
+        "total_tasks": tasks,
         "chunks_size": FILES_PER_CHUNK,
         "data_files_size_in_mb": MEGABYTES_PER_FILE,
         "video_files_size_in_mb": _VIDEO_MEGABYTES,
@@ -257,20 +266,30 @@ def _describe_dataset(source: Source, features: dict[str, Feature], *, frames: i
     }
 
 
-def _say_task(source: Source) -> str:
-    """What the robot is to do, in words."""
+def _say_task(source: Source, target: Mapping[str, float]) -> str:
+    """What the robot is to do, in words, such as ``Throw the ball to x 1.40 m, y -0.20 m``."""
     task = source.dataset.config.task
-    return "Throw the ball." if task.throws else f"{task.name.replace('_', ' ').capitalize()}."
+    said = "Throw the ball" if task.throws else task.name.replace("_", " ").capitalize()
+    goal = [f"{each.word} {target[each.name]:.2f} {unit_of(each.name)}" for each in source.targets]
+    return f"{said} to {', '.join(goal)}." if goal else f"{said}."
 
 
-def _tabulate_tasks(task: str) -> pa.Table:
-    """One row for the one task; its text is the index of the table, as pandas stores it."""
+def _tell_goal(source: Source) -> str:
+    """What stands behind the ball in the state of the environment, as the end of a sentence."""
+    goal = [f"{each.word} [{unit_of(each.name)}]" for each in source.targets]
+    return f"; then where it should end: {', '.join(goal)}, also in the text of the task" if goal else ""
+
+
+def _tabulate_tasks(tasks: Mapping[str, int]) -> pa.Table:
+    """One row for each task; its text is the index of the table, as pandas stores it."""
     columns = [
         {"name": name, "field_name": name, "pandas_type": kind, "numpy_type": stored, "metadata": None}
         for name, kind, stored in (("task_index", "int64", "int64"), ("task", "unicode", "object"))
     ]
     pandas = {"index_columns": ["task"], "column_indexes": [], "columns": columns}
-    return pa.table({"task_index": [0], "task": [task]}).replace_schema_metadata({"pandas": json.dumps(pandas)})
+    return pa.table({"task_index": [*tasks.values()], "task": [*tasks]}).replace_schema_metadata(
+        {"pandas": json.dumps(pandas)}
+    )
 
 
 def _write_json(path: Path, value: object) -> None:

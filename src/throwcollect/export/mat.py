@@ -15,6 +15,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config, DynamicMovementPrimitive
+from throwcollect.config.task import TaskConfig
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.export.npz import to_array
 from throwcollect.export.readme import Layout, list_joints
@@ -64,6 +65,8 @@ _FIELDS = (
     "- `targets(k, :)`: what the throw achieved. `d`: distance of the ball's centre at its landing from the vertical "
     "axis through the world's origin [m]; `h`: height of the landing plane [m]; `alpha`: direction of flight at the "
     "landing below the horizontal [rad]. `d` and `alpha` are NaN if the ball did not land.",
+    "- `wanted(k, :)`: where the throw should have ended, in columns that `wanted_names` names; only if all throws "
+    "have a target.",
     "- `DMP{k}`: `N`, `dt`, `a_z`, `a_x`, `c`, `sigma_2`, `w` (N × n), `tau`, `goal`, `y0`, with which each joint y "
     "follows `tau z' = a_z (a_z / 4 (goal - y) - z) + f(x)`, `tau y' = z`, `tau x' = -a_x x`, "
     "`f(x) = sum(psi_i w_i) / sum(psi_i) x`, `psi_i = exp(-(x - c_i)² / (2 sigma_2_i))`, x(0) = 1. `fitted` is 0 if "
@@ -144,12 +147,14 @@ def _gather_throws(
 ) -> dict[str, Any]:
     plan = source.dataset.plan
     moving = [source.joints.index(joint) for joint in source.moving]
-    paths, primitives, targets, measured, balls = [], [], [], [], []
+    paths, motions, targets, measured, balls = [], [], [], [], []
+    wanted: list[Mapping[str, float]] = []
     for throw in source.throws(entries):
         config = plan.config_of(plan.trial(throw.trial))
         paths.append(_sample_path(throw.trajectory, source.rate_hz))
-        primitives.append(_describe_primitive(throw.trajectory, config, source.rate_hz))
+        motions.append((throw.trajectory, config.task))
         targets.append(_measure_target(landings[throw.trial], config))
+        wanted.append(throw.target)
         measured.append(
             _stack_signals(throw, "joint_position_rad", "joint_velocity_radps", "joint_effort_nm", of=moving)
         )
@@ -162,11 +167,20 @@ def _gather_throws(
         },
         "qPath": _to_cell(paths),
         "targets": np.array(targets),
-        "DMP": _to_cell(primitives),
+        **_list_wanted(source, wanted),
+        "DMP": _to_cell(_describe_primitives(motions, source.rate_hz)),
         "trial": np.array([[float(entry.trial)] for entry in entries]),
         "measured": _to_cell(measured),
         "ball": _to_cell(balls),
     }
+
+
+def _list_wanted(source: Source, wanted: Sequence[Mapping[str, float]]) -> dict[str, Any]:
+    """Fields of the targets of throws; none if they have none."""
+    if not source.targets:
+        return {}
+    names = [each.name for each in source.targets]
+    return {"wanted": np.array([[each[name] for name in names] for each in wanted]), "wanted_names": _to_cell(names)}
 
 
 def _sample_path(trajectory: JointTrajectory, rate_hz: int) -> NDArray[np.float64]:
@@ -184,22 +198,48 @@ def _measure_target(landing: tuple[float | None, ...], config: Config) -> tuple[
     return float(np.hypot(x, y)), config.scene.landing_height_m, angle
 
 
-def _describe_primitive(trajectory: JointTrajectory, config: Config, rate_hz: int) -> dict[str, Any]:
-    """Fields of the DMP of a throw: that of its configuration, or else one fitted to the commanded motion."""
+def _describe_primitives(motions: Sequence[tuple[JointTrajectory, TaskConfig]], rate_hz: int) -> list[dict[str, Any]]:
+    """Fields of the DMPs of throws: those of their configurations, or else ones fitted to the commanded motions."""
+    to_fit = [motion for motion, task in motions if not isinstance(task.trajectory, DynamicMovementPrimitive)]
+    fitted = iter(_fit_primitives(to_fit))
+    return [
+        _describe_primitive(motion, task.trajectory, task.duration_s, rate_hz)
+        if isinstance(task.trajectory, DynamicMovementPrimitive)
+        else _describe_primitive(motion, next(fitted), float(motion.times[-1]), rate_hz, fitted=True)
+        for motion, task in motions
+    ]
+
+
+def _fit_primitives(motions: Sequence[JointTrajectory]) -> list[DynamicMovementPrimitive]:
+    """Fit a DMP to each motion, all by one decomposition, as they have the same phases when each lasts 1."""
+    if not motions:
+        return []
+    shares = np.linspace(0, 1, _FIT_POINTS)
+    sampled = [sample_quintic(motion, shares * motion.times[-1]) for motion in motions]
+    positions, velocities, accelerations = (
+        np.hstack([each[order] * motion.times[-1] ** order for each, motion in zip(sampled, motions, strict=True)])
+        for order in range(3)
+    )
+    names = [(number, joint) for number, motion in enumerate(motions) for joint in motion.joints]
+    together = fit_dmp(
+        [f"{number} {joint}" for number, joint in names],
+        shares,
+        positions,
+        velocities=velocities,
+        accelerations=accelerations,
+        basis_functions=BASIS_FUNCTIONS,
+    )
+    weights: list[dict[str, list[float]]] = [{} for _ in motions]
+    for number, joint in names:
+        weights[number][joint] = together.weights[f"{number} {joint}"]
+    return [together.model_copy(update={"weights": each}) for each in weights]
+
+
+def _describe_primitive(
+    trajectory: JointTrajectory, family: DynamicMovementPrimitive, tau: float, rate_hz: int, *, fitted: bool = False
+) -> dict[str, Any]:
     times = np.linspace(0, trajectory.times[-1], _FIT_POINTS)
-    positions, velocities, accelerations = sample_quintic(trajectory, times)
-    family, tau = config.task.trajectory, config.task.duration_s
-    fitted = not isinstance(family, DynamicMovementPrimitive)
-    if not isinstance(family, DynamicMovementPrimitive):
-        tau = float(trajectory.times[-1])
-        family = fit_dmp(
-            trajectory.joints,
-            times,
-            positions,
-            velocities=velocities,
-            accelerations=accelerations,
-            basis_functions=BASIS_FUNCTIONS,
-        )
+    positions, _, _ = sample_quintic(trajectory, times)
     weights = np.array(
         [family.weights.get(joint, [0.0] * family.basis_functions) for joint in trajectory.joints], dtype=np.float64
     )

@@ -9,6 +9,7 @@ from typing import Any
 import pyarrow as pa
 
 from throwcollect.config.schema import Config
+from throwcollect.config.target import is_target
 from throwcollect.dataset.bag import to_yaml
 from throwcollect.dataset.data_card import outcome_lines
 from throwcollect.dataset.directory import CONFIG
@@ -65,7 +66,7 @@ def render_card(source: Source, layout: Layout) -> str:
         layout.loading,
         "```",
         "",
-        *(line for note in (*layout.notes, _explain_rate(source)) for line in (note, "")),
+        *(line for note in (*layout.notes, _explain_rate(source), *_explain_targets(source)) for line in (note, "")),
         "The world frame has x forward, y left, z up; its origin is on the ground below the robot's base.",
         "",
         "## Over time",
@@ -105,6 +106,17 @@ def _explain_rate(source: Source) -> str:
         f"The samples are at {source.rate_hz} Hz. {how} Nothing is filtered: what is faster than "
         f"{source.rate_hz / 2:g} Hz is aliased. Commanded values are computed at the very instants."
     )
+
+
+def _explain_targets(source: Source) -> list[str]:
+    """What there is of targets, if the dataset has some."""
+    there = [name for name in source.table.column_names if is_target(name)]
+    if not there:
+        return []
+    if not source.targets:
+        return ["Not every throw has a target, so targets are in the table of all trials alone."]
+    names = _quote([each.name for each in source.targets])
+    return [f"Every throw has a target, {names}, which is the same in all its samples, for policies to condition on."]
 
 
 def tabulate_signals(source: Source, *, columns: bool = False) -> list[str]:

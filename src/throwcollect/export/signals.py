@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from throwcollect.config.shape import unit_of_key
+from throwcollect.config.target import TargetColumn
+from throwcollect.dataset.columns import name_components
 
 _ASCII = str.maketrans({"²": "^2", "³": "^3"})
 
@@ -53,12 +55,13 @@ class Signal:
         return self.components or (self.name,)
 
 
-def list_signals(joints: Sequence[str], moving: Sequence[str]) -> tuple[Signal, ...]:
+def list_signals(joints: Sequence[str], moving: Sequence[str], targets: Sequence[TargetColumn]) -> tuple[Signal, ...]:
     """Describe all signals of an exported throw.
 
     Args:
         joints: All joints of the robot.
         moving: Joints that the task moves.
+        targets: Columns of targets, which are the same in all samples of a throw.
     """
     every = f"{len(joints)} joints"
     return (
@@ -71,10 +74,13 @@ def list_signals(joints: Sequence[str], moving: Sequence[str]) -> tuple[Signal, 
         ),
         _describe_joints("command_velocity_radps", "Commanded velocities.", moving),
         _describe_joints("command_acceleration_radps2", "Commanded accelerations.", moving),
-        _describe_ball("ball_position_m", "Ball centre in world.", "", "xyz", "_m"),
-        _describe_ball("ball_orientation_xyzw", "Unit quaternion, ball to world.", "q", "xyzw", ""),
-        _describe_ball("ball_velocity_mps", "Velocity of the ball in world.", "v", "xyz", "_mps"),
-        _describe_ball("ball_angular_velocity_radps", "Angular velocity of the ball in world.", "w", "xyz", "_radps"),
+        _describe_ball("ball_position_m", "Ball centre in world.", "ball.position", "xyz"),
+        _describe_ball("ball_orientation_xyzw", "Unit quaternion, ball to world.", "ball.orientation_xyzw", "xyzw"),
+        _describe_ball("ball_velocity_mps", "Velocity of the ball in world.", "ball.velocity", "xyz"),
+        _describe_ball(
+            "ball_angular_velocity_radps", "Angular velocity of the ball in world.", "ball.angular_velocity", "xyz"
+        ),
+        *(Signal(each.name, each.description, (each.name,), "target", each.name) for each in targets),
     )
 
 
@@ -83,6 +89,6 @@ def _describe_joints(name: str, description: str, joints: Sequence[str], each: s
     return Signal(name, description, tuple(f"{joint}_{ending}" for joint in joints), each, f"<joint>_{ending}")
 
 
-def _describe_ball(name: str, description: str, prefix: str, axes: str, unit: str) -> Signal:
-    components = tuple(f"ball_{prefix}{axis}{unit}" for axis in axes)
+def _describe_ball(name: str, description: str, column: str, axes: str) -> Signal:
+    components = name_components(column, ())
     return Signal(name, description, components, ", ".join(axes), ", ".join(components))

@@ -10,6 +10,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from throwcollect.config.target import TargetColumn
 from throwcollect.dataset.reader import Dataset
 from throwcollect.episode.record import Samples
 from throwcollect.errors import ConfigError, DatasetError
@@ -49,12 +50,14 @@ class Throw:
         succeeded: Whether it is one that succeeded.
         signals: Each signal of the source by name, ``(n_samples, ...)``.
         trajectory: The trajectory that the controllers were sent.
+        target: Where it should end, by column of targets; those of the source.
     """
 
     trial: int
     succeeded: bool
     signals: Signals
     trajectory: JointTrajectory
+    target: Mapping[str, float]
 
     def __len__(self) -> int:
         return len(self.signals["time_s"])
@@ -70,6 +73,7 @@ class Source:
         rate_hz: Samples per second to give.
         joints: All joints of the robot, in the order of the samples.
         moving: Joints that the task moves, in the order of the trajectories.
+        targets: Columns of targets that each of its throws has; a policy that is conditioned on them needs them all.
         signals: Quantities of each throw over time.
         shards: Throws of each recording, by the name of its file without ending; all in order of trials.
         table: One row a trial, with ``description`` and ``unit`` in the metadata of each column.
@@ -80,6 +84,7 @@ class Source:
     rate_hz: int
     joints: tuple[str, ...]
     moving: tuple[str, ...]
+    targets: tuple[TargetColumn, ...]
     signals: tuple[Signal, ...]
     shards: Mapping[str, tuple[Entry, ...]]
     table: pa.Table
@@ -107,14 +112,16 @@ class Source:
             raise DatasetError(f"{directory}: none of its {len(dataset.throws)} trials has an episode to export")
         rate_hz = rate_hz or recorded_hz
         joints = dataset.joints
-        moving = tuple(joint for joint in joints if joint in dataset.config.task.end)
+        moving = dataset.moving_joints
+        targets = _list_targets(dataset)
         return cls(
             dataset,
             dataset.digest,
             rate_hz,
             joints,
             moving,
-            list_signals(joints, moving),
+            targets,
+            list_signals(joints, moving, targets),
             _list_entries(dataset, rate_hz),
             add_units(dataset.throws),
         )
@@ -141,8 +148,12 @@ class Source:
         except DatasetError as error:
             raise DatasetError(f"{dataset.directory}: trial {trial}: {error}") from error
         samples = resample(recorded, recorded_hz=dataset.config.record.rate_hz, rate_hz=self.rate_hz)
-        trajectory = task_of(dataset.plan.config_of(dataset.plan.trial(trial))).trajectory()
-        return Throw(trial, succeeded, _compute_signals(samples, trajectory, episode.header.start_ns), trajectory)
+        planned = dataset.plan.trial(trial)
+        trajectory = task_of(dataset.plan.config_of(planned)).trajectory()
+        signals = _compute_signals(samples, trajectory, episode.header.start_ns)
+        target = {each.name: planned.target[each.name] for each in self.targets}
+        signals |= {name: np.full((len(samples), 1), value) for name, value in target.items()}
+        return Throw(trial, succeeded, signals, trajectory, target)
 
 
 def _list_entries(dataset: Dataset, rate_hz: int) -> dict[str, tuple[Entry, ...]]:
@@ -155,7 +166,14 @@ def _list_entries(dataset: Dataset, rate_hz: int) -> dict[str, tuple[Entry, ...]
     return {shard: tuple(entries) for shard, entries in found.items()}
 
 
-def _compute_signals(samples: Samples, trajectory: JointTrajectory, start_ns: int) -> Signals:
+def _list_targets(dataset: Dataset) -> tuple[TargetColumn, ...]:
+    """The columns of targets of which no throw with an episode lacks one, in the order of the task."""
+    throws = dataset.recorded.throws
+    columns = [each for each in dataset.config.task.target_columns if each.name in throws.column_names]
+    return tuple(each for each in columns if not throws[each.name].null_count)
+
+
+def _compute_signals(samples: Samples, trajectory: JointTrajectory, start_ns: int) -> dict[str, NDArray[np.float64]]:
     time_s = (samples.stamps_ns - start_ns) / NS_PER_S
     position, velocity, acceleration = sample_quintic(trajectory, time_s)
     return {

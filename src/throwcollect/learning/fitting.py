@@ -140,7 +140,7 @@ def _find_axes(
     Raises:
         ConfigError: If a key was not swept, or has one value alone.
     """
-    swept = dataset.parameters
+    swept = dataset.plan.keys
     for key in (*parameters, *context):
         if key not in swept:
             raise ConfigError(f"{key} was not swept", expected=f"one of {', '.join(swept)}")

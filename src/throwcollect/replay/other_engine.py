@@ -110,7 +110,8 @@ class _Kept:
         self.dataset = Dataset.open(directory)
         config = self.dataset.config
         self.config: Config = config.model_copy(update={"sim": config.sim.model_copy(update={"engine": engine})})
-        self.table = ThrowsTable(self.dataset.plan.keys, self.config)
+        plan = self.dataset.plan
+        self.table = ThrowsTable(plan.keys, self.config, plan.trials.target_names)
         self.replayer = Replayer(self.config)
         self.stored = {row["trial"]: row for row in self.dataset.throws.to_pylist()}
 
@@ -123,7 +124,7 @@ class _Kept:
         compared = [
             column
             for column in again
-            if column not in ("trial", *trial.values)
+            if column not in ("trial", *trial.values, *trial.target)
             and all(isinstance(row.get(column), int | float) for row in (stored, again))
         ]
         values = {column: float(again[column]) - float(stored[column]) for column in compared}

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import plotly.graph_objects as go
+from numpy.typing import NDArray
 
 from throwcollect.dataset.reader import Dataset
 from throwcollect.errors import ConfigError
@@ -14,12 +15,11 @@ from throwcollect.learning.model import Model, load_model
 from throwcollect.learning.model_directory import read_score
 from throwcollect.learning.score import Errors, Score, ThrowAtTarget
 from throwcollect.report.contents import Panel, Row, Section, Table
-from throwcollect.report.figures import BLUE, LEGEND_ABOVE, LIMIT_LINE, NEUTRAL
+from throwcollect.report.figures import BLUE, LEGEND_ABOVE
+from throwcollect.report.miss_map import ARROWS, draw_miss_map
 from throwcollect.wording import command, format_count
 
 _TITLE = "How a model of it hits"
-_ARROWS = 10
-"""Misses are drawn so many times as long."""
 _CENTIMETRES = 100.0
 
 
@@ -49,11 +49,12 @@ def show_model(directory: Path, dataset: Dataset) -> Section:
     if score is None:
         hint = command("score", directory)
         return Section("model", "Model", _TITLE, f"{text} Nobody has thrown with it yet; {hint} does, in simulation.")
-    text += f" All distances are those of throws in simulation, at {score.targets} targets."
+    seeds = format_count(score.seeds, "seed")
+    text += f" Distances are medians of {seeds}, of {score.targets} targets each, in simulation."
     panels = [
         Panel(
             "targets",
-            f"Targets, and misses drawn {_ARROWS} times as long",
+            f"Targets, and misses drawn {ARROWS} times as long",
             _draw_misses(model, score.throws),
             picture="targets",
         ),
@@ -66,7 +67,7 @@ def show_model(directory: Path, dataset: Dataset) -> Section:
         )
         there = Panel(
             "elsewhere",
-            f"Targets there after the last of them, misses {_ARROWS} times as long",
+            f"Targets there after the last of them, misses {ARROWS} times as long",
             _draw_misses(model, score.adapted_throws),
         )
         rows.append((adapted, there))
@@ -74,33 +75,19 @@ def show_model(directory: Path, dataset: Dataset) -> Section:
 
 
 def _draw_misses(model: Model, throws: Sequence[ThrowAtTarget]) -> go.Figure:
-    """Draw targets amid what the dataset reached, in the first two columns, and an arrow for each miss."""
-    landings = model.learned.outputs
-    figure = go.Figure()
-    if landings.shape[1] < 2:
-        landings = np.column_stack([landings, np.zeros(len(landings))])
-    grey = {"color": NEUTRAL, "size": 3, "opacity": 0.5, "symbol": "circle"}
-    figure.add_scatter(x=landings[:, 0], y=landings[:, 1], mode="markers", marker=grey, name="throws of the dataset")
-    hit = [throw for throw in throws if throw.place is not None]
-    lost = [throw for throw in throws if throw.place is None]
-    for some, name, colour in ((hit, "targets", BLUE), (lost, "targets where no throw landed", LIMIT_LINE["color"])):
-        if some:
-            points = np.array([[*throw.target, 0.0][:2] for throw in some])
-            marker = {"color": colour, "size": 7, "symbol": "cross"}
-            figure.add_scatter(x=points[:, 0], y=points[:, 1], mode="markers", marker=marker, name=name)
-    x: list[float | None] = []
-    y: list[float | None] = []
-    for throw in hit:
-        target, place = np.array([*throw.target, 0.0][:2]), np.array([*(throw.place or ()), 0.0][:2])
-        end = target + _ARROWS * (place - target)
-        x += [target[0], end[0], None]
-        y += [target[1], end[1], None]
-    if hit:
-        line = {"color": LIMIT_LINE["color"], "width": 1.5}
-        figure.add_scatter(x=x, y=y, mode="lines", line=line, name=f"misses × {_ARROWS}")
+    """Draw targets amid what the dataset reached, in the first two columns, and a line for each miss."""
+    count = len(model.targets)
+    targets = np.array([throw.target for throw in throws], np.float64).reshape(len(throws), count)
+    nowhere = [np.nan] * count
+    places = np.array([throw.place or nowhere for throw in throws], np.float64).reshape(len(throws), count)
+    ends, targets, places = (_take_two(points) for points in (model.learned.outputs, targets, places))
     names = [*model.targets, ""]
-    figure.update_xaxes(title=names[0]).update_yaxes(title=names[1], scaleanchor="x")
-    return figure.update_layout(height=420, legend=LEGEND_ABOVE)
+    return draw_miss_map(ends, targets, places, (names[0], names[1]))
+
+
+def _take_two(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The first two columns; of points of one column, zeros beside it."""
+    return np.column_stack([points, np.zeros(len(points))])[:, :2]
 
 
 def _draw_training(score: Score) -> go.Figure:

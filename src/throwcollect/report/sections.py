@@ -22,6 +22,7 @@ from throwcollect.report.model_section import show_model
 from throwcollect.report.outcomes import LANDED, Outcomes, in_words
 from throwcollect.report.provenance import config_text, provenance
 from throwcollect.report.swept_keys import Parameter, read_parameters
+from throwcollect.report.targets_section import show_targets
 from throwcollect.report.throughput import Throughput, measure_throughput
 from throwcollect.robots.description import robot_of
 from throwcollect.tasks.task import task_of
@@ -80,6 +81,7 @@ def report_dataset(dataset: Dataset, *, model: Path | None = None) -> Report:
         outcomes=outcomes,
         sections=(
             *task.results,
+            *show_targets(dataset),
             *(() if model is None else (show_model(model, dataset),)),
             _show_parameters(parameters, outcomes),
             _show_outcomes(outcomes, parameters, group_failures(reasons), noun),

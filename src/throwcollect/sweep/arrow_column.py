@@ -8,6 +8,7 @@ from __future__ import annotations
 from array import array
 from collections.abc import Sequence
 from itertools import accumulate
+from math import isnan
 from typing import Any
 
 import numpy as np
@@ -50,13 +51,25 @@ def _make_array_column(values: NDArray[Any], kind: pa.DataType) -> pa.Array:
 
 
 def read_numbers(column: pa.Array) -> NDArray[Any]:
-    """The numbers of a column of which nothing is null, ``(n_rows,)``; not to be written to.
+    """The numbers of a column, ``(n_rows,)``; any number stands for what is null. Not to be written to.
 
     Args:
         column: Of ``int64``, ``uint64`` or ``float64``.
     """
     dtype = np.dtype(_CODES[column.type])
     return np.frombuffer(column.buffers()[1], dtype, len(column), dtype.itemsize * column.offset)
+
+
+def null_where_nan(values: NDArray[np.float64]) -> Sequence[float | None] | NDArray[np.float64]:
+    """A column of numbers as `make_column` takes it, in which what is not a number is null."""
+    if not np.isnan(values).any():
+        return values
+    return [None if isnan(value) else value for value in values.tolist()]
+
+
+def nan_where_null(column: pa.Array) -> NDArray[np.float64]:
+    """The numbers of a ``float64`` column, ``(n_rows,)``; NaN for those that are null."""
+    return np.where(read_validity(column), read_numbers(column), np.nan)
 
 
 def read_validity(column: pa.Array) -> NDArray[np.bool_]:

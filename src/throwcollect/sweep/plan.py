@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 
 from throwcollect.config.schema import Config
+from throwcollect.config.target import is_target
 from throwcollect.config.values import reason_not_sweepable, with_values
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError, PlanError, Problem
 from throwcollect.files import is_there, remove, write_file
 from throwcollect.sweep.digest import config_digest, is_digest, trial_digests
 from throwcollect.sweep.parquet_file import encode_table, open_parquet
-from throwcollect.sweep.points import Points
+from throwcollect.sweep.points import Points, Targets
 from throwcollect.sweep.round_file import read_rounds, rounds_path
 from throwcollect.sweep.samplers import draw_points
 from throwcollect.sweep.slice import Slice
@@ -105,9 +106,9 @@ class Plan:
         """Bytes of the plan's Parquet file; equal plans give equal bytes.
 
         Columns: ``trial`` int64, ``digest`` string, ``seed`` uint64, ``refused`` string or null, then one float64
-        column per swept key, named like it.
+        column per swept key, named like it, and one per column of targets, null where a trial has none.
         """
-        from throwcollect.sweep.arrow_column import make_table
+        from throwcollect.sweep.arrow_column import make_table, null_where_nan
 
         trials = self.trials
         columns: list[Any] = [
@@ -116,11 +117,12 @@ class Plan:
             trials.seeds,
             [trials.refused.get(number) for number in trials.numbers],
             *trials.values.T,
+            *([] if trials.targets is None else map(null_where_nan, trials.targets.values.T)),
         ]
         metadata = {_FORMAT_KEY: _FORMAT, _CONFIG_KEY: config_digest(self.config)}
         if self.slice is not None:
             metadata[_SLICE_KEY] = str(self.slice)
-        schema = _schema(self.keys).with_metadata(metadata)
+        schema = _schema(self.keys, trials.target_names).with_metadata(metadata)
         return encode_table(make_table(columns, schema))
 
     @classmethod
@@ -139,9 +141,11 @@ class Plan:
         """
         with open_parquet(path) as file:
             metadata = file.schema_arrow.metadata or {}
-            keys = tuple(file.schema_arrow.names[4:])
+            columns = file.schema_arrow.names[4:]
+            keys = tuple(name for name in columns if not is_target(name))
+            targets = tuple(name for name in columns if is_target(name))
             found = metadata.get(_FORMAT_KEY, b"none").decode(errors="replace")
-            if found != _FORMAT or not file.schema_arrow.equals(_schema(keys)) or not file.metadata.num_rows:
+            if found != _FORMAT or not file.schema_arrow.equals(_schema(keys, targets)) or not file.metadata.num_rows:
                 raise DatasetError(
                     "not a plan that this version reads",
                     path=path,
@@ -153,7 +157,9 @@ class Plan:
             for key in keys:
                 if reason := reason_not_sweepable(config, key):
                     raise DatasetError(f"is damaged: column {key!r}: {reason}", path=path)
-            trials = _read_trials(file, keys, path)
+            for name, reason in config.task.find_wrong_targets(targets).items():
+                raise DatasetError(f"is damaged: column {name!r}: {reason}", path=path)
+            trials = _read_trials(file, keys, targets, path)
         stored = metadata.get(_SLICE_KEY)
         if stored is not None:
             return cls(config, trials, Slice.parse(stored.decode()))
@@ -211,7 +217,8 @@ def make_trials(config: Config, points: Points, *, first: int = 0) -> Trials:
     """
     count = len(points.values)
     seeds = np.fromiter((_seed(config.seed, number) for number in range(first, first + count)), np.uint64, count)
-    return Trials(points.keys, points.values, seeds, trial_digests(config, points, seeds), first=first)
+    digests = trial_digests(config, points, seeds)
+    return Trials(points.keys, points.values, seeds, digests, first=first, targets=points.targets)
 
 
 def _seed(root: int, number: int) -> int:
@@ -250,12 +257,13 @@ def check_some_left(trials: Trials) -> None:
     )
 
 
-def _read_trials(file: Any, keys: tuple[str, ...], path: Path) -> Trials:
+def _read_trials(file: Any, keys: tuple[str, ...], targets: tuple[str, ...], path: Path) -> Trials:
     """The trials of a plan's file, some after the other, as Arrow's memory for all of them is several times theirs.
 
     Args:
         file: The open file.
         keys: Swept dotted keys.
+        targets: Columns of targets.
         path: Its path, for messages.
 
     Raises:
@@ -265,7 +273,7 @@ def _read_trials(file: Any, keys: tuple[str, ...], path: Path) -> Trials:
     for rows in file.iter_batches(_ROWS_AT_ONCE):
         rows.validate(full=True)
         first = rows["trial"][0].as_py()
-        more = _trials_of(rows, keys, first, path)
+        more = _trials_of(rows, keys, targets, first, path)
         if trials is None:
             trials = more
         elif first != trials.numbers.stop:
@@ -277,8 +285,8 @@ def _read_trials(file: Any, keys: tuple[str, ...], path: Path) -> Trials:
     return trials
 
 
-def _trials_of(rows: Any, keys: tuple[str, ...], first: int, path: Path) -> Trials:
-    from throwcollect.sweep.arrow_column import read_numbers
+def _trials_of(rows: Any, keys: tuple[str, ...], targets: tuple[str, ...], first: int, path: Path) -> Trials:
+    from throwcollect.sweep.arrow_column import nan_where_null, read_numbers
 
     numbers = np.arange(first, first + len(rows))
     if not np.array_equal(read_numbers(rows["trial"]), numbers):
@@ -295,12 +303,16 @@ def _trials_of(rows: Any, keys: tuple[str, ...], first: int, path: Path) -> Tria
         np.frombuffer(bytes.fromhex("".join(digests)), np.uint8).reshape(-1, DIGEST_BYTES),
         first=first,
         refused={number: reason for number, reason in reasons if reason is not None},
+        targets=Targets(targets, np.column_stack([nan_where_null(rows[name]) for name in targets]))
+        if targets
+        else None,
     )
 
 
-def _schema(keys: Sequence[str]) -> Any:
+def _schema(keys: Sequence[str], targets: Sequence[str]) -> Any:
     import pyarrow as pa
 
     kinds = {"trial": pa.int64(), "digest": pa.string(), "seed": pa.uint64(), "refused": pa.string()}
-    kinds |= dict.fromkeys(keys, pa.float64())
-    return pa.schema([pa.field(name, kind, nullable=name == "refused") for name, kind in kinds.items()])
+    kinds |= dict.fromkeys((*keys, *targets), pa.float64())
+    nullable = {"refused", *targets}
+    return pa.schema([pa.field(name, kind, nullable=name in nullable) for name, kind in kinds.items()])

@@ -1,4 +1,4 @@
-"""Points from a CSV or Parquet file: one row a trial, dotted keys as columns."""
+"""Points from a CSV or Parquet file: one row a trial, dotted keys as columns, and columns of targets."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
+from throwcollect.config.target import is_target
 from throwcollect.config.values import reason_not_sweepable, with_values
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.sweep.parquet_file import encode_table
-from throwcollect.sweep.points import Points
+from throwcollect.sweep.points import Points, Targets
 
 _MOST_PROBLEMS = 20
 _UNNAMED_INDEX = re.compile(r"__index_level_\d+__")
@@ -38,7 +39,7 @@ def read_points(path: Path, config: Config) -> Points:
 
     Args:
         path: File that ends in ``.csv`` (UTF-8, comma, a header line) or ``.parquet``.
-        config: Configuration whose keys the columns are.
+        config: Configuration whose keys the columns are, and whose task says which targets there may be.
 
     Raises:
         ConfigError: If the file cannot be read, or its columns or values cannot be used; it holds all problems, or
@@ -51,7 +52,7 @@ def read_points(path: Path, config: Config) -> Points:
         problem = f"should be a file, got the directory {path}" if path.is_dir() else f"there is no file {path}"
         raise ConfigError([Problem(problem, "sweep.file")])
     rows = readers[path.suffix](path, config)
-    problems = [*rows.problems, *_value_problems(rows, path, config)]
+    problems = [*rows.problems, *_find_value_problems(rows, path, config), *_find_target_problems(rows, path, config)]
     if problems:
         raise ConfigError(sorted(problems, key=lambda problem: problem.line or 0)[:_MOST_PROBLEMS])
     if not len(rows.numbers):
@@ -63,7 +64,21 @@ def encode_points(points: Points) -> bytes:
     """Parquet bytes that `read_points` reads; equal points give equal bytes."""
     import pyarrow as pa
 
-    return encode_table(pa.table({key: points.values[:, column] for column, key in enumerate(points.keys)}))
+    from throwcollect.sweep.arrow_column import make_column, null_where_nan
+
+    columns: dict[str, Any] = {key: points.values[:, column] for column, key in enumerate(points.keys)}
+    if (targets := points.targets) is not None:
+        values = map(null_where_nan, targets.values.T)
+        columns |= {name: make_column(each, pa.float64()) for name, each in zip(targets.names, values, strict=True)}
+    return encode_table(pa.table(columns))
+
+
+def _make_points(names: tuple[str, ...], values: NDArray[np.float64], config: Config) -> Points:
+    """Tell keys from targets, which are in the order of the task then, wherever they stand."""
+    keys = [column for column, name in enumerate(names) if not is_target(name)]
+    targets = tuple(each.name for each in config.task.target_columns if each.name in names)
+    wanted = Targets(targets, values[:, [names.index(name) for name in targets]]) if targets else None
+    return Points(tuple(names[column] for column in keys), values[:, keys], wanted)
 
 
 def _read_csv(path: Path, config: Config) -> _Rows:
@@ -73,12 +88,12 @@ def _read_csv(path: Path, config: Config) -> _Rows:
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
             reader = csv.reader(file)
-            keys = tuple(name.strip() for name in next(reader, []))
-            _check_keys(keys, path, config, line=1)
+            names = tuple(name.strip() for name in next(reader, []))
+            _check_columns(names, path, config, line=1)
             for cells in reader:
                 if not cells:
                     continue
-                row, wrong = _row(keys, cells, path, reader.line_num)
+                row, wrong = _row(names, cells, path, reader.line_num)
                 problems += wrong
                 if not wrong:
                     rows.append(row)
@@ -91,18 +106,23 @@ def _read_csv(path: Path, config: Config) -> _Rows:
         raise ConfigError([Problem(f"not valid CSV: {error}", "sweep.file", path)]) from error
     except OSError as error:
         raise ConfigError([Problem(f"cannot be read: {error.strerror}", "sweep.file", path)]) from error
-    return _Rows(Points(keys, np.array(rows).reshape(len(rows), len(keys))), np.array(lines), problems)
+    values = np.array(rows).reshape(len(rows), len(names))
+    return _Rows(_make_points(names, values, config), np.array(lines), problems)
 
 
-def _row(keys: tuple[str, ...], cells: list[str], path: Path, line: int) -> tuple[list[float], list[Problem]]:
-    if len(cells) != len(keys):
-        return [], [Problem(f"should have {len(keys)} values, got {len(cells)}", "", path, line)]
+def _row(names: tuple[str, ...], cells: list[str], path: Path, line: int) -> tuple[list[float], list[Problem]]:
+    """The numbers of a row, NaN for targets that it leaves out."""
+    if len(cells) != len(names):
+        return [], [Problem(f"should have {len(names)} values, got {len(cells)}", "", path, line)]
     row, problems = [], []
-    for key, cell in zip(keys, cells, strict=True):
+    for name, cell in zip(names, cells, strict=True):
         number = _number(cell)
         row.append(number)
+        if is_target(name) and not cell.strip():
+            continue
         if not math.isfinite(number):
-            problems.append(Problem(f"should be a number, got {cell.strip()!r}", key, path, line))
+            expected = "a number, or empty for no target" if is_target(name) else "a number"
+            problems.append(Problem(f"should be {expected}, got {cell.strip()!r}", name, path, line))
     return row, problems
 
 
@@ -122,7 +142,7 @@ def _read_parquet(path: Path, config: Config) -> _Rows:
     except (pa.ArrowException, OSError) as error:
         raise ConfigError([Problem(f"cannot be read as Parquet: {error}", "sweep.file", path)]) from error
     table = table.drop_columns([name for name in table.column_names if _UNNAMED_INDEX.fullmatch(name)])
-    _check_keys(tuple(table.column_names), path, config, line=None)
+    _check_columns(tuple(table.column_names), path, config, line=None)
     problems: list[Problem] = []
     columns: dict[str, Any] = {}
     good = np.ones(len(table), dtype=bool)
@@ -130,30 +150,66 @@ def _read_parquet(path: Path, config: Config) -> _Rows:
         column = table[field.name]
         if not (pa.types.is_floating(field.type) or pa.types.is_integer(field.type)):
             problems.append(Problem(f"should be a column of numbers, got {field.type}", field.name, path))
+            # Without it no row would have a whole target, which is no further mistake.
+            good &= not is_target(field.name)
+            continue
+        valid = column.is_valid().to_numpy()
+        columns[field.name] = column.to_numpy()
+        if is_target(field.name):
+            wrong = np.flatnonzero(valid & ~np.isfinite(columns[field.name])).tolist()
+            numbers = [(row + 1, columns[field.name][row]) for row in wrong[:_MOST_PROBLEMS]]
+            problems += [
+                _of_row("should be a number, or null for no target, got " + str(value), field.name, path, row)
+                for row, value in numbers
+            ]
+            good[wrong] = False
             continue
         if nulls := column.null_count:
             problems.append(Problem(f"should have a number in each row, got {nulls} nulls", field.name, path))
-        good &= column.is_valid().to_numpy()
-        columns[field.name] = column.to_numpy()
+        good &= valid
     values = np.array([column[good] for column in columns.values()], dtype=np.float64)
-    points = Points(tuple(columns), values.reshape(len(columns), np.count_nonzero(good)).T)
+    points = _make_points(tuple(columns), values.reshape(len(columns), np.count_nonzero(good)).T, config)
     return _Rows(points, np.flatnonzero(good) + 1, problems)
 
 
-def _check_keys(keys: tuple[str, ...], path: Path, config: Config, *, line: int | None) -> None:
+def _check_columns(names: tuple[str, ...], path: Path, config: Config, *, line: int | None) -> None:
     problems = []
-    for index, key in enumerate(keys):
-        if key in keys[:index]:
-            problems.append(Problem("the column is here twice", key, path, line))
-        elif reason := reason_not_sweepable(config, key):
-            problems.append(Problem(reason, key or f"column {index + 1}", path, line))
-    if not keys:
-        problems.append(Problem("the file is empty", "sweep.file", path))
+    targets = [name for name in names if is_target(name)]
+    for index, name in enumerate(names):
+        if name in names[:index]:
+            problems.append(Problem("the column is here twice", name, path, line))
+        elif not is_target(name) and (reason := reason_not_sweepable(config, name)):
+            problems.append(Problem(reason, name or f"column {index + 1}", path, line))
+    problems += [Problem(reason, name, path, line) for name, reason in config.task.find_wrong_targets(targets).items()]
+    if len(targets) == len(names):
+        sentence = "has no column of a key, only targets" if names else "the file is empty"
+        problems.append(Problem(sentence, "sweep.file", path))
     if problems:
-        raise ConfigError(problems, expected="dotted configuration keys as columns")
+        also = ", and targets as the task names them" if targets else ""
+        raise ConfigError(problems, expected=f"dotted configuration keys as columns{also}")
 
 
-def _value_problems(rows: _Rows, path: Path, config: Config) -> Iterator[Problem]:
+def _find_target_problems(rows: _Rows, path: Path, config: Config) -> Iterator[Problem]:
+    """Rows with parts of a target."""
+    if (targets := rows.points.targets) is None or not len(rows.numbers):
+        return
+    there = ~np.isnan(targets.values)
+    for pattern in np.unique(there, axis=0):
+        names = [name for name, has in zip(targets.names, pattern.tolist(), strict=True) if has]
+        wrong = config.task.find_wrong_targets(names)
+        for row in np.flatnonzero((there == pattern).all(axis=1))[:_MOST_PROBLEMS] if wrong else ():
+            for name, sentence in wrong.items():
+                yield _of_row(sentence, name, path, int(rows.numbers[row]))
+
+
+def _of_row(sentence: str, key: str, path: Path, number: int) -> Problem:
+    """A problem of a row: CSV has lines, and Parquet rows."""
+    if path.suffix == ".csv":
+        return Problem(sentence, key, path, number)
+    return Problem(f"row {number}: {sentence}", key, path)
+
+
+def _find_value_problems(rows: _Rows, path: Path, config: Config) -> Iterator[Problem]:
     if not len(rows.numbers):
         return
     for key, column in zip(rows.points.keys, rows.points.values.T, strict=True):
@@ -161,11 +217,7 @@ def _value_problems(rows: _Rows, path: Path, config: Config) -> Iterator[Problem
         if not _refusals(config, key, np.array([column.min(), column.max()])):
             continue
         for row, sentence in _refusals(config, key, column):
-            number = int(rows.numbers[row])
-            if path.suffix == ".csv":
-                yield Problem(sentence, key, path, number)
-            else:
-                yield Problem(f"row {number}: {sentence}", key, path)
+            yield _of_row(sentence, key, path, int(rows.numbers[row]))
 
 
 def _refusals(config: Config, key: str, column: NDArray[np.float64]) -> list[tuple[int, str]]:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import overload
 
 import numpy as np
 from numpy.typing import NDArray
 
+from throwcollect.sweep.points import Points, Targets
 from throwcollect.sweep.rows import Rows
 
 DIGEST_BYTES = 32
@@ -26,6 +27,7 @@ class Trial:
         seed: Seed for anything random in the trial, from the root seed and the number; fits uint64.
         digest: SHA-256 in hex over everything that determines the trial's samples.
         refused: Why the trial is not run, or None.
+        target: Where it should end, by column; empty if nobody says so. Nothing that the trial does depends on it.
     """
 
     number: int
@@ -33,6 +35,7 @@ class Trial:
     seed: int
     digest: str
     refused: str | None = None
+    target: Mapping[str, float] = field(default_factory=dict)
 
 
 class Trials(Sequence[Trial]):
@@ -41,6 +44,7 @@ class Trials(Sequence[Trial]):
     Attributes:
         keys: Swept dotted keys.
         first: Number of the first trial.
+        target_names: Columns of targets; none if nobody says where trials should end.
 
     Args:
         keys: Swept dotted keys, ``(n_keys,)``.
@@ -49,6 +53,7 @@ class Trials(Sequence[Trial]):
         digests: Digest of each trial, shape ``(n_trials, DIGEST_BYTES)``.
         first: Number of the first trial.
         refused: Why trials are not run, by their numbers; of those that are not run alone.
+        targets: Where the trials should end; None if nobody says so.
     """
 
     def __init__(
@@ -60,11 +65,14 @@ class Trials(Sequence[Trial]):
         *,
         first: int = 0,
         refused: Mapping[int, str] = MappingProxyType({}),
+        targets: Targets | None = None,
     ) -> None:
         self.keys = tuple(keys)
         self.first = first
         self._values, self._seeds, self._digests = Rows(values), Rows(seeds), Rows(digests)
         self._refused = dict(refused)
+        self.target_names = () if targets is None else targets.names
+        self._targets = Rows(np.empty((len(values), 0)) if targets is None else targets.values)
 
     @property
     def values(self) -> NDArray[np.float64]:
@@ -80,6 +88,16 @@ class Trials(Sequence[Trial]):
     def digests(self) -> NDArray[np.uint8]:
         """Digests, shape ``(n_trials, DIGEST_BYTES)``."""
         return self._digests.all
+
+    @property
+    def points(self) -> Points:
+        """Values and targets, as they were drawn."""
+        return Points(self.keys, self.values, self.targets)
+
+    @property
+    def targets(self) -> Targets | None:
+        """Where the trials should end; None if nobody says so."""
+        return Targets(self.target_names, self._targets.all) if self.target_names else None
 
     @property
     def refused(self) -> Mapping[int, str]:
@@ -118,7 +136,8 @@ class Trials(Sequence[Trial]):
         rows = slice(chosen.start - self.first, chosen.stop - self.first)
         refused = {number: self._refused[number] for number in chosen if number in self._refused}
         columns = self.values[rows], self.seeds[rows], self.digests[rows]
-        return Trials(self.keys, *columns, first=chosen.start, refused=refused)
+        targets = None if self.targets is None else self.targets[rows]
+        return Trials(self.keys, *columns, first=chosen.start, refused=refused, targets=targets)
 
     def __iter__(self) -> Iterator[Trial]:
         return map(self._trial, self.numbers)
@@ -127,10 +146,9 @@ class Trials(Sequence[Trial]):
         if not isinstance(other, Trials):
             return NotImplemented
         return (
-            self.keys == other.keys
+            self.points == other.points
             and self.first == other.first
             and self._refused == other._refused
-            and np.array_equal(self.values, other.values)
             and np.array_equal(self.seeds, other.seeds)
             and np.array_equal(self.digests, other.digests)
         )
@@ -141,16 +159,18 @@ class Trials(Sequence[Trial]):
         return f"Trials({len(self)} from {self.first}, {len(self._refused)} refused; swept: {', '.join(self.keys)})"
 
     def extend(self, others: Trials) -> None:
-        """Append trials, which go on where these end and vary the same keys.
+        """Append trials, which go on where these end, vary the same keys and have the same columns of targets.
 
         Raises:
             ValueError: If they do not.
         """
-        if others.first != self.numbers.stop or others.keys != self.keys:
+        names = (others.keys, others.target_names)
+        if others.first != self.numbers.stop or names != (self.keys, self.target_names):
             raise ValueError(f"{others} cannot follow {self}")
         self._values.append(others.values)
         self._seeds.append(others.seeds)
         self._digests.append(others.digests)
+        self._targets.append(others._targets.all)
         self._refused |= others.refused
 
     def refuse(self, reasons: Sequence[str | None]) -> Trials:
@@ -161,10 +181,12 @@ class Trials(Sequence[Trial]):
         """
         pairs = zip(self.numbers, reasons, strict=True)
         refused = {number: reason for number, reason in pairs if reason is not None}
-        return Trials(self.keys, self.values, self.seeds, self.digests, first=self.first, refused=refused)
+        columns = self.values, self.seeds, self.digests
+        return Trials(self.keys, *columns, first=self.first, refused=refused, targets=self.targets)
 
     def _trial(self, number: int) -> Trial:
         row = number - self.first
         values = dict(zip(self.keys, self.values[row].tolist(), strict=True))
         digest = self.digests[row].tobytes().hex()
-        return Trial(number, values, int(self.seeds[row]), digest, self._refused.get(number))
+        target = {} if self.targets is None else self.targets.row(row)
+        return Trial(number, values, int(self.seeds[row]), digest, self._refused.get(number), target)

@@ -15,7 +15,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import Field, dataclass, field
 from typing import Any, Literal
 
-from throwcollect.tasks.measures import BallState, Peak
+from throwcollect.tasks.measures import BallState, Peak, Vector
 
 _DECLARED = "columns"
 
@@ -28,11 +28,13 @@ class Column:
         name: Its name.
         kind: What it holds: numbers, whole numbers, or text; null where there is nothing.
         description: One sentence, with units.
+        later: Whether datasets of earlier versions lack it.
     """
 
     name: str
     kind: Literal["number", "count", "text"]
     description: str
+    later: bool = False
 
 
 class Columns(ABC):
@@ -62,13 +64,15 @@ class Number(Columns):
 
     Attributes:
         description: What it is, with its unit.
+        later: Whether datasets of earlier versions lack it.
     """
 
     description: str
+    later: bool = False
 
     def declare(self, name: str, joints: Sequence[str]) -> list[Column]:
         """List the column; see `Columns`."""
-        return [Column(name, "number", self.description)]
+        return [Column(name, "number", self.description, self.later)]
 
     def split(self, value: float, joints: Sequence[str]) -> Sequence[object]:
         """Return the number alone; see `Columns`."""
@@ -85,7 +89,7 @@ class Count(Number):
 
     def declare(self, name: str, joints: Sequence[str]) -> list[Column]:
         """List the column; see `Columns`."""
-        return [Column(name, "count", self.description)]
+        return [Column(name, "count", self.description, self.later)]
 
 
 @dataclass(frozen=True)
@@ -125,6 +129,37 @@ def join_ball(values: Sequence[float]) -> BallState:
     """Make a state of the values of its columns."""
     time_s, x, y, z, vx, vy, vz = values
     return BallState(time_s, (x, y, z), (vx, vy, vz))
+
+
+@dataclass(frozen=True)
+class SpinColumns(Columns):
+    """An angular velocity of the ball: ``<field>_x_radps`` and so on. Datasets of earlier versions lack it.
+
+    Attributes:
+        when: At which instant, as the end of a sentence.
+    """
+
+    when: str
+
+    def declare(self, name: str, joints: Sequence[str]) -> list[Column]:
+        """List the columns; see `Columns`."""
+        return [
+            Column(
+                f"{name}_{axis}_radps",
+                "number",
+                f"Angular velocity of the ball in world {self.when}, {axis} [rad/s].",
+                later=True,
+            )
+            for axis in "xyz"
+        ]
+
+    def split(self, value: Vector, joints: Sequence[str]) -> Sequence[object]:
+        """Return the components; see `Columns`."""
+        return value
+
+    def join(self, values: Sequence[Any], joints: Sequence[str]) -> Any:
+        """Return the vector; see `Columns`."""
+        return tuple(values)
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+Vector = tuple[float, float, float]
+
 
 @dataclass(frozen=True)
 class BallState:
@@ -16,8 +18,8 @@ class BallState:
     """
 
     time_s: float
-    position: tuple[float, float, float]
-    velocity: tuple[float, float, float]
+    position: Vector
+    velocity: Vector
 
 
 @dataclass(frozen=True)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import Field, dataclass, fields
+from dataclasses import Field, dataclass, fields, replace
 from enum import Enum
 from typing import Any, Generic, TypeVar
 
 from throwcollect.errors import DatasetError
-from throwcollect.tasks.columns import Column, Columns, JointColumns, Number, PeakColumns, columns_of, measured
+from throwcollect.tasks.columns import Columns, JointColumns, Number, PeakColumns, columns_of, measured
 from throwcollect.tasks.measures import Peak
 
 LIMIT_VIOLATED, TRACKING_FAILED, LOST = "limit_violated", "tracking_failed", "lost"
@@ -74,7 +74,7 @@ class ResultColumns(Generic[AnyResult]):
             (each.name, columns, columns.declare(each.name, joints)) for each, columns in _list_declared(results)
         ]
         self.columns = tuple(
-            Column(column.name, column.kind, column.description.replace("{tool}", tool))
+            replace(column, description=column.description.replace("{tool}", tool))
             for _, _, declared in self._fields
             for column in declared
         )
@@ -118,7 +118,8 @@ class ResultColumns(Generic[AnyResult]):
         """
         measures = {}
         for name, columns, declared in self._fields:
-            values = [row[column.name] for column in declared]
+            # Rows of an earlier version have fewer columns.
+            values = [row.get(column.name) if column.later else row[column.name] for column in declared]
             measures[name] = None if None in values else columns.join(values, self._joints)
         return self._results(outcome, reason, **measures)
 

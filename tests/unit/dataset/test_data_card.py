@@ -1,6 +1,8 @@
 from __future__ import annotations
 
+import hashlib
 import socket
+import subprocess
 from pathlib import Path
 
 import pyarrow as pa
@@ -10,8 +12,10 @@ from ruamel.yaml import YAML
 
 import throwcollect
 from throwcollect.config.loader import load
+from throwcollect.dataset import provenance
 from throwcollect.dataset.data_card import data_card
-from throwcollect.dataset.provenance import HOST_VARIABLE, Provenance
+from throwcollect.dataset.provenance import HOST_VARIABLE, IMAGE_VARIABLE, Provenance, read_provenance
+from throwcollect.dataset.reader import Dataset
 
 
 def test_the_card_has_the_header_that_hubs_read(dataset: Path) -> None:
@@ -39,7 +43,7 @@ def test_trials_without_an_episode_are_no_throws(dataset: Path) -> None:
     throws = pq.read_table(dataset / "throws.parquet")
     column = throws.schema.get_field_index("digest")
     fewer = throws.set_column(column, "digest", pa.array([None, None, *throws["digest"].to_pylist()[2:]]))
-    provenance = Provenance.of_this_machine(simulations=1, wall_s=1.0, was_open=False)
+    provenance = Provenance.of_this_machine(simulations=1, wall_s=1.0, was_open=False, robot="<robot/>")
     assert "\n5 simulated throws of a ball" in data_card(load(dataset / "config.yaml"), fewer, provenance)
 
 
@@ -51,8 +55,31 @@ def test_a_container_knows_its_host_only_if_it_is_told(
         monkeypatch.delenv(HOST_VARIABLE, raising=False)
     else:
         monkeypatch.setenv(HOST_VARIABLE, told)
-    provenance = Provenance.of_this_machine(simulations=1, wall_s=1.0, was_open=False)
+    provenance = Provenance.of_this_machine(simulations=1, wall_s=1.0, was_open=False, robot="<robot/>")
     assert provenance.host == host
     card = data_card(load(dataset / "config.yaml"), pq.read_table(dataset / "throws.parquet"), provenance)
     assert (f"| host | {host} |" in card) == (host is not None)
     assert ("| host |" in card) == (host is not None)
+
+
+def test_provenance_says_which_sources_image_and_robot_there_were(
+    monkeypatch: pytest.MonkeyPatch, dataset: Path
+) -> None:
+    read = read_provenance(dataset)
+    assert read is not None
+    recorded = Dataset.open(dataset).robot_description()
+    assert recorded is not None
+    assert read.robot_sha256 == hashlib.sha256(recorded.encode()).hexdigest()
+    head = subprocess.run(
+        ["git", "rev-parse", "HEAD"], cwd=Path(__file__).parent, capture_output=True, text=True, check=True
+    )
+    assert read.revision is not None
+    assert read.revision.removesuffix("-dirty") == head.stdout.strip()
+    assert read.image is None
+    monkeypatch.setenv(IMAGE_VARIABLE, "sha256:12ab")
+    assert Provenance.of_this_machine(simulations=1, wall_s=1.0, was_open=False, robot="").image == "sha256:12ab"
+
+
+def test_sources_that_lie_in_no_clone_have_no_revision(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(provenance, "__file__", str(tmp_path / "site-packages" / "throwcollect" / "dataset" / "x.py"))
+    assert Provenance.of_this_machine(simulations=1, wall_s=1.0, was_open=False, robot="").revision is None

@@ -52,7 +52,7 @@ def test_throws_stand_beside_the_table(loaded: Dataset, collected: Path) -> None
     assert len(loaded) == len(loaded.throws) == 7
     assert trials(loaded) == list(range(7))
     assert (loaded[-1].trial, loaded[3].trial) == (6, 3)
-    assert loaded.parameters == ("task.duration_s",)
+    assert loaded.parameters.names == ("task.duration_s",)
     assert loaded[3].parameters == {"task.duration_s": loaded.throws["task.duration_s"][3].as_py()}
     assert loaded.config.name == "quick"
 
@@ -177,14 +177,14 @@ def test_no_file_stays_open(loaded: Dataset) -> None:
 
 
 @pytest.mark.parametrize("problem", ["missing", "unfinished"])
-def test_only_finished_datasets_are_loaded(dataset: Path, tmp_path: Path, problem: str) -> None:
+def test_only_finished_datasets_are_opened(dataset: Path, tmp_path: Path, problem: str) -> None:
     if problem == "unfinished":
         (dataset / "metadata.yaml").unlink()
         with pytest.raises(DatasetError, match="is not finished"):
-            throwcollect.load(dataset)
+            Dataset.open(dataset)
     else:
         with pytest.raises(DatasetError, match="holds no dataset"):
-            throwcollect.load(tmp_path / "nowhere")
+            Dataset.open(tmp_path / "nowhere")
 
 
 def test_an_episode_comes_back_as_it_went_in(collection: Any, dataset: Path) -> None:

@@ -1,9 +1,15 @@
 from dataclasses import replace
+from pathlib import Path
 
+import pyarrow.parquet as pq
+import pytest
 from tests.unit.dataset.conftest import Collection
 
-from throwcollect.dataset.throws_table import Place, ThrowsTable
+from throwcollect.dataset.throws_table import Place, ThrowsTable, read_throws
+from throwcollect.dataset.verify import verify
+from throwcollect.derive.selection import merge
 from throwcollect.episode.record import Contact, EpisodeHeader, Samples
+from throwcollect.errors import DatasetError
 from throwcollect.tasks.throw.outcome import ThrowOutcome
 
 
@@ -25,3 +31,39 @@ def test_results_come_back_from_the_table(collection: Collection) -> None:
         assert table.result(stored) == result
         outcomes.add(result.outcome)
     assert outcomes == {ThrowOutcome.LANDED, ThrowOutcome.NOT_RELEASED, ThrowOutcome.TRACKING_FAILED}
+
+
+def test_a_swept_key_has_a_unit_and_a_name_without_dots() -> None:
+    swept = {
+        "task.end.arm_right_4_joint": {"min": -0.7, "max": -0.4},
+        "task.duration_s": {"min": 0.9, "max": 1.1},
+        "ball.friction": {"min": 0.1, "max": 0.5},
+    }
+    collection = Collection({"sweep": {"sampler": "uniform", "parameters": swept}})
+    schema = ThrowsTable.of(collection.plan).schema
+    told = {key: schema.field(key).metadata for key in swept}
+    assert [each[b"alias"].decode() for each in told.values()] == [
+        "task_end_arm_right_4_joint_rad",
+        "task_duration_s",
+        "ball_friction",
+    ]
+    assert [each[b"unit"].decode() for each in told.values()] == ["rad", "s", ""]
+    assert told["ball.friction"][b"description"] == b"Swept value of ball.friction [-]."
+
+
+def test_a_table_of_an_earlier_version_is_read_and_verified_and_merged(collection: Collection, tmp_path: Path) -> None:
+    directory = collection.collect(tmp_path / "dataset")
+    earlier = pq.read_table(directory / "throws.parquet").drop_columns(sorted(ThrowsTable.of(collection.plan).later))
+    (directory / "throws.parquet").unlink()
+    pq.write_table(earlier, directory / "throws.parquet")
+    (directory / "datapackage.json").unlink()
+    assert read_throws(directory, collection.plan).equals(earlier)
+    assert not [finding for finding in verify(directory) if finding.file not in ("datapackage.json",)]
+    merge([directory, collection.collect(tmp_path / "new")], tmp_path / "merged")
+    merged = pq.read_table(tmp_path / "merged" / "throws.parquet")
+    assert merged["release_spin_y_radps"].null_count == 0
+    assert not verify(tmp_path / "merged")
+
+    pq.write_table(earlier.drop_columns(["recontacts"]), directory / "throws.parquet")
+    with pytest.raises(DatasetError, match=r"not the table of this plan: differs in \['recontacts'\]"):
+        read_throws(directory, collection.plan)

@@ -11,7 +11,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 from tests.unit.dataset.conftest import Collection
 
-from throwcollect.dataset.reader import Dataset, load
+from throwcollect.dataset.reader import Dataset
 from throwcollect.learning.fitting import fit_throws
 from throwcollect.learning.learned_map import Axis, Kind, LearnedMap, Role
 
@@ -69,7 +69,7 @@ def make_dataset(directory: Path, count: int) -> Dataset:
     """A dataset whose table tells of throws in worlds that differ in the ball's drag; its recordings do not matter."""
     ends = zip(KEYS, LOW.tolist(), HIGH.tolist(), strict=True)
     sweep = {key: {"min": low, "max": high} for key, low, high in ends} | {DRAG.key: {"min": 0.0, "max": 1.0}}
-    found = load(Collection({"sweep": {"sampler": "uniform", "parameters": sweep}}).collect(directory))
+    found = Dataset.open(Collection({"sweep": {"sampler": "uniform", "parameters": sweep}}).collect(directory))
     values = draw(count)
     drag = np.random.default_rng(1).random(count)
     columns = dict(zip(KEYS, values.T, strict=True)) | dict(zip(TARGETS, land(values, drag).T, strict=True))

@@ -4,7 +4,8 @@ import pytest
 
 from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError
-from throwcollect.sweep.point_file import read_points
+from throwcollect.sweep.point_file import encode_points, read_points
+from throwcollect.tasks.throw.config import ThrowConfig
 
 HEADER = "ball.mass_kg,task.duration_s\n"
 
@@ -160,3 +161,87 @@ def test_files_that_are_no_table(tmp_path):
     broken = tmp_path / "broken.parquet"
     broken.write_bytes(b"PAR1 but not much more")
     assert problems(broken)[0].startswith("broken.parquet: sweep.file: cannot be read as Parquet: ")
+
+
+TARGETED = "task.duration_s,target_y_m,target_x_m\n"
+
+
+def test_targets_are_no_keys_and_a_row_may_have_none(csv):
+    points = read_points(csv(TARGETED + "1.0,-0.2,1.4\n1.1,,\n1.2, ,\n"), Config())
+    assert points.keys == ("task.duration_s",)
+    assert points.values.tolist() == [[1.0], [1.1], [1.2]]
+    assert points.targets.names == ("target_x_m", "target_y_m")
+    assert [points.targets.row(number) for number in range(3)] == [{"target_x_m": 1.4, "target_y_m": -0.2}, {}, {}]
+
+
+def test_parquet_holds_the_same_targets(csv, tmp_path):
+    points = read_points(csv(TARGETED + "1.0,-0.2,1.4\n1.1,,\n"), Config())
+    path = tmp_path / "points.parquet"
+    path.write_bytes(encode_points(points))
+    assert read_points(path, Config()) == points
+    assert pq.read_table(path)["target_x_m"].to_pylist() == [1.4, None]
+
+
+@pytest.mark.parametrize(
+    ("content", "messages"),
+    [
+        (
+            "task.duration_s,target_x_m\n1,1.4\n",
+            ["list.csv:1: target_y_m: is missing beside target_x_m"],
+        ),
+        (
+            "task.duration_s,target_hit_angle_rad\n1,1.4\n",
+            [
+                "list.csv:1: target_x_m: is missing beside target_hit_angle_rad",
+                "list.csv:1: target_y_m: is missing beside target_hit_angle_rad",
+            ],
+        ),
+        (
+            "task.duration_s,target_x_cm,target_x_m,target_y_m\n1,1,1,1\n",
+            [
+                "list.csv:1: target_x_cm: the task throw has no such target; it has target_x_m, target_y_m, "
+                "target_z_m, target_hit_angle_rad"
+            ],
+        ),
+        ("target_x_m,target_y_m\n1,1\n", ["list.csv: sweep.file: has no column of a key, only targets"]),
+        (
+            "task.duration_s,target_x_m,target_x_m,target_y_m\n1,1,1,1\n",
+            ["list.csv:1: target_x_m: the column is here twice"],
+        ),
+        (
+            TARGETED + "1,-0.2,1.4\n1,-0.2,\n1,nan,1.4\n1,far,inf\n1,,1.4\n",
+            [
+                "list.csv:3: target_x_m: is missing beside target_y_m",
+                "list.csv:4: target_y_m: should be a number, or empty for no target, got 'nan'",
+                "list.csv:5: target_y_m: should be a number, or empty for no target, got 'far'",
+                "list.csv:5: target_x_m: should be a number, or empty for no target, got 'inf'",
+                "list.csv:6: target_y_m: is missing beside target_x_m",
+            ],
+        ),
+    ],
+)
+def test_wrong_targets_are_named_with_their_lines(csv, content, messages):
+    assert problems(csv(content)) == messages
+
+
+def test_wrong_targets_in_parquet_are_named_with_their_rows(parquet):
+    columns = {
+        "task.duration_s": [1.0, 1.0, 1.0, 1.0],
+        "target_x_m": [1.4, None, float("nan"), float("inf")],
+        "target_y_m": [-0.2, -0.2, -0.2, -0.2],
+    }
+    assert problems(parquet(columns)) == [
+        "list.parquet: target_x_m: row 3: should be a number, or null for no target, got nan",
+        "list.parquet: target_x_m: row 4: should be a number, or null for no target, got inf",
+        "list.parquet: target_x_m: row 2: is missing beside target_y_m",
+    ]
+    text = parquet({"task.duration_s": [1.0], "target_x_m": ["1.4"], "target_y_m": [-0.2]})
+    assert problems(text) == ["list.parquet: target_x_m: should be a column of numbers, got string"]
+
+
+def test_a_task_without_targets_takes_none(csv, monkeypatch):
+    monkeypatch.setattr(ThrowConfig, "target_columns", ())
+    assert problems(csv(TARGETED + "1,1,1\n")) == [
+        "list.csv:1: target_y_m: the task throw has no such target; it has none",
+        "list.csv:1: target_x_m: the task throw has no such target; it has none",
+    ]

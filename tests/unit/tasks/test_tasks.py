@@ -7,10 +7,12 @@ from pathlib import Path
 import pytest
 
 from throwcollect.config.schema import Config
+from throwcollect.config.target import is_target
 from throwcollect.config.task import TaskConfig
 from throwcollect.members import load_member, load_object, names_of
 from throwcollect.tasks.result import LIMIT_VIOLATED, LOST, TRACKING_FAILED, Result
 from throwcollect.tasks.task import Task, task_of
+from throwcollect.units import unit_of_name
 
 sys.path.append(str(Path(__file__).parents[2] / "plugins"))
 
@@ -47,6 +49,18 @@ def test_every_measure_of_its_results_has_columns(section: type[TaskConfig]) -> 
         if each.name not in {"outcome", "reason"}:
             assert any(each.name in column for column in columns), each.name
     assert all("{" not in column.description for column in task.columns.columns)
+
+
+@of_every_task
+def test_targets_are_wanted_of_what_it_measures_or_is_given(section: type[TaskConfig]) -> None:
+    measured = {column.name: column.kind for column in described(section).columns.columns}
+    for each in section.target_columns:
+        assert is_target(each.name)
+        assert measured.get(each.of) == "number" or each.of in section.given, each
+        assert unit_of_name(each.name) == unit_of_name(each.of) == unit_of_name(each.miss) != ""
+        assert each.miss not in measured
+    assert not any(map(is_target, measured))
+    assert section.target_columns == () or any(each.required for each in section.target_columns)
 
 
 @of_every_task

@@ -11,10 +11,11 @@ import typer
 
 from throwcollect.cli.options import DatasetArgument, JsonOption
 from throwcollect.cli.streams import ensure_written
-from throwcollect.wording import command
+from throwcollect.units import unit_of_name
+from throwcollect.wording import command, format_count
 
 if TYPE_CHECKING:
-    from throwcollect.dataset.summary import Info
+    from throwcollect.dataset.summary import Info, MissSummary
 
 
 def show_info(directory: DatasetArgument, json: JsonOption = False) -> None:
@@ -58,6 +59,7 @@ def describe(found: Info) -> str:
     lines = {
         "trials": f"{found.trials}: {outcomes}{_missing(found)}",
         **({"landing": _landing(found.landing)} if found.noun == "throw" else {}),
+        **{name: _describe_misses(name, each) for name, each in found.misses.items()},
         "episodes": f"{found.episodes}, {found.samples} samples, {found.duration_s:.0f} s of simulated time",
         "files": f"{found.shards} MCAP of {found.recordings_bytes / 1e6:.1f} MB, "
         f"{found.size_bytes / 1e6:.1f} MB in all",
@@ -66,7 +68,10 @@ def describe(found: Info) -> str:
     }
     if found.wall_s:
         speed = found.episodes / found.wall_s
-        lines["took"] = f"{found.wall_s:.1f} s, {speed:.1f} {found.noun}s/s, start-up included"
+        factor = found.duration_s / found.wall_s
+        lines["took"] = (
+            f"{found.wall_s:.1f} s, {speed:.1f} {found.noun}s/s, {factor:.1f} x real time, start-up included"
+        )
     if isinstance(found, Summary) and found.open:
         lines["open"] = "anybody who reached the router could join, read and disturb the run"
     width = max(map(len, lines))
@@ -77,6 +82,14 @@ def _missing(found: Info) -> str:
     if found.wanted is None or found.outcomes.get(found.success, 0) >= found.wanted:
         return ""
     return f"; {found.wanted} should have {found.success}, but all trials were used up"
+
+
+def _describe_misses(name: str, found: MissSummary) -> str:
+    targets = f"{found.measured} of {format_count(found.targets, 'target')}"
+    if found.median is None:
+        return targets
+    unit = unit_of_name(name)
+    return f"{targets}: median {found.median:.3g} {unit}, 9 of 10 below {found.share90:.3g} {unit}"
 
 
 def _landing(landing: Mapping[str, tuple[float, float]] | None) -> str:

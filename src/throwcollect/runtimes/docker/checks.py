@@ -23,13 +23,16 @@ from throwcollect.runtimes.ports import reserve_port
 _NODES = {"router": ROUTER, "sim": "sim_0", "coordinator": COORDINATOR}
 
 
-def check(client: DockerClient, place: RunPlace, config: Config) -> None:
+def check(client: DockerClient, place: RunPlace, config: Config) -> str:
     """Look for the image, the mounts, the networks, and the router's port.
 
     Args:
         client: Client of the engine.
         place: The run.
         config: Its configuration.
+
+    Returns:
+        Id of the image, which is the SHA-256 of all that it is made of.
 
     Raises:
         ConfigError: If a mount or a network is not there or must not be used, or the router's port is taken.
@@ -38,9 +41,12 @@ def check(client: DockerClient, place: RunPlace, config: Config) -> None:
     with engine_errors("the Docker engine cannot be asked"):
         # The containers of a launcher that died hold the port already, and are taken over with it.
         begun = client.api.containers(all=True, filters={"label": f"{RUN_LABEL}={place.run_id}"})
-    _check(client, image(config), {f"containers.{kind}": section_of(config, node) for kind, node in _NODES.items()})
+    found = _check(
+        client, image(config), {f"containers.{kind}": section_of(config, node) for kind, node in _NODES.items()}
+    )
     if config.run.router_port and not begun:
         reserve_port(config.run).close()
+    return found
 
 
 def check_container(client: DockerClient, spec: ContainerSpec, component: str) -> None:
@@ -60,12 +66,12 @@ def check_container(client: DockerClient, spec: ContainerSpec, component: str) -
 
 def _check(
     client: DockerClient, name: str, sections: Mapping[str, NodeContainerConfig], *, mounts: str = "mounts"
-) -> None:
+) -> str:
     with engine_errors("the Docker engine cannot be asked"):
         networks = {each["Name"] for each in client.api.networks()}
         root = os.path.realpath(client.api.info()["DockerRootDir"])
         try:
-            client.images.get(name)
+            found = str(client.images.get(name).id)
         except ImageNotFound as error:
             hint = "throwcollect image build" if name == default_tag() else f"docker pull {name}"
             raise WorkerError(f"the Docker engine has no image {name}", hint=hint) from error
@@ -74,6 +80,7 @@ def _check(
     ]
     if problems:
         raise ConfigError(problems)
+    return found
 
 
 def _problems(

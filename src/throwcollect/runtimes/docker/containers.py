@@ -97,7 +97,7 @@ class DockerNodes(NodeHost):
             self._client = client or connect(timeout_s=SILENCE_S)
             self._clock.attend(self._client)
             undo.callback(self._clock.ignore, self._client)
-            check(self._client, self._place, config)
+            self._image_id = check(self._client, self._place, config)
             undo.pop_all()
 
     def collect(self, session: Session) -> Info | None:
@@ -198,6 +198,7 @@ class DockerNodes(NodeHost):
             place=self._place,
             config=self.config,
             middleware=self.place.middleware,
+            image_id=self._image_id,
             address=self._address_of(node),
         )
         container = self._nodes[node.name] = self._node(node.name)

@@ -14,7 +14,7 @@ from docker.types import EndpointConfig, LogConfig, Mount, Ulimit
 from throwcollect.config.containers import NodeContainerConfig
 from throwcollect.config.schema import Config
 from throwcollect.dataset.directory import DIRECTORY_VARIABLE
-from throwcollect.dataset.provenance import HOST_VARIABLE
+from throwcollect.dataset.provenance import HOST_VARIABLE, IMAGE_VARIABLE
 from throwcollect.ros.connection import Connection
 from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
@@ -146,7 +146,13 @@ def confine(place: RunPlace, image: str) -> dict[str, Any]:
 
 
 def node_options(
-    node: NodeSpec, *, place: RunPlace, config: Config, middleware: Middleware, address: str | None = None
+    node: NodeSpec,
+    *,
+    place: RunPlace,
+    config: Config,
+    middleware: Middleware,
+    image_id: str,
+    address: str | None = None,
 ) -> dict[str, Any]:
     """Keywords for `containers.create` that make the container of a node.
 
@@ -155,6 +161,7 @@ def node_options(
         place: The run.
         config: Its configuration.
         middleware: What carries the messages of its nodes.
+        image_id: Id of the image, for the dataset's provenance.
         address: Its address in the run's network; None for any.
     """
     section = section_of(config, node.name)
@@ -162,6 +169,7 @@ def node_options(
         **node_environment(Connection(router_endpoint(config, middleware), KEY, config.run.domain_id, middleware)),
         # What nodes would say otherwise, a random id and /data, means nothing outside of the container.
         HOST_VARIABLE: socket.gethostname(),
+        IMAGE_VARIABLE: image_id,
         DIRECTORY_VARIABLE: "" if place.in_volume else place.source,
         "THROWCOLLECT_NODE": node.name,
     }

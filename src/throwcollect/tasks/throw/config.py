@@ -8,6 +8,7 @@ from pydantic import Field
 
 from throwcollect.config.key import Effect, Key
 from throwcollect.config.kinds import Angle, Joint
+from throwcollect.config.target import TargetColumn
 from throwcollect.config.task import TaskConfig
 from throwcollect.config.until import UntilConfig, Wanted
 from throwcollect.errors import ConfigError, Problem
@@ -28,6 +29,24 @@ class ThrowConfig(TaskConfig):
     throws: ClassVar[bool] = True
     targets: ClassVar[tuple[str, ...]] = ("landing_x_m", "landing_y_m")
     given: ClassVar[tuple[str, ...]] = ("scene.landing_height_m",)
+    target_columns: ClassVar[tuple[TargetColumn, ...]] = (
+        TargetColumn(
+            "target_x_m", "landing_x_m", "miss_m", "x", "Where the ball should land: x in world [m].", required=True
+        ),
+        TargetColumn(
+            "target_y_m", "landing_y_m", "miss_m", "y", "Where the ball should land: y in world [m].", required=True
+        ),
+        TargetColumn(
+            "target_z_m", "scene.landing_height_m", "miss_m", "z", "Height at which the ball should land [m]."
+        ),
+        TargetColumn(
+            "target_hit_angle_rad",
+            "hit_angle_rad",
+            "miss_hit_angle_rad",
+            "hit angle",
+            "Direction of flight below the horizontal with which the ball should land [rad].",
+        ),
+    )
 
     name: Literal["throw"] = "throw"
     """Task."""

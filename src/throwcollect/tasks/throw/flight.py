@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from throwcollect.config.schema import Config
 from throwcollect.episode.record import Contact, EpisodeHeader, Samples
 from throwcollect.tasks.free_flight import ballistic_positions
-from throwcollect.tasks.measures import BallState
+from throwcollect.tasks.measures import BallState, Vector
 from throwcollect.tasks.throw.config import throw_section
 from throwcollect.units import NS_PER_S
 
@@ -162,6 +162,21 @@ def release_of(contacts: tuple[Contact, ...], *, tool: str, gap_s: float) -> int
     return None
 
 
+def spin_after(samples: Samples, release_ns: int) -> Vector:
+    """Angular velocity of the ball in the first sample from its release on, which nothing changes in flight.
+
+    Args:
+        samples: The whole trial.
+        release_ns: Instant of the release [ns], not after the last sample.
+
+    Returns:
+        In world [rad/s].
+    """
+    first = int(np.searchsorted(samples.stamps_ns, release_ns))
+    x, y, z = samples.ball_angular_velocity[first].tolist()
+    return x, y, z
+
+
 def flight_residual(samples: Samples, header: EpisodeHeader, *, config: Config) -> float | None:
     """How far the recorded flight departs from the discrete ballistic motion of the physics.
 
@@ -201,7 +216,9 @@ def flight_residual(samples: Samples, header: EpisodeHeader, *, config: Config) 
         steps=stride * (stop - first - 1),
         config=config,
     )
-    return float(np.linalg.norm(samples.ball_position[first:stop] - predicted[::stride], axis=1).max())
+    x, y, z = (samples.ball_position[first:stop] - predicted[::stride]).T
+    # `norm` adds in an order that depends on the processor.
+    return float(np.sqrt(x * x + y * y + z * z).max())
 
 
 def _root(cubic: tuple[float, float, float, float]) -> float:

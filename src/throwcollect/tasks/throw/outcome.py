@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from throwcollect.tasks.columns import BallColumns, Count, Number, measured
-from throwcollect.tasks.measures import BallState
+from throwcollect.tasks.columns import BallColumns, Count, Number, SpinColumns, measured
+from throwcollect.tasks.measures import BallState, Vector
 from throwcollect.tasks.result import Outcome, Result
 
 
@@ -45,6 +45,9 @@ class ThrowResult(Result):
         flight_time_s: From release to landing [s].
         hit_angle_rad: Direction of flight at landing below the horizontal [rad].
         recontacts: Number of contacts with tool or robot between release and landing.
+        release_spin: Angular velocity of the ball in world when it left the tool [rad/s].
+        ballistic_residual_m: How far the recorded flight is from the one that gravity and drag alone give [m]; see
+            `flight.flight_residual`.
     """
 
     release: BallState | None = measured(BallColumns("when it left the {tool}"))
@@ -55,3 +58,7 @@ class ThrowResult(Result):
     flight_time_s: float | None = measured(Number("From release to landing [s]."))
     hit_angle_rad: float | None = measured(Number("Direction of flight at landing below the horizontal [rad]."))
     recontacts: int | None = measured(Count("Contacts with {tool} or robot between release and landing."))
+    release_spin: Vector | None = measured(SpinColumns("when it left the {tool}"))
+    ballistic_residual_m: float | None = measured(
+        Number("Largest distance of the flight from one under gravity and drag alone [m].", later=True)
+    )

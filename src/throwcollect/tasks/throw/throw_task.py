@@ -10,7 +10,14 @@ from throwcollect.tasks.measures import BallState
 from throwcollect.tasks.task import Failure, Task
 from throwcollect.tasks.throw.config import throw_section
 from throwcollect.tasks.throw.drop import drop, find_early_loss
-from throwcollect.tasks.throw.flight import Flight, flight_after, release_of, without_impact
+from throwcollect.tasks.throw.flight import (
+    Flight,
+    flight_after,
+    flight_residual,
+    release_of,
+    spin_after,
+    without_impact,
+)
 from throwcollect.tasks.throw.outcome import ThrowOutcome, ThrowResult
 from throwcollect.units import NS_PER_S
 
@@ -52,7 +59,12 @@ class ThrowTask(Task[ThrowResult]):
                 flight = without_impact(flight, (min(impacts) - header.start_ns) / NS_PER_S, config=config)
             result = self._measure_flight(result, flight)
             touched = self._touches(header, release_ns, result.landing.time_s if result.landing else math.inf)
-            result = replace(result, recontacts=len(touched))
+            result = replace(
+                result,
+                recontacts=len(touched),
+                release_spin=spin_after(samples, release_ns),
+                ballistic_residual_m=flight_residual(samples, header, config=config),
+            )
         return result, self._failure(result, samples, header, touched)
 
     def _failure(

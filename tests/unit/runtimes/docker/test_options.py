@@ -21,7 +21,7 @@ def options(
 ) -> dict[str, Any]:
     config = Config.model_validate({"run": run or {}, "containers": containers}, strict=True)
     node = NodeSpec(name, ("command", "--option"), Role.EXPENDABLE, core)
-    return node_options(node, place=place, config=config, middleware=Middleware())
+    return node_options(node, place=place, config=config, middleware=Middleware(), image_id="sha256:12ab")
 
 
 @pytest.mark.parametrize("name", ["router", "sim_0", "coordinator"])
@@ -46,6 +46,7 @@ def test_a_node_is_told_who_it_is_and_where_the_router_is() -> None:
     assert (environment["THROWCOLLECT_NODE"], environment["ROS_DOMAIN_ID"]) == ("sim_3", "9")
     assert "tls/router:7447" in environment["ZENOH_CONFIG_OVERRIDE"]
     assert environment["THROWCOLLECT_HOST"] == socket.gethostname()
+    assert environment["THROWCOLLECT_IMAGE"] == "sha256:12ab"
     assert environment["THROWCOLLECT_DIRECTORY"] == "/home/me/data set"
     assert options("sim_3", VOLUME)["environment"]["THROWCOLLECT_DIRECTORY"] == ""
     assert made["labels"] == {

@@ -44,10 +44,20 @@ def test_landed_throw_has_all_its_numbers():
     assert result.apex.time_s == pytest.approx(RELEASE_S + VELOCITY[2] / GRAVITY, abs=1e-6)
     assert result.apex.position[2] == pytest.approx(ORIGIN[2] + VELOCITY[2] ** 2 / (2 * GRAVITY), abs=1e-6)
     assert result.recontacts == 0
+    # The physics goes in steps, which are not quite on a parabola.
+    assert 0.005 < result.ballistic_residual_m < 0.01
     assert result.effort_saturated_share == 0
     assert max(result.tracking_error_rad.values()) < 1e-12
     assert result.velocity_peak.joint == "arm_right_7_joint"
     assert result.velocity_peak.share == pytest.approx(0.686, abs=2e-3)
+
+
+def test_spin_is_that_of_the_first_sample_after_the_release():
+    samples, header = episode()
+    spins = np.arange(3.0 * len(samples)).reshape(-1, 3)
+    result = judged(replace(samples, ball_angular_velocity=spins), header)
+    first = int(np.argmax((samples.stamps_ns - header.start_ns) / 1e9 >= RELEASE_S))
+    assert result.release_spin == tuple(spins[first])
 
 
 def test_judging_leaves_the_samples_as_they_are():

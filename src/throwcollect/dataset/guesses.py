@@ -1,0 +1,66 @@
+"""Says what somebody looks for who takes an attribute that is not there."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from difflib import get_close_matches
+
+DATASET: Mapping[str, str] = {
+    "columns": "throws.column_names",
+    "data": "throws",
+    "dataframe": "to_pandas()",
+    "df": "to_pandas()",
+    "filter": "select(...)",
+    "head": "to_pandas()",
+    "landing": "landings",
+    "params": "parameters",
+    "query": "select(...)",
+    "rows": "throws",
+    "table": "throws",
+    "to_df": "to_pandas()",
+    "to_table": "throws",
+    "trials": "throws",
+    "where": "select(...)",
+}
+"""What people try on a dataset, and what they look for."""
+
+THROW: Mapping[str, str] = {
+    "apex": "events.apex",
+    "contacts": "events.contacts",
+    "df": "to_pandas()",
+    "joint_positions": "joints.position",
+    "landing": "events.landing",
+    "names": "joints.names",
+    "params": "parameters",
+    "position": "ball.position or joints.position",
+    "q": "joints.position",
+    "qd": "joints.velocity",
+    "release": "events.release",
+    "robot": "joints",
+    "time": "ball.time_s",
+    "time_s": "ball.time_s",
+    "times": "ball.time_s",
+    "to_df": "to_pandas()",
+    "torque": "joints.effort",
+    "trajectory": "ball, joints or to_pandas()",
+    "velocity": "ball.velocity or joints.velocity",
+}
+"""What people try on a throw, and what they look for."""
+
+
+def refuse_attribute(owner: object, name: str, guesses: Mapping[str, str]) -> AttributeError:
+    """Make the error for an attribute that is not there, which names the one that is meant, if that can be guessed.
+
+    Args:
+        owner: What has no such attribute.
+        name: Its name.
+        guesses: What people try, and what they look for.
+    """
+    kind = type(owner).__name__
+    meant = guesses.get(name) or next(iter(get_close_matches(name, _list_public(type(owner)), 1)), None)
+    hint = f"; try .{meant}" if meant and not name.startswith("_") else ""
+    return AttributeError(f"a {kind} has no {name!r}{hint}")
+
+
+def _list_public(kind: type) -> list[str]:
+    return [name for name in dir(kind) if not name.startswith("_")]

@@ -1,0 +1,103 @@
+"""Numbers of all throws of a dataset in one array whose columns have names and bounds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from throwcollect.errors import ConfigError
+
+Bounds = tuple[float, float]
+"""Smallest and largest value."""
+
+
+class UnknownNameError(ConfigError, KeyError):
+    """A column or joint was asked for that does not exist."""
+
+    # `KeyError` would quote the message.
+    __str__ = ConfigError.__str__
+
+
+def refuse_name(what: str, name: object, known: Iterable[str]) -> UnknownNameError:
+    """Make the error for a name that is none, which tells those that are like it, or all.
+
+    Args:
+        what: What has no such name, as the beginning of a sentence.
+        name: The name.
+        known: All names that there are.
+    """
+    names = list(known)
+    near = get_close_matches(str(name), names, 3, 0.5) or [each for each in names if str(name) in each]
+    return UnknownNameError(f"{what} {name!r}", expected=", ".join(near or names))
+
+
+def read_column(column: pa.ChunkedArray) -> NDArray[Any]:
+    """A column of a table in an array of its own, one value a row; a number that is missing is NaN, a text None."""
+    if pa.types.is_string(column.type):
+        return np.array(column.to_pylist(), dtype=object)
+    if column.null_count:
+        column = column.cast(pa.float64()).fill_null(np.nan)
+    return np.array(column.to_numpy())
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class NamedArray:
+    """A table of numbers, one row a throw; NumPy takes it as its `values`.
+
+    ``array["landing_x_m"]`` is one column, shape ``(n_throws,)``.
+
+    Attributes:
+        names: Names of the columns.
+        values: Shape ``(n_throws, n_names)``, NaN where a throw has no such number; in SI units and radians.
+        bounds: Smallest and largest value of each column, shape ``(n_names, 2)``.
+    """
+
+    names: tuple[str, ...]
+    values: NDArray[np.float64]
+    bounds: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, table: pa.Table, names: Sequence[str], bounds: Sequence[Bounds]) -> NamedArray:
+        """Take columns of a table.
+
+        Args:
+            table: One row a throw.
+            names: Names of the columns, which are numbers.
+            bounds: Smallest and largest value of each; None if there is none.
+        """
+        columns = [read_column(table[name]).astype(np.float64) for name in names]
+        values = np.column_stack(columns) if columns else np.empty((len(table), 0))
+        return cls(tuple(names), values, np.array(bounds, np.float64).reshape(-1, 2))
+
+    # Whether rows or names were meant, nobody could tell.
+    __iter__ = None
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def __getitem__(self, name: str) -> NDArray[np.float64]:
+        """One column.
+
+        Raises:
+            ConfigError: If there is none of this name; it is also a `KeyError`.
+        """
+        if name not in self.names:
+            raise refuse_name("no column", name, self.names)
+        return self.values[:, self.names.index(name)]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.names
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
+        values = self.values if dtype is None else self.values.astype(dtype)
+        return values.copy() if copy else values
+
+    def __repr__(self) -> str:
+        ranges = (f"{name} {low:g} to {high:g}" for name, (low, high) in zip(self.names, self.bounds, strict=True))
+        return f"NamedArray({len(self)} throws: {', '.join(ranges)})"

@@ -1,0 +1,84 @@
+"""Opens a dataset for people: a finished one as it is, one that is still collected with what it holds so far."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+
+from throwcollect.config.loader import load as load_config
+from throwcollect.dataset.directory import METADATA, PLAN, config_path
+from throwcollect.dataset.judging import judge_episode
+from throwcollect.dataset.reader import Dataset
+from throwcollect.dataset.scan import scan_whole
+from throwcollect.dataset.shard import path_of_part
+from throwcollect.dataset.throws_table import Place, Row, ThrowsTable
+from throwcollect.dataset.verify_tables import shard_of
+from throwcollect.errors import DatasetError
+from throwcollect.files import StrPath, is_there
+from throwcollect.sweep.plan import Plan
+from throwcollect.wording import command, format_count
+
+
+class UnfinishedDatasetWarning(UserWarning):
+    """A dataset was opened whose collection has not come to its end."""
+
+
+def load(directory: StrPath) -> Dataset:
+    """Open a dataset for reading.
+
+    Its tables are read and checked against each other; recordings are opened when they are looked at. Of a dataset that
+    is not finished, the recordings are read through, and its rows are the trials that have ended so far: row i is not
+    trial i, and `Dataset.digest` is an error.
+
+    Args:
+        directory: Its directory.
+
+    Raises:
+        DatasetError: If the directory holds no dataset, or its tables or plan are damaged.
+        ConfigError: If its ``config.yaml`` is wrong.
+
+    Warns:
+        UnfinishedDatasetWarning: If it is not finished.
+    """
+    path = Path(directory)
+    if is_there(path / METADATA) or not is_there(path / PLAN):
+        return Dataset.open(path)
+    plan = Plan.read(path / PLAN, load_config(config_path(path)))
+    rows = sorted(_list_rows(path, plan), key=lambda row: int(row["trial"]))
+    warnings.warn(
+        f"{path} is not finished: it has {len(rows)} of {format_count(len(plan.trials), 'trial')} so far; "
+        f"`{command('resume', path)}` goes on with it",
+        UnfinishedDatasetWarning,
+        stacklevel=2,
+    )
+    return Dataset(path, plan, ThrowsTable.of(plan).table(rows), {})
+
+
+def _list_rows(directory: Path, plan: Plan) -> Iterator[Row]:
+    """Rows of the trials that were refused, and of those whose episodes are there, each once."""
+    table = ThrowsTable.of(plan)
+    yield from (table.make_refused_row(plan.trial(number)) for number in plan.trials.refused)
+    for name in dict.fromkeys(shard_of(plan, number) for number in plan.trials.numbers):
+        final = directory / name
+        for path in (final, path_of_part(final)):
+            if is_there(path):
+                yield from _read_rows(path, plan, table)
+                break
+
+
+def _read_rows(path: Path, plan: Plan, table: ThrowsTable) -> Iterator[Row]:
+    seen: set[int] = set()
+    for found in scan_whole(path):
+        episode = found.stored.episode
+        number = episode.header.trial
+        if number in seen or number not in plan.trials.numbers:
+            continue
+        trial = plan.trial(number)
+        try:
+            result = judge_episode(plan.config_of(trial), episode)
+        except DatasetError:
+            # `resume` collects it again.
+            continue
+        seen.add(number)
+        yield table.row(trial, result, Place(path.name, found.stored.offset, episode.header.samples, episode.digest))

@@ -1,0 +1,110 @@
+"""The section of a report on the targets of trials: where they should end, and by how much they missed."""
+
+from __future__ import annotations
+
+import numpy as np
+import plotly.graph_objects as go
+from numpy.typing import NDArray
+
+from throwcollect.dataset.misses import read_targets, summarise_misses
+from throwcollect.dataset.reader import Dataset
+from throwcollect.dataset.summary import MissSummary
+from throwcollect.report.contents import Panel, Section, Table
+from throwcollect.report.figures import BLUE
+from throwcollect.report.miss_map import choose_scale, draw_miss_map
+from throwcollect.report.points import choose_points, read_numbers
+from throwcollect.sweep.points import Targets
+from throwcollect.units import unit_of_name
+from throwcollect.wording import format_count
+
+_TITLE = "How targets are missed"
+
+
+def show_targets(dataset: Dataset) -> tuple[Section, ...]:
+    """Show the targets of trials; nothing if they have none.
+
+    Args:
+        dataset: The dataset.
+    """
+    targets = read_targets(dataset.throws)
+    if targets is None:
+        return ()
+    found = summarise_misses(dataset.config, dataset.throws)
+    wanted = int((~np.isnan(targets.values)).any(axis=1).sum())
+    said = [
+        f"{name}: median {_format(name, each.median)}, 9 of 10 below {_format(name, each.share90)}"
+        for name, each in found.items()
+        if each.measured
+    ]
+    text = f"{wanted:,} of {format_count(len(dataset.throws), dataset.config.task.noun)} should end at a target. "
+    text += f"{'; '.join(said)}, in simulation." if said else "None of them ended anywhere."
+    panels = [
+        _show_map(dataset, targets),
+        *(
+            Panel(name, f"Share of misses below a distance: {name}", _draw_share(dataset, name), picture=name)
+            for name, each in found.items()
+            if each.measured
+        ),
+    ]
+    return (Section("misses", "Targets", _TITLE, text, (tuple(panels), _tabulate(found))),)
+
+
+def _show_map(dataset: Dataset, targets: Targets) -> Panel:
+    """Show the first two columns of targets; beside one that is alone, zeros."""
+    declared = {each.name: each for each in dataset.config.task.target_columns}
+    throws, shown = dataset.throws, targets.names[:2]
+    beside = [np.zeros(len(throws))] * (2 - len(shown))
+    wanted = np.column_stack([*(targets.values[:, targets.names.index(name)] for name in shown), *beside])
+    sources = [declared[name].of for name in shown]
+    fixed = np.full(len(throws), np.nan)
+    ended = [read_numbers(throws, name) if name in throws.column_names else fixed for name in sources]
+    chosen = choose_points(len(throws))
+    wanted, places = wanted[chosen], np.column_stack([*ended, *beside])[chosen]
+    aimed = ~np.isnan(wanted).any(axis=1)
+    first, second = [*(f"{declared[name].word} [{unit_of_name(name)}]" for name in shown), ""][:2]
+    times = choose_scale(wanted[aimed], places[aimed]) if aimed.any() else 1
+    figure = draw_miss_map(places[~aimed], wanted[aimed], places[aimed], (first, second), times=times)
+    title = f"Targets, and misses drawn {times} times as long" if times > 1 else "Targets and misses"
+    return Panel("map", title, figure, picture="targets_and_misses")
+
+
+def _draw_share(dataset: Dataset, miss: str) -> go.Figure:
+    scale, unit = _scale(miss)
+    values: NDArray[np.float64] = np.sort(dataset.throws[miss].drop_null().to_numpy()) * scale
+    figure = go.Figure()
+    chosen = choose_points(len(values))
+    figure.add_scatter(
+        x=values[chosen],
+        y=(chosen + 1) / len(values),
+        mode="lines+markers",
+        line={"color": BLUE, "width": 2},
+        marker={"color": BLUE, "size": 4, "symbol": "circle"},
+    )
+    figure.update_xaxes(title=f"distance from the target [{unit}]", rangemode="tozero")
+    figure.update_yaxes(title="share of trials", range=[0, 1.02])
+    return figure.update_layout(height=420, showlegend=False)
+
+
+def _tabulate(found: dict[str, MissSummary]) -> Table:
+    rows = tuple(
+        (
+            name,
+            f"{each.targets:,}",
+            f"{each.measured:,}",
+            *(_format(name, value) for value in (each.median, each.share90, each.largest)),
+        )
+        for name, each in found.items()
+    )
+    head = ("", "with a target", "measured", "median", "9 of 10 below", "largest")
+    return Table(head=head, rows=rows, number_columns=(1, 2, 3, 4, 5))
+
+
+def _format(miss: str, value: float | None) -> str:
+    scale, unit = _scale(miss)
+    return "-" if value is None else f"{scale * value:.2f} {unit}"
+
+
+def _scale(miss: str) -> tuple[float, str]:
+    """By what a distance is multiplied to be read with ease, and its unit then."""
+    unit = unit_of_name(miss)
+    return {"m": (100.0, "cm"), "rad": (1000.0, "mrad")}.get(unit, (1.0, unit))

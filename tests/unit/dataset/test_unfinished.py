@@ -1,0 +1,63 @@
+"""Datasets that are still collected, or were interrupted, are read with what they hold so far."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import throwcollect
+from throwcollect.dataset.creation import create
+from throwcollect.dataset.writer import DatasetWriter
+from throwcollect.errors import DatasetError
+
+
+def begin(collection: Any, directory: Path, trials: list[int]) -> Path:
+    create(directory, collection.plan)
+    writer = DatasetWriter.open(directory)
+    collection.fill(writer, trials)
+    writer.close()
+    return directory
+
+
+def test_rows_are_the_trials_that_have_ended(collection: Any, collected: Path, tmp_path: Path) -> None:
+    collection.refuse(5, "an elbow needs 30 Nm")
+    # The first shard is finished, the second has one of its three, the third none.
+    directory = begin(collection, tmp_path / "dataset", [2, 0, 1, 4])
+    with pytest.warns(
+        throwcollect.UnfinishedDatasetWarning, match=r"is not finished: it has 5 of 7 trials so far"
+    ) as said:
+        dataset = throwcollect.load(directory)
+    assert said[0].filename == __file__
+    assert [throw.trial for throw in dataset] == [0, 1, 2, 4, 5]
+    assert dataset["outcome"].tolist() == ["landed"] * 4 + ["refused"]
+    whole = throwcollect.load(collected)
+    for throw in dataset.recorded:
+        assert throw.ball.position.tolist() == whole[throw.trial].ball.position.tolist()
+    assert (
+        dataset.throws.drop_columns(["shard", "chunk_offset"])
+        .slice(0, 4)
+        .equals(whole.throws.drop_columns(["shard", "chunk_offset"]).take([0, 1, 2, 4]))
+    )
+    with pytest.raises(DatasetError, match=r"throwcollect\.digest is missing"):
+        _ = dataset.digest
+
+
+def test_what_was_written_last_may_be_cut_off(collection: Any, tmp_path: Path) -> None:
+    directory = begin(collection, tmp_path / "dataset", [0, 1])
+    part = directory / "quick_00000.mcap.part"
+    part.write_bytes(part.read_bytes()[:-100])
+    with pytest.warns(throwcollect.UnfinishedDatasetWarning, match="it has 1 of 7 trials"):
+        assert [throw.trial for throw in throwcollect.load(directory)] == [0]
+
+
+def test_nothing_yet_is_no_throw(collection: Any, tmp_path: Path) -> None:
+    create(tmp_path / "dataset", collection.plan)
+    with pytest.warns(throwcollect.UnfinishedDatasetWarning, match="it has 0 of 7 trials"):
+        assert len(throwcollect.load(tmp_path / "dataset")) == 0
+
+
+def test_a_directory_without_a_plan_is_no_dataset(tmp_path: Path) -> None:
+    with pytest.raises(DatasetError, match="holds no dataset"):
+        throwcollect.load(tmp_path)

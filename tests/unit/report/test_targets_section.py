@@ -1,0 +1,56 @@
+"""The section of a report on targets."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from tests.unit.dataset.conftest import Collection
+from tests.unit.dataset.targeted import collect_targeted
+
+from throwcollect.dataset.reader import Dataset
+from throwcollect.episode.record import EpisodeHeader, Samples
+from throwcollect.report.miss_map import choose_scale
+from throwcollect.report.pictures import write_pictures
+from throwcollect.report.sections import report_dataset
+from throwcollect.report.targets_section import show_targets
+
+
+def held(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
+    return samples, replace(header, end_reason="timeout", contacts=(replace(header.contacts[0], end_ns=None),))
+
+
+def test_the_section_shows_targets_misses_and_their_spread(tmp_path: Path) -> None:
+    dataset = Dataset.open(collect_targeted(tmp_path / "data"))
+    misses = sorted(throw.miss_m for throw in dataset if throw.miss_m is not None)
+    (section,) = show_targets(dataset)
+    share90 = np.quantile(misses, 0.9)
+    assert section.text == (
+        f"3 of 4 throws should end at a target. miss_m: median {100 * misses[1]:.2f} cm, "
+        f"9 of 10 below {100 * share90:.2f} cm, in simulation."
+    )
+    above, spread = section.panels
+    others, targets, lines = above.figure.data
+    assert (len(others.x), sorted(targets.x)) == (1, [1.4, 1.5, 1.6])
+    ends = np.array(lines.x, np.float64)[1::3], np.array(lines.y, np.float64)[1::3]
+    thrown = [throw for throw in dataset if throw.target]
+    assert np.allclose(ends[0], [throw.row["landing_x_m"] for throw in thrown])
+    assert np.allclose(spread.figure.data[0].x, [100 * miss for miss in misses])
+    assert np.allclose(spread.figure.data[0].y, [1 / 3, 2 / 3, 1])
+    assert "misses" in [each.key for each in report_dataset(dataset).sections]
+    assert {path.name for path in write_pictures((section,), tmp_path)} == {"targets_and_misses.png", "miss_m.png"}
+
+
+def test_there_is_no_section_without_targets_and_one_without_misses(tmp_path: Path) -> None:
+    assert show_targets(Dataset.open(Collection().collect(tmp_path / "plain"))) == ()
+    (section,) = show_targets(Dataset.open(collect_targeted(tmp_path / "held", change=held)))
+    assert section.text == "3 of 4 throws should end at a target. None of them ended anywhere."
+    (above,) = section.panels
+    assert [trace.name for trace in above.figure.data] == ["throws of the dataset", "targets where no throw landed"]
+
+
+def test_large_misses_are_drawn_as_long_as_they_are() -> None:
+    targets = np.array([[1.0, 0.0], [1.5, 0.2]])
+    assert choose_scale(targets, targets + 0.01) == 10
+    assert choose_scale(targets, targets + np.array([0.4, 0.0])) == 1
