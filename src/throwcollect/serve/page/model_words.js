@@ -25,7 +25,7 @@ export function describe({ learned_from: name, throws, error, parameters, target
       + `${after.length ? `, and ${inCentimetres(median(after))} after, each predicted by the others` : ""} (median).`);
     if (found.length) texts.push(`Found: ${found.map(({ name: key, value, deviation }) => `${key} ${short(value)} ± ${short(deviation)}`).join(", ")}.`);
   }
-  texts.push(score ? `All distances below are those of throws in simulation, at ${score.targets} targets.` : "Nobody has thrown with it yet; throwcollect score does, in simulation.");
+  texts.push(score ? `All distances below are those of throws in simulation, at ${score.targets} targets${score.seeds > 1 ? ` of each of ${score.seeds} seeds` : ""}.` : "Nobody has thrown with it yet; throwcollect score does, in simulation.");
   return texts.join(" ");
 }
 
