@@ -123,7 +123,8 @@ dist: | $(VENV)/bin/python
 	build/release/bin/twine check --strict dist/*
 	$(BIN)/python -m venv build/tried
 	build/tried/bin/python -m pip install --quiet --disable-pip-version-check dist/*.whl
-	cd / && $(CURDIR)/build/tried/bin/throwcollect --version && $(CURDIR)/build/tried/bin/throwcollect config $(CURDIR)/configs/quickstart.yaml > /dev/null
+	build/tried/bin/throwcollect --version
+	build/tried/bin/throwcollect config configs/quickstart.yaml > build/tried/config.yaml
 
 clean:
 	rm -rf $(VENV) $(ROS_VENV) .mypy_cache .pytest_cache .ruff_cache .import_linter_cache .hypothesis
