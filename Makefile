@@ -5,6 +5,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 READY_DEV := $(VENV)/.ready-dev
+READY_DOCS := $(VENV)/.ready-docs
 # Genuine ROS 2 has an environment of its own: where rclpy is, nodes run on it.
 ROS_VENV := .venv-ros
 ROS_WHEELS := build/wheelhouse-ros
@@ -14,7 +15,7 @@ READY_ROS := $(ROS_VENV)/.ready
 export PYTHONDONTWRITEBYTECODE :=
 
 .PHONY: up ros dist test test-fast \
-    test-units test-ros test-ros-client test-containers test-processes test-cluster check bench bench-full clean
+    test-units test-ros test-ros-client test-containers test-processes test-cluster check docs bench bench-full clean
 
 # Where the Python is too new for pybullet, MuJoCo simulates; `packaging/environment.sh` has said so.
 up: $(READY)
@@ -38,6 +39,10 @@ $(READY_DEV): pyproject.toml | $(VENV)/bin/python
 	@echo "installing about 80 packages, 1.7 GB with the robot's description, into $(VENV)"
 	$(INSTALL) -e '.[dev]'
 	@touch $(READY) $@
+
+$(READY_DOCS): pyproject.toml | $(VENV)/bin/python
+	$(INSTALL) -e '.[docs]'
+	@touch $@
 
 # An environment with genuine rclpy on top of the one for development: `.venv-ros/bin/python -m pytest tests/ros`.
 ros: $(READY_DEV)
@@ -104,6 +109,10 @@ check: $(READY_DEV)
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/python -m pytest -q tests/architecture
+
+# The documentation site, build/site/index.html; a broken link fails.
+docs: $(READY_DOCS)
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
 # Throws a second against the raw limit of the same machine, in the same run.
 bench: $(READY_DEV) ros
