@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
@@ -11,14 +12,20 @@ import pytest
 _BUILD = Path(__file__).parents[1] / "build"
 
 
-def install(name: str, version: str) -> Path:
-    """Directory in whose ``node_modules`` a package lies; the test is skipped where it cannot be had."""
-    place = _BUILD / f"{name}-{version}"
+def install(name: str, packages: Mapping[str, str]) -> Path:
+    """Directory in whose ``node_modules`` packages lie; the test is skipped where they cannot be had.
+
+    Args:
+        name: What the directory is called.
+        packages: Their versions by their names.
+    """
+    words = [f"{package}@{version}" for package, version in packages.items()]
+    place = _BUILD / "-".join([name, *packages.values()])
     if shutil.which("npm") is None:
         pytest.skip("there is no npm")
-    if not (place / "node_modules" / name).is_dir():
+    if not all((place / "node_modules" / package).is_dir() for package in packages):
         place.mkdir(parents=True, exist_ok=True)
-        command = ["npm", "install", "--no-audit", "--no-fund", "--prefix", str(place), f"{name}@{version}"]
+        command = ["npm", "install", "--no-audit", "--no-fund", "--prefix", str(place), *words]
         found = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
         if found.returncode:
             pytest.skip(f"{name} cannot be installed: {found.stderr.strip().splitlines()[-1:]}")

@@ -35,6 +35,7 @@ EXTRA_OF = MappingProxyType(
         "jinja2": "report",
         "matplotlib": "report",
         "mujoco": "mujoco",
+        "onnx": "onnx",
         "orjson": "serve",
         "pandas": "pandas",
         "plotly": "report",

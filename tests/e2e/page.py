@@ -21,9 +21,9 @@ CHANGED = "ERR_NETWORK_CHANGED"
 
 
 @contextmanager
-def served(catalogue: Path, datasets: Path) -> Iterator[dict[str, Any]]:
-    """Serve a catalogue; gives what `throwcollect serve --json` tells."""
-    options = ("--port", "0", "--datasets", datasets, "--json")
+def served(catalogue: Path, datasets: Path, models: Path | None = None) -> Iterator[dict[str, Any]]:
+    """Serve a catalogue, and models; gives what `throwcollect serve --json` tells."""
+    options = ("--port", "0", "--datasets", datasets, "--models", models or datasets, "--json")
     with subprocess.Popen(command("serve", catalogue, *options), stdout=subprocess.PIPE, text=True) as server:
         assert server.stdout is not None
         try:

@@ -94,7 +94,7 @@ def test_aimed_throws_become_a_dataset_with_targets_and_misses(place: Path) -> N
 
 def test_a_score_tells_how_throws_hit_here_and_elsewhere(place: Path) -> None:
     other = ["--config", place / "throws.yaml", "--set", "scene.gravity_mps2=8.5"]
-    found = call_here("score", place / "model", "--targets", "5", *other, "--json")
+    found = call_here("score", place / "model", "--targets", "5", "--seeds", "2", *other, "--json")
     assert found.returncode == 0, found.stderr
     score = json.loads(found.stdout)
     assert score["trained"][-1]["errors"]["median"] < 0.03
@@ -117,6 +117,7 @@ def test_a_score_tells_how_throws_hit_here_and_elsewhere(place: Path) -> None:
         (["fit", "data", "-o", "new", "--where", "trial < 5"], "at least 18 for 5 parameters"),
         (["adapt", "model", "model/config.yaml", "-o", "new"], "no column"),
         (["score", "model", "--targets", "0"], "targets: got 0"),
+        (["score", "model", "--seeds", "0"], "seeds: got 0"),
         (["score", "model", "--seed", "-1"], "seed: got -1"),
         (["score", "model", "--set", "ball.mass_kg=1"], "--config CONFIG"),
         (["throw", "throws.yaml", "--set", "task.duration_s=0.2"], "its limit is 1.76 rad/s"),

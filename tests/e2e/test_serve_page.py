@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from urllib.parse import urlsplit
@@ -12,6 +14,7 @@ import pytest
 from tests.e2e.chromium import browse, chromium
 from tests.e2e.collection import FAST, write_config
 from tests.e2e.page import CHANGED, load, press, served, unexpected
+from tests.unit.serve.made_model import make_model
 
 pytestmark = pytest.mark.e2e
 
@@ -41,7 +44,8 @@ def address(tmp_path: Path) -> Iterator[str]:
     write_config(tmp_path, trials=600, sim=f"{FAST}, real_time_factor: 1")
     catalogue = tmp_path / "catalogue.yaml"
     catalogue.write_text("components: {throws: {pretty_name: Throws, config: small.yaml}}\n")
-    with served(catalogue, tmp_path / "datasets") as told:
+    make_model(tmp_path / "models" / "quick")
+    with served(catalogue, tmp_path / "datasets", tmp_path / "models") as told:
         yield told["page"]
 
 
@@ -62,6 +66,8 @@ def test_a_collection_is_started_watched_and_stopped_by_the_page(address: str) -
         assert tab.evaluate("document.querySelector('#play').textContent") == "Play"
         tab.evaluate("throwcollect.playback.seek(0); document.querySelector('#play').click()")
         tab.wait_for("document.querySelector('#scrub').value > 0.2")
+        # All landings are on the map, whether their throws were shown or not.
+        tab.wait_for("document.querySelector('#map-text').textContent.includes('landings so far')")
         # A description brings its plots, each once; what cannot be plotted is left out.
         tab.evaluate(f"for (const _ of [1, 2]) throwcollect.plots.bind('sim_0', {json.dumps(_TOOLTIPS)})")
         titles = "[...document.querySelectorAll('.plot strong')].map((each) => each.textContent).join()"
@@ -73,3 +79,44 @@ def test_a_collection_is_started_watched_and_stopped_by_the_page(address: str) -
             urlsplit(address).netloc
         }
         assert unexpected(tab) == []
+
+
+@pytest.mark.skipif(chromium() is None, reason="needs Chromium: apt-get install chromium")
+def test_a_model_is_seen_and_aims_where_somebody_clicks(address: str) -> None:
+    with browse(address, width=390, height=800) as tab:
+        load(tab)
+        tab.wait_for("!document.querySelector('#model-box').hidden")
+        assert tab.evaluate("document.querySelector('#map-box').hidden"), "nothing runs, and no model is chosen"
+        choose = "(() => { const model = document.querySelector('#model'); model.value = 'quick';"
+        tab.evaluate(f"{choose} model.dispatchEvent(new Event('change')); }})()")
+        tab.wait_for("document.querySelector('#model-text').textContent.includes('400 throws of quick')")
+        assert "400 of the throws" in tab.evaluate("document.querySelector('#map-model').textContent")
+        tab.evaluate("document.querySelector('#map').dispatchEvent(new MouseEvent('click', {bubbles: true}))")
+        tab.wait_for("document.querySelector('#aim-text').textContent !== ''")
+        # By fields, what is clicked can be said exactly.
+        tab.evaluate(
+            "document.querySelectorAll('#aim-fields input').forEach((field, i) => field.value = [0.25, -0.5][i])"
+        )
+        tab.evaluate("document.querySelector('#aim-form').requestSubmit()")
+        values = "[...document.querySelectorAll('#aim-values > *')].map((each) => each.textContent).join()"
+        tab.wait_for(f"{values} === 'task.a,0.25,task.b,-0.5'")
+        tab.evaluate("document.querySelectorAll('#aim-fields input')[0].value = 9")
+        tab.evaluate("document.querySelector('#aim-form').requestSubmit()")
+        tab.wait_for("document.querySelector('#aim-text').textContent.startsWith('Out of reach')")
+        assert tab.evaluate(values) == ""
+        assert tab.evaluate("document.documentElement.scrollWidth") == 390
+        assert unexpected(tab) == []
+
+
+@pytest.mark.skipif(chromium() is None, reason="needs Chromium: apt-get install chromium")
+def test_the_page_works_without_a_network(tmp_path: Path) -> None:
+    unshare = ["unshare", "--net"]
+    if subprocess.run([*unshare, "true"], capture_output=True, check=False).returncode:
+        pytest.skip("may make no network namespace; root may")
+    write_config(tmp_path, trials=600, sim=f"{FAST}, real_time_factor: 1")
+    catalogue = tmp_path / "catalogue.yaml"
+    catalogue.write_text("components: {throws: {pretty_name: Throws, config: small.yaml}}\n")
+    command = [*unshare, sys.executable, "-m", "tests.e2e.offline_page", catalogue, tmp_path]
+    done = subprocess.run(command, stdout=subprocess.PIPE, text=True, timeout=240, check=False)
+    assert done.returncode == 0
+    assert json.loads(done.stdout) == {"networks": ["lo"], "meshes": _MESHES, "errors": []}

@@ -104,7 +104,7 @@ def server(tmp_path: Path) -> Iterator[dict[str, Any]]:
 @pytest.fixture(scope="module")
 def emulator() -> str:
     """A script that puts an emulated headset into a browser."""
-    place = install("iwer", "2.5.0")
+    place = install("iwer", {"iwer": "2.5.0"})
     return (place / "node_modules/iwer/build/iwer.min.js").read_text(encoding="utf-8") + _DEVICE
 
 

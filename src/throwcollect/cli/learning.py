@@ -13,6 +13,7 @@ import typer
 
 from throwcollect.cli.options import ConfigArgument, DatasetArgument, JsonOption, SetOption, overrides
 from throwcollect.errors import ConfigError, PlanError
+from throwcollect.extras import require
 from throwcollect.side_by_side import count_cores
 from throwcollect.wording import command, format_count, join_names
 
@@ -48,12 +49,17 @@ def fit(
     where: Annotated[
         str | None, typer.Option("--where", metavar="CONDITION", help="Learn from throws of this kind alone.")
     ] = None,
+    onnx: Annotated[
+        bool, typer.Option("--onnx", help="Write model.onnx, too: target to parameters, for a robot's controller.")
+    ] = False,
     json: JsonOption = False,
 ) -> None:
     """Learn from a dataset where throws end, and which parameters lead to a target."""
     from throwcollect.dataset.reader import Dataset
     from throwcollect.learning.model import fit
 
+    if onnx:
+        require("onnx")
     model = fit(
         Dataset.open(dataset),
         kind=kind,
@@ -62,6 +68,8 @@ def fit(
         given=_split(given),
         where=where,
     )
+    if onnx:
+        model = model.distil()
     model.save(output)
     trained = model.file.trained_on
     if json:
@@ -169,8 +177,9 @@ def throw(
 
 def score(
     directory: ModelArgument,
-    targets: Annotated[int, typer.Option("--targets", metavar="N", help="Number of targets.")] = 100,
-    seed: Annotated[int, typer.Option("--seed", help="Seed of their choice.")] = 0,
+    targets: Annotated[int, typer.Option("--targets", metavar="N", help="Number of targets of each seed.")] = 40,
+    seed: Annotated[int, typer.Option("--seed", help="The first seed of their choice.")] = 0,
+    seeds: Annotated[int, typer.Option("--seeds", metavar="N", help="Number of seeds, whose medians are taken.")] = 3,
     world: Annotated[
         Path | None,
         typer.Option(
@@ -195,7 +204,7 @@ def score(
         simulator = opened.enter_context(Simulator(directory / CONFIG))
         other = None if world is None else opened.enter_context(Simulator(world, overrides=overrides(settings)))
         found = model.score(
-            simulator, targets=targets, seed=seed, world=other, scatter=scatter, processes=count_cores()
+            simulator, targets=targets, seed=seed, seeds=seeds, world=other, scatter=scatter, processes=count_cores()
         )
     write_score(directory, found)
     typer.echo(found.model_dump_json(indent=2) if json else "\n".join(_score_lines(found)))
@@ -347,7 +356,8 @@ def _numbers(values: Iterable[float]) -> str:
 
 def _score_lines(score: Score) -> list[str]:
     lines = [
-        f"throws at {format_count(score.targets, 'target')}, in simulation: median, 9 of 10 below, largest; not landed"
+        f"throws at {format_count(score.targets, 'target')} for each of {format_count(score.seeds, 'seed')}, medians "
+        "of the seeds, in simulation: median, 9 of 10 below, largest; not landed"
     ]
     lines += [f"  learned from {each.trained_on:5} throws:  {_error_cells(each.errors)}" for each in score.trained]
     if score.adapted:

@@ -39,6 +39,9 @@ def serve(
     datasets: Annotated[
         Path, typer.Option("--datasets", metavar="DIR", help="Where instances make their datasets.")
     ] = Path("datasets"),
+    models: Annotated[
+        Path, typer.Option("--models", metavar="DIR", help="Where models are, each in a directory of its own.")
+    ] = Path("models"),
     certificate: Annotated[
         Path | None, typer.Option("--tls-cert", metavar="FILE", help="Certificate in PEM: speak HTTPS.")
     ] = None,
@@ -58,6 +61,7 @@ def serve(
     """Serve a page, REST, the state of all runs and rosbridge on one port, until it is stopped."""
     from throwcollect.serve.catalogue import Catalogue
     from throwcollect.serve.instances import Instances
+    from throwcollect.serve.models import Models
     from throwcollect.serve.server import Tls
     from throwcollect.serve.server import serve as serve_all
 
@@ -79,6 +83,7 @@ def serve(
 
     serve_all(
         Instances(Catalogue.read(catalogue) if catalogue else Catalogue.find(DEFAULT_CONFIG), datasets.absolute()),
+        Models(models.absolute()),
         host=host,
         port=port,
         tls=tls,

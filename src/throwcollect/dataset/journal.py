@@ -9,7 +9,8 @@ from __future__ import annotations
 import json
 import os
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -18,7 +19,7 @@ from typing import Any, Literal, get_args
 from throwcollect.dataset.directory import JOURNAL
 from throwcollect.dataset.lock import lock
 from throwcollect.errors import DatasetError
-from throwcollect.files import open_log, unwritable, write_all
+from throwcollect.files import open_log, unreadable, unwritable, write_all
 
 Event = Literal["opened", "exposed", "recovered", "planned", "lease", "commit", "fail", "lost", "shard", "finished"]
 """
@@ -27,7 +28,7 @@ Event = Literal["opened", "exposed", "recovered", "planned", "lease", "commit", 
 - ``recovered``: what earlier ones had left was taken in: `episodes`.
 - ``planned``: trials were added to the plan: `trials` in all.
 - ``lease``: a trial was given to a simulation: `trial`, `simulation`.
-- ``commit``: its episode was written: `trial`, `outcome`, `digest`.
+- ``commit``: its episode was written: `trial`, `outcome`, `digest`, and where it ended: columns that the task aims at.
 - ``fail``: a simulation did not bring it back: `trial`, `simulation`, `reason`.
 - ``lost``: no simulation did: `trial`, `reason`.
 - ``shard``: a file was finished: `name`.
@@ -141,6 +142,45 @@ def read_journal(path: Path) -> Iterator[Entry]:
                     wall_s if isinstance(wall_s, int | float) else None,
                     outcome if isinstance(outcome, str) else None,
                 )
+
+
+def read_commits(
+    path: Path, columns: Sequence[str], *, first: int, most_bytes: int
+) -> tuple[list[list[Any]], int, bool]:
+    """Trials whose episodes were written, as a part of a journal tells them; more than once if they were lost again.
+
+    Args:
+        path: The file; if it is missing, nothing happened.
+        columns: What is told of each: `trial`, `outcome`, and numbers. Trials without one of them are left out.
+        first: Where the part begins [bytes]: 0, or where an earlier one has ended.
+        most_bytes: How long the part is at most, which is more than a line.
+
+    Returns:
+        The values of `columns` of each, where the part ended, and whether there is more.
+
+    Raises:
+        DatasetError: If it cannot be read.
+    """
+    try:
+        with open(open_log(path, os.O_RDONLY), "rb") as file:
+            file.seek(first)
+            data = file.read(most_bytes)
+            rest = file.read(1)
+    except FileNotFoundError:
+        return [], first, False
+    except OSError as error:
+        raise unreadable(path, error) from error
+    # The last line may be one that is being written.
+    whole = data[: data.rfind(b"\n") + 1]
+    found = []
+    for line in whole.splitlines():
+        if b'"commit"' not in line:
+            continue
+        with suppress(ValueError):
+            entry = json.loads(line)
+            if isinstance(entry, dict) and all(isinstance(entry.get(name), int | float | str) for name in columns):
+                found.append([entry[name] for name in columns])
+    return found, first + len(whole), bool(rest)
 
 
 def was_open(directory: Path) -> bool:

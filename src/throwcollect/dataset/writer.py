@@ -235,8 +235,9 @@ class DatasetWriter:
         shard = self._shard(number)
         shard.append(episode)
         place = Place(shard.path.name, -1, episode.header.samples, episode.digest)
-        self._rows[number][trial] = self._row(trial, result, place)
-        self.note("commit", trial=trial, outcome=result.outcome.value, digest=episode.digest)
+        row = self._rows[number][trial] = self._row(trial, result, place)
+        ends = {name: row[name] for name in self._config.task.targets if row.get(name) is not None}
+        self.note("commit", trial=trial, outcome=result.outcome.value, digest=episode.digest, **ends)
         self._finish_shard_if_complete(number)
 
     def append_lost(self, trial: int, reason: str) -> None:

@@ -102,7 +102,7 @@ def _walk(learned: LearnedMap, parameters: Array, context: Array, goals: Array) 
     for _ in range(_STEPS):
         inputs = learned.in_world(parameters, context)
         missing = goals - learned.forward.predict(inputs)
-        slopes = learned.forward.slopes(inputs)[:, :, columns]
+        slopes = learned.forward.slopes(inputs, columns)
         step = _step(slopes, missing)
         # What would leave its range stays where it is, and the others make up for it.
         stuck = np.abs(np.clip(parameters + step, -1.0, 1.0) - parameters) < 1e-12
@@ -125,7 +125,7 @@ def _judge(learned: LearnedMap, choice: Choice, inputs: Array, steps: Array) -> 
     if choice is Choice.LEAST_EFFORT:
         return learned.effort.predict(inputs)[:, 0]
     if choice is Choice.LEAST_SENSITIVE:
-        slopes: Array = learned.forward.slopes(inputs)[:, :, learned.columns_of(Role.PARAMETER)]
+        slopes = learned.forward.slopes(inputs, learned.columns_of(Role.PARAMETER))
         steps = slopes.reshape(len(slopes), -1)
     squares: Array = (steps**2).sum(axis=1)
     return squares

@@ -159,7 +159,7 @@ class LearnedMap:
             In the units of the targets, shape ``(n, n_targets)``.
         """
         inputs = self.in_world(parameters, context)
-        return self.forward.predict(inputs) + self._local(inputs) + self.correction.offset
+        return self.forward.predict(inputs) + self.predict_residuals(inputs) + self.correction.offset
 
     def carry_over(self, context: Array) -> Array:
         """Where the throws of the dataset would have ended in the corrected world.
@@ -175,18 +175,30 @@ class LearnedMap:
         return self.residuals + self.forward.predict(moved) + self.correction.offset
 
     def correct(self, correction: Correction) -> LearnedMap:
-        """The map of another world."""
-        return replace(self, correction=correction)
+        """The map of another world, which has the same throws: what they say is not worked out again."""
+        other = replace(self, correction=correction)
+        vars(other).update(inputs=self.inputs, residuals=self.residuals)
+        return other
 
-    def _local(self, inputs: Array) -> Array:
-        """What the nearest throws say beside the polynomial, shape ``(n, n_targets)``."""
+    def predict_residuals(self, inputs: Array) -> Array:
+        """What the nearest throws say beside the polynomial.
+
+        Args:
+            inputs: All inputs, scaled, shape ``(n, n_axes)``.
+
+        Returns:
+            In the units of the targets, shape ``(n, n_targets)``.
+        """
         if self.kind is Kind.POLYNOMIAL:
             return np.zeros((len(inputs), len(self.targets)))
         residuals = self.residuals
         found = np.empty((len(inputs), len(self.targets)))
         for row, place in enumerate(inputs):
             squares = ((self.inputs - place) ** 2).sum(axis=1)
-            near = np.argsort(squares, kind="stable")[:_NEIGHBOURS]
+            # The nearest of all, found among the few that are as near as the last of them.
+            last = min(_NEIGHBOURS, len(squares)) - 1
+            few = np.flatnonzero(squares <= np.partition(squares, last)[last])
+            near = few[np.argsort(squares[few], kind="stable")][:_NEIGHBOURS]
             weights = 1.0 / (squares[near] + 1e-12)
             found[row] = (weights[:, np.newaxis] * residuals[near]).sum(axis=0) / weights.sum()
         return found

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,9 +13,11 @@ from numpy.typing import NDArray
 
 from throwcollect.config.loader import dump_yaml
 from throwcollect.errors import ConfigError
+from throwcollect.extras import require
 from throwcollect.files import StrPath
 from throwcollect.learning.adapting import Method, adapt
 from throwcollect.learning.aiming import Choice, aim
+from throwcollect.learning.distilling import distil
 from throwcollect.learning.fitting import Fit, fit_map
 from throwcollect.learning.learned_map import Kind, LearnedMap, Role
 from throwcollect.learning.model_directory import read_model, write_model
@@ -22,12 +25,13 @@ from throwcollect.learning.model_file import (
     AdaptationEntry,
     AxisEntry,
     CorrectionEntry,
-    Found,
+    DistilledEntry,
     ModelFile,
     PolynomialEntry,
     TrainedOn,
+    list_found,
 )
-from throwcollect.learning.score import Score
+from throwcollect.learning.score import Score, pool_scores
 from throwcollect.learning.scoring import Simulates, score_model
 from throwcollect.version import __version__
 
@@ -147,8 +151,9 @@ class Model:
         self,
         simulator: Simulates,
         *,
-        targets: int = 100,
+        targets: int = 40,
         seed: int = 0,
+        seeds: int = 3,
         world: Simulates | None = None,
         scatter: float = 0.0,
         processes: int = 1,
@@ -157,8 +162,9 @@ class Model:
 
         Args:
             simulator: Simulates the world of the dataset.
-            targets: Number of targets.
-            seed: Seed of their choice; models of one dataset get the same ones.
+            targets: Number of targets of each seed.
+            seed: The first seed of their choice; models of one dataset get the same ones.
+            seeds: Number of seeds, whose medians are taken.
             world: Simulates another world, in which the model is adapted by a few throws; None for none.
             scatter: Standard deviation of noise on what is measured of those throws, in the unit of the targets.
             processes: How many processes simulate.
@@ -167,23 +173,14 @@ class Model:
             ConfigError: If a number is out of its range.
             WorkerError: If a process of a simulator ends.
         """
-        if targets < 1:
-            raise ConfigError(f"targets: got {targets}", expected="1 or more")
-        if seed < 0:
-            raise ConfigError(f"seed: got {seed}", expected="0 or more")
+        for name, number, least in (("targets", targets, 1), ("seeds", seeds, 1), ("seed", seed, 0)):
+            if number < least:
+                raise ConfigError(f"{name}: got {number}", expected=f"{least} or more")
         _check_scatter(scatter)
         error, counts = self.file.trained_on.error, self.file.trained_on.latents_count
-        return score_model(
-            self.learned,
-            simulator,
-            count=targets,
-            seed=seed,
-            world=world,
-            scatter=scatter,
-            error=error,
-            latents_count=counts,
-            processes=processes,
-        )
+        score = partial(score_model, self.learned, simulator, count=targets, world=world, scatter=scatter)
+        score = partial(score, error=error, latents_count=counts, processes=processes)
+        return pool_scores([score(seed=each) for each in range(seed, seed + seeds)])
 
     def adapt(
         self,
@@ -193,7 +190,7 @@ class Model:
         method: str | None = None,
         scatter: float = 0.0,
     ) -> Model:
-        """Make the model of another world, of a few throws in it.
+        """Make the model of another world, of a few throws in it; if this one was distilled, that one is, too.
 
         Args:
             points: What was thrown: values by key, of all `parameters` and all `given` each.
@@ -239,12 +236,28 @@ class Model:
             scatter=deviation,
             before=adapted.before.tolist(),
             after=adapted.after.tolist(),
-            found=_describe_found(learned, adapted.method, adapted.deviations),
+            found=list_found(learned, adapted.method, adapted.deviations),
         )
         file = self.file.model_copy(
-            update={"correction": CorrectionEntry.of(adapted.correction), "adaptation": entry, "version": __version__}
+            update={
+                "correction": CorrectionEntry.of(adapted.correction),
+                "adaptation": entry,
+                "version": __version__,
+                "distilled": None,
+            }
         )
-        return replace(self, file=file, learned=learned)
+        world = replace(self, file=file, learned=learned)
+        return world if self.file.distilled is None else world.distil()
+
+    def distil(self) -> Model:
+        """Add the way from a target to parameters as one polynomial, which `save` writes into ``model.onnx``, too.
+
+        Raises:
+            MissingExtraError: If the package ``onnx`` is not installed.
+        """
+        require("onnx")
+        entry = DistilledEntry.of(distil(self.learned))
+        return replace(self, file=self.file.model_copy(update={"distilled": entry}))
 
     def save(self, directory: StrPath) -> None:
         """Write the model.
@@ -255,6 +268,7 @@ class Model:
         Raises:
             ConfigError: If there is something already.
             DatasetError: If it cannot be written.
+            MissingExtraError: If the model was distilled, and the package ``onnx`` is not installed.
         """
         write_model(Path(directory), self.file, self.learned, self.trials, self.config)
 
@@ -365,24 +379,6 @@ def _describe(found: Fit, dataset: Dataset, where: str | None) -> ModelFile:
         ),
         adaptation=None,
     )
-
-
-def _describe_found(learned: LearnedMap, method: Method, deviations: Array) -> list[Found]:
-    """The numbers that adaptation found, in their units."""
-    if method is Method.NONE:
-        return []
-    role = {Method.BIAS: Role.PARAMETER, Method.LATENT: Role.LATENT}.get(method)
-    axes = learned.axes_of(role) if role else ()
-    found = []
-    for number, axis in enumerate(axes):
-        half = (axis.maximum - axis.minimum) / 2
-        if role is Role.LATENT:
-            value = axis.minimum + (float(learned.correction.latents[number]) + 1) * half
-        else:
-            value = float(learned.correction.bias[number]) * half
-        found.append(Found(name=axis.key, value=value, deviation=float(deviations[number]) * half))
-    offsets = zip(learned.targets, learned.correction.offset.tolist(), deviations[len(axes) :].tolist(), strict=True)
-    return [*found, *(Found(name=name, value=value, deviation=spread) for name, value, spread in offsets)]
 
 
 def _check_scatter(scatter: float) -> None:

@@ -33,6 +33,17 @@ parameters = {axis["key"]: value for axis, value in zip(axes, values) if axis["r
 """Finds parameters for ``target`` with ``model.json`` alone; the card shows it, and a test runs it."""
 
 
+ONNX_PROGRAM = """\
+import json
+import onnxruntime
+
+keys = [axis["key"] for axis in json.load(open("model.json"))["axes"] if axis["role"] == "parameter"]
+session = onnxruntime.InferenceSession("model.onnx")
+parameters = dict(zip(keys, session.run(None, {"target": [target]})[0][0].tolist()))
+"""
+"""The same with ``model.onnx``."""
+
+
 def describe_model(file: ModelFile, score: Score | None) -> str:
     """README.md of a model.
 
@@ -73,7 +84,11 @@ def describe_model(file: ModelFile, score: Score | None) -> str:
         lines += _describe_adaptation(file.adaptation, file)
     if score is not None:
         lines += _describe_score(score, file)
-    lines += [
+    return "\n".join([*lines, *_describe_use(file)])
+
+
+def _describe_use(file: ModelFile) -> list[str]:
+    lines = [
         "## What it was not tested on",
         "",
         "A real robot; balls, tools, surfaces and postures other than the dataset's; throws that scatter. Every number "
@@ -88,7 +103,17 @@ def describe_model(file: ModelFile, score: Score | None) -> str:
         "```",
         "",
     ]
-    return "\n".join(lines)
+    if file.distilled is not None:
+        lines += [
+            "`model.onnx` needs no NumPy in a controller: one polynomial, distilled from this model. Its parameters "
+            "stay inside of their ranges for any target, in reach or not. In Python:",
+            "",
+            "```python",
+            ONNX_PROGRAM.rstrip(),
+            "```",
+            "",
+        ]
+    return lines
 
 
 def _describe_axis(axis: Axis) -> str:
@@ -127,7 +152,8 @@ def _describe_score(score: Score, file: ModelFile) -> list[str]:
     lines = [
         "## How it hits",
         "",
-        f"Distance from {targets} (seed {score.seed}), in simulation:",
+        f"Distance from {targets} for each of {format_count(score.seeds, 'seed')} (from {score.seed} on), medians of "
+        "the seeds; each draws targets, the throws that were learned from, and those in another world; in simulation:",
         "",
         "| learned from | median | 9 of 10 below | largest | did not succeed |",
         "|---|---|---|---|---|",
@@ -140,8 +166,8 @@ def _describe_score(score: Score, file: ModelFile) -> list[str]:
     if score.adapted:
         scatter = f", with a scatter of {_length(score.scatter, file)} of what is measured" if score.scatter else ""
         lines += [
-            f"In another world{scatter}, at the {score.adapted[0].errors.throws} of these targets that can be reached "
-            "there, in simulation:",
+            f"In another world{scatter}, at those of these targets that can be reached there, "
+            f"{format_count(score.adapted[0].errors.throws, 'throw')} for each row, in simulation:",
             "",
             "| throws there | differs by | median | 9 of 10 below | largest | did not succeed |",
             "|---|---|---|---|---|---|",

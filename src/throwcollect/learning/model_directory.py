@@ -15,6 +15,7 @@ from throwcollect.files import new_directory, read_text, write_file
 from throwcollect.learning.learned_map import LearnedMap
 from throwcollect.learning.model_card import describe_model
 from throwcollect.learning.model_file import MODEL, ModelFile, read_model_file
+from throwcollect.learning.onnx_file import ONNX, encode_onnx
 from throwcollect.learning.score import Score
 from throwcollect.sweep.parquet_file import encode_table, read_parquet
 
@@ -40,15 +41,19 @@ def write_model(directory: Path, file: ModelFile, learned: LearnedMap, trials: N
     Raises:
         ConfigError: If there is something already.
         DatasetError: If it cannot be written.
+        MissingExtraError: If the model was distilled, and the package ``onnx`` is not installed.
     """
     columns: dict[str, NDArray[Any]] = {"trial": trials}
     columns |= {axis.key: learned.values[:, number] for number, axis in enumerate(learned.axes)}
     columns |= {target: learned.outputs[:, number] for number, target in enumerate(learned.targets)}
+    onnx = None if file.distilled is None else encode_onnx(learned, file.distilled.to_map())
     with new_directory(directory) as beside:
         write_file(beside / MODEL, (file.model_dump_json(indent=1) + "\n").encode())
         write_file(beside / POINTS, encode_table(pa.table({**columns, _EFFORT: learned.efforts})))
         write_file(beside / CONFIG, config.encode())
         write_file(beside / CARD, describe_model(file, None).encode())
+        if onnx is not None:
+            write_file(beside / ONNX, onnx)
 
 
 def read_model(directory: Path) -> tuple[ModelFile, LearnedMap, NDArray[np.int64], str]:

@@ -11,8 +11,9 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError,
 
 from throwcollect.errors import DatasetError
 from throwcollect.files import read_text
-from throwcollect.learning.adapting import Method
-from throwcollect.learning.learned_map import Axis, Correction, Kind, Role
+from throwcollect.learning.adapting import ROLES, Method
+from throwcollect.learning.distilling import DistilledMap
+from throwcollect.learning.learned_map import Axis, Correction, Kind, LearnedMap, Role
 from throwcollect.learning.polynomial import Polynomial
 
 MODEL = "model.json"
@@ -81,6 +82,33 @@ class CorrectionEntry(_Entry):
             np.array(each, np.float64) for each in (self.bias, self.latents, self.offset)
         ]
         return Correction(*arrays)
+
+
+class DistilledEntry(_Entry):
+    """The way from a target to parameters as one polynomial; see `DistilledMap`."""
+
+    low: list[FiniteFloat]
+    high: list[FiniteFloat]
+    polynomial: PolynomialEntry
+
+    @classmethod
+    def of(cls, distilled: DistilledMap) -> DistilledEntry:
+        """Take down what was distilled."""
+        polynomial = PolynomialEntry.of(distilled.polynomial)
+        return cls(low=distilled.low.tolist(), high=distilled.high.tolist(), polynomial=polynomial)
+
+    def to_map(self) -> DistilledMap:
+        """Make the map."""
+        low, high = np.array(self.low, np.float64), np.array(self.high, np.float64)
+        return DistilledMap(low, high, self.polynomial.to_polynomial())
+
+    def has_shape(self, targets: int, context: int, parameters: int) -> bool:
+        """Whether all numbers belong to so many targets, keys that are given, and parameters."""
+        return (
+            len(self.low) == len(self.high) == targets
+            and all(low < high for low, high in zip(self.low, self.high, strict=True))
+            and self.polynomial.has_shape(targets + context, parameters)
+        )
 
 
 class Found(_Entry):
@@ -165,6 +193,7 @@ class ModelFile(_Entry):
     correction: CorrectionEntry
     trained_on: TrainedOn
     adaptation: AdaptationEntry | None
+    distilled: DistilledEntry | None = None
 
     @model_validator(mode="after")
     def _fits_together(self) -> ModelFile:
@@ -178,6 +207,10 @@ class ModelFile(_Entry):
             and len(self.correction.offset) == targets
             and roles == sorted(roles, key=list(Role).index)
             and all(axis.minimum < axis.maximum for axis in self.axes)
+            and (
+                self.distilled is None
+                or self.distilled.has_shape(targets, roles.count(Role.CONTEXT), roles.count(Role.PARAMETER))
+            )
         ):
             raise ValueError("axes, targets, polynomials and correction do not belong together")
         return self
@@ -201,3 +234,27 @@ def read_model_file(directory: Path) -> ModelFile:
         raise DatasetError(
             f"{where + ': ' if where else ''}{first['msg']}", path=path, hint="throwcollect fit makes models"
         ) from error
+
+
+def list_found(learned: LearnedMap, method: Method, deviations: NDArray[np.float64]) -> list[Found]:
+    """List the numbers that adaptation found, in their units.
+
+    Args:
+        learned: The adapted map.
+        method: What differs in its world.
+        deviations: As `Adaptation` has them.
+    """
+    if method is Method.NONE:
+        return []
+    role = ROLES.get(method)
+    axes = learned.axes_of(role) if role else ()
+    found = []
+    for number, axis in enumerate(axes):
+        half = (axis.maximum - axis.minimum) / 2
+        if role is Role.LATENT:
+            value = axis.minimum + (float(learned.correction.latents[number]) + 1) * half
+        else:
+            value = float(learned.correction.bias[number]) * half
+        found.append(Found(name=axis.key, value=value, deviation=float(deviations[number]) * half))
+    offsets = zip(learned.targets, learned.correction.offset.tolist(), deviations[len(axes) :].tolist(), strict=True)
+    return [*found, *(Found(name=name, value=value, deviation=spread) for name, value, spread in offsets)]

@@ -49,24 +49,27 @@ class Polynomial:
         Returns:
             Shape ``(n, n_outputs)``.
         """
-        return matmul(_terms(inputs, self.exponents), self.coefficients)
+        return matmul(list_terms(inputs, self.exponents), self.coefficients)
 
-    def slopes(self, inputs: Array) -> Array:
-        """Change of each output with each input.
+    def slopes(self, inputs: Array, columns: slice) -> Array:
+        """Change of each output with some of the inputs.
 
         Args:
             inputs: Shape ``(n, n_inputs)``.
+            columns: Which inputs.
 
         Returns:
-            Shape ``(n, n_outputs, n_inputs)``.
+            Shape ``(n, n_outputs, n_columns)``; there is at least one column.
         """
-        columns = []
-        for each in range(inputs.shape[1]):
-            factors = self.exponents[:, each : each + 1].astype(np.float64)
-            lowered = self.exponents.copy()
-            lowered[:, each] = np.maximum(lowered[:, each] - 1, 0)
-            columns.append(matmul(_terms(inputs, lowered), factors * self.coefficients))
-        return np.stack(columns, axis=-1)
+        found = []
+        for each in range(inputs.shape[1])[columns]:
+            with_it = self.exponents[:, each] > 0
+            lowered = self.exponents[with_it]
+            factors = lowered[:, each : each + 1] * self.coefficients[with_it]
+            lowered[:, each] -= 1
+            zero = np.zeros((len(inputs), self.coefficients.shape[1]))
+            found.append(matmul(list_terms(inputs, lowered), factors) if len(lowered) else zero)
+        return np.stack(found, axis=-1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,7 +161,7 @@ class _Sums:
 
     @classmethod
     def of(cls, inputs: Array, outputs: Array, exponents: NDArray[np.int64]) -> _Sums:
-        terms = _terms(inputs, exponents)
+        terms = list_terms(inputs, exponents)
         transposed = np.ascontiguousarray(terms.T)
         return cls(len(inputs), matmul(transposed, terms), matmul(transposed, outputs))
 
@@ -176,13 +179,14 @@ def _solve(exponents: NDArray[np.int64], sums: _Sums) -> Polynomial:
     return Polynomial(exponents, solve(sums.squares + ridge, sums.products))
 
 
-def _terms(inputs: Array, exponents: NDArray[np.int64]) -> Array:
+def list_terms(inputs: Array, exponents: NDArray[np.int64]) -> Array:
     """Value of each term without its coefficient, shape ``(n, n_terms)``."""
-    powers = [np.ones_like(inputs)]
-    for _ in range(int(exponents.max(initial=0))):
-        powers.append(powers[-1] * inputs)
+    powers = [np.ones_like(inputs.T), np.ascontiguousarray(inputs.T)]
+    for _ in range(1, int(exponents.max(initial=0))):
+        powers.append(powers[-1] * powers[1])
     table = np.stack(powers)
-    terms = np.ones((len(inputs), len(exponents)))
+    terms = np.ones((len(exponents), len(inputs)))
     for each in range(inputs.shape[1]):
-        terms *= table[exponents[:, each], :, each].T
-    return terms
+        with_it = np.flatnonzero(exponents[:, each])
+        terms[with_it] *= table[exponents[with_it, each], each]
+    return terms.T

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
@@ -43,9 +44,19 @@ class Errors(_Entry):
         missed = int((~np.isfinite(errors)).sum())
         return cls(throws=len(errors), missed=missed, median=median, share90=share90, largest=largest)
 
+    @classmethod
+    def middle(cls, some: Sequence[Errors]) -> Errors:
+        """Sum up those of several seeds: each number is the median of theirs; there is at least one."""
+        lists = ([each.median for each in some], [each.share90 for each in some], [each.largest for each in some])
+        median, share90, largest = (
+            sorted(values, key=lambda value: (value is None, value))[(len(values) - 1) // 2] for values in lists
+        )
+        throws, missed = sum(each.throws for each in some), sum(each.missed for each in some)
+        return cls(throws=throws, missed=missed, median=median, share90=share90, largest=largest)
+
 
 class Trained(_Entry):
-    """How a model of the first throws of the dataset hits.
+    """How a model of some throws of the dataset hits.
 
     Attributes:
         trained_on: Number of throws that it was learned from.
@@ -86,8 +97,9 @@ class Score(_Entry):
     """All of it; every number is one "in simulation".
 
     Attributes:
-        targets: Number of targets.
-        seed: Seed of their choice.
+        targets: Number of targets of each seed.
+        seed: The first seed of their choice.
+        seeds: Number of seeds; numbers are medians of theirs.
         trained: By the number of throws that a model was learned from; the model itself comes last.
         throws: Its throws.
         scatter: Noise on what was measured of throws in the other world, in the unit of the targets.
@@ -98,8 +110,40 @@ class Score(_Entry):
     format: Literal["1"] = "1"
     targets: int
     seed: int
+    seeds: int = 1
     trained: list[Trained]
     throws: list[ThrowAtTarget]
     scatter: FiniteFloat
     adapted: list[Adapted]
     adapted_throws: list[ThrowAtTarget]
+
+
+def pool_scores(scores: Sequence[Score]) -> Score:
+    """Put the scores of several seeds together.
+
+    Args:
+        scores: One for each seed, at least one.
+    """
+    first = scores[0]
+    sizes = [each.trained_on for each in first.trained]
+    numbers = sorted({each.real_throws for score in scores for each in score.adapted})
+    there = [each for score in scores for each in score.adapted]
+    return first.model_copy(
+        update={
+            "seeds": len(scores),
+            "trained": [
+                Trained(trained_on=size, errors=Errors.middle([score.trained[at].errors for score in scores]))
+                for at, size in enumerate(sizes)
+            ],
+            "throws": [throw for score in scores for throw in score.throws],
+            "adapted": [_pool_adapted([each for each in there if each.real_throws == number]) for number in numbers],
+            "adapted_throws": [throw for score in scores for throw in score.adapted_throws],
+        }
+    )
+
+
+def _pool_adapted(some: Sequence[Adapted]) -> Adapted:
+    """What most seeds took the world to differ by, and their errors."""
+    methods = [each.method for each in some]
+    method = max(methods, key=methods.count)
+    return Adapted(real_throws=some[0].real_throws, method=method, errors=Errors.middle([each.errors for each in some]))

@@ -58,7 +58,7 @@ def score_model(
             the world of the dataset leave it out.
         simulator: Simulates the world of the dataset.
         count: Number of targets.
-        seed: Seed of their choice.
+        seed: Seed of their choice, of the throws that smaller models are learned from, and of the noise.
         world: Simulates the other world; None for none.
         scatter: Standard deviation of noise on what is measured of throws in the other world.
         error: What the map itself is off by, as a standard deviation.
@@ -69,7 +69,7 @@ def score_model(
     plain = learned.correct(no_correction(learned.axes, learned.targets))
     targets = draw_targets(plain.carry_over(context), count, seed)
     sizes = [*(size for size in SIZES if size < len(learned.values)), len(learned.values)]
-    maps = {size: smaller for size in sizes if (smaller := _learn_from(plain, size)) is not None}
+    maps = {size: smaller for size in sizes if (smaller := _learn_from(plain, size, seed)) is not None}
     loops = _throw_at(list(maps.values()), targets, context, simulator, processes)
     trained = [
         Trained(trained_on=size, errors=Errors.of(_distances(places, targets)))
@@ -163,19 +163,20 @@ def _nominal_context(learned: LearnedMap) -> Array:
     return inside
 
 
-def _learn_from(learned: LearnedMap, size: int) -> LearnedMap | None:
-    """The map that the first throws of the dataset give; None if they are too few."""
+def _learn_from(learned: LearnedMap, size: int, seed: int) -> LearnedMap | None:
+    """The map that some throws of the dataset give, drawn at random; None if they are too few."""
     if size == len(learned.inputs):
         return learned
     if not enough_throws(size, len(learned.axes_of(Role.PARAMETER))):
         return None
+    drawn = np.sort(np.random.default_rng((seed, 2)).permutation(len(learned.inputs))[:size])
     fit = fit_throws(
         learned.kind,
         learned.axes,
         learned.targets,
-        learned.values[:size],
-        learned.outputs[:size],
-        learned.efforts[:size],
+        learned.values[drawn],
+        learned.outputs[drawn],
+        learned.efforts[drawn],
     )
     return fit.learned
 

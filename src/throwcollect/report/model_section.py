@@ -49,7 +49,8 @@ def show_model(directory: Path, dataset: Dataset) -> Section:
     if score is None:
         hint = command("score", directory)
         return Section("model", "Model", _TITLE, f"{text} Nobody has thrown with it yet; {hint} does, in simulation.")
-    text += f" All distances are those of throws in simulation, at {score.targets} targets."
+    seeds = format_count(score.seeds, "seed")
+    text += f" Distances are medians of {seeds}, of {score.targets} targets each, in simulation."
     panels = [
         Panel(
             "targets",

@@ -18,6 +18,8 @@ from throwcollect.serve.dataset_routes import make_dataset_routes
 from throwcollect.serve.instance_routes import make_component_routes, make_instance_routes, make_log_routes
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.live import keep_letting_go
+from throwcollect.serve.model_routes import make_model_routes
+from throwcollect.serve.models import Models
 from throwcollect.serve.problems import add_handlers, describe_problems, problem
 from throwcollect.serve.rosbridge_routes import make_rosbridge_routes
 from throwcollect.serve.sockets import keep_telling
@@ -44,11 +46,12 @@ class Token(BaseModel):
     token: str
 
 
-def make_app(instances: Instances, keys: Keys) -> FastAPI:
+def make_app(instances: Instances, models: Models, keys: Keys) -> FastAPI:
     """The application, to be put behind `access.Access`.
 
     Args:
         instances: All runs, and what can be done with them.
+        models: All models.
         keys: What lets somebody in.
     """
 
@@ -80,6 +83,7 @@ def make_app(instances: Instances, keys: Keys) -> FastAPI:
     app.include_router(make_dataset_routes(instances), prefix=PREFIX, responses=of_runs)
     app.include_router(make_description_routes(instances), prefix=PREFIX, responses=of_runs)
     app.include_router(make_view_routes(instances), prefix=PREFIX, responses=of_runs)
+    app.include_router(make_model_routes(models), prefix=PREFIX, responses=describe_problems(*_ALWAYS, 401, 404, 422))
     app.include_router(make_rosbridge_routes(instances, Bridges()))
     app.mount("/", StaticFiles(directory=_PAGE, html=True))
     return app

@@ -8,14 +8,15 @@ import tarfile
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Query
 from fastapi.responses import FileResponse, StreamingResponse
 from pydantic import BaseModel
 from starlette.background import BackgroundTask
 
-from throwcollect.dataset.directory import CARD, MANIFEST, PROVENANCE, THROWS
+from throwcollect.dataset.directory import CARD, JOURNAL, MANIFEST, PROVENANCE, THROWS
+from throwcollect.dataset.journal import read_commits
 from throwcollect.dataset.manifest import read_manifest, size_of_file
 from throwcollect.errors import ConflictError, NotFoundError
 from throwcollect.files import check_regular, open_regular
@@ -28,6 +29,10 @@ _PIECE_BYTES = 1 << 20
 _OWN_FILES = {CARD, PROVENANCE}
 """Files that no manifest covers, as they say how and when a dataset was collected."""
 _LANDING = ("landing_x_m", "landing_y_m", "outcome", "trial")
+_MOST_LANDINGS = 20_000
+_JOURNAL_BYTES = 4_000_000
+"""Bounds of one answer; so long a part of a journal is of some 15,000 throws."""
+_MOST_FIRST = 2**53
 
 
 class DatasetFile(BaseModel):
@@ -36,6 +41,24 @@ class DatasetFile(BaseModel):
     path: str
     bytes: int
     sha256: str
+
+
+class Landings(BaseModel):
+    """Where throws came down.
+
+    Attributes:
+        landings: x and y [m], outcome and trial; a trial that was collected again may be there twice.
+        total: Number of landings that these were evenly chosen from.
+        following: What to ask for as `first` next, for landings that come later, if the dataset grows.
+        is_finished: Whether the dataset is finished.
+        has_more: Whether there are later ones by now.
+    """
+
+    landings: list[tuple[float, float, str, int]]
+    total: int
+    following: int
+    is_finished: bool
+    has_more: bool
 
 
 def make_dataset_routes(instances: Instances) -> APIRouter:
@@ -90,9 +113,12 @@ def make_dataset_routes(instances: Instances) -> APIRouter:
         return FileResponse(page, filename=page.name, background=BackgroundTask(scratch.cleanup))
 
     @router.get("/landings")
-    def landings(instance: str) -> list[tuple[float, float, str, int]]:
-        """Where the throws of a finished dataset came down: x and y [m], outcome and trial; none for other tasks."""
-        return _read_landings(_find_finished(instances, instance))
+    def landings(instance: str, first: Annotated[int, Query(ge=0, le=_MOST_FIRST)] = 0) -> Landings:
+        """Where throws came down, of a finished dataset or of one that grows; none for other tasks."""
+        directory = _get_collection(instances, instance).place.directory
+        if _is_finished(directory):
+            return _read_landings(directory)
+        return _read_landings_so_far(directory, first)
 
     return router
 
@@ -117,6 +143,12 @@ def _find_file(directory: Path, path: str) -> Path:
     return directory / path
 
 
+def _is_finished(directory: Path) -> bool:
+    # A run that goes on with it is one of its own.
+    grows = any(each.status == "running" and each.place.directory == directory for each in Records().all())
+    return not grows and (directory / MANIFEST).is_file()
+
+
 def _find_finished(instances: Instances, instance: str) -> Path:
     """Directory of the finished dataset of a run.
 
@@ -126,9 +158,7 @@ def _find_finished(instances: Instances, instance: str) -> Path:
     """
     run = _get_collection(instances, instance)
     directory = run.place.directory
-    # A run that goes on with it is one of its own.
-    grows = any(each.status == "running" and each.place.directory == directory for each in Records().all())
-    if grows or not (directory / MANIFEST).is_file():
+    if not _is_finished(directory):
         raise ConflictError(f"run {instance}: its dataset is not finished")
     return directory
 
@@ -141,12 +171,21 @@ def _list_names(directory: Path) -> list[str]:
     ]
 
 
-def _read_landings(directory: Path) -> list[tuple[float, float, str, int]]:
+def _read_landings(directory: Path) -> Landings:
+    """Landings of a finished dataset."""
     table = read_parquet(directory / THROWS)
     if not set(_LANDING) <= set(table.column_names):
-        return []
-    rows: Any = zip(*(table[name].to_pylist() for name in _LANDING), strict=True)
-    return [row for row in rows if row[0] is not None]
+        return Landings(landings=[], total=0, following=0, is_finished=True, has_more=False)
+    landed = table.select([*_LANDING]).drop_null()
+    some = landed.take([*range(0, len(landed), max(1, -(-len(landed) // _MOST_LANDINGS)))])
+    rows: Any = zip(*(column.to_pylist() for column in some.columns), strict=True)
+    return Landings(landings=list(rows), total=len(landed), following=0, is_finished=True, has_more=False)
+
+
+def _read_landings_so_far(directory: Path, first: int) -> Landings:
+    """Landings of a dataset that grows, from a byte of its journal on."""
+    rows, following, has_more = read_commits(directory / JOURNAL, _LANDING, first=first, most_bytes=_JOURNAL_BYTES)
+    return Landings(landings=rows, total=len(rows), following=following, is_finished=False, has_more=has_more)
 
 
 def _archive(directory: Path, name: str) -> Iterator[bytes]:

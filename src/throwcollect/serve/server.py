@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from io import TextIOWrapper
 from pathlib import Path
 from types import FrameType
+from typing import Literal
 
 import uvicorn
 
@@ -23,9 +24,12 @@ from throwcollect.serve.access import Access, Keys
 from throwcollect.serve.app import make_app
 from throwcollect.serve.finding import Address, log_path, publish
 from throwcollect.serve.instances import Instances
+from throwcollect.serve.models import Models
 
 PORT = 8080
 """Where to serve if nobody says otherwise, and it is free."""
+WEBSOCKETS: Literal["websockets-sansio"] = "websockets-sansio"
+"""The implementation of WebSockets; it waits for clients that read slowly, and keeps nothing for them meanwhile."""
 _MOST_FRAME = 10_000_000
 _MOST_CLIENTS = 256
 _LOG_BYTES = 1_000_000
@@ -43,6 +47,7 @@ class Tls:
 
 def serve(
     instances: Instances,
+    models: Models,
     *,
     host: str = "127.0.0.1",
     port: int | None = None,
@@ -55,6 +60,7 @@ def serve(
 
     Args:
         instances: All runs, and what can be done with them.
+        models: All models.
         host: Address to listen at.
         port: Port to listen at, 0 for any that is free; None for 8080, or any that is free if that is not.
         tls: Certificate and key; None to speak in the clear.
@@ -76,12 +82,12 @@ def serve(
         url = f"{scheme}://{_reachable(host)}:{bound}"
         certificate = None if tls is None else str(tls.certificate.absolute())
         address = Address(url, keys.full, keys.read_only, os.getpid(), certificate)
-        app = Access(make_app(instances, keys), keys, hosts, origins)
+        app = Access(make_app(instances, models, keys), keys, hosts, origins)
         config = uvicorn.Config(
             app,
             log_config=None,
             access_log=False,
-            ws="websockets-sansio",
+            ws=WEBSOCKETS,
             ws_max_size=_MOST_FRAME,
             # On this machine it would cost time and spare nothing.
             ws_per_message_deflate=False,

@@ -104,3 +104,9 @@ def test_of_many_throws_each_is_predicted_by_a_map_of_most_others() -> None:
 
 def test_what_is_wanted_is_done_even_if_it_does_not_help() -> None:
     assert elsewhere(learn(), 5, land, method=Method.OFFSET).method is Method.OFFSET
+
+
+@pytest.mark.parametrize("count", [1, 3, 5, 10])
+def test_scatter_is_not_taken_for_a_difference(count: int) -> None:
+    found = [elsewhere(learn(), count, land, noise_m=0.02, seed=seed).method for seed in range(12)]
+    assert found.count(Method.NONE) >= 11

@@ -13,7 +13,7 @@ from tests.unit.learning.worlds import KEYS, TARGETS, land, learn
 
 from throwcollect.config.schema import Config
 from throwcollect.learning.adapting import Method
-from throwcollect.learning.score import Errors, Score
+from throwcollect.learning.score import Errors, Score, pool_scores
 from throwcollect.learning.scoring import draw_targets, score_model
 
 SHIFT = np.array([0.1, 0.12])
@@ -114,3 +114,17 @@ def test_targets_lie_between_throws_that_are_near_each_other() -> None:
 def test_errors_are_summed_up_in_order() -> None:
     found = Errors.of(np.array([0.3, 0.1, np.inf, 0.2]))
     assert (found.throws, found.missed, found.median, found.share90, found.largest) == (4, 1, 0.2, None, None)
+
+
+def test_scores_of_several_seeds_become_medians() -> None:
+    some = [score(World(), World(SHIFT), seed=seed) for seed in range(3)]
+    found = pool_scores(some)
+    assert (found.seeds, found.targets, len(found.throws)) == (3, 25, 75)
+    for at, each in enumerate(found.trained):
+        assert each.errors.median == sorted(one.trained[at].errors.median for one in some)[1]
+        assert each.errors.throws == 75
+    assert [each.real_throws for each in found.adapted] == [0, 1, 3, 5, 10]
+    assert found.adapted[-1].errors.median == sorted(one.adapted[-1].errors.median for one in some)[1]
+    assert some[0].trained[0] != some[1].trained[0]
+    missed = Errors(throws=1, missed=1, median=None, share90=None, largest=None)
+    assert Errors.middle([missed, missed, found.trained[0].errors]).median is None

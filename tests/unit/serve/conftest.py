@@ -18,6 +18,7 @@ from throwcollect.serve.access import Access, Keys
 from throwcollect.serve.app import make_app
 from throwcollect.serve.catalogue import Catalogue
 from throwcollect.serve.instances import Instances
+from throwcollect.serve.models import Models
 
 HOST = "127.0.0.1:8080"
 CONFIG = "name: small\ntrials: 3\ntask: {name: throw}\n"
@@ -69,7 +70,9 @@ def catalogue(tmp_path: Path) -> Catalogue:
 def served(catalogue: Catalogue, tmp_path: Path) -> Served:
     keys = Keys()
     instances = Instances(catalogue, tmp_path / "datasets")
-    return Served(Access(make_app(instances, keys), keys, frozenset({HOST})), keys, instances)
+    return Served(
+        Access(make_app(instances, Models(tmp_path / "models"), keys), keys, frozenset({HOST})), keys, instances
+    )
 
 
 @pytest.fixture

@@ -12,6 +12,8 @@ const { inOrder, steps } = await load("state.js");
 const { readChanges } = await load("controls.js");
 const { coarsen } = await load("coarse.js");
 const { coverPlace } = await load("target.js");
+const { describeModel } = await load("model_map.js");
+const { describe, tabulate } = await load("model_words.js");
 const { Rosbridge } = await load("rosbridge.js");
 const { BoxGeometry, SphereGeometry } = await load("vendor/three/build/three.module.js");
 
@@ -123,4 +125,28 @@ test("a coarse mesh keeps its extent with fewer triangles, and edges stay sharp"
   const box = coarsen(new BoxGeometry(1, 1, 1), 0.4);
   assert.equal(box.index.count, 36);
   assert.ok(box.getAttribute("position").count > 8);
+});
+
+test("a model is told in sentences, before and after it was adapted", () => {
+  const model = {
+    learned_from: "quick", throws: 1021, error: 0.0021, parameters: ["task.duration_s"], targets: ["landing_x_m", "landing_y_m"],
+    adaptation: null, score: null,
+  };
+  assert.match(describe(model), /1021 throws of quick: task.duration_s to landing_x_m, landing_y_m\. .* 0\.21 cm \(median\)\. Nobody/);
+  const adaptation = { method: "bias", throws: 3, before: [0.1, 0.2, 0.3], after: [0.01, 0.03, 0.02], found: [{ name: "task.duration_s", value: 0.01234, deviation: 0.001 }] };
+  assert.match(describe({ ...model, adaptation }), /by 3 throws \(bias\): .* 20\.00 cm .* before, and 2\.00 cm after.* task\.duration_s 0\.0123 ± 0\.001\./);
+  assert.match(describe({ ...model, adaptation: { ...adaptation, throws: 1, before: [0.1], after: [] } }), /by 1 throw \(bias\): .* 10\.00 cm from their prediction before \(median\)/);
+});
+
+test("errors are rows, those in another world behind those in the own one", () => {
+  const errors = { median: 0.01, share90: 0.02, largest: null };
+  const rows = tabulate({ trained: [{ trained_on: 30, errors }], adapted: [{ real_throws: 0, method: "none", errors }, { real_throws: 1, method: "offset", errors }] });
+  assert.deepEqual(rows.map(([text]) => text), ["learned from 30 throws", "other world, not adapted", "other world, 1 throw there (offset)"]);
+  assert.deepEqual(rows[0].slice(1), [0.01, 0.02, null]);
+});
+
+test("what is drawn of a model is told as well", () => {
+  assert.equal(describeModel(null), "");
+  const throws = [{ target: [1, 0], place: [1, 0.01] }, { target: [1, 1], place: null }];
+  assert.match(describeModel({ name: "quick", reached: [[1, 0]], throws }), /^Grey: 1 .* quick .* 2 targets, .* 10 times as long; at 1 of them no throw landed\.$/);
 });

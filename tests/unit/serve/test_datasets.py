@@ -13,6 +13,8 @@ import pytest
 from starlette.testclient import TestClient
 from tests.unit.serve.conftest import Remember, ended
 
+from throwcollect.serve import dataset_routes
+
 URL = "/api/v1/collections"
 
 
@@ -79,9 +81,58 @@ def test_the_archive_is_the_dataset(client: TestClient, directory: Path, tmp_pat
 
 
 def test_landings_and_the_report_are_made_of_it(client: TestClient, directory: Path) -> None:
-    landings = client.get(f"{URL}/a/landings").json()
+    found = client.get(f"{URL}/a/landings").json()
+    landings = found["landings"]
     assert [(outcome, trial) for _, _, outcome, trial in landings] == [("landed", 0), ("landed", 1), ("landed", 2)]
     assert all(isinstance(x, float) and 0 < x < 20 for x, *_ in landings)
+    assert (found["total"], found["is_finished"], found["has_more"]) == (3, True, False)
+
+
+def test_of_many_landings_some_are_given(client: TestClient, directory: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(dataset_routes, "_MOST_LANDINGS", 2)
+    found = client.get(f"{URL}/a/landings").json()
+    assert (found["total"], [trial for *_, trial in found["landings"]]) == (3, [0, 2])
+
+
+def test_landings_are_given_while_they_come(client: TestClient, directory: Path, remember: Remember) -> None:
+    """Those of a dataset that grows are the same as those of the finished one, in parts and in order of arrival."""
+    finished = client.get(f"{URL}/a/landings").json()["landings"]
+    remember("growing", directory=str(directory))
+    journal = directory / "logs" / "journal.jsonl"
+    lines = journal.read_bytes().splitlines(keepends=True)
+    commits = [number for number, line in enumerate(lines) if b'"commit"' in line]
+    # The last of the first two lines is being written.
+    journal.write_bytes(b"".join(lines[: commits[1]]) + lines[commits[1]][:-20])
+    first = client.get(f"{URL}/growing/landings").json()
+    assert (len(first["landings"]), first["is_finished"], first["has_more"]) == (1, False, False)
+    journal.write_bytes(b"".join(lines))
+    then = client.get(f"{URL}/growing/landings", params={"first": first["following"]}).json()
+    assert sorted(first["landings"] + then["landings"], key=lambda row: row[3]) == finished
+    last = client.get(f"{URL}/growing/landings", params={"first": then["following"]}).json()
+    assert (last["landings"], last["following"]) == ([], then["following"])
+
+
+def test_a_long_journal_is_given_in_parts(
+    client: TestClient, directory: Path, remember: Remember, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    remember("growing", directory=str(directory))
+    monkeypatch.setattr(dataset_routes, "_JOURNAL_BYTES", 500)
+    first, landings, asked = 0, [], 0
+    has_more = True
+    while has_more:
+        found = client.get(f"{URL}/growing/landings", params={"first": first}).json()
+        has_more = found["has_more"]
+        assert found["following"] > first
+        first, asked = found["following"], asked + 1
+        landings += found["landings"]
+    assert (len(landings), asked > 2) == (3, True)
+
+
+def test_without_a_journal_nothing_has_landed(client: TestClient, directory: Path, remember: Remember) -> None:
+    remember("growing", directory=str(directory))
+    (directory / "logs" / "journal.jsonl").unlink()
+    assert client.get(f"{URL}/growing/landings").json()["landings"] == []
+    assert client.get(f"{URL}/growing/landings", params={"first": -1}).status_code == 422
 
 
 def test_what_is_not_finished_is_not_given(client: TestClient, directory: Path, remember: Remember) -> None:
@@ -89,9 +140,10 @@ def test_what_is_not_finished_is_not_given(client: TestClient, directory: Path, 
     remember("torn", **ended(exit_code=3))
     remember("session", **ended(kind="session"))
     remember("volume", **ended(volume="v"))
-    for what in ("files", "files/config.yaml", "dataset.tar", "report", "landings"):
+    for what in ("files", "files/config.yaml", "dataset.tar", "report"):
         found = {name: client.get(f"{URL}/{name}/{what}").status_code for name in ("growing", "torn")}
         assert found == {"growing": 409, "torn": 409}, what
+    for what in ("files", "files/config.yaml", "dataset.tar", "report", "landings"):
         for name in ("session", "volume", "nobody", ".."):
             assert client.get(f"{URL}/{name}/{what}").status_code == 404, (name, what)
 

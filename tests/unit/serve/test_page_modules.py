@@ -13,6 +13,18 @@ import pytest
 
 from throwcollect.serve import app
 
+PAGE = Path(app.__file__).parent / "page"
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="needs node, which reads modules without a browser")
+@pytest.mark.parametrize("path", sorted(PAGE.glob("*.js")), ids=lambda path: path.name)
+def test_modules_can_be_parsed(path: Path) -> None:
+    command = ["node", "--input-type=module", "--check"]
+    done = subprocess.run(
+        command, input=path.read_bytes(), env={**os.environ, "NODE_OPTIONS": ""}, capture_output=True, check=False
+    )
+    assert done.returncode == 0, done.stderr.decode()
+
 
 def test_modules_compute_what_they_should(tmp_path: Path) -> None:
     if (node := shutil.which("node")) is None:
@@ -27,7 +39,7 @@ def test_modules_compute_what_they_should(tmp_path: Path) -> None:
     # Without what an installation by hand has node read first.
     environment = {
         **os.environ,
-        "PAGE": str(Path(app.__file__).parent / "page"),
+        "PAGE": str(PAGE),
         "THROW": str(tmp_path / "throw"),
         "NODE_OPTIONS": "",
     }

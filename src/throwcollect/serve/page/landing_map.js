@@ -1,10 +1,17 @@
 /** The landing map: where throws have landed, seen from above; the robot stands at the origin and throws upwards. */
 
 import { get, make, setText } from "./dom.js";
+import { describeModel, drawModel } from "./model_map.js";
 import { TARGET_COLOR, colorOf } from "./outcomes.js";
 
 const DOT_PX = 2.5;
 const MARGIN_PX = 26;
+/** Of more landings, every second one is drawn, and so on. */
+const MOST = 20000;
+
+const SHOWN = "of throws that were shown";
+const SO_FAR = "so far";
+const ALL = "of all throws";
 
 /** @typedef {[number | null, number | null, string, number]} Landing x, y [m], outcome, trial */
 
@@ -13,13 +20,18 @@ export class LandingMap {
   /** @type {Landing[]} */
   #landings = [];
   #trials = new Set();
-  #isWhole = false;
+  /** Which landings there are, in words. */
+  #which = SHOWN;
+  /** How many landings there are; those that are drawn are evenly chosen from them. */
+  #total = 0;
   /** @type {[number, number] | null} */
   #target = null;
   /** @type {import("./throws.js").Throw | null} */
   #newest = null;
   /** @type {number[] | null} */
   #chosen = null;
+  /** @type {import("./model_map.js").ModelOnMap | null} */
+  #model = null;
   /** Grows with each change. */
   revision = 0;
 
@@ -35,15 +47,27 @@ export class LandingMap {
   clear() {
     this.#trials.clear();
     this.#newest = null;
-    this.#isWhole = false;
     this.#target = null;
-    this.put([]);
+    this.put([], 0);
+    this.#which = SHOWN;
   }
 
-  /** @param {Landing[]} landings all of a dataset */
-  put(landings) {
-    this.#isWhole = landings.length > 0;
+  /**
+   * @param {Landing[]} landings of a finished dataset, evenly chosen
+   * @param {number} total number of its landings
+   */
+  put(landings, total) {
+    this.#total = total;
+    this.#which = ALL;
     this.#landings = landings;
+    this.#tell();
+    this.#draw();
+  }
+
+  /** @param {Landing[]} landings of a dataset that grows, which come in order; those that are known are left out */
+  addAll(landings) {
+    this.#which = SO_FAR;
+    for (const landing of landings) this.#push(landing);
     this.#tell();
     this.#draw();
   }
@@ -61,13 +85,28 @@ export class LandingMap {
     this.#draw();
   }
 
+  /** @param {import("./model_map.js").ModelOnMap | null} model that is drawn below the landings; null for none */
+  showModel(model) {
+    this.#model = model;
+    setText(get("map-model"), describeModel(model));
+    this.#draw();
+  }
+
   /** @param {import("./throws.js").Throw} shown was handed out by a run that goes on */
   add({ trial, outcome, landing }) {
-    if (this.#isWhole || this.#trials.has(trial)) return;
-    this.#trials.add(trial);
-    this.#landings.push([landing?.[0] ?? null, landing?.[1] ?? null, outcome, trial]);
+    if (this.#which === ALL) return;
+    this.#push([landing?.[0] ?? null, landing?.[1] ?? null, outcome, trial]);
     this.#tell();
     this.#draw();
+  }
+
+  #push(landing) {
+    const [x, , , trial] = landing;
+    if (this.#trials.has(trial)) return;
+    this.#trials.add(trial);
+    this.#landings.push(landing);
+    if (x !== null) this.#total += 1;
+    if (this.#landings.length > MOST) this.#landings = this.#landings.filter((_, i) => i % 2 === 0);
   }
 
   /** @param {import("./throws.js").Throw | null} shown is marked */
@@ -88,8 +127,8 @@ export class LandingMap {
     }
     const [x0, x1] = range(placed.map(([x]) => x));
     const [y0, y1] = range(placed.map(([, y]) => y));
-    const which = this.#isWhole ? `All ${placed.length} landings` : `${placed.length} landings of throws that were shown`;
-    const text = `${which}: ${x0.toFixed(2)} to ${x1.toFixed(2)} m before the robot, `
+    const count = this.#total > placed.length ? `${placed.length} of ${this.#total}` : placed.length;
+    const text = `${count} landings ${this.#which}: ${x0.toFixed(2)} to ${x1.toFixed(2)} m before the robot, `
       + `${y0.toFixed(2)} to ${y1.toFixed(2)} m to its left.${this.#target ? " Aimed at: between the arcs." : ""}`;
     setText(get("map-text"), text);
   }
@@ -110,8 +149,9 @@ export class LandingMap {
     const placed = this.#placed();
     const [chosenX, chosenY] = this.#chosen ?? [0, 0];
     // The robot is always in the picture.
-    const [x0, x1] = range([...placed.map(([x]) => x), -0.2, 1, this.#target?.[1] ?? 1, chosenX]);
-    const [y0, y1] = range([...placed.map(([, y]) => y), -0.5, 0.5, chosenY]);
+    const places = [...placed, ...(this.#model?.reached ?? [])];
+    const [x0, x1] = range([...places.map(([x]) => x), -0.2, 1, this.#target?.[1] ?? 1, chosenX]);
+    const [y0, y1] = range([...places.map(([, y]) => y), -0.5, 0.5, chosenY]);
     const scale = Math.min((width - 2 * MARGIN_PX) / (y1 - y0), (height - 2 * MARGIN_PX) / (x1 - x0));
     const [x, y] = [(x0 + x1) / 2, (y0 + y1) / 2];
     return {
@@ -140,6 +180,7 @@ export class LandingMap {
     const { at, scale, centre } = this.#frame(width, height);
     drawGrid(pen, style, at, scale, { width, height });
     drawRobot(pen, style, at, scale);
+    if (this.#model) drawModel(pen, style, at, this.#model);
     if (this.#target) drawTarget(pen, style, at, scale, this.#target);
     pen.globalAlpha = placed.length > 500 ? 0.5 : 0.85;
     for (const [x, y, outcome] of placed) {

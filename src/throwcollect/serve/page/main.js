@@ -6,6 +6,7 @@ import { get, setChoices, setText } from "./dom.js";
 import { listenForKeys } from "./keys.js";
 import { LandingMap } from "./landing_map.js";
 import { Live } from "./live.js";
+import { Models } from "./model.js";
 import { Playback } from "./playback.js";
 import { Plots } from "./plots.js";
 import { Meshes } from "./robot.js";
@@ -69,7 +70,8 @@ class Page {
     this.plots = new Plots({ view, playback, live: this.live });
     this.watching.described = (simulation, urdf) => this.plots.bind(simulation, urdf);
     const watch = (id) => this.#watch(id);
-    this.target = new Target({ connection, view, map, live: this.live, watch });
+    this.models = new Models({ connection, map, changed: () => this.#showBoxes() });
+    this.target = new Target({ connection, view, map, live: this.live, watch, aim: (place) => this.models.aimAt(place) });
     this.room = new Room({ view, map, target: this.target, plots: this.plots, tell, advance: (seconds) => this.#advance(seconds), facts: () => this.#facts() });
     this.controls = new Controls(connection, watch);
     if (matchMedia("(prefers-reduced-motion: reduce)").matches) this.playback.playing = false;
@@ -86,7 +88,10 @@ class Page {
 
   #connect() {
     this.socket = this.connection.open("/state", {
-      opened: () => say("connected", "connected"),
+      opened: () => {
+        say("connected", "connected");
+        this.models.list();
+      },
       receive: (text) => this.#store.put(JSON.parse(text)),
       lost: (waitMs) => this.#lost(waitMs),
     });
@@ -129,11 +134,16 @@ class Page {
     }
     this.watching.put(instance);
     if (instance && !lives(instance) && this.view.shown.length) this.tell(`${instance.id} has ended; its last throws are replayed`);
-    get("map-box").hidden = instance?.kind !== "collection";
-    get("target-box").hidden = !instance;
+    this.#showBoxes();
     const names = this.#names(instance);
     setChoices(get("alone"), [["", "all"], ...names.map((name) => [name, name])]);
     this.#show();
+  }
+
+  #showBoxes() {
+    const { instance } = this.watching;
+    get("map-box").hidden = instance?.kind !== "collection" && !this.models.isOnMap;
+    get("target-box").hidden = !instance && !this.models.isOnMap;
   }
 
   /** Simulations of a run; one that has ended keeps those that were seen. */

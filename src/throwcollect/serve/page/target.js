@@ -48,9 +48,10 @@ export class Target {
    * @param {import("./landing_map.js").LandingMap} parts.map
    * @param {import("./live.js").Live} parts.live
    * @param {(id: string) => void} parts.watch has a run shown
+   * @param {(place: number[]) => void} parts.aim is told of each place that is set
    */
-  constructor({ connection, view, map, live, watch }) {
-    Object.assign(this, { connection, view, map, live, watch });
+  constructor({ connection, view, map, live, watch, aim }) {
+    Object.assign(this, { connection, view, map, live, watch, aim });
     live.refused = (text) => this.#say(`not published: ${text}`);
     get("target-form").addEventListener("submit", (event) => {
       event.preventDefault();
@@ -91,6 +92,7 @@ export class Target {
     });
     this.view.setTarget(place);
     this.map.choose(place);
+    this.aim(place);
     const [x, y, z] = place;
     try {
       this.live.publish(TOPIC, TYPE, { header: { frame_id: FRAME }, point: { x, y, z } });

@@ -1,5 +1,6 @@
 /** What is seen of one run: its newest throws, its robots, its landings. */
 
+import { Landings } from "./landings.js";
 import { Robot } from "./robot.js";
 import { lives } from "./state.js";
 import { ballAt, decodeThrow, jointsAt } from "./throws.js";
@@ -11,7 +12,6 @@ export class Watching {
   #socket = null;
   #urdf = null;
   #scene = null;
-  #hasAll = false;
   /** @type {(simulation: string, urdf: string) => void} is told of each description that is drawn */
   described = () => {};
 
@@ -26,6 +26,7 @@ export class Watching {
    */
   constructor({ connection, view, playback, map, meshes, tell }) {
     Object.assign(this, { connection, view, playback, map, meshes, tell });
+    this.landings = new Landings(connection, map);
     document.addEventListener("visibilitychange", () => this.#follow());
   }
 
@@ -35,7 +36,10 @@ export class Watching {
     if (id !== this.id) this.#begin(id);
     this.instance = instance;
     this.#follow();
-    if (instance) this.#fetchSome();
+    if (instance) {
+      this.#fetchDescription();
+      this.landings.follow(instance);
+    }
   }
 
   /** @param {string[]} simulations to show */
@@ -93,12 +97,12 @@ export class Watching {
     this.id = id;
     this.#urdf = null;
     this.#scene = null;
-    this.#hasAll = false;
     this.#socket?.close();
     this.#socket = null;
     this.view.clear();
     this.playback.clear();
     this.map.clear();
+    this.landings.begin(id);
   }
 
   /** Listen for throws as long as there may be some, and somebody looks. */
@@ -120,8 +124,8 @@ export class Watching {
     this.map.add(newest);
   }
 
-  /** Fetch what there is by now: the description of the robots, and all landings of a dataset that is finished. */
-  async #fetchSome() {
+  /** Fetch the description of the robots, once there are some. */
+  async #fetchDescription() {
     const { id, instance } = this;
     const run = `/instances/${encodeURIComponent(id)}`;
     if (this.#urdf === null && instance.robots.length) {
@@ -134,11 +138,6 @@ export class Watching {
         this.map.aim(scene.target_distance_m);
         this.show(this.view.shown);
       }
-    }
-    if (instance.summary && !this.#hasAll) {
-      this.#hasAll = true;
-      const landings = await this.#ask(`/collections/${encodeURIComponent(id)}/landings`, (response) => response.json());
-      if (landings !== null && this.id === id) this.map.put(landings);
     }
   }
 

@@ -22,7 +22,7 @@ def program() -> Path:
     """The program beside roslib."""
     if shutil.which("node") is None:
         pytest.skip("there is no Node.js")
-    return Path(shutil.copy(HERE / "roslib_client.mjs", install("roslib", "2.1.0")))
+    return Path(shutil.copy(HERE / "roslib_client.mjs", install("roslib", {"roslib": "2.1.0"})))
 
 
 def test_roslib_hears_speaks_calls_offers_and_sends_goals(program: Path, url: str, node: Node) -> None:

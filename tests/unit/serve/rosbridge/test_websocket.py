@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import json
+from contextlib import suppress
 from typing import Any
 
+import psutil
 import pytest
 from tests.unit.serve.rosbridge.conftest import wait_for, wait_for_listener
 from websockets.exceptions import ConnectionClosedError
@@ -82,6 +84,31 @@ def test_who_does_not_read_loses_the_oldest_frames_and_holds_up_nobody(url: str,
         statuses = [each["msg"] for each in told if each["op"] == "status"]
         assert len(statuses) == 1
         assert "the oldest are dropped" in statuses[0]
+
+
+def test_memory_for_who_never_reads_is_bounded(url: str, node: Node) -> None:
+    """Far more is published than may wait; this process is publisher, bridge and both clients."""
+    publisher = node.create_publisher(String, "/much", 10)
+    subscribe = json.dumps({"op": "subscribe", "topic": "/much", "type": "std_msgs/String"})
+    process, text, memory = psutil.Process(), "x" * 2**20, []
+    with connect(url, max_queue=1, max_size=None) as stalled, connect(url, max_size=None) as quick:
+        stalled.send(subscribe)
+        quick.send(subscribe)
+
+        def hears() -> bool:
+            publisher.publish(String(data="once"))
+            with suppress(TimeoutError):
+                return bool(quick.recv(0.5))
+            return False
+
+        wait_for(hears, "the topic is heard")
+        for number in range(250):
+            publisher.publish(String(data=f"{number} {text}"))
+            while not json.loads(quick.recv(20))["msg"]["data"].startswith(f"{number} "):
+                pass
+            memory.append(process.memory_info().rss)
+        # As much waits after 100 MiB as may.
+        assert max(memory) - max(memory[:100]) < 2**25, [each >> 20 for each in memory[::25]]
 
 
 def test_what_waits_to_be_sent_is_bounded_in_number_and_in_bytes(monkeypatch: pytest.MonkeyPatch) -> None:

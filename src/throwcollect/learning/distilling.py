@@ -1,0 +1,104 @@
+"""Distils the way from a target to parameters into one polynomial, which a robot's controller can evaluate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from throwcollect.learning.learned_map import LearnedMap, Role
+from throwcollect.learning.polynomial import SAMPLES_PER_TERM, Polynomial, fit_polynomial, list_exponents, list_terms
+from throwcollect.reproducible_math import matmul, solve
+
+Array = NDArray[np.float64]
+
+_DEGREE = 4
+"""Degree of the polynomial, where there are throws enough: more terms hit no better."""
+_MOST_THROWS = 1000
+"""Ends of so many throws, the first ones, are targets to learn from."""
+_STEPS = 10
+_TO_THE_MIDDLE = 0.005
+"""Miss [m or rad] that is as bad as one parameter at an end of its range: of many ways, one amid ranges is taken."""
+_SMALL = 1e-12
+"""Keeps terms small that the targets say nothing about."""
+
+
+@dataclass(frozen=True, eq=False)
+class DistilledMap:
+    """From a target to parameters, by a polynomial alone.
+
+    Attributes:
+        low: Smallest values of the targets that it was learned from, in their units, shape ``(n_targets,)``.
+        high: Largest ones.
+        polynomial: Scaled targets (-1 is the smallest value, 1 the largest) and scaled context to scaled parameters.
+    """
+
+    low: Array
+    high: Array
+    polynomial: Polynomial
+
+    def aim(self, targets: Array, context: Array) -> Array:
+        """Parameters for targets, at the ends of their ranges if they are beyond.
+
+        Args:
+            targets: Shape ``(n, n_targets)``.
+            context: Scaled, shape ``(n, n_context)``.
+
+        Returns:
+            Scaled, shape ``(n, n_parameters)``.
+        """
+        return np.clip(self.polynomial.predict(_inputs(targets, context, self.low, self.high)), -1.0, 1.0)
+
+
+def distil(learned: LearnedMap) -> DistilledMap:
+    """Find the polynomial whose parameters lead to their targets, as the map has it.
+
+    Not the parameters of the throws are learned, as several ways lead to one target, and their mean to none: the misses
+    that the map predicts are made small, by Gauss-Newton steps for all coefficients together.
+
+    Args:
+        learned: The map of the world that is aimed in.
+    """
+    parameters, context = (
+        learned.inputs[:_MOST_THROWS, learned.columns_of(role)] for role in (Role.PARAMETER, Role.CONTEXT)
+    )
+    targets = learned.predict(parameters, context)
+    low, high = targets.min(axis=0), targets.max(axis=0)
+    inputs = _inputs(targets, context, low, high)
+    exponents = list_exponents(inputs.shape[1], 1)
+    for degree in range(2, _DEGREE + 1):
+        if len(more := list_exponents(inputs.shape[1], degree)) * SAMPLES_PER_TERM <= len(inputs):
+            exponents = more
+    terms = np.ascontiguousarray(list_terms(inputs, exponents))
+    begun = fit_polynomial(inputs, parameters, 1).coefficients
+    coefficients = np.zeros((len(exponents), parameters.shape[1]))
+    coefficients[: len(begun)] = begun
+    squares = matmul(np.ascontiguousarray(terms.T), terms)
+    best, least = coefficients, np.inf
+    for _ in range(_STEPS):
+        raw = matmul(terms, coefficients)
+        missing = targets - learned.predict(np.clip(raw, -1.0, 1.0), context)
+        cost = float((missing**2).sum() + _TO_THE_MIDDLE**2 * (raw**2).sum())
+        if cost < least:
+            best, least = coefficients, cost
+        coefficients = coefficients + _step(learned, terms, squares, raw, context, missing)
+    return DistilledMap(low, high, Polynomial(exponents, best))
+
+
+def _step(learned: LearnedMap, terms: Array, squares: Array, raw: Array, context: Array, missing: Array) -> Array:
+    """Change of the coefficients that makes up for what is missing, shape ``(n_terms, n_parameters)``."""
+    clipped = np.clip(raw, -1.0, 1.0)
+    slopes = learned.forward.slopes(learned.in_world(clipped, context), learned.columns_of(Role.PARAMETER))
+    slopes = slopes * (clipped == raw)[:, np.newaxis]
+    wide = (slopes[:, :, np.newaxis, :] * terms[:, np.newaxis, :, np.newaxis]).reshape(missing.size, -1)
+    transposed = np.ascontiguousarray(wide.T)
+    size = raw.shape[1]
+    middle = _TO_THE_MIDDLE**2 * np.kron(squares, np.eye(size)) + _SMALL * np.eye(len(transposed))
+    pull = _TO_THE_MIDDLE**2 * matmul(np.ascontiguousarray(terms.T), raw).reshape(-1, 1)
+    right = matmul(transposed, missing.reshape(-1, 1)) - pull
+    return solve(matmul(transposed, wide) + middle, right).reshape(-1, size)
+
+
+def _inputs(targets: Array, context: Array, low: Array, high: Array) -> Array:
+    return np.hstack([(targets - low) / (high - low) * 2.0 - 1.0, context])

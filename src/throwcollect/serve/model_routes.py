@@ -1,0 +1,35 @@
+"""REST on models: what was learned from datasets, and where to aim."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Query
+
+from throwcollect.serve.models import AimView, Models, ModelView
+
+
+def make_model_routes(models: Models) -> APIRouter:
+    """Routes on models, which they look at alone.
+
+    Args:
+        models: All models.
+    """
+    router = APIRouter(prefix="/models")
+
+    @router.get("")
+    def names() -> list[str]:
+        """Names of all models."""
+        return models.names()
+
+    @router.get("/{model}")
+    def view(model: str) -> ModelView:
+        """What a model was learned from, how it hits, and what adapting did."""
+        return models.view(model)
+
+    @router.get("/{model}/aim")
+    def aim(model: str, at: Annotated[list[float], Query(max_length=16)]) -> AimView:
+        """The parameters of a throw at a target: values of the model's targets, then of what is given with them."""
+        return models.aim(model, at)
+
+    return router

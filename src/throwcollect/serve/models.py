@@ -1,0 +1,141 @@
+"""Models of a directory, as the page shows them: where their throws came down, how they miss, where to aim."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+from pydantic import BaseModel
+
+from throwcollect.errors import NotFoundError
+from throwcollect.learning.model import Model, load_model
+from throwcollect.learning.model_directory import POINTS, read_score
+from throwcollect.learning.model_file import MODEL, AdaptationEntry
+from throwcollect.learning.score import Score
+
+_NAME = r"(?!\.)[A-Za-z0-9_.-]{1,80}"
+_MOST_MODELS = 200
+_MOST_POINTS = 2000
+
+
+class ModelView(BaseModel):
+    """What is seen of a model.
+
+    Attributes:
+        name: Name of its directory.
+        learned_from: Name of the collection that it was learned from.
+        throws: Number of throws that it was learned from.
+        error: How far throws end from where polynomials predict them that were not fitted to them, median.
+        parameters: Keys that aiming chooses.
+        targets: Columns that say where a trial ends.
+        given: Keys whose values are given with a target, behind it.
+        reached: Ends of throws that it was learned from, evenly chosen: values of `targets`.
+        adaptation: How it was adapted; None if it was not.
+        score: What throwing at targets has shown; None if nobody has thrown.
+    """
+
+    name: str
+    learned_from: str
+    throws: int
+    error: float
+    parameters: list[str]
+    targets: list[str]
+    given: list[str]
+    reached: list[list[float]]
+    adaptation: AdaptationEntry | None
+    score: Score | None
+
+
+class AimView(BaseModel):
+    """How to reach a target; see `Aim`."""
+
+    target: list[float]
+    parameters: dict[str, float]
+    predicted: list[float]
+    reachable: bool
+    nearest: list[float]
+
+
+@dataclass(frozen=True)
+class Models:
+    """The models in a directory; nothing of them is changed here.
+
+    Attributes:
+        directory: Where they are, each in a directory of its own. It need not exist.
+    """
+
+    directory: Path
+
+    def names(self) -> list[str]:
+        """Names of the models, at most 200."""
+        try:
+            names = sorted(os.listdir(self.directory))
+        except OSError:
+            return []
+        found = (each for each in names if re.fullmatch(_NAME, each) and (self.directory / each / MODEL).is_file())
+        return [name for name, _ in zip(found, range(_MOST_MODELS), strict=False)]
+
+    def view(self, name: str) -> ModelView:
+        """What is seen of a model.
+
+        Args:
+            name: Its name.
+
+        Raises:
+            NotFoundError: If there is none.
+            DatasetError: If it is damaged.
+        """
+        model = self._load(name)
+        trained, ends = model.file.trained_on, model.learned.outputs
+        return ModelView(
+            name=name,
+            learned_from=trained.name,
+            throws=trained.throws,
+            error=trained.error,
+            parameters=list(model.parameters),
+            targets=list(model.targets),
+            given=list(model.given),
+            reached=ends[:: max(1, -(-len(ends) // _MOST_POINTS))].tolist(),
+            adaptation=model.file.adaptation,
+            score=read_score(self.directory / name),
+        )
+
+    def aim(self, name: str, target: Sequence[float]) -> AimView:
+        """Find parameters for a target.
+
+        Args:
+            name: Name of the model.
+            target: Where to: values of its targets and of what is given with them.
+
+        Raises:
+            NotFoundError: If there is no such model.
+            ConfigError: If it takes another number of values.
+            DatasetError: If it is damaged.
+        """
+        (aim,) = self._load(name).aim([target])
+        return AimView(
+            target=aim.target.tolist(),
+            parameters=aim.parameters,
+            predicted=aim.predicted.tolist(),
+            reachable=aim.reachable,
+            nearest=aim.nearest.tolist(),
+        )
+
+    def _load(self, name: str) -> Model:
+        # Names of models are names of directories.
+        if not re.fullmatch(_NAME, name) or not (self.directory / name / MODEL).is_file():
+            raise NotFoundError(
+                f"no model {name!r}", hint=f"throwcollect fit makes models; they belong in {self.directory}"
+            )
+        directory = self.directory / name
+        changed = [path.stat().st_mtime_ns for path in (directory / MODEL, directory / POINTS) if path.exists()]
+        return _load(directory, *changed)
+
+
+@lru_cache(maxsize=8)
+def _load(directory: Path, *_changed_ns: int) -> Model:
+    return load_model(directory)

@@ -1,0 +1,65 @@
+/** All landings of a run that is watched: those there are so far while it collects, and those of the dataset then. */
+
+/** Time between two questions, while there are new throws. */
+const PERIOD_MS = 2000;
+
+/** Fetches landings for the map, whether their throws were shown or not. */
+export class Landings {
+  #id = null;
+  #following = 0;
+  /** How many trials had ended when it was asked last. */
+  #ended = 0;
+  #hasAll = false;
+  #timer = 0;
+
+  /**
+   * @param {import("./connection.js").Connection} connection
+   * @param {import("./landing_map.js").LandingMap} map
+   */
+  constructor(connection, map) {
+    Object.assign(this, { connection, map });
+  }
+
+  /** @param {string | null} id of the run that is watched from now on */
+  begin(id) {
+    clearTimeout(this.#timer);
+    this.#timer = 0;
+    this.#id = id;
+    this.#following = this.#ended = 0;
+    this.#hasAll = false;
+  }
+
+  /** @param {import("./state.js").Instance} instance is asked for what is new of it, not more often than now and then */
+  follow(instance) {
+    this.instance = instance;
+    if (this.#timer || this.#hasAll || instance.kind !== "collection") return;
+    const ended = instance.progress?.ended ?? 0;
+    if (!instance.summary && (ended === this.#ended || document.hidden)) return;
+    this.#ended = ended;
+    this.#timer = setTimeout(() => this.#again(), PERIOD_MS);
+    this.#fetch(this.#id);
+  }
+
+  #again() {
+    this.#timer = 0;
+    this.follow(this.instance);
+  }
+
+  async #fetch(id) {
+    const path = `/collections/${encodeURIComponent(id)}/landings`;
+    try {
+      for (let hasMore = true; hasMore && id === this.#id && !this.#hasAll;) {
+        const found = await (await this.connection.ask("GET", `${path}?first=${this.#following}`)).json();
+        if (id !== this.#id) return;
+        this.#hasAll = found.is_finished;
+        this.#following = found.following;
+        hasMore = found.has_more;
+        if (found.is_finished) this.map.put(found.landings, found.total);
+        else this.map.addAll(found.landings);
+      }
+    } catch {
+      // Datasets in volumes of a container engine are not read by the server; the map has the throws that were shown.
+      this.#hasAll = id === this.#id && Boolean(this.instance.summary);
+    }
+  }
+}

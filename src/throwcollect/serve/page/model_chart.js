@@ -1,0 +1,42 @@
+/** A small chart of distances from targets over a number of throws; the table beside it says the same. */
+
+import uPlot from "./vendor/uplot/dist/uPlot.esm.js";
+import { make } from "./dom.js";
+import { CENTIMETRES } from "./model_words.js";
+
+const HEIGHT_PX = 130;
+
+/**
+ * Draw median and what nine of ten throws stay below, both in centimetres.
+ * @param {Element} place that it is put into
+ * @param {string} title of the numbers of throws
+ * @param {[number, {median: number | null, share90: number | null}][]} errors by number of throws
+ * @param {{isLogarithmic: boolean}} options whether both axes are
+ */
+export function drawErrors(place, title, errors, { isLogarithmic }) {
+  const box = make("figure", { className: "model-chart" }, make("figcaption", {}, `Distance from the target [cm] over ${title}`));
+  box.setAttribute("aria-hidden", "true");
+  place.append(box);
+  const style = getComputedStyle(place);
+  const distr = isLogarithmic ? 3 : 1;
+  const axis = { stroke: style.color, grid: { stroke: style.getPropertyValue("--grid"), width: 1 }, ticks: { show: false }, font: "11px system-ui, sans-serif" };
+  const line = { stroke: style.getPropertyValue("--accent"), width: 2, points: { show: true, size: 5 } };
+  const data = [
+    errors.map(([count]) => count),
+    errors.map(([, { median }]) => scale(median)),
+    errors.map(([, { share90 }]) => scale(share90)),
+  ];
+  new uPlot({
+    width: place.clientWidth,
+    height: HEIGHT_PX,
+    cursor: { show: false },
+    legend: { show: false },
+    scales: { x: { time: false, distr }, y: { distr, ...(isLogarithmic ? {} : { range: (_, __, most) => [0, most * 1.1] }) } },
+    axes: [{ ...axis, size: 24 }, { ...axis, size: 44 }],
+    series: [{}, line, { ...line, dash: [5, 4] }],
+  }, data, box);
+}
+
+function scale(length) {
+  return length === null ? null : length * CENTIMETRES;
+}

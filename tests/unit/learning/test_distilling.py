@@ -1,0 +1,92 @@
+"""The way from a target to parameters as one polynomial, and as a file for a robot's controller."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.unit.learning.worlds import KEYS, draw, land, learn, make_dataset
+
+from throwcollect import DatasetError, MissingExtraError, fit, load_model
+from throwcollect.learning.distilling import distil
+from throwcollect.learning.learned_map import LearnedMap, Role
+from throwcollect.learning.model_card import ONNX_PROGRAM
+
+SHIFT = np.array([0.1, 0.12])
+
+
+def off(learned: LearnedMap, shift=(0.0, 0.0)) -> np.ndarray:
+    """How far throws by the distilled map are off, in a world that is shifted."""
+    targets = land(draw(60, seed=5, inside=0.8)) + shift
+    values = learned.unscale(Role.PARAMETER, distil(learned).aim(targets, np.zeros((60, 0))))
+    return np.linalg.norm(land(values) + shift - targets, axis=1)
+
+
+def test_one_polynomial_hits_nearly_as_well() -> None:
+    errors = off(learn())
+    assert np.median(errors) < 0.002
+    assert errors.max() < 0.01
+
+
+def test_of_an_adapted_map_the_adapted_way_is_distilled() -> None:
+    learned = learn()
+    assert np.median(off(learned.correct(replace(learned.correction, offset=SHIFT)), SHIFT)) < 0.002
+
+
+def test_few_throws_give_a_polynomial_of_few_terms() -> None:
+    distilled = distil(learn(30))
+    assert distilled.polynomial.degree == 4
+    assert distil(learn(20)).polynomial.degree == 3
+
+
+def test_parameters_stay_inside_of_their_ranges() -> None:
+    found = distil(learn()).aim(np.array([[9.0, 0.0], [-3.0, 4.0]]), np.zeros((2, 0)))
+    assert np.abs(found).max() == 1.0
+
+
+def test_the_file_is_the_same_bytes_each_time_and_gives_what_the_map_gives(tmp_path: Path) -> None:
+    dataset = make_dataset(tmp_path / "data", 150)
+    for name in ("one", "two"):
+        fit(dataset, given=[KEYS[2]]).distil().save(tmp_path / name)
+    load_model(tmp_path / "one").save(tmp_path / "three")
+    files = {path.name: path.read_bytes() for path in (tmp_path / "one").iterdir()}
+    assert "model.onnx" in files
+    for name in ("two", "three"):
+        assert {path.name: path.read_bytes() for path in (tmp_path / name).iterdir()} == files
+    model = load_model(tmp_path / "one")
+    assert model.file.distilled is not None
+    context = model.learned.scale(Role.CONTEXT, np.array([[0.1]]))
+    scaled = model.file.distilled.to_map().aim(np.array([[1.2, -0.2]]), context)
+    wanted = model.learned.unscale(Role.PARAMETER, scaled)[0]
+    assert ONNX_PROGRAM.rstrip() in (tmp_path / "one" / "README.md").read_text()
+    script = f"target = [1.2, -0.2, 0.1]\n{ONNX_PROGRAM}\nprint(json.dumps(parameters))"
+    said = subprocess.run(
+        [sys.executable, "-c", script], cwd=tmp_path / "one", capture_output=True, text=True, check=True
+    )
+    assert json.loads(said.stdout) == pytest.approx(dict(zip(model.parameters, wanted, strict=True)), abs=1e-5)
+
+
+def test_adapting_a_distilled_model_distils_again(tmp_path: Path) -> None:
+    model = fit(make_dataset(tmp_path / "data", 120)).distil()
+    point = dict(zip(KEYS, draw(1, 8)[0].tolist(), strict=True))
+    adapted = model.adapt([point], [(land(draw(1, 8)) + SHIFT)[0]], method="offset")
+    assert adapted.file.distilled is not None
+    assert adapted.file.distilled.low == pytest.approx(np.add(model.file.distilled.low, SHIFT), abs=0.05)
+    path = tmp_path / "real"
+    adapted.save(path)
+    text = (path / "model.json").read_text()
+    (path / "model.json").write_text(text.replace('"distilled": {\n  "low": [', '"distilled": {\n  "low": [9.0,'))
+    with pytest.raises(DatasetError, match="do not belong together"):
+        load_model(path)
+
+
+def test_without_the_package_one_sentence_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("throwcollect.extras.is_installed", lambda package: package != "onnx")
+    with pytest.raises(MissingExtraError, match="this needs onnx, which is not installed") as caught:
+        fit(make_dataset(tmp_path / "data", 120)).distil()
+    assert caught.value.hint == "pip install 'throwcollect[onnx]'"
