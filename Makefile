@@ -13,11 +13,13 @@ READY_ROS := $(ROS_VENV)/.ready
 # starts twice as fast when its libraries are compiled once.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: up ros test test-fast \
+.PHONY: up ros dist test test-fast \
     test-units test-ros test-ros-client test-containers test-processes test-cluster check bench bench-full clean
 
+# Where the Python is too new for pybullet, MuJoCo simulates; `packaging/environment.sh` has said so.
 up: $(READY)
-	$(BIN)/throwcollect up -n 2 configs/quickstart.yaml
+	$(BIN)/throwcollect up -n 2 configs/quickstart.yaml \
+	    $$($(BIN)/python -c 'import sys; print("--set sim.engine=mujoco" * (sys.version_info >= (3, 12)))')
 
 $(VENV)/bin/python:
 	@packaging/environment.sh $(VENV) $(PYTHON)
@@ -31,6 +33,8 @@ $(READY): pyproject.toml | $(VENV)/bin/python
 	@touch $@
 
 $(READY_DEV): pyproject.toml | $(VENV)/bin/python
+	@$(BIN)/python -c 'import sys; sys.version_info < (3, 12) or sys.exit("the tests need pybullet, which has wheels for \
+	Python 3.10 and 3.11 alone, and $(VENV) has another: rm -r $(VENV), then make PYTHON=/path/to/python3.11 test")'
 	@echo "installing about 80 packages, 1.7 GB with the robot's description, into $(VENV)"
 	$(INSTALL) -e '.[dev]'
 	@touch $(READY) $@
@@ -109,6 +113,18 @@ bench: $(READY_DEV) ros
 # A database as large as a published one, collected in peace and among crashes: the same files. Takes half an hour.
 bench-full: $(READY_DEV)
 	$(BIN)/python -m bench.full
+
+# What is published (docs/releasing.md): checked, and tried in an environment of its own.
+dist: | $(VENV)/bin/python
+	rm -rf dist build/release build/tried
+	$(BIN)/python -m venv build/release
+	build/release/bin/python -m pip install --quiet --disable-pip-version-check build twine
+	build/release/bin/python -m build
+	build/release/bin/twine check --strict dist/*
+	$(BIN)/python -m venv build/tried
+	build/tried/bin/python -m pip install --quiet --disable-pip-version-check dist/*.whl
+	build/tried/bin/throwcollect --version
+	build/tried/bin/throwcollect config configs/quickstart.yaml > build/tried/config.yaml
 
 clean:
 	rm -rf $(VENV) $(ROS_VENV) .mypy_cache .pytest_cache .ruff_cache .import_linter_cache .hypothesis

@@ -16,7 +16,7 @@ fi
 CONFIGS=$(cd "$(dirname "$config")" && pwd)
 CONFIG=$(basename "$config")
 RUN_USER=$(id -u):$(id -g)
-THROWCOLLECT_IMAGE=${THROWCOLLECT_IMAGE:-throwcollect:0.1.0}
+THROWCOLLECT_IMAGE=${THROWCOLLECT_IMAGE:-throwcollect:0.2.0}
 THROWCOLLECT_HOST=${THROWCOLLECT_HOST:-$(uname -n)}
 export CONFIGS CONFIG RUN_USER THROWCOLLECT_IMAGE THROWCOLLECT_HOST
 

@@ -1,18 +1,52 @@
 #!/bin/sh
-# Makes a virtual environment with a Python that the physics engine has wheels for: `environment.sh DIRECTORY [PYTHON]`.
-# Looks at PYTHON, or else at what is usual, and then has uv fetch Python 3.11. Without wheels, pip would compile the engine
-# for a quarter of an hour, into one that computes other bytes.
+# Makes a virtual environment for `make`: `environment.sh DIRECTORY [PYTHON]`. One line says with which Python, and why.
+#
+# It takes PYTHON, or else the first of these that can be had:
+# 1. Python 3.11 or 3.10 of this machine. pybullet, the physics engine of all tests and examples, has wheels for no later one;
+#    pip would compile it for a quarter of an hour, into an engine that computes other bytes.
+# 2. Python 3.11 that uv fetches. Where uv is missing, pip fetches that first, into build/uv.
+# 3. A later Python of this machine, on which MuJoCo simulates.
 set -eu
-for python in ${2:-python3.11 python3.10 python3}; do
-    if "$python" -c 'import sys; sys.exit(not (3, 10) <= sys.version_info < (3, 12))' 2> /dev/null; then
-        echo "environment: $1, with $("$python" --version)"
-        exec "$python" -m venv "$1"
-    fi
+directory=$1
+named=${2:-}
+
+# Whether a Python has a version in a range, and can make environments.
+suits() {
+    "$1" -c "import ensurepip, sys, venv; sys.exit(not ($2 <= sys.version_info < $3))" 2> /dev/null
+}
+
+make_with() {
+    echo "environment: $directory, with $("$1" --version)$2"
+    exec "$1" -m venv "$directory"
+}
+
+for python in ${named:-python3.11 python3.10 python3}; do
+    suits "$python" "(3, 10)" "(3, 12)" && make_with "$python" ""
 done
-if command -v uv > /dev/null; then
-    echo "environment: $1, with Python 3.11 by uv"
-    exec uv venv --quiet --seed --python 3.11 "$1"
+
+fetch_uv() {
+    for python in python3 python; do
+        "$python" -m pip install --quiet --disable-pip-version-check --target build/uv uv 2> /dev/null && return
+    done
+    return 1
+}
+
+if [ -z "$named" ]; then
+    uv=uv
+    if ! command -v uv > /dev/null; then
+        uv=build/uv/bin/uv
+        [ -x "$uv" ] || ! fetch_uv || echo "no Python 3.10 or 3.11 is here; uv, which fetches one, is in build/uv"
+    fi
+    if command -v "$uv" > /dev/null && "$uv" venv --quiet --seed --python 3.11 "$directory"; then
+        echo "environment: $directory, with Python 3.11 by uv"
+        exit
+    fi
 fi
-echo "no Python 3.10 or 3.11 is here (${2:-python3.11, python3.10, python3}), and pybullet has wheels for no other:" \
-    "install python3.11-venv or uv, or name one: make PYTHON=/path/to/python3.11" >&2
+
+for python in ${named:-python3 python3.12 python3.13 python3.14}; do
+    suits "$python" "(3, 12)" "(3, 15)" \
+        && make_with "$python" ", for which pybullet has no wheel: MuJoCo simulates, whose throws land centimetres elsewhere (docs/engines.md)"
+done
+echo "no Python from 3.10 to 3.14 that can make environments is here (${named:-python3.11, python3.10, python3}):" \
+    "install python3-venv or uv, or name one: make PYTHON=/path/to/python3.11" >&2
 exit 1

@@ -32,6 +32,7 @@ from throwcollect.runtimes.local import LocalNodes
 from throwcollect.runtimes.node_collection import roster
 from throwcollect.runtimes.nodes import COORDINATOR, ROUTER, NodeExit, NodeSpec, Role
 from throwcollect.runtimes.supervisor import Supervisor
+from throwcollect.version import __version__
 
 pytestmark = pytest.mark.docker
 
@@ -272,7 +273,7 @@ def test_a_node_says_how_it_ended_and_what_it_said_last(monkeypatch: pytest.Monk
     assert end.log.splitlines()[-1] == "throwcollect: /data/nothing.yaml: no such file"
     assert runtime.exits() == []
     runtime.start(NodeSpec("sim_0", ("--version",), Role.EXPENDABLE))
-    assert ended(runtime).log.splitlines()[-2:] == [*end.log.splitlines()[-1:], "throwcollect 0.1.0"]
+    assert ended(runtime).log.splitlines()[-2:] == [*end.log.splitlines()[-1:], f"throwcollect {__version__}"]
 
 
 def test_a_container_that_somebody_removes_has_ended(bare: Any, client: DockerClient) -> None:

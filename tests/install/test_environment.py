@@ -22,21 +22,40 @@ def commands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return directory
 
 
-def put(directory: Path, name: str, *, suits: bool = True) -> None:
-    """A command that says whether it suits when it is asked with `-c`, and otherwise tells of itself."""
+def put(directory: Path, name: str, *, version: str = "3.11", pip: str = "exit 1", code: int = 0) -> None:
+    """A command that tells of itself, and if it is asked with `-c`, whether its version is in the range asked for.
+
+    Args:
+        directory: Where it lies.
+        name: Its name.
+        version: Its version.
+        pip: What it does as pip.
+        code: How it ends otherwise.
+    """
     path = directory / name
-    path.write_text(f'#!/bin/sh\n[ "$1" = -c ] && exit {int(not suits)}\necho "{name}" "$@"\n')
+    path.write_text(
+        f"""#!/bin/sh
+case "$1$2$3" in
+    -c*"(3, 10) <= sys.version_info < (3, 12)"*) case {version} in 3.10|3.11) exit 0 ;; *) exit 1 ;; esac ;;
+    -c*) case {version} in 3.12|3.13|3.14) exit 0 ;; *) exit 1 ;; esac ;;
+    -mpipinstall) {pip} ;;
+esac
+echo "{name}" "$@"
+exit {code}
+"""
+    )
     path.chmod(0o755)
 
 
-def made(*arguments: str) -> tuple[int, str, str]:
-    done = subprocess.run([SCRIPT, "there", *arguments], capture_output=True, text=True, timeout=60, check=False)
+def made(*arguments: str, cwd: Path | None = None) -> tuple[int, str, str]:
+    words = [SCRIPT, "there", *arguments]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=60, check=False, cwd=cwd)
     return done.returncode, done.stdout, done.stderr
 
 
 def test_the_first_python_with_wheels_is_taken(commands: Path) -> None:
-    put(commands, "python3.11", suits=False)
-    put(commands, "python3.10")
+    put(commands, "python3.11", version="3.9")
+    put(commands, "python3.10", version="3.10")
     put(commands, "python3")
     put(commands, "uv")
     code, out, _ = made()
@@ -44,20 +63,50 @@ def test_the_first_python_with_wheels_is_taken(commands: Path) -> None:
 
 
 def test_where_no_python_suits_uv_fetches_one(commands: Path) -> None:
-    put(commands, "python3", suits=False)
+    put(commands, "python3", version="3.13")
     put(commands, "uv")
     code, out, _ = made()
-    assert (code, out.splitlines()[-1]) == (0, "uv venv --quiet --seed --python 3.11 there")
+    assert (code, out.splitlines()) == (
+        0,
+        ["uv venv --quiet --seed --python 3.11 there", "environment: there, with Python 3.11 by uv"],
+    )
+
+
+def test_where_uv_is_missing_pip_fetches_it(commands: Path, tmp_path: Path) -> None:
+    for name in ("mkdir", "chmod", "cat"):
+        (commands / name).symlink_to(shutil.which(name) or f"/bin/{name}")
+    fetched = """mkdir -p build/uv/bin; echo 'echo "uv $*"' > build/uv/bin/uv; chmod +x build/uv/bin/uv; exit 0"""
+    put(commands, "python3", version="3.12", pip=fetched)
+    code, out, _ = made(cwd=tmp_path)
+    assert (code, out.splitlines()[1:]) == (
+        0,
+        ["uv venv --quiet --seed --python 3.11 there", "environment: there, with Python 3.11 by uv"],
+    )
+    assert out.startswith("no Python 3.10 or 3.11 is here; uv, which fetches one, is in build/uv")
+
+
+@pytest.mark.parametrize("uv", [False, True])
+def test_where_uv_is_not_to_be_had_or_fetches_nothing_mujoco_simulates(
+    commands: Path, tmp_path: Path, uv: bool
+) -> None:
+    put(commands, "python3", version="3.13")
+    if uv:
+        put(commands, "uv", code=2)
+    code, out, _ = made(cwd=tmp_path)
+    told, made_with = out.splitlines()[-2:]
+    assert (code, made_with) == (0, "python3 -m venv there")
+    assert "for which pybullet has no wheel: MuJoCo simulates" in told
 
 
 def test_a_python_that_is_named_is_the_only_one_that_is_looked_at(commands: Path) -> None:
     put(commands, "python3.11")
-    put(commands, "python3.12", suits=False)
-    code, _, err = made("python3.12")
-    assert code == 1
-    assert "(python3.12)" in err
+    put(commands, "python3.9", version="3.9")
+    put(commands, "python3.12", version="3.12")
     put(commands, "uv")
-    assert "uv venv" in made("python3.12")[1]
+    code, _, err = made("python3.9")
+    assert code == 1
+    assert "(python3.9)" in err
+    assert "python3.12 -m venv there" in made("python3.12")[1]
     assert "python3.11 -m venv there" in made("python3.11")[1]
 
 
@@ -65,21 +114,17 @@ def test_without_python_and_uv_one_sentence_says_so_at_once(commands: Path) -> N
     began = time.monotonic()
     code, out, err = made()
     assert (code, out, err.count("\n")) == (1, "", 1)
-    assert err.startswith(
-        "no Python 3.10 or 3.11 is here (python3.11, python3.10, python3), and pybullet has wheels for"
-    )
+    assert err.startswith("no Python from 3.10 to 3.14 that can make environments is here (python3.11, python3.10,")
     assert "make PYTHON=" in err
     assert time.monotonic() - began < 1 + 0.5 * os.getloadavg()[0]
 
 
 def test_a_genuine_python_is_judged_by_its_version(tmp_path: Path) -> None:
-    pythons = [name for name in ("python3.9", "python3.12", "python3.13") if works(name)]
+    pythons = [name for name in ("python3.8", "python3.9") if works(name)]
     if not pythons:
-        pytest.skip("no Python but 3.10 and 3.11 is here")
-    if shutil.which("uv"):
-        pytest.skip("uv would fetch another one")
+        pytest.skip("no Python before 3.10 is here")
     for python in pythons:
-        assert made(python)[0] == 1, python
+        assert made(python, cwd=tmp_path)[0] == 1, python
     assert not (tmp_path / "there").exists()
 
 
