@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping, Sequence
 from types import TracebackType
 
@@ -57,7 +58,7 @@ class Renderer:
 
     def _load(self, urdf: str, base_height_m: float) -> int:
         with tempfile.NamedTemporaryFile("w", prefix="throwcollect-", suffix=".urdf", encoding="utf-8") as file:
-            file.write(urdf)
+            file.write(_with_masses(urdf))
             file.flush()
             try:
                 position = [0, 0, base_height_m]
@@ -112,3 +113,14 @@ class Renderer:
         picture = np.array(colors, np.uint8).reshape(height, width, 4)
         picture[..., 3] = np.where(np.array(what).reshape(height, width) == _NOTHING_THERE, 0, 255)
         return picture
+
+
+def _with_masses(urdf: str) -> str:
+    """A description in which every link has a mass, as Bullet complains on standard output of those that have none."""
+    robot = ElementTree.fromstring(urdf)  # noqa: S314 - the dataset's own description
+    for link in robot.iter("link"):
+        if link.find("inertial") is None:
+            inertial = ElementTree.SubElement(link, "inertial")
+            ElementTree.SubElement(inertial, "mass", value="1")
+            ElementTree.SubElement(inertial, "inertia", ixx="1", ixy="0", ixz="0", iyy="1", iyz="0", izz="1")
+    return ElementTree.tostring(robot, encoding="unicode")
