@@ -360,6 +360,8 @@ def _score_lines(score: Score) -> list[str]:
         "of the seeds, in simulation: median, 9 of 10 below, largest; not landed"
     ]
     lines += [f"  learned from {each.trained_on:5} throws:  {_error_cells(each.errors)}" for each in score.trained]
+    if score.distilled is not None:
+        lines.append(f"  model.onnx of these:        {_error_cells(score.distilled)}")
     if score.adapted:
         lines.append("in the other world, by the number of throws there:")
         lines += [
@@ -369,5 +371,6 @@ def _score_lines(score: Score) -> list[str]:
 
 
 def _error_cells(errors: Errors) -> str:
-    cells = ("       -" if each is None else f"{each:8.4f}" for each in (errors.median, errors.share90, errors.largest))
-    return "  ".join([*cells, str(errors.missed)])
+    from throwcollect.learning.score import tell_misses
+
+    return "  ".join([*(f"{cell:>8}" for cell in tell_misses(errors)), str(errors.missed)])
