@@ -57,6 +57,7 @@ def fit(
     """Learn from a dataset where throws end, and which parameters lead to a target."""
     from throwcollect.dataset.reader import Dataset
     from throwcollect.learning.model import fit
+    from throwcollect.learning.score import tell_length
 
     if onnx:
         require("onnx")
@@ -82,7 +83,8 @@ def fit(
     for names, what in ((model.given, "given with a target"), (model.latents, "of the world")):
         if names:
             typer.echo(f"{what}: {', '.join(names)}")
-    errors = ", ".join(f"degree {degree}: {error:.4f}" for degree, error in trained.folds_error.items())
+    told = ((degree, tell_length(error, model.targets)) for degree, error in trained.folds_error.items())
+    errors = ", ".join(f"degree {degree}: {error}" for degree, error in told)
     typer.echo(f"error for throws that it was not fitted to, in simulation, median: {errors}")
     typer.echo(f"model: {output}\naim with it: {command('aim', output, '--at', _example(model))}")
 
