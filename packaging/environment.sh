@@ -4,16 +4,18 @@
 # It takes PYTHON, or else the first of these that can be had:
 # 1. Python 3.11 or 3.10 of this machine. pybullet, the physics engine of all tests and examples, has wheels for no later one;
 #    pip would compile it for a quarter of an hour, into an engine that computes other bytes.
-# 2. Python 3.11 that uv fetches. Where uv is missing, pip fetches that first, into build/uv.
-# 3. A later Python of this machine, on which MuJoCo simulates.
+# 2. Python 3.11 that uv finds or fetches. Where uv is missing, pip fetches that first, into build/uv; and where pip is missing,
+#    as it is with Debian's Python alone, `fetch_uv.py` does.
+# 3. A later Python of this machine, on which MuJoCo simulates. If it cannot make environments, uv makes it.
 set -eu
 directory=$1
 named=${2:-}
 
-# Whether a Python has a version in a range, and can make environments.
+# Whether a Python has a version in a range, and the modules that are named.
 suits() {
-    "$1" -c "import ensurepip, sys, venv; sys.exit(not ($2 <= sys.version_info < $3))" 2> /dev/null
+    "$1" -c "import sys${4:-}; sys.exit(not ($2 <= sys.version_info < $3))" 2> /dev/null
 }
+MAKES=", ensurepip, venv"
 
 make_with() {
     echo "environment: $directory, with $("$1" --version)$2"
@@ -21,31 +23,38 @@ make_with() {
 }
 
 for python in ${named:-python3.11 python3.10 python3}; do
-    suits "$python" "(3, 10)" "(3, 12)" && make_with "$python" ""
+    suits "$python" "(3, 10)" "(3, 12)" "$MAKES" && make_with "$python" ""
 done
 
 fetch_uv() {
     for python in python3 python; do
         "$python" -m pip install --quiet --disable-pip-version-check --target build/uv uv 2> /dev/null && return
+        "$python" "${0%/*}/fetch_uv.py" build/uv 2> /dev/null && return
     done
     return 1
 }
 
-if [ -z "$named" ]; then
-    uv=uv
-    if ! command -v uv > /dev/null; then
-        uv=build/uv/bin/uv
-        [ -x "$uv" ] || ! fetch_uv || echo "no Python 3.10 or 3.11 is here; uv, which fetches one, is in build/uv"
-    fi
-    if command -v "$uv" > /dev/null && "$uv" venv --quiet --seed --python 3.11 "$directory"; then
-        echo "environment: $directory, with Python 3.11 by uv"
-        exit
+uv=uv
+if ! command -v uv > /dev/null; then
+    uv=build/uv/bin/uv
+    if [ -z "$named" ] && ! [ -x "$uv" ] && fetch_uv; then
+        echo "no Python 3.10 or 3.11 is here that makes environments; uv, which fetches one, is in build/uv"
     fi
 fi
 
+if [ -z "$named" ] && command -v "$uv" > /dev/null && "$uv" venv --quiet --seed --python 3.11 "$directory"; then
+    echo "environment: $directory, with Python 3.11 by uv"
+    exit
+fi
+
+because="for which pybullet has no wheel: MuJoCo simulates, whose throws land centimetres elsewhere (docs/engines.md)"
 for python in ${named:-python3 python3.12 python3.13 python3.14}; do
-    suits "$python" "(3, 12)" "(3, 15)" \
-        && make_with "$python" ", for which pybullet has no wheel: MuJoCo simulates, whose throws land centimetres elsewhere (docs/engines.md)"
+    suits "$python" "(3, 12)" "(3, 15)" "$MAKES" && make_with "$python" ", $because"
+    if command -v "$uv" > /dev/null && suits "$python" "(3, 10)" "(3, 15)"; then
+        "$uv" venv --quiet --seed --python "$python" "$directory" || continue
+        echo "environment: $directory, with $("$python" --version) by uv$(suits "$python" "(3, 12)" "(3, 15)" && echo ", $because")"
+        exit
+    fi
 done
 echo "no Python from 3.10 to 3.14 that can make environments is here (${named:-python3.11, python3.10, python3}):" \
     "install python3-venv or uv, or name one: make PYTHON=/path/to/python3.11" >&2

@@ -39,6 +39,7 @@ EXTRA_OF = MappingProxyType(
         "orjson": "serve",
         "pandas": "pandas",
         "plotly": "report",
+        "PIL": "report",
         "uvicorn": "serve",
         "websockets": "serve",
     }

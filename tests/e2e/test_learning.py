@@ -26,7 +26,7 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     settings = ["--set", f"trials={TRIALS}", "--set", "run.replay=0", "--runtime", "inprocess"]
     up = call_here("up", path / "throws.yaml", *settings, "--output", path / "data")
     assert up.returncode == 0, up.stderr
-    fit = call_here("fit", path / "data", "-o", path / "model")
+    fit = call_here("fit", path / "data", "-o", path / "model", "--onnx")
     assert fit.returncode == 0, fit.stderr
     assert re.search(r"learned from \d+ throws, \d+ ignored", fit.stdout)
     return path
@@ -98,6 +98,7 @@ def test_a_score_tells_how_throws_hit_here_and_elsewhere(place: Path) -> None:
     assert found.returncode == 0, found.stderr
     score = json.loads(found.stdout)
     assert score["trained"][-1]["errors"]["median"] < 0.03
+    assert score["trained"][-1]["errors"]["median"] < score["distilled"]["median"] < 0.1
     before, *_, after = (each["errors"]["median"] for each in score["adapted"])
     assert after < before
     assert json.loads((place / "model" / "score.json").read_text()) == score

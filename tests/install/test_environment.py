@@ -1,6 +1,7 @@
 """Which Python `make up` and `make test` take."""
 
 import os
+import runpy
 import shutil
 import subprocess
 import time
@@ -22,23 +23,39 @@ def commands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return directory
 
 
-def put(directory: Path, name: str, *, version: str = "3.11", pip: str = "exit 1", code: int = 0) -> None:
+def put(
+    directory: Path,
+    name: str,
+    *,
+    version: str = "3.11",
+    makes: bool = True,
+    pip: str = "exit 1",
+    fetch: str = "exit 1",
+    code: int = 0,
+) -> None:
     """A command that tells of itself, and if it is asked with `-c`, whether its version is in the range asked for.
 
     Args:
         directory: Where it lies.
         name: Its name.
         version: Its version.
+        makes: Whether it has the modules that make environments.
         pip: What it does as pip.
+        fetch: What it does with `fetch_uv.py`.
         code: How it ends otherwise.
     """
     path = directory / name
     path.write_text(
         f"""#!/bin/sh
 case "$1$2$3" in
+    -c*ensurepip*) {":" if makes else "exit 1"} ;;
+esac
+case "$1$2$3" in
+    -c*"(3, 10) <= sys.version_info < (3, 15)"*) case {version} in 3.1?) exit 0 ;; *) exit 1 ;; esac ;;
     -c*"(3, 10) <= sys.version_info < (3, 12)"*) case {version} in 3.10|3.11) exit 0 ;; *) exit 1 ;; esac ;;
     -c*) case {version} in 3.12|3.13|3.14) exit 0 ;; *) exit 1 ;; esac ;;
     -mpipinstall) {pip} ;;
+    */fetch_uv.py*) {fetch} ;;
 esac
 echo "{name}" "$@"
 exit {code}
@@ -72,17 +89,53 @@ def test_where_no_python_suits_uv_fetches_one(commands: Path) -> None:
     )
 
 
-def test_where_uv_is_missing_pip_fetches_it(commands: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("by", ["pip", "fetch"])
+def test_where_uv_is_missing_pip_fetches_it_or_a_script_without_pip(commands: Path, tmp_path: Path, by: str) -> None:
     for name in ("mkdir", "chmod", "cat"):
         (commands / name).symlink_to(shutil.which(name) or f"/bin/{name}")
     fetched = """mkdir -p build/uv/bin; echo 'echo "uv $*"' > build/uv/bin/uv; chmod +x build/uv/bin/uv; exit 0"""
-    put(commands, "python3", version="3.12", pip=fetched)
+    put(commands, "python3", version="3.12", makes=by == "pip", **{by: fetched})
     code, out, _ = made(cwd=tmp_path)
     assert (code, out.splitlines()[1:]) == (
         0,
         ["uv venv --quiet --seed --python 3.11 there", "environment: there, with Python 3.11 by uv"],
     )
-    assert out.startswith("no Python 3.10 or 3.11 is here; uv, which fetches one, is in build/uv")
+    assert out.startswith(
+        "no Python 3.10 or 3.11 is here that makes environments; uv, which fetches one, is in build/uv"
+    )
+
+
+@pytest.mark.parametrize(("version", "told"), [("3.13", ", for which pybullet has no wheel: "), ("3.11", "")])
+def test_a_python_without_the_modules_for_it_gets_its_environment_by_uv(
+    commands: Path, version: str, told: str
+) -> None:
+    put(commands, "python3", version=version, makes=False)
+    put(commands, "uv")
+    code, out, _ = made("python3")
+    by_uv, environment = out.splitlines()
+    assert (code, by_uv) == (0, "uv venv --quiet --seed --python python3 there")
+    assert environment.partition(" by uv")[2].startswith(told)
+    assert bool(told) == ("MuJoCo" in environment)
+
+
+def test_the_newest_uv_for_this_machine_is_chosen() -> None:
+    names = [
+        "uv-0.9.9-py3-none-manylinux_2_17_x86_64.manylinux2014_x86_64.whl",
+        "uv-0.13.2-py3-none-manylinux_2_17_x86_64.manylinux2014_x86_64.whl",
+        "uv-0.13.2-py3-none-musllinux_1_1_x86_64.whl",
+        "uv-0.13.2-py3-none-macosx_11_0_arm64.whl",
+        "uv-0.13.2-py3-none-win_amd64.whl",
+        "uv-0.13.2.tar.gz",
+        "uv-0.14.0-py3-none-manylinux_2_17_x86_64.manylinux2014_x86_64.whl",
+        "uv-1.0.0rc1-py3-none-manylinux_2_17_x86_64.manylinux2014_x86_64.whl",
+    ]
+    files = [{"filename": name, "yanked": "0.14" in name} for name in names]
+    find = runpy.run_path(str(SCRIPT.with_name("fetch_uv.py")))["find_wheel"]
+    assert find(files, "Linux", "x86_64", False) == files[1]
+    assert find(files, "Linux", "x86_64", True) == files[2]
+    assert find(files, "Darwin", "arm64", False) == files[3]
+    assert find(files, "Linux", "riscv64", False) is None
+    assert find(files, "Windows", "AMD64", False) is None
 
 
 @pytest.mark.parametrize("uv", [False, True])

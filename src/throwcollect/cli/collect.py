@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from throwcollect.cli.options import (
-    DEFAULT_CONFIG,
     DatasetArgument,
     JsonOption,
     SetOption,
     TrialsOption,
     overrides,
 )
+from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.errors import ConfigError
 from throwcollect.files import write_secret
 from throwcollect.side_by_side import count_cores

@@ -57,6 +57,7 @@ def fit(
     """Learn from a dataset where throws end, and which parameters lead to a target."""
     from throwcollect.dataset.reader import Dataset
     from throwcollect.learning.model import fit
+    from throwcollect.learning.score import tell_length
 
     if onnx:
         require("onnx")
@@ -82,7 +83,8 @@ def fit(
     for names, what in ((model.given, "given with a target"), (model.latents, "of the world")):
         if names:
             typer.echo(f"{what}: {', '.join(names)}")
-    errors = ", ".join(f"degree {degree}: {error:.4f}" for degree, error in trained.folds_error.items())
+    told = ((degree, tell_length(error, model.targets)) for degree, error in trained.folds_error.items())
+    errors = ", ".join(f"degree {degree}: {error}" for degree, error in told)
     typer.echo(f"error for throws that it was not fitted to, in simulation, median: {errors}")
     typer.echo(f"model: {output}\naim with it: {command('aim', output, '--at', _example(model))}")
 
@@ -360,6 +362,8 @@ def _score_lines(score: Score) -> list[str]:
         "of the seeds, in simulation: median, 9 of 10 below, largest; not landed"
     ]
     lines += [f"  learned from {each.trained_on:5} throws:  {_error_cells(each.errors)}" for each in score.trained]
+    if score.distilled is not None:
+        lines.append(f"  model.onnx of these:        {_error_cells(score.distilled)}")
     if score.adapted:
         lines.append("in the other world, by the number of throws there:")
         lines += [
@@ -369,5 +373,6 @@ def _score_lines(score: Score) -> list[str]:
 
 
 def _error_cells(errors: Errors) -> str:
-    cells = ("       -" if each is None else f"{each:8.4f}" for each in (errors.median, errors.share90, errors.largest))
-    return "  ".join([*cells, str(errors.missed)])
+    from throwcollect.learning.score import tell_misses
+
+    return "  ".join([*(f"{cell:>8}" for cell in tell_misses(errors)), str(errors.missed)])

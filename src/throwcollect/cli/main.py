@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from throwcollect.cli import cluster, collect, image, learning, nodes, runs, serve, show
+from throwcollect.cli import cluster, collect, image, learning, nodes, runs, serve, show, starting
 from throwcollect.cli.dataset.commands import dataset_app
 from throwcollect.cli.execution import execute
 from throwcollect.cli.ros.commands import ros_app
@@ -31,7 +31,7 @@ def _add(*commands: Callable[..., None], panel: str | None = None, hidden: bool 
         app.command(rich_help_panel=panel, hidden=hidden)(command)
 
 
-_add(collect.up, collect.resume, collect.join_run, cluster.submit, collect.join)
+_add(starting.init, collect.up, collect.resume, collect.join_run, cluster.submit, collect.join)
 _add(runs.ps, runs.wait, runs.logs, runs.events, runs.scale, runs.stop, runs.down, panel="Runs")
 _add(serve.serve, serve.view, panel="Runs")
 _add(learning.fit, learning.aim, learning.throw, learning.score, learning.adapt, panel="From a dataset to a throw")

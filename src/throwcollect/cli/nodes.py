@@ -8,8 +8,9 @@ from typing import Annotated
 
 import typer
 
-from throwcollect.cli.options import DEFAULT_CONFIG, ConfigArgument, DatasetArgument
+from throwcollect.cli.options import ConfigArgument, DatasetArgument
 from throwcollect.cli.streams import only_log
+from throwcollect.config.default_path import DEFAULT_CONFIG
 
 
 def router(

@@ -7,8 +7,6 @@ from typing import Annotated
 
 import typer
 
-DEFAULT_CONFIG = Path("throwcollect.yaml")
-
 ConfigArgument = Annotated[
     # Whether it can be read is found where it is read, and said there.
     Path,

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from throwcollect.cli.options import DEFAULT_CONFIG, JsonOption
+from throwcollect.cli.options import JsonOption
 from throwcollect.cli.runs import RunOption
+from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.errors import ConfigError
 
 if TYPE_CHECKING:

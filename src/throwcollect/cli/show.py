@@ -10,7 +10,6 @@ from typing import Annotated
 import typer
 
 from throwcollect.cli.options import (
-    DEFAULT_CONFIG,
     ConfigArgument,
     JsonOption,
     SetOption,
@@ -18,6 +17,7 @@ from throwcollect.cli.options import (
     overrides,
 )
 from throwcollect.cli.streams import end_with_reader
+from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.side_by_side import count_cores
 from throwcollect.wording import format_count
 

@@ -79,14 +79,17 @@ class _Bar(Display):
     def __init__(self) -> None:
         from rich import progress
         from rich.console import Console
+        from rich.table import Column
 
         console = Console(stderr=True)
+        self._bar = progress.BarColumn()
+        whole = Column(no_wrap=True, overflow="ellipsis")
         self._progress = progress.Progress(
-            progress.BarColumn(bar_width=min(max(console.width - _TEXT_COLUMNS, 4), 40)),
-            progress.MofNCompleteColumn(),
-            progress.TextColumn("{task.description}"),
-            progress.TextColumn("ETA"),
-            progress.TimeRemainingColumn(compact=True),
+            self._bar,
+            progress.MofNCompleteColumn(table_column=whole),
+            progress.TextColumn("{task.description}", table_column=whole.copy()),
+            progress.TextColumn("ETA", table_column=whole.copy()),
+            progress.TimeRemainingColumn(compact=True, table_column=whole.copy()),
             console=console,
         )
         self._task = self._progress.add_task("waiting for simulations", total=None)
@@ -102,6 +105,8 @@ class _Bar(Display):
 
     def update(self, progress: Progress) -> None:
         completed, total = progress.steps
+        # The terminal may have another width by now.
+        self._bar.bar_width = min(max(self._progress.console.width - _TEXT_COLUMNS, 4), 40)
         self._progress.update(self._task, total=total, completed=completed, description=progress.counts)
 
     def say(self, line: str) -> None:

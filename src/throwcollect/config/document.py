@@ -13,9 +13,11 @@ from ruamel.yaml.constructor import SafeConstructor
 from ruamel.yaml.error import YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
+from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.config.problems import Location, join_key, quote
 from throwcollect.config.yaml_nodes import MOST_LEVELS, MOST_VALUES, compose, line, reason
 from throwcollect.errors import ConfigError, Problem
+from throwcollect.wording import command
 
 _TAG = "tag:yaml.org,2002:"
 _MOST_BYTES = 5_000_000
@@ -178,7 +180,8 @@ def _text_of(path: Path) -> str:
             raise ConfigError([Problem(f"larger than {_MOST_BYTES} bytes", path=path)])
         return data.decode("utf-8")
     except FileNotFoundError as error:
-        raise ConfigError([Problem("no such file", path=path)]) from error
+        hint = f"{command('init')} writes one to begin with" if path == DEFAULT_CONFIG else None
+        raise ConfigError([Problem("no such file", path=path)], hint=hint) from error
     except PermissionError as error:
         raise ConfigError([Problem("no permission to read the file", path=path)]) from error
     except OSError as error:

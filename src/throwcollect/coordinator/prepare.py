@@ -32,6 +32,8 @@ _TOLD_TRIALS = 20_000
 """From here on it is told at once what goes on, as seconds pass until the first trials are checked."""
 _TELL_FIRST_S = 2.0
 _TELL_EVERY_S = 10.0
+_SUNKEN_M = 0.01
+"""From this depth on, it is no matter of how a sole is modelled that a robot stands in the ground."""
 _LEAST_BYTES = 40
 """Of a trial in the file of a plan: its digest and its seed, which nothing compresses."""
 
@@ -68,6 +70,8 @@ def _count_before(config: Config) -> int:
 
 def _check_trials(config: Config, points: Points, *, processes: int, say: Say) -> Plan:
     """The plan of points, in which trials are refused that the robot cannot do; as `draw_plan`."""
+    if sentence := find_sunken_robot(config):
+        say(sentence)
     count = len(points.values)
     size = max(_TRIALS_A_PIECE, count // _MOST_PIECES)
     if count >= _TOLD_TRIALS:
@@ -91,6 +95,26 @@ def _check_trials(config: Config, points: Points, *, processes: int, say: Say) -
             say(f"plan: {len(trials)} of {count} trials checked")
     check_some_left(trials)
     return Plan(config, trials)
+
+
+def find_sunken_robot(config: Config) -> str | None:
+    """Say by how much a robot stands in the ground at the start, if its base is not where it is by default.
+
+    Such trials are not refused: the robot's base is fixed, and of its links the ground stops none.
+
+    Raises:
+        ConfigError: If the robot's files cannot be read.
+    """
+    height_m = config.robot.base_height_m
+    if height_m == RobotConfig().base_height_m:
+        return None
+    link, below_m = Feasibility(config).find_lowest(config)
+    if height_m + below_m > -_SUNKEN_M:
+        return None
+    return (
+        f"warning: robot.base_height_m: {height_m:g}: {link} is {-below_m - height_m:.2f} m below the ground at the "
+        f"start; the robot stands on it at {-below_m:.3f}"
+    )
 
 
 def _make_checked_trials(config: Config) -> Callable[[tuple[int, Points]], Trials]:

@@ -77,7 +77,8 @@ def data_card(config: Config, throws: pa.Table, provenance: Provenance) -> str:
         "",
         "| | |",
         "|---|---|",
-        *(f"| {name} | {value} |" for name, value in provenance.facts().items()),
+        # A card is published; the name of a machine concerns nobody there, and stands in provenance.json.
+        *(f"| {name} | {value} |" for name, value in provenance.facts().items() if name != "host"),
         "",
     ]
     return "\n".join(lines)

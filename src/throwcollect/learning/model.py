@@ -32,7 +32,7 @@ from throwcollect.learning.model_file import (
     list_found,
 )
 from throwcollect.learning.score import Score, pool_scores
-from throwcollect.learning.scoring import Simulates, score_model
+from throwcollect.learning.scoring import Simulates, leave_out_correction, score_model
 from throwcollect.version import __version__
 
 if TYPE_CHECKING:
@@ -160,6 +160,8 @@ class Model:
     ) -> Score:
         """Throw at targets in simulation, and measure by how much they are missed.
 
+        If the model was distilled, the distilled map throws at them, too.
+
         Args:
             simulator: Simulates the world of the dataset.
             targets: Number of targets of each seed.
@@ -179,7 +181,8 @@ class Model:
         _check_scatter(scatter)
         error, counts = self.file.trained_on.error, self.file.trained_on.latents_count
         score = partial(score_model, self.learned, simulator, count=targets, world=world, scatter=scatter)
-        score = partial(score, error=error, latents_count=counts, processes=processes)
+        distilled = None if self.file.distilled is None else distil(leave_out_correction(self.learned))
+        score = partial(score, error=error, latents_count=counts, distilled=distilled, processes=processes)
         return pool_scores([score(seed=each) for each in range(seed, seed + seeds)])
 
     def adapt(

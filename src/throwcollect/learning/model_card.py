@@ -5,8 +5,7 @@ from __future__ import annotations
 from throwcollect.learning.adapting import Method
 from throwcollect.learning.learned_map import Axis
 from throwcollect.learning.model_file import AdaptationEntry, ModelFile
-from throwcollect.learning.score import Errors, Score
-from throwcollect.units import unit_of_name
+from throwcollect.learning.score import Errors, Score, tell_length, tell_misses, tell_scatter
 from throwcollect.wording import format_count
 
 PROGRAM = """\
@@ -152,19 +151,21 @@ def _describe_score(score: Score, file: ModelFile) -> list[str]:
     lines = [
         "## How it hits",
         "",
-        f"Distance from {targets} for each of {format_count(score.seeds, 'seed')} (from {score.seed} on), medians of "
+        f"Misses of {targets} for each of {format_count(score.seeds, 'seed')} (from {score.seed} on), medians of "
         "the seeds; each draws targets, the throws that were learned from, and those in another world; in simulation:",
         "",
         "| learned from | median | 9 of 10 below | largest | did not succeed |",
         "|---|---|---|---|---|",
-        *(
-            f"| {format_count(each.trained_on, 'throw')} | {_describe_errors(each.errors, file)} |"
-            for each in score.trained
-        ),
+        *(f"| {format_count(each.trained_on, 'throw')} | {_describe_errors(each.errors)} |" for each in score.trained),
+        *([f"| `model.onnx` of these | {_describe_errors(score.distilled)} |"] if score.distilled is not None else []),
         "",
     ]
     if score.adapted:
-        scatter = f", with a scatter of {_length(score.scatter, file)} of what is measured" if score.scatter else ""
+        scatter = (
+            f", with a scatter of {tell_scatter(score.scatter, file.targets)} of what is measured"
+            if score.scatter
+            else ""
+        )
         lines += [
             f"In another world{scatter}, at those of these targets that can be reached there, "
             f"{format_count(score.adapted[0].errors.throws, 'throw')} for each row, in simulation:",
@@ -172,7 +173,7 @@ def _describe_score(score: Score, file: ModelFile) -> list[str]:
             "| throws there | differs by | median | 9 of 10 below | largest | did not succeed |",
             "|---|---|---|---|---|---|",
             *(
-                f"| {each.real_throws} | {each.method.value} | {_describe_errors(each.errors, file)} |"
+                f"| {each.real_throws} | {each.method.value} | {_describe_errors(each.errors)} |"
                 for each in score.adapted
             ),
             "",
@@ -180,12 +181,10 @@ def _describe_score(score: Score, file: ModelFile) -> list[str]:
     return lines
 
 
-def _describe_errors(errors: Errors, file: ModelFile) -> str:
-    lengths = ("-" if each is None else _length(each, file) for each in (errors.median, errors.share90, errors.largest))
-    return " | ".join([*lengths, str(errors.missed)])
+def _describe_errors(errors: Errors) -> str:
+    return " | ".join([*tell_misses(errors), str(errors.missed)])
 
 
 def _length(value: float, file: ModelFile) -> str:
-    """A distance between targets; in centimetres if all of them are lengths."""
-    units = {unit_of_name(target) for target in file.targets}
-    return f"{value * 100:.2f} cm" if units == {"m"} else f"{value:.3g}"
+    """A distance between targets, over all of them."""
+    return tell_length(value, file.targets)

@@ -10,49 +10,126 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, FiniteFloat
 
 from throwcollect.learning.adapting import Method
+from throwcollect.units import unit_of_name
 
 Array = NDArray[np.float64]
+
+SHOWN_AS = {"m": (100.0, " cm"), "rad": (180.0 / np.pi, "°")}
+"""By unit of targets: what their misses are multiplied by where people read them, and the unit there."""
 
 
 class _Entry(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-class Errors(_Entry):
-    """Distances of throws from their targets, in the unit of the targets.
+class Misses(_Entry):
+    """How far throws ended from their targets, over the targets of one unit: a distance [m], an angle [rad].
 
     Attributes:
-        throws: Number of throws.
-        missed: Number of those that did not succeed, or were refused; they count as farther than all others.
-        median: Median; None if half of them did not succeed, and likewise below.
+        unit: The unit.
+        median: Median; None if half of the throws did not succeed, and likewise below.
         share90: What nine of ten throws stay below.
         largest: Largest.
     """
 
-    throws: int
-    missed: int
+    unit: str = "m"
     median: FiniteFloat | None
     share90: FiniteFloat | None
     largest: FiniteFloat | None
 
+
+class Errors(Misses):
+    """The same over all targets; the fields of `Misses` are those of the first unit, metres where a target has them.
+
+    Attributes:
+        throws: Number of throws.
+        missed: Number of those that did not succeed, or were refused; they count as farther than all others.
+        others: Misses over the targets of each further unit.
+    """
+
+    throws: int
+    missed: int
+    others: list[Misses] = []
+
+    @property
+    def by_unit(self) -> tuple[Misses, ...]:
+        """Misses over the targets of each unit."""
+        return self, *self.others
+
     @classmethod
-    def of(cls, errors: Array) -> Errors:
-        """Sum up distances, which are infinite where a throw did not succeed; there is at least one."""
-        ordered = np.sort(errors)
-        places = (len(ordered) - 1) // 2, int(np.ceil(0.9 * len(ordered))) - 1, len(ordered) - 1
-        median, share90, largest = (float(ordered[place]) if np.isfinite(ordered[place]) else None for place in places)
-        missed = int((~np.isfinite(errors)).sum())
-        return cls(throws=len(errors), missed=missed, median=median, share90=share90, largest=largest)
+    def of(cls, away: Array, targets: Sequence[str]) -> Errors:
+        """Sum up how far throws ended from their targets.
+
+        Args:
+            away: Differences, NaN where a throw did not succeed; shape ``(n, n_targets)``, at least one throw.
+            targets: Names of the targets, which tell their units.
+        """
+        units = np.array([unit_of_name(target) for target in targets])
+        first, *others = (_sum_up(away[:, units == unit], unit) for unit in list_units(targets))
+        missed = int((~np.isfinite(away).all(axis=1)).sum())
+        return cls(throws=len(away), missed=missed, **vars(first), others=others)
 
     @classmethod
     def middle(cls, some: Sequence[Errors]) -> Errors:
         """Sum up those of several seeds: each number is the median of theirs; there is at least one."""
-        lists = ([each.median for each in some], [each.share90 for each in some], [each.largest for each in some])
-        median, share90, largest = (
-            sorted(values, key=lambda value: (value is None, value))[(len(values) - 1) // 2] for values in lists
-        )
+        first, *others = (_take_middle(each) for each in zip(*(each.by_unit for each in some), strict=True))
         throws, missed = sum(each.throws for each in some), sum(each.missed for each in some)
-        return cls(throws=throws, missed=missed, median=median, share90=share90, largest=largest)
+        return cls(throws=throws, missed=missed, **vars(first), others=others)
+
+
+def list_units(targets: Sequence[str]) -> list[str]:
+    """Units of targets, each once: metres first, the others in order."""
+    units = dict.fromkeys(unit_of_name(target) for target in targets)
+    return sorted(units, key=lambda unit: unit != "m")
+
+
+def tell_miss(miss: float | None, unit: str) -> str:
+    """A miss in words: in centimetres, degrees, or its own unit; ``-`` for None."""
+    if miss is None:
+        return "-"
+    factor, shown = SHOWN_AS.get(unit, (1.0, unit))
+    return f"{miss * factor:.2f}{shown}" if unit in SHOWN_AS else f"{miss:.3g} {shown}".rstrip()
+
+
+def tell_misses(errors: Errors) -> tuple[str, str, str]:
+    """Median, what nine of ten throws stay below, and largest, in words, each for all units."""
+    median, share90, largest = (
+        ", ".join(dict.fromkeys(tell_miss(getattr(each, name), each.unit) for each in errors.by_unit))
+        for name in ("median", "share90", "largest")
+    )
+    return median, share90, largest
+
+
+def tell_length(length: float, targets: Sequence[str]) -> str:
+    """A distance over all targets in words, whatever their units."""
+    units = list_units(targets)
+    return tell_miss(length, units[0]) if len(units) == 1 else f"{length:.3g} ({' and '.join(units)} together)"
+
+
+def tell_scatter(scatter: float, targets: Sequence[str]) -> str:
+    """A standard deviation that every target has, in words."""
+    return " and ".join(tell_miss(scatter, unit) for unit in list_units(targets))
+
+
+def _sum_up(away: Array, unit: str) -> Misses:
+    distances = np.sqrt((away**2).sum(axis=1))
+    ordered = np.sort(np.where(np.isfinite(distances), distances, np.inf))
+    places = (len(ordered) - 1) // 2, int(np.ceil(0.9 * len(ordered))) - 1, len(ordered) - 1
+    median, share90, largest = (float(ordered[place]) if np.isfinite(ordered[place]) else None for place in places)
+    return Misses(unit=unit, median=median, share90=share90, largest=largest)
+
+
+def _take_middle(some: Sequence[Misses]) -> Misses:
+    median, share90, largest = (
+        _find_median([getattr(each, name) for each in some]) for name in ("median", "share90", "largest")
+    )
+    return Misses(unit=some[0].unit, median=median, share90=share90, largest=largest)
+
+
+def _find_median(values: Sequence[float | None]) -> float | None:
+    """The median; None counts as larger than all numbers."""
+    found = float(np.median([np.inf if value is None else value for value in values]))
+    return found if np.isfinite(found) else None
 
 
 class Trained(_Entry):
@@ -60,7 +137,7 @@ class Trained(_Entry):
 
     Attributes:
         trained_on: Number of throws that it was learned from.
-        errors: Distances from the targets.
+        errors: By how much the targets are missed.
     """
 
     trained_on: int
@@ -73,7 +150,7 @@ class Adapted(_Entry):
     Attributes:
         real_throws: Number of these throws.
         method: What the world was taken to differ by.
-        errors: Distances from the targets.
+        errors: By how much the targets are missed.
     """
 
     real_throws: int
@@ -101,7 +178,8 @@ class Score(_Entry):
         seed: The first seed of their choice.
         seeds: Number of seeds; numbers are medians of theirs.
         trained: By the number of throws that a model was learned from; the model itself comes last.
-        throws: Its throws.
+        distilled: How the map hits that is distilled from all of these throws; None if the model has none.
+        throws: Throws of the model itself.
         scatter: Noise on what was measured of throws in the other world, in the unit of the targets.
         adapted: By the number of throws in the other world; empty if there was none.
         adapted_throws: Throws in the other world after the most of them.
@@ -112,6 +190,7 @@ class Score(_Entry):
     seed: int
     seeds: int = 1
     trained: list[Trained]
+    distilled: Errors | None = None
     throws: list[ThrowAtTarget]
     scatter: FiniteFloat
     adapted: list[Adapted]
@@ -128,6 +207,7 @@ def pool_scores(scores: Sequence[Score]) -> Score:
     sizes = [each.trained_on for each in first.trained]
     numbers = sorted({each.real_throws for score in scores for each in score.adapted})
     there = [each for score in scores for each in score.adapted]
+    distilled = [score.distilled for score in scores if score.distilled is not None]
     return first.model_copy(
         update={
             "seeds": len(scores),
@@ -135,6 +215,7 @@ def pool_scores(scores: Sequence[Score]) -> Score:
                 Trained(trained_on=size, errors=Errors.middle([score.trained[at].errors for score in scores]))
                 for at, size in enumerate(sizes)
             ],
+            "distilled": Errors.middle(distilled) if distilled else None,
             "throws": [throw for score in scores for throw in score.throws],
             "adapted": [_pool_adapted([each for each in there if each.real_throws == number]) for number in numbers],
             "adapted_throws": [throw for score in scores for throw in score.adapted_throws],

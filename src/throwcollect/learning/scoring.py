@@ -12,6 +12,7 @@ from throwcollect.config.schema import Config
 from throwcollect.dataset.throw import Throw
 from throwcollect.learning.adapting import Adaptation, adapt, adapt_by_nothing
 from throwcollect.learning.aiming import Choice, aim
+from throwcollect.learning.distilling import DistilledMap
 from throwcollect.learning.fitting import enough_throws, fit_throws
 from throwcollect.learning.learned_map import LearnedMap, Role, no_correction
 from throwcollect.learning.score import Adapted, Errors, Score, ThrowAtTarget, Trained
@@ -23,6 +24,8 @@ SIZES = (30, 100, 300, 1000, 3000, 10_000)
 REAL_THROWS = (0, 1, 3, 5, 10)
 """Numbers of throws in another world that a model is adapted by."""
 _CELL = 0.05
+_APART = 1000
+"""Seeds of throws to adapt by are so far from those of targets that no seed's throws are the targets of another."""
 
 
 class Simulates(Protocol):
@@ -49,6 +52,7 @@ def score_model(
     scatter: float,
     error: float,
     latents_count: bool,
+    distilled: DistilledMap | None,
     processes: int,
 ) -> Score:
     """Throw at targets, in the world of the dataset and in another one.
@@ -63,69 +67,97 @@ def score_model(
         scatter: Standard deviation of noise on what is measured of throws in the other world.
         error: What the map itself is off by, as a standard deviation.
         latents_count: Whether latents have an effect that is worth knowing.
+        distilled: The map that is distilled for the world of the dataset; None for none.
         processes: How many processes simulate.
     """
     context = _nominal_context(learned)
-    plain = learned.correct(no_correction(learned.axes, learned.targets))
+    plain = leave_out_correction(learned)
     targets = draw_targets(plain.carry_over(context), count, seed)
+    given = np.repeat(context[np.newaxis], count, axis=0)
     sizes = [*(size for size in SIZES if size < len(learned.values)), len(learned.values)]
     maps = {size: smaller for size in sizes if (smaller := _learn_from(plain, size, seed)) is not None}
-    loops = _throw_at(list(maps.values()), targets, context, simulator, processes)
-    trained = [
-        Trained(trained_on=size, errors=Errors.of(_distances(places, targets)))
-        for size, (_, places) in zip(maps, loops, strict=True)
-    ]
+    ways = [aim(each, targets, given, Choice.NEAREST).parameters for each in maps.values()]
+    if distilled is not None:
+        ways.append(distilled.aim(targets, given))
+    places = _throw(learned, ways, given, simulator, processes)
+    errors = [Errors.of(each - targets, learned.targets) for each in places]
     adapted: list[Adapted] = []
     adapted_throws: list[ThrowAtTarget] = []
     if world is not None:
-        tries = draw_targets(learned.carry_over(context), REAL_THROWS[-1], seed + 1)
-        [(parameters, places)] = _throw_at([learned], tries, context, world, processes)
-        landed = np.isfinite(places).all(axis=1)
-        noise = scatter * np.random.default_rng((seed, 1)).standard_normal(places.shape)
         adaptations = _adapt_step_by_step(
-            learned,
-            learned.scale(Role.PARAMETER, parameters[landed]),
-            (places + noise)[landed],
-            scatter=float(np.hypot(scatter, error)),
-            latents_count=latents_count,
+            learned, world, seed, scatter=scatter, error=error, latents_count=latents_count, processes=processes
         )
-        worlds = [learned.correct(each.correction) for each in adaptations.values()]
-        given = np.repeat(context[np.newaxis], len(targets), axis=0)
-        reachable = targets[aim(worlds[-1], targets, given).reachable]
-        if len(reachable):
-            found = _throw_at(worlds, reachable, context, world, processes)
-            adapted = [
-                Adapted(real_throws=number, method=each.method, errors=Errors.of(_distances(places, reachable)))
-                for (number, each), (_, places) in zip(adaptations.items(), found, strict=True)
-            ]
-            adapted_throws = _list_throws(reachable, found[-1][1])
+        adapted, adapted_throws = _throw_there(learned, adaptations, targets, world, processes)
     return Score(
         targets=count,
         seed=seed,
-        trained=trained,
-        throws=_list_throws(targets, loops[-1][1]),
+        trained=[Trained(trained_on=size, errors=each) for size, each in zip(maps, errors, strict=False)],
+        distilled=None if distilled is None else errors[-1],
+        throws=_list_throws(targets, places[len(maps) - 1]),
         scatter=scatter,
         adapted=adapted,
         adapted_throws=adapted_throws,
     )
 
 
+def leave_out_correction(learned: LearnedMap) -> LearnedMap:
+    """The map of the dataset's own world."""
+    return learned.correct(no_correction(learned.axes, learned.targets))
+
+
 def _adapt_step_by_step(
-    learned: LearnedMap, parameters: Array, measured: Array, *, scatter: float, latents_count: bool
+    learned: LearnedMap,
+    world: Simulates,
+    seed: int,
+    *,
+    scatter: float,
+    error: float,
+    latents_count: bool,
+    processes: int,
 ) -> dict[int, Adaptation]:
-    """Adapt a map by more and more throws; the keys are the numbers of throws, from 0."""
-    context = np.repeat(_nominal_context(learned)[np.newaxis], len(measured), axis=0)
+    """Throw in another world, and adapt a map by more and more throws; the keys are their numbers, from 0."""
+    context = _nominal_context(learned)
+    tries = spread_first(draw_targets(learned.carry_over(context), REAL_THROWS[-1], seed + _APART))
+    given = np.repeat(context[np.newaxis], len(tries), axis=0)
+    parameters = aim(learned, tries, given, Choice.NEAREST).parameters
+    [places] = _throw(learned, [parameters], given, world, processes)
+    landed = np.isfinite(places).all(axis=1)
+    noise = scatter * np.random.default_rng((seed, 1)).standard_normal(places.shape)
+    parameters, given, measured = parameters[landed], given[landed], (places + noise)[landed]
     found = {0: adapt_by_nothing(learned)}
     for number in sorted({min(number, len(measured)) for number in REAL_THROWS} - {0}):
         found[number] = adapt(
             learned,
             parameters[:number],
-            context[:number],
+            given[:number],
             measured[:number],
-            scatter=scatter,
+            scatter=float(np.hypot(scatter, error)),
             latents_count=latents_count,
         )
     return found
+
+
+def _throw_there(
+    learned: LearnedMap, adaptations: Mapping[int, Adaptation], targets: Array, world: Simulates, processes: int
+) -> tuple[list[Adapted], list[ThrowAtTarget]]:
+    """Throw in another world at the targets that can be reached there, by each of some adaptations.
+
+    Returns:
+        How each of them hits, and the throws of the last one; both empty if no target can be reached.
+    """
+    given = np.repeat(_nominal_context(learned)[np.newaxis], len(targets), axis=0)
+    worlds = [learned.correct(each.correction) for each in adaptations.values()]
+    reachable = aim(worlds[-1], targets, given).reachable
+    targets, given = targets[reachable], given[reachable]
+    if not len(targets):
+        return [], []
+    ways = [aim(each, targets, given, Choice.NEAREST).parameters for each in worlds]
+    found = _throw(learned, ways, given, world, processes)
+    adapted = [
+        Adapted(real_throws=number, method=each.method, errors=Errors.of(places - targets, learned.targets))
+        for (number, each), places in zip(adaptations.items(), found, strict=True)
+    ]
+    return adapted, _list_throws(targets, found[-1])
 
 
 def draw_targets(landings: Array, count: int, seed: int) -> Array:
@@ -156,6 +188,22 @@ def draw_targets(landings: Array, count: int, seed: int) -> Array:
     return targets
 
 
+def spread_first(targets: Array) -> Array:
+    """Order targets so that the first few of them are spread: a few throws tell most of a world then.
+
+    The one that is nearest to the middle comes first, as it stands for all; then always the one that is farthest from
+    all before.
+
+    Args:
+        targets: Shape ``(n, n_targets)``.
+    """
+    squares = ((targets[:, np.newaxis] - targets) ** 2).sum(axis=2)
+    order = [int(((targets - targets.mean(axis=0)) ** 2).sum(axis=1).argmin())]
+    while len(order) < len(targets):
+        order.append(int(squares[order].min(axis=0).argmax()))
+    return targets[order]
+
+
 def _nominal_context(learned: LearnedMap) -> Array:
     """Scaled values of the configuration for what is given with targets, shape ``(n_context,)``."""
     nominal = np.array([[axis.nominal for axis in learned.axes_of(Role.CONTEXT)]], np.float64)
@@ -181,38 +229,32 @@ def _learn_from(learned: LearnedMap, size: int, seed: int) -> LearnedMap | None:
     return fit.learned
 
 
-def _throw_at(
-    maps: Sequence[LearnedMap], targets: Array, context: Array, world: Simulates, processes: int
-) -> list[tuple[Array, Array]]:
-    """Aim at targets by each of some maps, and throw.
+def _throw(learned: LearnedMap, ways: Sequence[Array], given: Array, world: Simulates, processes: int) -> list[Array]:
+    """Throw with some lists of parameters.
 
     All throws are simulated together, as processes take a while to begin.
 
+    Args:
+        learned: Its axes are those of the parameters.
+        ways: Scaled parameters, each of shape ``(n, n_parameters)``.
+        given: Scaled context of each of these lists, shape ``(n, n_context)``.
+        world: Simulates the throws.
+        processes: How many processes simulate.
+
     Returns:
-        For each map: parameters in the units of their keys, shape ``(n, n_parameters)``; and where the throws ended,
-        shape ``(n, n_targets)``, with NaN where one did not succeed.
+        For each list, where the throws ended, shape ``(n, n_targets)``, with NaN where one did not succeed.
     """
-    given = np.repeat(context[np.newaxis], len(targets), axis=0)
-    parameters = [
-        learned.unscale(Role.PARAMETER, aim(learned, targets, given, Choice.NEAREST).parameters) for learned in maps
-    ]
-    one = maps[0]
-    keys = [axis.key for axis in (*one.axes_of(Role.PARAMETER), *one.axes_of(Role.CONTEXT))]
-    values = np.hstack([np.concatenate(parameters), np.tile(one.unscale(Role.CONTEXT, given), (len(maps), 1))])
+    keys = [axis.key for axis in (*learned.axes_of(Role.PARAMETER), *learned.axes_of(Role.CONTEXT))]
+    parameters = learned.unscale(Role.PARAMETER, np.concatenate(ways))
+    values = np.hstack([parameters, np.tile(learned.unscale(Role.CONTEXT, given), (len(ways), 1))])
     points = [dict(zip(keys, row, strict=True)) for row in values.tolist()]
     thrown = [number for number, point in enumerate(points) if world.find_refusal(point) is None]
-    places = np.full((len(points), targets.shape[1]), np.nan)
+    places = np.full((len(points), len(learned.targets)), np.nan)
     throws = world.throw_many([points[number] for number in thrown], processes=processes)
     for number, throw in zip(thrown, throws, strict=True):
         if throw.outcome == world.config.task.success:
-            places[number] = [throw.row[column] for column in one.targets]
-    return list(zip(parameters, np.split(places, len(maps)), strict=True))
-
-
-def _distances(places: Array, targets: Array) -> Array:
-    """Distance of each throw from its target, shape ``(n,)``; infinite where it did not succeed."""
-    away = np.sqrt(((places - targets) ** 2).sum(axis=1))
-    return np.where(np.isfinite(away), away, np.inf)
+            places[number] = [throw.row[column] for column in learned.targets]
+    return np.split(places, len(ways))
 
 
 def _list_throws(targets: Array, places: Array) -> list[ThrowAtTarget]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,14 +13,15 @@ from throwcollect.dataset.reader import Dataset
 from throwcollect.errors import ConfigError
 from throwcollect.learning.model import Model, load_model
 from throwcollect.learning.model_directory import read_score
-from throwcollect.learning.score import Errors, Score, ThrowAtTarget
+from throwcollect.learning.score import SHOWN_AS, Errors, Misses, Score, ThrowAtTarget, tell_length, tell_misses
 from throwcollect.report.contents import Panel, Row, Section, Table
 from throwcollect.report.figures import BLUE, LEGEND_ABOVE
 from throwcollect.report.miss_map import ARROWS, draw_miss_map
 from throwcollect.wording import command, format_count
 
 _TITLE = "How a model of it hits"
-_CENTIMETRES = 100.0
+_NOUNS = {"m": "distance", "rad": "angle"}
+"""What lies between a throw and its target, by unit."""
 
 
 def show_model(directory: Path, dataset: Dataset) -> Section:
@@ -42,15 +43,16 @@ def show_model(directory: Path, dataset: Dataset) -> Section:
             expected=f"a model of this dataset, digest {dataset.digest[:10]}",
             hint=command("fit", dataset.directory, "-o", "MODEL"),
         )
+    error = tell_length(trained.error, model.targets)
     text = (
         f"Learned from {trained.throws:,} throws: {', '.join(model.parameters)} to {', '.join(model.targets)}. "
-        f"Throws that polynomials were not fitted to are predicted to {_centimetres(trained.error)} (median)."
+        f"Throws that polynomials were not fitted to are predicted to {error} (median)."
     )
     if score is None:
         hint = command("score", directory)
         return Section("model", "Model", _TITLE, f"{text} Nobody has thrown with it yet; {hint} does, in simulation.")
     seeds = format_count(score.seeds, "seed")
-    text += f" Distances are medians of {seeds}, of {score.targets} targets each, in simulation."
+    text += f" Misses are medians of {seeds}, of {score.targets} targets each, in simulation."
     panels = [
         Panel(
             "targets",
@@ -58,19 +60,18 @@ def show_model(directory: Path, dataset: Dataset) -> Section:
             _draw_misses(model, score.throws),
             picture="targets",
         ),
-        Panel("training", "Misses by number of throws learned from", _draw_training(score), picture="training"),
+        *_show_errors("training", "Misses by number of throws learned from", score, _draw_training),
     ]
     rows: list[Row | Table] = [tuple(panels), _tabulate(score)]
     if score.adapted:
-        adapted = Panel(
-            "adapting", "In another world, by number of throws there", _draw_adapting(score), picture="adapting"
-        )
         there = Panel(
             "elsewhere",
             f"Targets there after the last of them, misses {ARROWS} times as long",
             _draw_misses(model, score.adapted_throws),
         )
-        rows.append((adapted, there))
+        rows.append(
+            (*_show_errors("adapting", "In another world, by number of throws there", score, _draw_adapting), there)
+        )
     return Section("model", "Model", _TITLE, text, tuple(rows))
 
 
@@ -90,33 +91,48 @@ def _take_two(points: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.column_stack([points, np.zeros(len(points))])[:, :2]
 
 
-def _draw_training(score: Score) -> go.Figure:
-    figure = _draw_errors([each.trained_on for each in score.trained], [each.errors for each in score.trained])
+def _show_errors(key: str, title: str, score: Score, draw: Callable[[Score, int], go.Figure]) -> list[Panel]:
+    """A panel for each unit of misses."""
+    units = [each.unit for each in score.trained[-1].errors.by_unit]
+    return [
+        Panel(key if number == 0 else f"{key}-{unit}", title, draw(score, number), picture=key)
+        for number, unit in enumerate(units)
+    ]
+
+
+def _draw_training(score: Score, unit: int) -> go.Figure:
+    misses = [each.errors.by_unit[unit] for each in score.trained]
+    figure = _draw_errors([each.trained_on for each in score.trained], misses)
     figure.update_xaxes(title="throws learned from", type="log").update_yaxes(type="log")
     return figure
 
 
-def _draw_adapting(score: Score) -> go.Figure:
-    figure = _draw_errors([each.real_throws for each in score.adapted], [each.errors for each in score.adapted])
+def _draw_adapting(score: Score, unit: int) -> go.Figure:
+    misses = [each.errors.by_unit[unit] for each in score.adapted]
+    figure = _draw_errors([each.real_throws for each in score.adapted], misses)
     return figure.update_xaxes(title="throws in the other world").update_yaxes(rangemode="tozero")
 
 
-def _draw_errors(numbers: Sequence[int], errors: Sequence[Errors]) -> go.Figure:
-    """Draw median and ninth decile of misses [cm] over a number of throws."""
+def _draw_errors(numbers: Sequence[int], misses: Sequence[Misses]) -> go.Figure:
+    """Draw median and ninth decile of misses of one unit over a number of throws."""
+    factor, unit = SHOWN_AS.get(misses[0].unit, (1.0, misses[0].unit))
     figure = go.Figure()
     lines = (
-        ("median", [each.median for each in errors], {"color": BLUE, "width": 2}),
-        ("9 of 10 below", [each.share90 for each in errors], {"color": BLUE, "width": 1.5, "dash": "dash"}),
+        ("median", [each.median for each in misses], {"color": BLUE, "width": 2}),
+        ("9 of 10 below", [each.share90 for each in misses], {"color": BLUE, "width": 1.5, "dash": "dash"}),
     )
     for name, values, line in lines:
-        scaled = [None if value is None else value * _CENTIMETRES for value in values]
+        scaled = [None if value is None else value * factor for value in values]
         marker = {"color": BLUE, "size": 5, "symbol": "circle"}
         figure.add_scatter(x=list(numbers), y=scaled, mode="lines+markers", line=line, marker=marker, name=name)
-    return figure.update_yaxes(title="distance from the target [cm]").update_layout(height=420, legend=LEGEND_ABOVE)
+    title = f"{_NOUNS.get(misses[0].unit, 'difference')} from the target [{unit.strip()}]"
+    return figure.update_yaxes(title=title).update_layout(height=420, legend=LEGEND_ABOVE)
 
 
 def _tabulate(score: Score) -> Table:
     rows = [(f"learned from {each.trained_on:,} throws", *_cells(each.errors)) for each in score.trained]
+    if score.distilled is not None:
+        rows.append(("model.onnx of these", *_cells(score.distilled)))
     rows += [
         (
             f"in the other world after {format_count(each.real_throws, 'throw')} ({each.method.value})",
@@ -129,9 +145,4 @@ def _tabulate(score: Score) -> Table:
 
 
 def _cells(errors: Errors) -> tuple[str, ...]:
-    lengths = ("-" if each is None else _centimetres(each) for each in (errors.median, errors.share90, errors.largest))
-    return (*lengths, str(errors.throws), str(errors.missed))
-
-
-def _centimetres(length: float) -> str:
-    return f"{length * _CENTIMETRES:.2f} cm"
+    return (*tell_misses(errors), str(errors.throws), str(errors.missed))

@@ -102,7 +102,7 @@ def _report_task(dataset: Dataset, outcomes: Outcomes) -> TaskReport:
     trials = len(outcomes.codes)
     tiles = (
         Tile(f"{trials:,}", "trials planned"),
-        Tile(format_share(outcomes.succeeded, trials), f"{in_words(outcomes.success)} as planned"),
+        Tile(format_share(outcomes.succeeded, trials), f"{in_words(outcomes.success)}"),
     )
     by = robot_of(dataset.config).introduction
     return TaskReport(f"simulated {dataset.config.task.subject} by {by}", tiles, results=(), episodes=())
@@ -147,10 +147,10 @@ def _show_outcomes(
     bars = Panel("all", title, figures.draw_outcome_bars(outcomes), picture="outcomes", on_page=False)
     blocks: list[Row | Table] = [(bars,)]
     failed = trials - outcomes.succeeded
-    text = f"All {trials:,} {noun}s {in_words(outcomes.success)} as planned."
+    text = f"All {trials:,} {noun}s {in_words(outcomes.success)}."
     if failed:
         did_not = "land" if outcomes.success == LANDED else "succeed"
-        text = f"{failed:,} of {trials:,} {noun}s ({format_share(failed, trials)}) did not {did_not} as planned."
+        text = f"{failed:,} of {trials:,} {noun}s ({format_share(failed, trials)}) did not {did_not}."
     if failures:
         blocks.append(_tabulate(failures))
     if failed and len(outcomes.names) > 1 and parameters:

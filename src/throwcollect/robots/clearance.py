@@ -112,6 +112,25 @@ class Clearance:
                 )
         return None
 
+    def find_lowest(self, configuration: NDArray[np.float64]) -> tuple[str, float]:
+        """Find the lowest link of a posture, by the boxes around its shapes.
+
+        Args:
+            configuration: In the order of the model [rad], shape ``(32,)``.
+
+        Returns:
+            Its name, and the height of its lowest point above the base [m].
+        """
+        pinocchio.updateGeometryPlacements(self._model, self._data, self.geometry, self._distances, configuration)
+        heights = []
+        for shape, placement in zip(self.geometry.geometryObjects, self._distances.oMg, strict=True):
+            shape.geometry.computeLocalAABB()
+            box, upright = shape.geometry.aabb_local, placement.rotation[2]
+            half = (np.array(box.max_) - np.array(box.min_)) / 2
+            heights.append(float(placement.translation[2] + (upright * box.center() - np.abs(upright) * half).sum()))
+        lowest = int(np.argmin(heights))
+        return self._links[lowest], heights[lowest]
+
     def _is_clear(self, configurations: NDArray[np.float64], unknown: list[NDArray[np.bool_]]) -> bool:
         """Whether the first of some postures is known to be clear; of others, takes note in `unknown`."""
         for known, rows in zip(self._clear, unknown, strict=True):

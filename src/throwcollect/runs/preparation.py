@@ -86,7 +86,7 @@ def prepare(
     """
     started = datetime.now(timezone.utc)
     with load_locating_errors(Path(config), overrides) as read:
-        directory = Path(output or Path("datasets") / f"{read.name}-{datetime.now():%Y%m%d-%H%M%S}")
+        directory = _name_directory(read.name) if output is None else Path(output)
         records = Records()
         if (run := _take_over(records, directory, read, onlooker)) is not None:
             return run
@@ -94,6 +94,13 @@ def prepare(
             read, Path(config).parent, directory, started, resumed=False, processes=processes, ahead=ahead
         )
         return prepare_run(records, request, None, onlooker)
+
+
+def _name_directory(name: str) -> Path:
+    """Where a dataset goes if nobody says so: ``datasets/NAME``, or with the time behind it where something is."""
+    directory = Path("datasets", name)
+    taken = os.path.lexists(directory) and not (directory.is_dir() and not any(directory.iterdir()))
+    return directory.with_name(f"{name}-{datetime.now():%Y%m%d-%H%M%S}") if taken else directory
 
 
 def resume(

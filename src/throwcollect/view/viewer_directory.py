@@ -13,10 +13,10 @@ from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.throws_table import Row
 from throwcollect.episode.channels import Channel
 from throwcollect.episode.record import Samples
-from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.files import new_directory, unwritable
 from throwcollect.robots.description import full_description, robot_of
 from throwcollect.tools.tool import tool_of
+from throwcollect.view.chosen import choose_rows
 from throwcollect.view.foxglove import layout
 from throwcollect.view.robot import read_drawn_robot
 from throwcollect.view.viewed import ViewedThrow
@@ -72,7 +72,7 @@ def view(directory: Path, output: Path, trials: Iterable[int] | None = None) -> 
         DatasetError: If the dataset is damaged or not finished, a trial has no episode, or `output` cannot be written.
     """
     dataset = Dataset.open(directory)
-    throws = _schedule(dataset, _rows(dataset, trials))
+    throws = _schedule(dataset, choose_rows(dataset, trials))
     config = dataset.config
     robot = read_drawn_robot(full_description(config), tool_of(config.tool).link, robot_of(config).share())
     with new_directory(output) as beside:
@@ -98,23 +98,6 @@ def view(directory: Path, output: Path, trials: Iterable[int] | None = None) -> 
         recording_bytes=recording_bytes,
         mesh_bytes=sum(sizes.values()),
     )
-
-
-def _rows(dataset: Dataset, trials: Iterable[int] | None) -> list[Row]:
-    rows = dataset.throws.to_pylist()
-    if trials is None:
-        chosen = [row for row in rows if row["shard"] is not None]
-        if not chosen:
-            raise DatasetError("no trial has an episode: there is nothing to show", path=dataset.directory)
-        return chosen
-    numbers = list(trials)
-    for number in numbers:
-        if not 0 <= number < len(rows):
-            raise ConfigError(f"{dataset.directory}: no trial {number}", expected=f"0 to {len(rows) - 1}")
-        if rows[number]["shard"] is None:
-            reason = f"{rows[number]['outcome']}: {rows[number]['reason']}"
-            raise DatasetError(f"trial {number} has no episode: {reason}", path=dataset.directory)
-    return [rows[number] for number in numbers]
 
 
 def _schedule(dataset: Dataset, rows: Iterable[Row]) -> list[ViewedThrow]:

@@ -1,6 +1,6 @@
 import pytest
 
-from throwcollect.cli.terminal import display
+from throwcollect.cli.terminal import _Bar, display
 from throwcollect.coordinator.progress import Progress
 
 
@@ -29,3 +29,15 @@ def test_who_wants_quiet_hears_warnings_only(capsys: pytest.CaptureFixture[str])
         shown.update(progress(10, landed=10))
         shown.warn("sim_0 was lost")
     assert capsys.readouterr().err == "sim_0 was lost\n"
+
+
+@pytest.mark.parametrize(("columns", "cells"), [(200, 40), (90, 18), (60, 4)])
+def test_the_bar_fits_the_terminal_as_it_is_now_and_no_text_takes_a_second_line(columns: int, cells: int) -> None:
+    shown = _Bar()
+    console = shown._progress.console
+    console.width = 80
+    shown.update(progress(1, landed=1))
+    console.width = columns
+    shown.update(progress(3, landed=1, self_hit=1, lost=1))
+    assert shown._bar.bar_width == cells
+    assert len(console.render_lines(shown._progress.get_renderable())) == 1

@@ -45,3 +45,18 @@ def test_of_a_large_plan_it_is_told_at_once_what_goes_on(monkeypatch: pytest.Mon
     said.clear()
     prepare.draw_plan(Config.model_validate({**CONFIG, "trials": 399}), directory=Path(), say=said.append)
     assert said[0].endswith("of 399 trials checked")
+
+
+def test_a_robot_in_the_ground_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    def told(height_m: float) -> list[str]:
+        said: list[str] = []
+        config = Config.model_validate({**CONFIG, "trials": 1, "robot": {"base_height_m": height_m}})
+        monkeypatch.setattr(prepare, "feasibility_check", lambda _: lambda _: None)
+        prepare.draw_plan(config, directory=Path(), say=said.append)
+        return said
+
+    assert told(0.5) == [
+        "warning: robot.base_height_m: 0.5: leg_left_6_link is 0.52 m below the ground at the start; "
+        "the robot stands on it at 1.020"
+    ]
+    assert told(1.015) == told(1.5) == told(1.01927) == []

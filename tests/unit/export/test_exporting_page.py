@@ -27,7 +27,7 @@ IMPORTED = re.compile(r"^(?:import|from) (\w+)", re.MULTILINE)
 def place(source: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A directory in which the commands of the page were given."""
     place = tmp_path_factory.mktemp("page")
-    shutil.copytree(source, place / "datasets" / "quick")
+    shutil.copytree(source, place / "datasets" / "quickstart")
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(place)
         for command in COMMANDS:

@@ -17,7 +17,7 @@ from throwcollect import ConfigError, DatasetError, Model, fit, load_model
 from throwcollect.dataset.reader import Dataset
 from throwcollect.learning.model_card import PROGRAM
 from throwcollect.learning.model_directory import read_score, write_score
-from throwcollect.learning.score import Adapted, Errors, Score, ThrowAtTarget, Trained
+from throwcollect.learning.score import Adapted, Errors, Misses, Score, ThrowAtTarget, Trained
 
 COUNT = 120
 
@@ -89,10 +89,12 @@ def test_adapting_is_kept_in_the_file_and_in_the_card(model: Model, tmp_path: Pa
 
 def test_a_score_is_put_into_the_model_and_its_card(model: Model, tmp_path: Path) -> None:
     errors = Errors(throws=2, missed=1, median=0.0012, share90=None, largest=None)
+    angles = Misses(unit="rad", median=0.01, share90=0.02, largest=None)
     score = Score(
         targets=2,
         seed=0,
         trained=[Trained(trained_on=120, errors=errors)],
+        distilled=errors.model_copy(update={"median": 0.01, "others": [angles]}),
         throws=[ThrowAtTarget(target=[1.0, 0.0], place=[1.0, 0.0012]), ThrowAtTarget(target=[1.1, 0.0], place=None)],
         scatter=0.02,
         adapted=[Adapted(real_throws=0, method="none", errors=errors)],
@@ -104,6 +106,7 @@ def test_a_score_is_put_into_the_model_and_its_card(model: Model, tmp_path: Path
     assert read_score(tmp_path / "model") == score
     card = (tmp_path / "model" / "README.md").read_text()
     assert "| 120 throws | 0.12 cm | - | - | 1 |" in card
+    assert "| `model.onnx` of these | 1.00 cm, 0.57° | -, 1.15° | - | 1 |" in card
     assert "with a scatter of 2.00 cm" in card
 
 

@@ -13,8 +13,9 @@ from tests.unit.learning.worlds import KEYS, TARGETS, land, learn
 
 from throwcollect.config.schema import Config
 from throwcollect.learning.adapting import Method
-from throwcollect.learning.score import Errors, Score, pool_scores
-from throwcollect.learning.scoring import draw_targets, score_model
+from throwcollect.learning.distilling import distil
+from throwcollect.learning.score import Errors, Score, pool_scores, tell_misses
+from throwcollect.learning.scoring import draw_targets, score_model, spread_first
 
 SHIFT = np.array([0.1, 0.12])
 
@@ -43,7 +44,7 @@ class World:
 
 
 def score(world: World, other: World | None = None, *, seed: int = 0, scatter: float = 0.0) -> Score:
-    options = {"count": 25, "error": 0.002, "latents_count": False, "processes": 1}
+    options = {"count": 25, "error": 0.002, "latents_count": False, "distilled": None, "processes": 1}
     return score_model(learn(), world, seed=seed, world=other, scatter=scatter, **options)
 
 
@@ -85,7 +86,15 @@ def test_in_another_world_a_few_throws_close_the_gap() -> None:
 def test_in_the_world_of_the_dataset_a_model_is_scored_as_if_it_had_not_been_adapted() -> None:
     learned = learn()
     shifted = learned.correct(replace(learned.correction, offset=SHIFT))
-    options = {"count": 25, "seed": 0, "scatter": 0.0, "error": 0.002, "latents_count": False, "processes": 1}
+    options = {
+        "count": 25,
+        "seed": 0,
+        "scatter": 0.0,
+        "error": 0.002,
+        "latents_count": False,
+        "distilled": None,
+        "processes": 1,
+    }
     found = score_model(shifted, World(), world=World(SHIFT), **options)
     assert found.trained == score(World()).trained
     assert found.adapted[0].errors.median < 0.01
@@ -111,9 +120,36 @@ def test_targets_lie_between_throws_that_are_near_each_other() -> None:
     assert share > (np.linalg.norm(landings - np.median(landings, axis=0), axis=1) > 0.4).mean()
 
 
+def test_the_first_throws_elsewhere_are_spread() -> None:
+    targets = np.array([[0.5, 0.0], [0.0, 0.0], [0.1, 0.0], [1.0, 0.0], [0.4, 0.6]])
+    assert spread_first(targets).tolist() == targets[[0, 4, 1, 3, 2]].tolist()
+
+
 def test_errors_are_summed_up_in_order() -> None:
-    found = Errors.of(np.array([0.3, 0.1, np.inf, 0.2]))
+    found = Errors.of(np.array([[0.3], [-0.1], [np.nan], [0.2]]), ["landing_x_m"])
     assert (found.throws, found.missed, found.median, found.share90, found.largest) == (4, 1, 0.2, None, None)
+
+
+def test_metres_and_radians_are_not_added() -> None:
+    away = np.array([[0.5, 0.03, 0.04], [0.1, 0.0, 0.01], [-0.2, 0.3, 0.4]])
+    found = Errors.of(away, ["hit_angle_rad", "landing_x_m", "landing_y_m"])
+    lengths, angles = found.by_unit
+    assert (lengths.unit, lengths.median, lengths.largest) == ("m", pytest.approx(0.05), pytest.approx(0.5))
+    assert (angles.unit, angles.median, angles.largest) == ("rad", 0.2, 0.5)
+    assert Errors.middle([found, found]) == found.model_copy(update={"throws": 6})
+    assert tell_misses(found) == ("5.00 cm, 11.46°", "50.00 cm, 28.65°", "50.00 cm, 28.65°")
+    assert tell_misses(Errors.of(away[:, :1], ["landing_time_s"]))[2] == "0.5 s"
+
+
+def test_the_distilled_map_throws_at_the_same_targets() -> None:
+    learned, world = learn(), World()
+    options = {"count": 25, "seed": 0, "scatter": 0.0, "error": 0.002, "latents_count": False, "processes": 1}
+    found = score_model(learned, world, world=None, distilled=distil(learned), **options)
+    assert world.calls == 1
+    assert (found.trained, found.throws) == (score(World()).trained, score(World()).throws)
+    assert found.distilled.throws == 25
+    assert found.trained[-1].errors.median < found.distilled.median < 0.02
+    assert pool_scores([found, found]).distilled.throws == 50
 
 
 def test_scores_of_several_seeds_become_medians() -> None:
@@ -128,3 +164,5 @@ def test_scores_of_several_seeds_become_medians() -> None:
     assert some[0].trained[0] != some[1].trained[0]
     missed = Errors(throws=1, missed=1, median=None, share90=None, largest=None)
     assert Errors.middle([missed, missed, found.trained[0].errors]).median is None
+    two = [missed.model_copy(update={"median": median}) for median in (0.1, 0.3)]
+    assert Errors.middle(two).median == pytest.approx(0.2)

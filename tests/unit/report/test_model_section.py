@@ -8,7 +8,7 @@ from tests.unit.learning.worlds import make_dataset
 from throwcollect import ConfigError, DatasetError, fit
 from throwcollect.dataset.reader import Dataset
 from throwcollect.learning.model_directory import write_score
-from throwcollect.learning.score import Adapted, Errors, Score, ThrowAtTarget, Trained
+from throwcollect.learning.score import Adapted, Errors, Misses, Score, ThrowAtTarget, Trained
 from throwcollect.report.model_section import show_model
 from throwcollect.report.pictures import write_pictures
 
@@ -74,6 +74,22 @@ def test_curves_show_centimetres_over_numbers_of_throws(dataset: Dataset, model:
     assert median.y == pytest.approx([2.0, 0.1])
     (table,) = (block for block in section.blocks if hasattr(block, "rows"))
     assert table.rows[-1] == ("in the other world after 5 throws (bias)", "0.10 cm", "0.20 cm", "-", "3", "1")
+
+
+def test_each_unit_has_curves_of_its_own_and_the_distilled_map_a_row(dataset: Dataset, model: Path) -> None:
+    angles = Misses(unit="rad", median=0.01, share90=0.02, largest=0.02)
+    found = score()
+    mixed = found.trained[-1].errors.model_copy(update={"others": [angles]})
+    trained = [each.model_copy(update={"errors": mixed}) for each in found.trained]
+    write_score(model, found.model_copy(update={"trained": trained, "distilled": mixed, "adapted": []}))
+    section = show_model(model, dataset)
+    panels = {panel.key: panel.figure for panel in section.panels}
+    assert list(panels) == ["targets", "training", "training-rad"]
+    assert panels["training-rad"].data[0].y == pytest.approx([0.573, 0.573], abs=0.001)
+    assert panels["training-rad"].layout.yaxis.title.text == "angle from the target [°]"
+    assert panels["training"].data[0].y == pytest.approx([0.1, 0.1])
+    (table,) = (block for block in section.blocks if hasattr(block, "rows"))
+    assert table.rows[-1] == ("model.onnx of these", "0.10 cm, 0.57°", "0.20 cm, 1.15°", "-, 1.15°", "3", "1")
 
 
 def test_its_pictures_can_be_printed(dataset: Dataset, model: Path, tmp_path: Path) -> None:

@@ -104,7 +104,7 @@ def test_the_documented_command_gives_the_same_report_again_with_or_without_a_di
 ) -> None:
     text = (Path(__file__).parents[3] / "docs" / "report.md").read_text(encoding="utf-8")
     (command,) = re.findall(r"^throwcollect dataset (report .*)$", text, flags=re.MULTILINE)
-    shutil.copytree(collected, tmp_path / "datasets" / "quick")
+    shutil.copytree(collected, tmp_path / "datasets" / "quickstart")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("DISPLAY", "nowhere:7")
     with mpl.rc_context({"backend": "tkagg"}):

@@ -133,6 +133,7 @@ test("a model is told in sentences, before and after it was adapted", () => {
     adaptation: null, score: null,
   };
   assert.match(describe(model), /1021 throws of quick: task.duration_s to landing_x_m, landing_y_m\. .* 0\.21 cm \(median\)\. Nobody/);
+  assert.match(describe({ ...model, targets: [...model.targets, "hit_angle_rad"] }), /predicted to 0\.0021 \(over targets of several units\) \(median\)/);
   const adaptation = { method: "bias", throws: 3, before: [0.1, 0.2, 0.3], after: [0.01, 0.03, 0.02], found: [{ name: "task.duration_s", value: 0.01234, deviation: 0.001 }] };
   assert.match(describe({ ...model, adaptation }), /by 3 throws \(bias\): .* 20\.00 cm .* before, and 2\.00 cm after.* task\.duration_s 0\.0123 ± 0\.001\./);
   assert.match(describe({ ...model, adaptation: { ...adaptation, throws: 1, before: [0.1], after: [] } }), /by 1 throw \(bias\): .* 10\.00 cm from their prediction before \(median\)/);

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import typer
 
-from throwcollect.cli.dataset import derive, export, info, repair, replay, report, verify, view
+from throwcollect.cli.dataset import derive, export, info, render, repair, replay, report, verify, view
 
 dataset_app = typer.Typer(help="Look into datasets, and make others of them.", no_args_is_help=True)
 
@@ -24,6 +24,7 @@ _COMMANDS: dict[str, Callable[..., None]] = {
     "stats": derive.show_statistics,
     "report": report.report_dataset,
     "view": view.view_dataset,
+    "render": render.render_dataset,
     "replay": replay.replay_dataset,
 }
 for name, command in _COMMANDS.items():

@@ -48,6 +48,8 @@ def print_summary(found: Info, directory: Path | None, *, as_json: bool) -> None
     look = command("dataset", "info", directory) if directory is not None else None
     if look is not None and not as_json:
         typer.echo(f"look into it: {look}   (or open the .mcap files in Foxglove)")
+        typer.echo(f"see it all:   {command('dataset', 'report', directory)}   (a page with every plot)")
+        typer.echo(f"in Python:    dataset = throwcollect.load({jsonlib.dumps(str(directory))})")
     ensure_written(hint=look and f"{look} prints it again")
 
 

@@ -24,6 +24,18 @@
     };
   }
 
+  // The darkest colours of the scale cannot be told from a dark page; on a phone the scale lies below the plot, which gets its width.
+  function colours(axis, narrow) {
+    var changes = {};
+    if (dark.matches) { changes.colorscale = [[0, "#2a788e"], [0.35, "#22a884"], [0.7, "#7ad151"], [1, "#fde725"]]; }
+    if (narrow && axis.colorbar) {
+      changes.colorbar = Object.assign({}, axis.colorbar, {
+        orientation: "h", y: -0.2, yanchor: "top", title: Object.assign({}, axis.colorbar.title, { side: "bottom" })
+      });
+    }
+    return Object.assign({}, axis, changes);
+  }
+
   function withoutWebgl(spec) {
     spec.data.forEach(function (trace) { if (trace.type === "scattergl") { trace.type = "scatter"; } });
   }
@@ -40,7 +52,11 @@
   function draw(element) {
     var spec = specs.get(element);
     var layout = Object.assign({}, spec.layout, { template: template() });
-    return Plotly.react(element, spec.data, layout, { responsive: true, displaylogo: false, displayModeBar: false });
+    if (layout.coloraxis) { layout.coloraxis = colours(layout.coloraxis, element.clientWidth < 480); }
+    var data = spec.data.map(function (trace) {
+      return trace.type === "heatmap" && trace.colorscale ? colours(trace, element.clientWidth < 480) : trace;
+    });
+    return Plotly.react(element, data, layout, { responsive: true, displaylogo: false, displayModeBar: false });
   }
 
   function redraw() { specs.forEach(function (_, element) { draw(element); }); }

@@ -15,7 +15,7 @@ from throwcollect.report.throw.landings import Landings
 _BINS = 14
 _LABELS = {
     "distance_m": "landing distance [m]",
-    "hit_angle_rad": "hit angle below the horizontal [rad]",
+    "hit_angle_rad": "hit angle below the horizontal [°]",
     "height_m": "landing height [m]",
 }
 
@@ -35,12 +35,12 @@ class Axis:
 
 @dataclass(frozen=True)
 class Coverage:
-    """Throws that landed as planned, in cells of targets.
+    """Throws that landed, in cells of targets.
 
     Attributes:
         axes: One to three dimensions.
         counts: Throws in each cell, of one dimension for each axis.
-        throws: Number of throws that landed as planned, in a cell or not.
+        throws: Number of throws that landed, in a cell or not.
         asked: Whether the cells are those of the configuration; else they lie between the lowest and highest values.
     """
 
@@ -73,7 +73,7 @@ def count_throws(landings: Landings, throws: pa.Table, *, target: TargetConfig |
     """Count throws in the cells of a configuration's targets, or of what was reached if it has none.
 
     Args:
-        landings: Throws that landed as planned.
+        landings: Throws that landed.
         throws: Table of all throws.
         target: Targets of the configuration.
 
@@ -82,7 +82,7 @@ def count_throws(landings: Landings, throws: pa.Table, *, target: TargetConfig |
     """
     if not len(landings):
         return None
-    values = {"distance_m": landings.distance_m, "hit_angle_rad": landings.hit_angle_rad}
+    values = {"distance_m": landings.distance_m, "hit_angle_rad": np.degrees(landings.hit_angle_rad)}
     if target is None:
         edges = {name: _choose_edges(column) for name, column in values.items()}
     else:
@@ -91,6 +91,8 @@ def count_throws(landings: Landings, throws: pa.Table, *, target: TargetConfig |
         bins = target.dimensions
         values = {name: column for name, column in values.items() if name in bins}
         edges = {name: np.linspace(bins[name].min, bins[name].max, bins[name].bins + 1) for name in values}
+        if "hit_angle_rad" in edges:
+            edges["hit_angle_rad"] = np.degrees(edges["hit_angle_rad"])
     counts, _ = np.histogramdd(np.column_stack(list(values.values())), list(edges.values()))
     axes = tuple(Axis(_LABELS[name], edges[name]) for name in values)
     return Coverage(axes, counts.astype(np.intp), len(landings), target is not None)

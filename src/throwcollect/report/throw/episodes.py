@@ -84,11 +84,11 @@ class JointMotion:
     release_s: float | None
 
     def span(self, column: int) -> tuple[float, float]:
-        """Range of positions to show of a joint [rad], at least 0.1 rad, so that joints at rest look at rest."""
-        both = np.concatenate([self.commanded[:, column], self.measured[:, column]])
+        """Range of positions to show of a joint [°], at least 6°, so that joints at rest look at rest."""
+        both = np.degrees(np.concatenate([self.commanded[:, column], self.measured[:, column]]))
         both = both[np.isfinite(both)]
         low, high = (float(both.min()), float(both.max())) if len(both) else (0.0, 0.0)
-        room = max(0.05 * (high - low), 0.05 - (high - low) / 2)
+        room = max(0.05 * (high - low), 3.0 - (high - low) / 2)
         return low - room, high + room
 
 
@@ -116,7 +116,7 @@ def choose_examples(dataset: Dataset, landed: Landings, outcomes: Outcomes) -> t
 
     Args:
         dataset: The dataset.
-        landed: Throws that landed as planned.
+        landed: Throws that landed.
         outcomes: Outcomes of all its trials.
     """
     recorded = set(_find_recorded(dataset).tolist())

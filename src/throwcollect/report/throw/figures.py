@@ -53,12 +53,12 @@ def draw_release_map(landings: Landings, outcomes: Outcomes) -> go.Figure:
     figure = _draw_coloured(
         landings,
         outcomes,
-        columns=("speed_mps", "elevation_rad", "distance_m"),
-        hover="%{x:.2f} m/s at %{y:.3f} rad, landed at %{marker.color:.3f} m",
+        columns=("speed_mps", "elevation_deg", "distance_m"),
+        hover="%{x:.2f} m/s at %{y:.1f}°, landed at %{marker.color:.3f} m",
         scale_title="landing distance [m]",
     )
     figure.update_xaxes(title="release speed [m/s]")
-    figure.update_yaxes(title="release elevation [rad]")
+    figure.update_yaxes(title="release elevation [°]")
     return figure.update_layout(height=420)
 
 
@@ -199,14 +199,14 @@ def draw_joint(motion: JointMotion, column: int) -> go.Figure:
     ):
         figure.add_scatter(
             x=single_precision(motion.times_s),
-            y=single_precision(values[:, column]),
+            y=single_precision(np.degrees(values[:, column])),
             mode="lines",
             name=name,
             line=line,
-            hovertemplate=f"%{{x:.3f}} s, %{{y:.4f}} rad<extra>{name}</extra>",
+            hovertemplate=f"%{{x:.3f}} s, %{{y:.2f}}°<extra>{name}</extra>",
         )
     if motion.release_s is not None:
         figure.add_vline(x=motion.release_s, line=MOMENT_LINE, name="release")
     figure.update_xaxes(title="time [s]")
-    figure.update_yaxes(title="position [rad]", range=list(motion.span(column)))
+    figure.update_yaxes(title="position [°]", range=list(motion.span(column)))
     return figure.update_layout(height=230, showlegend=False)

@@ -36,6 +36,11 @@ class Landings:
     elevation_rad: NDArray[np.float64]
     code: NDArray[np.intp]
 
+    @property
+    def elevation_deg(self) -> NDArray[np.float64]:
+        """Direction of flight at release above the horizontal [°], as figures show it."""
+        return np.degrees(self.elevation_rad)
+
     def __len__(self) -> int:
         return len(self.trial)
 

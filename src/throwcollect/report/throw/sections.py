@@ -71,7 +71,7 @@ def _choose_middle(paths: Sequence[BallPath]) -> int:
 def _show_key_numbers(landings: Landings, outcomes: Outcomes) -> Iterator[Tile]:
     trials = len(outcomes.codes)
     yield Tile(f"{trials:,}", "throws planned")
-    yield Tile(format_share(outcomes.succeeded, trials), "landed as planned")
+    yield Tile(format_share(outcomes.succeeded, trials), "landed")
     if len(landings):
         distance, speed = landings.distance_m, landings.speed_mps
         yield Tile(f"{distance.min():.2f}–{distance.max():.2f} m", "landing distance")
@@ -98,7 +98,7 @@ def _show_landings(
 def _show_targets(coverage: Coverage | None) -> Iterator[Panel]:
     if coverage is None:
         return
-    text = f"{coverage.hit:,} of {coverage.counts.size:,} cells have a throw that landed as planned, "
+    text = f"{coverage.hit:,} of {coverage.counts.size:,} cells have a throw that landed, "
     text += f"at most {coverage.counts.max():,}"
     if coverage.asked:
         text += f"; {coverage.throws - int(coverage.counts.sum()):,} landed in no cell"
@@ -122,7 +122,7 @@ def _show_releases(landings: Landings, outcomes: Outcomes) -> Section:
         return Section("release", "Release", title, "No ball crossed the landing plane.")
     text = (
         f"Of the balls that crossed the landing plane, the median speed is {np.median(landings.speed_mps):.2f} m/s, "
-        f"the median elevation {np.median(landings.elevation_rad):.3f} rad above the horizontal."
+        f"the median elevation {np.median(landings.elevation_deg):.1f}° above the horizontal."
     )
     figure = figures.draw_release_map(landings, outcomes)
     panel = Panel("map", "Speed and elevation at release", figure, _say_how_many(landings), picture="release")
@@ -150,13 +150,13 @@ def _show_examples(
     )
     note = f"Joints of trial {motion.trial}: measured (blue) and commanded (orange, dashed)"
     note += "; the vertical line is the release." if motion.release_s is not None else "."
-    errors = np.abs(motion.measured - motion.commanded).max(axis=0)
+    errors = np.degrees(np.abs(motion.measured - motion.commanded).max(axis=0))
     joints = tuple(
         Panel(
             key=joint,
             title=joint,
             figure=figures.draw_joint(motion, column),
-            text=f"Largest tracking error: {errors[column]:.2g} rad.",
+            text=f"Largest tracking error: {errors[column]:.2g}°.",
             picture="joint_tracking",
             small=True,
         )

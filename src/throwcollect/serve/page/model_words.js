@@ -12,17 +12,26 @@ function inCentimetres(length) {
 }
 
 /**
+ * @param {number | null} length over all targets
+ * @param {string[]} targets whose names end with their units
+ * @returns {string} one of several units has no name
+ */
+function tellLength(length, targets) {
+  return length === null || targets.every((each) => each.endsWith("_m")) ? inCentimetres(length) : `${short(length)} (over targets of several units)`;
+}
+
+/**
  * What is known of a model, in sentences.
  * @param {any} model as the server tells it
  * @returns {string}
  */
 export function describe({ learned_from: name, throws, error, parameters, targets, adaptation, score }) {
   const texts = [`Learned from ${throws} throws of ${name}: ${parameters.join(", ")} to ${targets.join(", ")}.`,
-    `Throws that polynomials were not fitted to are predicted to ${inCentimetres(error)} (median).`];
+    `Throws that polynomials were not fitted to are predicted to ${tellLength(error, targets)} (median).`];
   if (adaptation) {
     const { method, throws: count, before, after, found } = adaptation;
-    texts.push(`Adapted by ${count} ${count === 1 ? "throw" : "throws"} (${method}): they ended ${inCentimetres(median(before))} from their prediction before`
-      + `${after.length ? `, and ${inCentimetres(median(after))} after, each predicted by the others` : ""} (median).`);
+    texts.push(`Adapted by ${count} ${count === 1 ? "throw" : "throws"} (${method}): they ended ${tellLength(median(before), targets)} from their prediction before`
+      + `${after.length ? `, and ${tellLength(median(after), targets)} after, each predicted by the others` : ""} (median).`);
     if (found.length) texts.push(`Found: ${found.map(({ name: key, value, deviation }) => `${key} ${short(value)} ± ${short(deviation)}`).join(", ")}.`);
   }
   texts.push(score ? `All distances below are those of throws in simulation, at ${score.targets} targets${score.seeds > 1 ? ` of each of ${score.seeds} seeds` : ""}.` : "Nobody has thrown with it yet; throwcollect score does, in simulation.");

@@ -43,7 +43,7 @@ def test_the_page_says_what_the_command_writes(tmp_path: Path, monkeypatch: pyte
     page = PAGE.read_text(encoding="utf-8")
     (command,) = re.findall(r"^throwcollect (dataset view .*)$", page, re.MULTILINE)
     monkeypatch.chdir(tmp_path)
-    Collection().collect(tmp_path / "datasets" / "quick")
+    Collection().collect(tmp_path / "datasets" / "quickstart")
     result = CliRunner().invoke(app, [*shlex.split(command), "--json"], catch_exceptions=False)
     assert result.exit_code == 0
     found = json.loads(result.stdout)

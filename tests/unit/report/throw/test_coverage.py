@@ -42,6 +42,6 @@ def test_cells_without_targets_are_of_round_numbers() -> None:
     assert found is not None
     distance, angle = found.axes
     assert distance.edges == pytest.approx(np.arange(1.0, 2.5001 + 0.1, 0.1)[: len(distance.edges)])
-    assert np.diff(angle.edges) == pytest.approx(0.01)
+    assert np.diff(angle.edges) == pytest.approx(0.5)
     assert found.counts.sum() == 3
     assert count_throws(landed([], []), pa.table({}), target=None) is None

@@ -1,0 +1,74 @@
+"""Make the pictures of the README: ``python packaging/pictures.py``, with the package and a Chromium installed.
+
+It collects `configs/wide.yaml` and `configs/quickstart.yaml` into a temporary directory, which takes some minutes, and
+writes ``docs/pictures/throw.webp``, ``landing-map.webp`` and ``report.webp``.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from PIL import Image
+
+import throwcollect
+from throwcollect.view.animation import render
+
+ROOT = Path(__file__).resolve().parents[1]
+PICTURES = ROOT / "docs" / "pictures"
+WIDTH = 900
+
+
+def collect(name: str, directory: Path) -> Path:
+    """Collect one of the configurations, unless that was done before."""
+    if not directory.exists():
+        config = ROOT / "configs" / f"{name}.yaml"
+        command = [sys.executable, "-m", "throwcollect", "up", "--runtime", "local", str(config)]
+        subprocess.run([*command, "--output", str(directory)], check=True)
+    return directory
+
+
+def far_throw(directory: Path) -> int:
+    """The trial that landed farthest from the robot."""
+    landed = throwcollect.load(directory).select("outcome == 'landed'")
+    return max(landed, key=lambda throw: throw["landing_x_m"]).trial
+
+
+def write(picture: Path, name: str) -> None:
+    """Write a picture as WebP, no wider than is shown."""
+    with Image.open(picture) as image:
+        height = round(image.height * WIDTH / image.width)
+        image.convert("RGB").resize((WIDTH, height), Image.Resampling.LANCZOS).save(
+            PICTURES / f"{name}.webp", quality=85
+        )
+
+
+def main(kept: Path) -> None:
+    """Write all pictures.
+
+    Args:
+        kept: Where the datasets are made, or are.
+    """
+    sys.path.insert(0, str(ROOT))
+    from tests.e2e.chromium import browse
+
+    wide, quickstart = (collect(name, kept / name) for name in ("wide", "quickstart"))
+    render(wide, PICTURES / "throw.webp", trial=far_throw(wide), slow=1.5)
+    page, plots = Path(tempfile.mkdtemp(dir=kept), "report.html"), Path(tempfile.mkdtemp(dir=kept))
+    command = [sys.executable, "-m", "throwcollect", "dataset", "report", str(quickstart)]
+    subprocess.run([*command, "--output", str(page), "--png", str(plots)], check=True)
+    write(plots / "landing_map.png", "landing-map")
+    with browse(page.as_uri(), width=1200, height=900) as tab:
+        tab.wait_for("document.querySelectorAll('.main-svg').length > 2")
+        tab.picture(kept / "report.png")
+    write(kept / "report.png", "report")
+
+
+if __name__ == "__main__":
+    if len(sys.argv) > 1:
+        main(Path(sys.argv[1]))
+    else:
+        with tempfile.TemporaryDirectory() as directory:
+            main(Path(directory))

@@ -1,0 +1,111 @@
+"""A configuration to begin with: a few keys and words about them, of a robot, task and sampler that are installed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+
+from pydantic import ValidationError
+
+from throwcollect.config.default_path import DEFAULT_CONFIG
+from throwcollect.config.loader import value_as_yaml
+from throwcollect.config.schema import Config
+from throwcollect.config.shape import root
+from throwcollect.errors import ConfigError
+from throwcollect.members import load_member, names_of
+
+POINTS = "throws.csv"
+"""The list of points that the sampler `list` reads, beside the configuration."""
+
+_NARROW_RAD = 0.2
+"""How far the last angle of a joint is varied to either side."""
+
+
+def samplers() -> list[str]:
+    """Names of all samplers."""
+    return root().child("sweep").child("sampler").choices
+
+
+def make_starter(robot: str, task: str, sampler: str) -> dict[str, str]:
+    """Write a configuration to begin with.
+
+    Args:
+        robot: Name of the robot.
+        task: Name of the task.
+        sampler: Name of the sampler.
+
+    Returns:
+        The text of the configuration as ``throwcollect.yaml``, and of `POINTS` if the sampler reads it.
+
+    Raises:
+        ConfigError: If there is no robot, task or sampler of that name, or the robot's files cannot be read.
+    """
+    for option, name, known in (
+        ("--robot", robot, names_of("robots")),
+        ("--task", task, names_of("tasks")),
+        ("--sampler", sampler, samplers()),
+    ):
+        if name not in known:
+            raise ConfigError(f"{option} {name}: no such {option[2:]} is installed", expected=" or ".join(known))
+    motion = _find_motion(robot, task)
+    start, end, duration_s = motion
+    joint = max(end, key=lambda name: abs(end[name] - start[name]))
+    ranges = {
+        f"task.end.{joint}": (round(end[joint] - _NARROW_RAD, 3), round(end[joint] + _NARROW_RAD, 3)),
+        "task.duration_s": (duration_s, round(1.3 * duration_s, 3)),
+    }
+    texts = {str(DEFAULT_CONFIG): "".join(f"{line}\n" for line in _lines(robot, task, sampler, motion, ranges))}
+    if sampler == "list":
+        rows = zip(*((low, (low + high) / 2, high) for low, high in ranges.values()), strict=True)
+        texts[POINTS] = "\n".join([",".join(ranges), *(",".join(f"{value:g}" for value in row) for row in rows), ""])
+    return texts
+
+
+_Motion = tuple[Mapping[str, float], Mapping[str, float], float]
+"""Angles at the start and at the end, by joint [rad], and the time in between [s]."""
+
+
+def _find_motion(robot: str, task: str) -> _Motion:
+    """The motion that the task has by default or, of another robot than that is for, one from its posture at rest."""
+    section: dict[str, object] = {"name": task}
+    values = {"name": "throws", "robot": {"name": robot}, "task": section}
+    try:
+        found = Config.model_validate(values, context=robot).task
+    except ValidationError:
+        rest = dict(load_member("robots", robot).rest_posture)
+        end = {joint: round(angle + 2 * _NARROW_RAD, 3) for joint, angle in rest.items()}
+        section |= {"start": rest, "end": end}
+        found = Config.model_validate(values, context=robot).task
+    return found.start, found.end, found.duration_s
+
+
+def _lines(
+    robot: str, task: str, sampler: str, motion: _Motion, ranges: Mapping[str, tuple[float, float]]
+) -> Iterator[str]:
+    start, end, duration_s = motion
+    yield "# What is collected. Angles are in radians, times in seconds; docs/configuration.md lists every key, and"
+    yield "# `throwcollect config` prints all of them. `throwcollect plan` says which trials the robot could not do."
+    yield "name: throws # of the dataset: datasets/throws"
+    yield f"trials: {'3' if sampler == 'list' else '200'}"
+    yield "seed: 1 # everything that is random follows from it"
+    yield ""
+    yield "robot:"
+    yield f"  name: {robot} # {_choices(names_of('robots'))}"
+    yield "task:"
+    yield f"  name: {task} # {_choices(names_of('tasks'))}"
+    yield f"  duration_s: {duration_s:g} # how long the arm swings"
+    yield f"  start: {value_as_yaml(dict(start))}"
+    yield f"  end: {value_as_yaml(dict(end))} # the joints that move"
+    yield ""
+    yield "sweep: # what varies from trial to trial: any number of any section, by its dotted key"
+    yield f"  sampler: {sampler} # {_choices(samplers())}"
+    if sampler == "list":
+        yield f"  file: {POINTS} # one row a trial, one column a key"
+        return
+    yield "  parameters:"
+    count = ", count: 20" if sampler == "grid" else ""
+    for number, (key, (low, high)) in enumerate(ranges.items()):
+        yield f"    {key}: {{min: {low:g}, max: {high:g}{', count: 10' if count and number else count}}}"
+
+
+def _choices(names: Iterable[str]) -> str:
+    return f"one of {', '.join(names)}"

@@ -1,0 +1,126 @@
+"""Pictures of a robot and a ball by Bullet's software renderer: no screen, no GPU, and nothing is simulated."""
+
+from __future__ import annotations
+
+import tempfile
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Mapping, Sequence
+from types import TracebackType
+
+import numpy as np
+import pybullet
+from numpy.typing import NDArray
+
+from throwcollect.engines.bullet.scenery import BASE, connect, links
+from throwcollect.engines.engine import Vector
+from throwcollect.errors import ConfigError
+
+_NOTHING_THERE = -1
+_UPRIGHT = (0.0, 0.0, 0.0, 1.0)
+
+
+class Renderer:
+    """A robot and a ball that are put where they are to be seen; a context manager.
+
+    Args:
+        urdf: URDF text of the robot; paths of meshes are absolute.
+        base_height_m: Height of its base above the ground [m].
+        ball_radius_m: Radius of the ball [m].
+        ball_rgba: Its colour.
+
+    Raises:
+        ConfigError: If Bullet cannot load the description.
+        WorkerError: If Bullet refuses to start another world in this process.
+    """
+
+    def __init__(
+        self, urdf: str, base_height_m: float, ball_radius_m: float, ball_rgba: tuple[float, float, float, float]
+    ) -> None:
+        self._client = connect()
+        self._robot = self._load(urdf, base_height_m)
+        self._joints = {
+            pybullet.getJointInfo(self._robot, number, physicsClientId=self._client)[1].decode(): number
+            for number in links(self._client, self._robot)
+            if number != BASE
+        }
+        sphere = pybullet.createVisualShape(
+            pybullet.GEOM_SPHERE, radius=ball_radius_m, rgbaColor=ball_rgba, physicsClientId=self._client
+        )
+        self._ball = pybullet.createMultiBody(0, baseVisualShapeIndex=sphere, physicsClientId=self._client)
+
+    def __enter__(self) -> Renderer:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        pybullet.disconnect(self._client)
+
+    def _load(self, urdf: str, base_height_m: float) -> int:
+        with tempfile.NamedTemporaryFile("w", prefix="throwcollect-", suffix=".urdf", encoding="utf-8") as file:
+            file.write(_with_masses(urdf))
+            file.flush()
+            try:
+                position = [0, 0, base_height_m]
+                return int(pybullet.loadURDF(file.name, position, useFixedBase=True, physicsClientId=self._client))
+            except pybullet.error as error:
+                pybullet.disconnect(self._client)
+                raise ConfigError(f"Bullet cannot load the robot's description: {error}") from error
+
+    def place(self, joints: Mapping[str, float], ball: Vector) -> None:
+        """Put robot and ball somewhere.
+
+        Args:
+            joints: Angle of each joint that is not at 0 [rad].
+            ball: Centre of the ball in world [m].
+        """
+        for name, angle in joints.items():
+            pybullet.resetJointState(self._robot, self._joints[name], angle, physicsClientId=self._client)
+        pybullet.resetBasePositionAndOrientation(self._ball, ball, _UPRIGHT, physicsClientId=self._client)
+
+    def find_frames(self) -> list[Vector]:
+        """Origins of the frames of the robot's links in world [m]."""
+        states = pybullet.getLinkStates(
+            self._robot, list(self._joints.values()), computeForwardKinematics=True, physicsClientId=self._client
+        )
+        return [state[4] for state in states]
+
+    def draw(
+        self, width: int, height: int, *, view: Sequence[float], projection: Sequence[float], light: Vector
+    ) -> NDArray[np.uint8]:
+        """Draw what a camera sees.
+
+        Args:
+            width: Width of the picture in pixels.
+            height: Its height.
+            view: World to camera as OpenGL has it: 16 numbers, column by column.
+            projection: Camera to clip space, alike.
+            light: Where the light comes from.
+
+        Returns:
+            Red, green, blue and 255 where there is something, else 0; shape ``(height, width, 4)``.
+        """
+        _, _, colors, _, what = pybullet.getCameraImage(
+            width,
+            height,
+            view,
+            projection,
+            lightDirection=light,
+            shadow=0,
+            renderer=pybullet.ER_TINY_RENDERER,
+            physicsClientId=self._client,
+        )
+        picture = np.array(colors, np.uint8).reshape(height, width, 4)
+        picture[..., 3] = np.where(np.array(what).reshape(height, width) == _NOTHING_THERE, 0, 255)
+        return picture
+
+
+def _with_masses(urdf: str) -> str:
+    """A description in which every link has a mass, as Bullet complains on standard output of those that have none."""
+    robot = ElementTree.fromstring(urdf)  # noqa: S314 - the dataset's own description
+    for link in robot.iter("link"):
+        if link.find("inertial") is None:
+            inertial = ElementTree.SubElement(link, "inertial")
+            ElementTree.SubElement(inertial, "mass", value="1")
+            ElementTree.SubElement(inertial, "inertia", ixx="1", ixy="0", ixz="0", iyy="1", iyz="0", izz="1")
+    return ElementTree.tostring(robot, encoding="unicode")

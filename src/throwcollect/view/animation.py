@@ -1,0 +1,182 @@
+"""Draws a stored throw as an animated picture: robot and ball as recorded, the ground, and the path of the ball."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from throwcollect.config.schema import Config
+from throwcollect.dataset.reader import Dataset
+from throwcollect.engines.bullet.renderer import Renderer
+from throwcollect.episode.record import Samples
+from throwcollect.errors import ConfigError
+from throwcollect.extras import lazily, require
+from throwcollect.files import write_file
+from throwcollect.robots.description import full_description, robot_of
+from throwcollect.tools.tool import tool_of
+from throwcollect.units import NS_PER_S
+from throwcollect.view.camera import Camera, camera_on
+from throwcollect.view.chosen import choose_rows
+from throwcollect.view.robot import BALL_RGBA, read_drawn_robot
+
+images = lazily("PIL.Image")
+drawing = lazily("PIL.ImageDraw")
+
+_FORMATS = MappingProxyType({".webp": "WEBP", ".gif": "GIF"})
+_WIDTH, _HEIGHT = 640, 400
+_FINER = 1.5
+"""Pictures are drawn so many times as large and then made smaller, as the renderer does not smooth edges."""
+_FRAME_MS = 50
+_LAST_FRAME_MS = 1200
+_LIGHT = (2.0, -5.0, 8.0)
+_ROOM_M = 0.15
+"""How far the robot's shapes reach beyond the frames of its links, roughly."""
+_GRID_M = 0.5
+_SKY, _GROUND, _LINE = (247, 249, 251), (233, 237, 241), (210, 216, 223)
+_HELD, _FLOWN, _LANDED = (150, 156, 164), (255, 115, 0), (200, 30, 30)
+
+
+@dataclass(frozen=True)
+class Animation:
+    """What has been written.
+
+    Attributes:
+        file: The file.
+        trial: Number of the trial.
+        pictures: Number of pictures.
+        duration_s: How long they take to watch [s], without the time for which the last one stands.
+        size_bytes: Size of the file.
+    """
+
+    file: Path
+    trial: int
+    pictures: int
+    duration_s: float
+    size_bytes: int
+
+
+def render(directory: Path, output: Path, *, trial: int | None = None, slow: float = 1.0) -> Animation:
+    """Draw a throw of a dataset.
+
+    Args:
+        directory: The dataset.
+        output: File to write, ``.webp`` or ``.gif``; one that is there is replaced.
+        trial: Number of the trial; None for the first one that has an episode.
+        slow: How many times slower than it was it is shown.
+
+    Raises:
+        ConfigError: If there is no such format or trial, or the robot's files cannot be read.
+        DatasetError: If the dataset is damaged or not finished, the trial has no episode, or `output` cannot be
+            written.
+        MissingExtraError: If Pillow is not installed.
+    """
+    kind = _FORMATS.get(output.suffix.lower())
+    if kind is None:
+        raise ConfigError(
+            f"{output}: no animated picture ends like this", expected=f"a name with {' or '.join(_FORMATS)}"
+        )
+    require("PIL")
+    dataset = Dataset.open(directory)
+    row = choose_rows(dataset, None if trial is None else [trial])[0]
+    config = dataset.plan.config_of(dataset.plan.trial(row["trial"]))
+    samples = dataset.episode(row["trial"]).samples(dataset.joints)
+    pictures = _draw_all(config, dataset.joints, samples, row, slow)
+    times = [_FRAME_MS] * (len(pictures) - 1) + [_LAST_FRAME_MS]
+    buffer = io.BytesIO()
+    pictures[0].save(
+        buffer, kind, save_all=True, append_images=pictures[1:], duration=times, loop=0, quality=80, method=4
+    )
+    write_file(output, buffer.getvalue())
+    shown_s = (len(pictures) - 1) * _FRAME_MS / 1000
+    return Animation(output, row["trial"], len(pictures), shown_s, len(buffer.getvalue()))
+
+
+def _draw_all(config: Config, joints: tuple[str, ...], samples: Samples, row: dict[str, Any], slow: float) -> list[Any]:
+    """Draw the pictures of a throw, one every `_FRAME_MS`, and its last sample."""
+    robot = read_drawn_robot(full_description(config), tool_of(config.tool).link, robot_of(config).share())
+    urdf = robot.urdf.replace("package://", f"{robot.share}/")
+    times_s = (samples.stamps_ns - samples.stamps_ns[0]) / NS_PER_S
+    shown = [*np.searchsorted(times_s, np.arange(0, times_s[-1], _FRAME_MS / 1000 / slow)), len(samples) - 1]
+    released_s = row.get("release_time_s")
+    released = len(samples) if released_s is None else int(np.searchsorted(times_s, released_s))
+    landing = None if row.get("landing_x_m") is None else np.array([row[f"landing_{axis}_m"] for axis in "xyz"])
+    with Renderer(urdf, config.robot.base_height_m, config.ball.radius_m, BALL_RGBA) as renderer:
+        points = [samples.ball_position]
+        for number in shown:
+            _place(renderer, joints, samples, number)
+            frames = np.array(renderer.find_frames())
+            points += [frames - _ROOM_M, frames + _ROOM_M]
+        everything = np.concatenate(points)
+        everything[:, 2] = np.maximum(everything[:, 2], 0)
+        camera = camera_on(everything, _WIDTH / _HEIGHT)
+        ground = _Ground(camera, everything[:, :2].mean(axis=0))
+        pictures = []
+        for number in shown:
+            _place(renderer, joints, samples, number)
+            picture = ground.picture()
+            ball = samples.ball_position[: number + 1]
+            ground.mark(picture, ball[-1], landing if number == shown[-1] else None)
+            ground.trace(picture, ball[: released + 1], _HELD)
+            ground.trace(picture, ball[released:], _FLOWN)
+            seen = renderer.draw(*ground.size, view=camera.view, projection=camera.projection, light=_LIGHT)
+            body = images.fromarray(seen)
+            picture.paste(body, (0, 0), body)
+            pictures.append(picture.resize((_WIDTH, _HEIGHT), images.Resampling.LANCZOS))
+    return pictures
+
+
+def _place(renderer: Renderer, joints: tuple[str, ...], samples: Samples, number: int) -> None:
+    angles = map(float, samples.position[number])
+    x, y, z = map(float, samples.ball_position[number])
+    renderer.place(dict(zip(joints, angles, strict=True)), (x, y, z))
+
+
+class _Ground:
+    """The ground with lines every half metre, and what is drawn on it and above it, but for robot and ball.
+
+    Args:
+        camera: Who sees it.
+        middle: What it is around in world [m], shape ``(2,)``.
+    """
+
+    def __init__(self, camera: Camera, middle: NDArray[np.float64]) -> None:
+        self._camera = camera
+        self.size = (round(_WIDTH * _FINER), round(_HEIGHT * _FINER))
+        self._empty = images.new("RGB", self.size, _SKY)
+        pen = drawing.Draw(self._empty)
+        reach = 2.5 * float(np.linalg.norm(camera.eye[:2] - middle))
+        pen.rectangle((0, camera.horizon * self.size[1], *self.size), fill=_GROUND)
+        across = np.linspace(-reach, reach, 200)
+        for at in np.arange(-(reach // _GRID_M), reach // _GRID_M + 1) * _GRID_M:
+            along = np.full_like(across, at)
+            for x, y in ((along, across), (across, along)):
+                line = np.column_stack([x, y, np.zeros_like(x)])
+                line[:, :2] += np.round(middle / _GRID_M) * _GRID_M
+                pen.line(self._pixels(line[camera.faces(line)]), fill=_LINE, width=1)
+
+    def _pixels(self, points: NDArray[np.float64]) -> list[tuple[float, float]]:
+        return [(float(x), float(y)) for x, y in self._camera.project(points) * self.size]
+
+    def picture(self) -> Any:
+        """A picture of the ground alone."""
+        return self._empty.copy()
+
+    def trace(self, picture: Any, path: NDArray[np.float64], color: tuple[int, int, int]) -> None:
+        """Draw the path of the ball, whose centres have the shape ``(n, 3)``."""
+        if len(path) > 1:
+            drawing.Draw(picture).line(self._pixels(path), fill=color, width=3, joint="curve")
+
+    def mark(self, picture: Any, ball: NDArray[np.float64], landing: NDArray[np.float64] | None) -> None:
+        """Draw the shadow of the ball, and a cross where it landed."""
+        pen = drawing.Draw(picture)
+        ((x, y),) = self._pixels(ball[np.newaxis] * [1, 1, 0])
+        pen.ellipse((x - 9, y - 3, x + 9, y + 3), fill=_LINE)
+        if landing is not None:
+            for step in (np.array([0.1, 0.1, 0.0]), np.array([0.1, -0.1, 0.0])):
+                pen.line(self._pixels(np.stack([landing - step, landing + step])), fill=_LANDED, width=3)

@@ -1,0 +1,36 @@
+"""Which throws of a dataset are shown."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from throwcollect.dataset.reader import Dataset
+from throwcollect.dataset.throws_table import Row
+from throwcollect.errors import ConfigError, DatasetError
+
+
+def choose_rows(dataset: Dataset, trials: Iterable[int] | None) -> list[Row]:
+    """Find the rows of the table of throws that are shown.
+
+    Args:
+        dataset: The dataset.
+        trials: Numbers of the trials, in this order; None: all that have an episode.
+
+    Raises:
+        ConfigError: If there is no such trial.
+        DatasetError: If a trial has no episode, or none has one.
+    """
+    rows = dataset.throws.to_pylist()
+    if trials is None:
+        chosen = [row for row in rows if row["shard"] is not None]
+        if not chosen:
+            raise DatasetError("no trial has an episode: there is nothing to show", path=dataset.directory)
+        return chosen
+    numbers = list(trials)
+    for number in numbers:
+        if not 0 <= number < len(rows):
+            raise ConfigError(f"{dataset.directory}: no trial {number}", expected=f"0 to {len(rows) - 1}")
+        if rows[number]["shard"] is None:
+            reason = f"{rows[number]['outcome']}: {rows[number]['reason']}"
+            raise DatasetError(f"trial {number} has no episode: {reason}", path=dataset.directory)
+    return [rows[number] for number in numbers]

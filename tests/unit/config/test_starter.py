@@ -1,0 +1,72 @@
+"""A configuration to begin with: complete, of what is installed, and nobody's work is lost."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from throwcollect.cli.starting import init
+from throwcollect.config.default_path import DEFAULT_CONFIG
+from throwcollect.config.loader import load
+from throwcollect.config.starter import make_starter, samplers
+from throwcollect.errors import ConfigError
+from throwcollect.sweep.plan import make_plan
+
+PLUGINS = Path(__file__).parents[2] / "plugins"
+
+
+@pytest.mark.parametrize("sampler", samplers())
+def test_every_sampler_has_one_that_gives_a_plan(sampler: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    init(sampler=sampler)
+    config = load(DEFAULT_CONFIG)
+    assert config.sweep.sampler == sampler
+    assert len(make_plan(config).trials) == config.trials
+
+
+def test_a_file_that_is_there_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "throws.csv").write_text("mine")
+    with pytest.raises(ConfigError, match=r"throws\.csv: is there already"):
+        init(sampler="list")
+    assert [path.read_text() for path in tmp_path.iterdir()] == ["mine"]
+
+
+def test_a_robot_of_another_package_moves_from_its_posture_at_rest(tmp_path: Path) -> None:
+    paths = os.pathsep.join([str(PLUGINS), os.environ.get("PYTHONPATH", "")])
+    for command in (("init", "--robot", "planar_arm"), ("config",)):
+        done = subprocess.run(
+            [sys.executable, "-m", "throwcollect", *command],
+            cwd=tmp_path,
+            env={**os.environ, "PYTHONPATH": paths},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+    assert "name: planar_arm" in done.stdout
+    assert "arm_right" not in done.stdout
+    assert "name: planar_arm # one of talos, planar_arm" in (tmp_path / DEFAULT_CONFIG).read_text(encoding="utf-8")
+
+
+def test_no_file_says_how_to_have_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ConfigError, match="throwcollect init writes one"):
+        load(DEFAULT_CONFIG)
+
+
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [
+        (("atlas", "throw", "sobol"), "--robot atlas: no such robot is installed\n  expected: talos"),
+        (("talos", "catch", "sobol"), "--task catch: no such task is installed\n  expected: throw"),
+        (("talos", "throw", "halton"), "--sampler halton: no such sampler is installed\n  expected: grid or "),
+    ],
+)
+def test_what_is_not_installed_is_told_with_what_is(names: tuple[str, str, str], said: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        make_starter(*names)
+    assert str(caught.value).startswith(said)

@@ -1,0 +1,85 @@
+"""A throw drawn: as long as it was, with robot, ball and path in the picture, and a sentence where there is none."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from PIL import Image
+
+from throwcollect.dataset.reader import Dataset
+from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.view.animation import Animation, render
+from throwcollect.view.camera import camera_on
+
+
+def picture(path: Path, number: int) -> NDArray[np.int_]:
+    with Image.open(path) as file:
+        file.seek(number)
+        return np.array(file.convert("RGB"), int)
+
+
+def count_orange(pixels: NDArray[np.int_]) -> int:
+    """Pixels with the colour of the path in flight."""
+    return int((np.abs(pixels - [255, 115, 0]).sum(axis=2) < 90).sum())
+
+
+@pytest.fixture(scope="module")
+def written(collected: Path, tmp_path_factory: pytest.TempPathFactory) -> Animation:
+    return render(collected, tmp_path_factory.mktemp("render") / "throw.webp", trial=4)
+
+
+def test_it_takes_as_long_as_the_throw(collected: Path, written: Animation) -> None:
+    throw = Dataset.open(collected).throws.to_pylist()[4]
+    assert written.duration_s == pytest.approx(throw["landing_time_s"], abs=0.06)
+    with Image.open(written.file) as file:
+        assert file.format == "WEBP"
+        assert file.n_frames == written.pictures
+    assert written.size_bytes == written.file.stat().st_size < 2_000_000
+
+
+def test_the_robot_moves_and_the_path_grows(written: Animation) -> None:
+    first, middle, last = (picture(written.file, at) for at in (0, written.pictures * 2 // 3, written.pictures - 1))
+    assert (first.sum(axis=2) < 150).mean() > 0.01  # Talos has black legs
+    assert np.abs(first - middle).max() > 100
+    assert count_orange(first) < count_orange(middle) < count_orange(last)
+
+
+def test_slower_takes_longer(collected: Path, written: Animation, tmp_path: Path) -> None:
+    slow = render(collected, tmp_path / "throw.GIF", trial=4, slow=2)
+    assert slow.duration_s == pytest.approx(2 * written.duration_s, abs=0.11)
+    assert slow.file.read_bytes()[:6] == b"GIF89a"
+
+
+def test_the_camera_sees_all_points_and_stands_no_farther_than_needed() -> None:
+    points = np.random.default_rng(1).uniform([-0.5, -0.5, 0], [3, 1, 2], (200, 3))
+    shares = camera_on(points, 1.6).project(points)
+    assert shares.min() > 0
+    assert shares.max() < 1
+    assert min(shares.min(), 1 - shares.max()) == pytest.approx(0.06)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ({"trial": 7}, r"no trial 7\n.*0 to 6"),
+        ({"output": "throw.mp4"}, r"throw.mp4: no animated picture ends like this\n.*\.webp or \.gif"),
+    ],
+)
+def test_what_cannot_be_drawn_is_told(collected: Path, tmp_path: Path, arguments: dict[str, Any], said: str) -> None:
+    output = tmp_path / arguments.pop("output", "throw.webp")
+    with pytest.raises(ConfigError, match=said):
+        render(collected, output, **arguments)
+    assert not output.exists()
+
+
+def test_a_trial_without_an_episode_is_told(make_collection: Any, tmp_path: Path) -> None:
+    collection = make_collection()
+    collection.refuse(1, "the arm would hit the head")
+    trials = [number for number in range(7) if number != 1]
+    directory = collection.collect(tmp_path / "dataset", trials)
+    with pytest.raises(DatasetError, match="trial 1 has no episode: refused: the arm would hit the head"):
+        render(directory, tmp_path / "throw.webp", trial=1)
