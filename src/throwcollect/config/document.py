@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import stat
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -79,11 +79,15 @@ class Document:
             holder = holder[index] if _holds(holder, index) else None
         return self.problem(location, problem.message)
 
-    def override(self, given: str) -> None:
+    def override(
+        self, given: str, *, find_default: Callable[[Location], Mapping[str, object]] = lambda _location: {}
+    ) -> None:
         """Replace one key; what is wrong with the override joins the problems.
 
         Args:
             given: Dotted key, equals sign and value, as in ``task.duration_s=1.1``; the value is read as YAML.
+            find_default: Says what a mapping holds that the file does not have, so that one key of it is replaced and
+                the others stay.
         """
         key, equals, text = given.partition("=")
         key = key.strip()
@@ -105,7 +109,7 @@ class Document:
             index = _index(holder, part)
             location = (*location, index)
             if isinstance(holder, dict) and holder.get(part) is None:
-                holder[part] = {}
+                holder[part] = dict(find_default(location))
                 self._lines[location] = None
             holder = holder[index] if _holds(holder, index) else None
         index = _index(holder, last)

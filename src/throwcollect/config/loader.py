@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from copy import deepcopy
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,8 @@ from throwcollect.files import StrPath
 from throwcollect.members import names_of
 
 _PARAMETERS = ("sweep", "parameters")
+_SHALLOWEST_MAPPING = 2
+"""Parts of its key: all keys of the first level are sections or single values."""
 _PLAIN_WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_./-]*")
 _NOT_PLAIN = {"true", "false", "null", "yes", "no", "on", "off", "y", "n"}
 
@@ -56,7 +59,7 @@ def load_locating_errors(path: Path, overrides: Sequence[str] = ()) -> Iterator[
     """
     document = Document(path)
     for override in overrides:
-        document.override(override)
+        document.override(override, find_default=partial(_find_default, document.values))
     config, found, more = _check(document.values)
     problems = [document.problem(each.location, each.sentence) for each in found]
     unknown = sum(each.unknown for each in found)
@@ -91,6 +94,16 @@ def value_as_yaml(value: Any) -> str:
 def _character(character: str) -> str:
     plain = character.isprintable() and character not in '"\\'
     return character if plain else f"\\U{ord(character):08x}"
+
+
+def _find_default(values: dict[str, Any], location: Location) -> Mapping[str, object]:
+    """What a mapping that is no section, such as ``task.end``, holds by default; nothing if it is not there at all."""
+    if len(location) < _SHALLOWEST_MAPPING:
+        return {}
+    holder: Any = _check(values)[0]
+    for part in location:
+        holder = getattr(holder, str(part), None)
+    return holder if isinstance(holder, dict) else {}
 
 
 def _check(values: dict[str, Any]) -> tuple[Config | None, list[Finding], int]:

@@ -195,3 +195,21 @@ def test_resolved_text_shows_every_key():
     assert "  topics: [joint_states, ball/odometry]" in lines
     assert "trials: null" in lines
     assert dump_yaml(Config(name="on")).startswith('name: "on"\n')
+
+
+def test_an_override_replaces_one_joint_and_leaves_the_others_as_they_are_by_default(tmp_path: Path) -> None:
+    path = tmp_path / "throws.yaml"
+    path.write_text("name: throws\n")
+    default = load(path).task.end
+    changed = load(path, ["task.end.arm_right_4_joint=-0.3", "task.end.torso_1_joint=0.1"]).task.end
+    assert changed == {**default, "arm_right_4_joint": -0.3, "torso_1_joint": 0.1}
+    # What the file says of the moving joints stays so.
+    path.write_text("name: throws\ntask: {end: {arm_right_4_joint: -0.5}}\n")
+    assert load(path, ["task.end.arm_right_7_joint=0.4"]).task.end == {
+        "arm_right_4_joint": -0.5,
+        "arm_right_7_joint": 0.4,
+    }
+    # A problem is told at the override, and nothing of the defaults is in its way.
+    path.write_text("name: throws\n")
+    with pytest.raises(ConfigError, match=r"^task\.end\.arm_right_9_joint: "):
+        load(path, ["task.end.arm_right_9_joint=1"])
