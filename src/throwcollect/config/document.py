@@ -19,6 +19,9 @@ from throwcollect.config.yaml_nodes import MOST_LEVELS, MOST_VALUES, compose, li
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.wording import command
 
+Plain = bool | float | str | list[float] | None
+"""What a mapping of a configuration holds."""
+
 _TAG = "tag:yaml.org,2002:"
 _MOST_BYTES = 5_000_000
 _SWEPT = ("sweep", "parameters")
@@ -80,7 +83,7 @@ class Document:
         return self.problem(location, problem.message)
 
     def override(
-        self, given: str, *, find_default: Callable[[Location], Mapping[str, object]] = lambda _location: {}
+        self, given: str, *, find_default: Callable[[Location], Mapping[str, Plain]] = lambda _location: {}
     ) -> None:
         """Replace one key; what is wrong with the override joins the problems.
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from throwcollect.config.document import Document
+from throwcollect.config.document import Document, Plain
 from throwcollect.config.problems import MOST_EXAMINED, Finding, Location, findings, join_key
 from throwcollect.config.schema import Config, Range
 from throwcollect.config.values import reason_not_sweepable, with_values
@@ -96,7 +96,7 @@ def _character(character: str) -> str:
     return character if plain else f"\\U{ord(character):08x}"
 
 
-def _find_default(values: dict[str, Any], location: Location) -> Mapping[str, object]:
+def _find_default(values: dict[str, Any], location: Location) -> Mapping[str, Plain]:
     """What a mapping that is no section, such as ``task.end``, holds by default; nothing if it is not there at all."""
     if len(location) < _SHALLOWEST_MAPPING:
         return {}
