@@ -177,6 +177,6 @@ def test_a_command_that_simulates_has_a_hint_for_pythons_without_a_wheel(environ
 def test_doctor_tells_which_extras_are_missing(environment: Path) -> None:
     checks = {each["name"]: each for each in json.loads(run(environment, "throwcollect", "doctor", "--json").stdout)}
     assert checks["extras"]["finding"].startswith(
-        "without collect, docker, export, mujoco, pandas and 2 more (try: pip install"
+        "without collect, docker, export, mujoco, onnx and 3 more (try: pip install"
     )
     assert checks["robot"]["status"] == checks["embedded"]["status"] == checks["pybullet"]["status"] == "problem"

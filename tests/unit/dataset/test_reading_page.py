@@ -17,7 +17,7 @@ BLOCKS = re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL)
 
 def run(block: str, collected: Path, directory: Path) -> str:
     (directory / "datasets").mkdir()
-    shutil.copytree(collected, directory / "datasets" / "quick")
+    shutil.copytree(collected, directory / "datasets" / "quickstart")
     (directory / "example.py").write_text(block, encoding="utf-8")
     command = [sys.executable, "-W", "error::UserWarning", "example.py"]
     ended = subprocess.run(command, check=False, cwd=directory, capture_output=True, text=True, timeout=300)
