@@ -1,7 +1,7 @@
 """From a dataset to a throw at a target, and to another robot; in cells, for editors that run them one by one.
 
-Collect first: ``throwcollect up -n 2 configs/quickstart.yaml --output datasets/quick``. Then, from the same directory:
-``python examples/learning.py datasets/quick configs/quickstart.yaml configs/real.yaml``.
+Collect first: ``throwcollect up -n 2 configs/quickstart.yaml --trials 1024 --output datasets/many``. Then, from there:
+``python examples/learning.py datasets/many configs/quickstart.yaml configs/real.yaml``.
 """
 
 # %% What there is

@@ -47,7 +47,7 @@ if [ -z "$named" ] && command -v "$uv" > /dev/null && "$uv" venv --quiet --seed 
     exit
 fi
 
-because="for which pybullet has no wheel: MuJoCo simulates, whose throws land centimetres elsewhere (docs/engines.md)"
+because="for which pybullet has no wheel: MuJoCo simulates, whose throws land some millimetres elsewhere (docs/engines.md)"
 for python in ${named:-python3 python3.12 python3.13 python3.14}; do
     suits "$python" "(3, 12)" "(3, 15)" "$MAKES" && make_with "$python" ", $because"
     if command -v "$uv" > /dev/null && suits "$python" "(3, 10)" "(3, 15)"; then

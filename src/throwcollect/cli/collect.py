@@ -54,7 +54,7 @@ def up(
     config: Annotated[
         Path | None,
         typer.Argument(
-            metavar="[CONFIG]", help="YAML file of the collection; throwcollect.yaml by default.", readable=False
+            metavar="CONFIG", help="YAML file of the collection; throwcollect.yaml by default.", readable=False
         ),
     ] = None,
     simulations: SimulationsOption = None,

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from throwcollect.cli.options import ConfigArgument, DatasetArgument, JsonOption, SetOption, overrides
+from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.errors import ConfigError, PlanError
 from throwcollect.extras import require
 from throwcollect.side_by_side import count_cores
@@ -139,7 +140,7 @@ def aim(
 
 
 def throw(
-    path: ConfigArgument,
+    path: ConfigArgument = DEFAULT_CONFIG,
     settings: SetOption = None,
     points: Annotated[
         Path | None, typer.Option("--list", metavar="FILE", help="CSV or Parquet file: a throw for each row.")

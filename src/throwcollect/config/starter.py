@@ -11,6 +11,7 @@ from throwcollect.config.loader import value_as_yaml
 from throwcollect.config.schema import Config
 from throwcollect.config.shape import root
 from throwcollect.errors import ConfigError
+from throwcollect.extras import has_wheel
 from throwcollect.members import load_member, names_of
 
 POINTS = "throws.csv"
@@ -95,6 +96,9 @@ def _lines(
     yield f"  duration_s: {duration_s:g} # how long the arm swings"
     yield f"  start: {value_as_yaml(dict(start))}"
     yield f"  end: {value_as_yaml(dict(end))} # the joints that move"
+    if not has_wheel("pybullet"):
+        yield "sim:"
+        yield "  engine: mujoco # bullet, the default, has no wheel for this Python"
     yield ""
     yield "sweep: # what varies from trial to trial: any number of any section, by its dotted key"
     yield f"  sampler: {sampler} # {_choices(samplers())}"

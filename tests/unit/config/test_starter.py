@@ -28,6 +28,16 @@ def test_every_sampler_has_one_that_gives_a_plan(sampler: str, tmp_path: Path, m
     assert len(make_plan(config).trials) == config.trials
 
 
+@pytest.mark.parametrize(("there", "engine"), [(True, "bullet"), (False, "mujoco")])
+def test_where_bullet_has_no_wheel_mujoco_simulates(
+    there: bool, engine: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("throwcollect.config.starter.has_wheel", lambda _package: there)
+    path = tmp_path / "throws.yaml"
+    path.write_text(make_starter("talos", "throw", "sobol")[str(DEFAULT_CONFIG)])
+    assert load(path).sim.engine == engine
+
+
 def test_a_file_that_is_there_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "throws.csv").write_text("mine")

@@ -27,7 +27,7 @@ def show_info(directory: DatasetArgument, json: JsonOption = False) -> None:
 
 
 def show_digest(directory: DatasetArgument) -> None:
-    """Print one hash over all episodes in trial order."""
+    """Print the digest of all episodes in trial order."""
     from throwcollect.dataset.inspect import digest
 
     typer.echo(digest(directory))
