@@ -157,7 +157,7 @@ def test_a_target_out_of_reach_is_told_with_the_nearest_point(place: Path) -> No
 
 def test_the_program_of_the_documents_runs(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (program,) = re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL)
-    program = program.replace('"datasets/quick"', '"data"').replace('"configs/quickstart.yaml"', '"throws.yaml"')
+    program = program.replace('"datasets/many"', '"data"').replace('"configs/quickstart.yaml"', '"throws.yaml"')
     x, y = middle(place).split(",")
     (place / "program.py").write_text(program.replace("(1.4, -0.2)", f"({x}, {y})"))
     monkeypatch.chdir(place)
