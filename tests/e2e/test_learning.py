@@ -4,13 +4,14 @@ import csv
 import json
 import re
 import runpy
+import shlex
 import shutil
 from pathlib import Path
 
 import pytest
 
 import throwcollect
-from tests.e2e.collection import call_here
+from tests.e2e.collection import INPROCESS, call_here
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "learning.md").read_text(encoding="utf-8")
@@ -50,6 +51,35 @@ def test_what_aiming_prints_throws_there(place: Path) -> None:
     x, y = map(float, target.split(","))
     assert row["landing_x_m"] == pytest.approx(x, abs=0.03)
     assert row["landing_y_m"] == pytest.approx(y, abs=0.03)
+
+
+def test_the_commands_of_the_page_work_as_they_stand_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = (ROOT / "configs" / "quickstart.yaml").read_text(encoding="utf-8")
+    Path("configs").mkdir()
+    Path("configs", "quickstart.yaml").write_text(text + "\nsim: {engine: ballistic}\nrun: {replay: 0}\n")
+    fewer = PAGE.replace("--trials 1024", "--trials 200").replace("--targets 20  ", "--targets 3 --seeds 1  ")
+    # This engine throws elsewhere.
+    fewer = fewer.replace("--at 1.3,-0.1", "--at 1.31,-0.05")
+    lines = "".join(re.findall(r"```bash\n(.*?)```", fewer, flags=re.DOTALL)).splitlines()
+    lines += re.findall(r"^    (throwcollect .*)$", fewer, flags=re.MULTILINE)
+    assert " ".join(line.split()[1] for line in lines) == "up fit aim throw score aim up dataset adapt"
+    said = ""
+    for line in lines:
+        if "measured.csv" in line:
+            # Whoever has the robot writes it.
+            throws = throwcollect.load("datasets/aimed")
+            keys = [*throws.parameters.names, "landing_x_m", "landing_y_m"]
+            rows = [",".join(repr(float(throw[key])) for key in keys) for throw in throws]
+            Path("measured.csv").write_text("\n".join([",".join(keys), *rows]))
+        inner = re.search(r"\$\((throwcollect .*?)\)", line)
+        whole = line.replace(inner[0], call_here(*shlex.split(inner[1])[1:]).stdout) if inner else line
+        words = shlex.split(whole.replace("$PWD", str(tmp_path)), comments=True)[1:]
+        done = call_here(*words, *(INPROCESS if words[0] == "up" else ()))
+        assert done.returncode == 0, (line, done.stderr)
+        said += done.stdout
+    assert re.search(r"^miss_m +2 of 2 targets: median ", said, re.MULTILINE)
+    assert Path("models", "real", "model.json").exists()
 
 
 def test_targets_become_a_list_of_throws_and_these_adapt_a_model(place: Path) -> None:
