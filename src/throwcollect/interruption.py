@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import os
 import signal
 
 _PR_SET_PDEATHSIG = 1
@@ -17,6 +18,12 @@ def stop_signals() -> tuple[signal.Signals, ...]:
     return (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
-def die_with_parent() -> None:
-    """Have the kernel end this process by force when its parent dies; for children between fork and exec."""
+def die_with_parent(parent: int) -> None:
+    """Have the kernel end this process by force when its parent dies; for children right after a fork.
+
+    Args:
+        parent: Process id of the parent. If it has died already, which the kernel tells nobody, this process ends now.
+    """
     _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != parent:
+        os._exit(1)

@@ -114,10 +114,7 @@ _make: list[Callable[[], Callable[[Any], Any]]] = []
 
 
 def _begin(make: Callable[[], Callable[[Any], Any]], parent: int) -> None:
-    die_with_parent()
-    if os.getppid() != parent:
-        # It died before it could take this process along.
-        os._exit(1)
+    die_with_parent(parent)
     # What is here now stays until the end; the garbage collector need not go through it again and again.
     gc.freeze()
     # It is made for the first piece and not here, where an error would not reach whoever wants the work done.

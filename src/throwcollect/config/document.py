@@ -111,6 +111,7 @@ class Document:
         for part in above:
             index = _index(holder, part)
             location = (*location, index)
+            # A section that the file leaves out gets its defaults, so that the others stay when one key of it is set.
             if isinstance(holder, dict) and holder.get(part) is None:
                 holder[part] = dict(find_default(location))
                 self._lines[location] = None
@@ -120,6 +121,7 @@ class Document:
             self.problems.append(Problem(f"nothing of this name can be set; got {quote(text)}", key))
             return
         location = (*location, index)
+        # Problems below the key come from the override now, and not from a line of the file.
         self._lines = {known: line for known, line in self._lines.items() if known[: len(location)] != location}
         self._lines[location] = None
         holder[index] = self._plain(node, location, in_file=False)

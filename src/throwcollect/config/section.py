@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import ast
 import inspect
+import sys
+from functools import cache
 from itertools import pairwise
 from typing import Any
 
@@ -34,11 +36,21 @@ def _read_docstrings(section: type[Section]) -> dict[str, str]:
     """The docstrings that stand below the fields of a section and of its bases, by name of the field."""
     found: dict[str, str] = {}
     for each in reversed(section.__mro__):
-        if not issubclass(each, Section):
+        if issubclass(each, Section):
+            found |= _read_docstrings_of_module(each.__module__).get(each.__qualname__, {})
+    return found
+
+
+@cache
+def _read_docstrings_of_module(module: str) -> dict[str, dict[str, str]]:
+    """The docstrings of fields, by class: a module is parsed once, as cutting each class out of it takes longer."""
+    classes: dict[str, dict[str, str]] = {}
+    for node in ast.parse(inspect.getsource(sys.modules[module])).body:
+        if not isinstance(node, ast.ClassDef):
             continue
-        statements = [line for top in ast.parse(inspect.getsource(each)).body for line in getattr(top, "body", ())]
-        for above, below in pairwise(statements):
+        found = classes[node.name] = {}
+        for above, below in pairwise(node.body):
             match above, below:
                 case ast.AnnAssign(target=ast.Name(name)), ast.Expr(ast.Constant(str(text))):
                     found[name] = inspect.cleandoc(text)
-    return found
+    return classes

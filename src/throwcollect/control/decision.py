@@ -67,6 +67,7 @@ class Judge:
                 return Decision(GoalStatus.ABORTED, ErrorCode.PATH_TOLERANCE_VIOLATED, text)
         if not past_end:
             return None
+        # As ros2_controllers do: a timeout of 0, and a tolerance of time of 0, mean that there is none.
         late_ns = motion.since_end_ns
         if 0 < self.timeout_ns < late_ns:
             text = f"Aborted due to command timeout: {late_ns / 1e9:f} seconds after the end"

@@ -63,6 +63,7 @@ class TrialCollection:
         self._leases = Leases(writer.plan.trials.numbers_to_run, retries=self._config.run.retries)
         self._growth = Growth(writer.plan) if self._config.grows else None
         self._names: dict[str, str] = {}
+        self._took_part: set[str] = set()
         self._acceptance = Acceptance(self._config)
         task = task_of(self._config)
         self._columns, self._outcome_names = task.columns, task.outcomes
@@ -170,6 +171,7 @@ class TrialCollection:
             name: Name of its node.
         """
         self._names[simulation] = name
+        self._took_part.add(name)
 
     def leave(self, simulation: str, reason: str) -> None:
         """Take its trials back from a simulation that is gone, and forget it; the next of its name is another one."""
@@ -332,7 +334,7 @@ class TrialCollection:
             )
         if (said := self._replay.compare(self.writer.digests(), meanwhile=meanwhile)) is not None:
             say(said)
-        outcomes = self.writer.finish()
+        outcomes = self.writer.finish(simulations=len(self._took_part) or None)
         lost = loss(outcomes, hint=f"{command('resume', known)} runs them again" if known else None)
         if lost is not None:
             raise lost

@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import IO
@@ -116,7 +117,7 @@ class _Process:
             stdin=subprocess.DEVNULL,
             stdout=self._printed,
             stderr=self._said,
-            preexec_fn=die_with_parent,  # noqa: PLW1509 - it calls nothing that takes a lock
+            preexec_fn=partial(die_with_parent, os.getpid()),  # noqa: PLW1509 - it calls nothing that takes a lock
         )
 
     def wait(self, meanwhile: Callable[[], None]) -> None:

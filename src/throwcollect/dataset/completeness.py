@@ -69,6 +69,7 @@ def _without_manifest(directory: Path, plan: Plan, *, in_full: bool) -> Iterator
         except OSError as error:
             yield Finding(name, "", "is missing" if isinstance(error, FileNotFoundError) else "is not a file")
             continue
+        # An MCAP file begins and ends with the same bytes, and the end is written last.
         with open(descriptor, "rb") as file:
             begins = file.read(len(MAGIC))
             file.seek(-min(len(MAGIC), os.fstat(descriptor).st_size), os.SEEK_END)

@@ -199,6 +199,7 @@ class McapContents:
 
         Records need not follow each other: chunks are found by the bytes that all their headers hold.
         """
+        # The bytes of a header may occur by chance, so the length that they announce has to fit into the file, too.
         mark = self.find(CHUNK_MARK, start + CHUNK_MARK_OFFSET)
         while mark >= 0:
             offset = mark - CHUNK_MARK_OFFSET
@@ -245,6 +246,7 @@ class McapContents:
         """
         chunks: list[StoredChunk] = []
         record = self.record(offset)
+        # Bounded, as a damaged file may have chunk after chunk and no metadata.
         while record.opcode == Opcode.CHUNK and len(chunks) < MOST_CHUNKS:
             indexes, following = self.message_indexes(record.end)
             chunks.append(StoredChunk(record, indexes))
@@ -272,6 +274,7 @@ def map_file(path: Path) -> Iterator[McapContents]:
         descriptor = open_regular(path)
         try:
             size = os.fstat(descriptor).st_size
+            # An empty file cannot be mapped.
             data = mmap.mmap(descriptor, 0, access=mmap.ACCESS_READ) if size else b""
         finally:
             os.close(descriptor)

@@ -56,7 +56,7 @@ class Provenance:
         platform: Its system and processor.
         python: Version of Python.
         libraries: Versions of the libraries that the data pass through.
-        simulations: Number of simulations; None if not known.
+        simulations: Number of simulations of the run that finished it; None if it had none, or if not known.
         wall_s: Real time that it took [s]; None if not known.
         was_open: Whether anybody who reached its router could join it.
         revision: Git revision of the sources that ran, with ``-dirty`` behind it if they were changed; None if they lie

@@ -105,6 +105,7 @@ def _rebuild(directory: Path) -> Rebuilt:
             path=directory,
             hint=f"{command('resume', directory)}, or {repair}",
         )
+    # The plan says what each recording should be, so it has to be whole before anything is derived from it.
     if wrong := find_wrong_trials(plan):
         raise DatasetError(
             "was changed since the plan was made", path=directory / PLAN, place=f"trial {min(wrong)}", hint=repair
@@ -115,6 +116,7 @@ def _rebuild(directory: Path) -> Rebuilt:
         if (directory / name).exists():
             if findings := recordings.read(directory / name):
                 raise DatasetError(str(findings[0]), path=directory, hint=repair)
+        # A file that no row names may be missing: all of its trials were refused, or lost.
         elif any(row["shard"] == name for row in earlier.values()):
             raise DatasetError(f"{name} is missing", path=directory, hint=repair)
     table, task = ThrowsTable.of(plan), task_of(config)
@@ -127,6 +129,7 @@ def _rebuild(directory: Path) -> Rebuilt:
     written = [*WRITTEN]
     if not (directory / CARD).exists():
         provenance = read_provenance(directory)
+        # Datasets of earlier versions have none, and who collected them is not known any more.
         if provenance is None:
             provenance = Provenance.of_this_machine(
                 simulations=None, wall_s=None, was_open=was_open(directory), robot=channels.robot
@@ -139,6 +142,7 @@ def _rebuild(directory: Path) -> Rebuilt:
         for row in rows
         if (before := earlier.get(trial := row["trial"])) and before["outcome"] != row["outcome"]
     )
+    # A card may have been edited by hand, so only the numbers in it are put right.
     if rejudged and CARD not in written:
         _correct_card(directory / CARD, table.table(earlier.values()), throws)
         written.append(CARD)

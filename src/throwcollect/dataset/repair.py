@@ -177,6 +177,7 @@ def _plan_of_table(path: Path, config: Config) -> Plan:
     """
     table = read_parquet(path)
     names = table.column_names
+    # Between number and outcome are the columns that were drawn: swept keys, then targets.
     drawn = names[1 : names.index("outcome")] if "outcome" in names else []
     keys = tuple(name for name in drawn if not is_target(name))
     targets = tuple(name for name in drawn if is_target(name))

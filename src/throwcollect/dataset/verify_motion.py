@@ -60,8 +60,10 @@ def find_joint_problems(trial: RecordedTrial) -> Iterator[str]:
     if apart.max() > tolerance:
         joint = robot.joints[int(apart.argmax())]
         yield f"{joint} starts {apart.max():.3g} rad away from the start posture of the trial"
+    # Where a goal failed, the joints need not have followed it.
     if any(goal.status in _FAILED_GOALS for goal in trial.header.goals):
         return
+    # A motor at its limit falls behind, and what comes after it says nothing about honesty.
     saturated = (shares >= _AT_LIMIT).any(axis=1)
     followed = int(saturated.argmax()) if saturated.any() else len(samples)
     wanted = _where_motors_should_be(trial)[:followed]

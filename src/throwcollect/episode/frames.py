@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,8 +76,9 @@ class FrameTree:
     moving: tuple[MovingFrame, ...]
 
 
+@lru_cache(maxsize=4)
 def read_frames(urdf: str, *, base_height: float) -> FrameTree:
-    """Frames of a robot.
+    """Frames of a robot; they are remembered, as several parts of a process ask for those of its only robot.
 
     Args:
         urdf: URDF text of the robot.

@@ -125,6 +125,7 @@ class MessageTable:
         self._first = FirstRow(contents, samples)
         self.columns = self._first.columns
         self._table: NDArray[np.uint8] = np.frombuffer(contents, np.uint8).reshape(samples, -1)
+        # Opcode, length and channel are the first bytes of a record: where they repeat, so does the layout.
         for channel, column in self.columns.items():
             alike = self._table[:, column.offset : column.offset + _ALIKE_BYTES]
             if alike.tobytes() != alike[0].tobytes() * samples:

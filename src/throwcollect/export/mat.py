@@ -216,10 +216,12 @@ def _fit_primitives(motions: Sequence[JointTrajectory]) -> list[DynamicMovementP
         return []
     shares = np.linspace(0, 1, _FIT_POINTS)
     sampled = [sample_quintic(motion, shares * motion.times[-1]) for motion in motions]
+    # A motion that lasts T is played in 1: its derivatives grow by T and T squared.
     positions, velocities, accelerations = (
         np.hstack([each[order] * motion.times[-1] ** order for each, motion in zip(sampled, motions, strict=True)])
         for order in range(3)
     )
+    # A primitive has each joint once, so columns of several motions get names with their numbers.
     names = [(number, joint) for number, motion in enumerate(motions) for joint in motion.joints]
     together = fit_dmp(
         [f"{number} {joint}" for number, joint in names],

@@ -147,6 +147,7 @@ def _find(
     role = ROLES.get(method)
     columns = learned.columns_of(role) if role else slice(0, 0)
     width = columns.stop - columns.start
+    # How far each number is believed to go before any throw was seen: the prior of the least squares below.
     spread = np.full(width + targets, _SMALL_OFFSET if width else _OFFSET)
     spread[:width] = _BIAS if method is Method.BIAS else _LATENT
     low, high = _ends(learned, method, len(spread))
@@ -154,6 +155,7 @@ def _find(
     for step in range(_STEPS):
         current = learned.correct(_shift(learned.correction, method, found))
         inputs = current.in_world(parameters, context)
+        # Residuals by neighbours jump where the nearest ones change, so they are held after the first steps.
         if step < (_LOOKS if begun is None else 1):
             residuals = current.predict_residuals(inputs)
         missing = places - (current.forward.predict(inputs) + residuals + current.correction.offset)
@@ -163,6 +165,7 @@ def _find(
         slopes[:, :, width:] = np.eye(targets)
         flat = slopes.reshape(-1, len(found))
         transposed = np.ascontiguousarray(flat.T)
+        # The normal equations of measurements and prior, with sums in the same order on every processor.
         normal = matmul(transposed, flat) / scatter**2 + np.eye(len(found)) / spread**2
         right = matmul(transposed, missing.reshape(-1, 1))[:, 0] / scatter**2 - found / spread**2
         before, found = found, _step_inside(normal, right, found, low, high)

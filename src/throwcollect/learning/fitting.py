@@ -112,9 +112,11 @@ def fit_throws(
         efforts: Largest shares of a joint's torque limit, shape ``(n,)``.
     """
     inputs, folds = scale_values(axes, values), _folds(outputs)
+    # Latents come last; they matter little beside one another, so terms of two of them are left out.
     minor = sum(axis.role is Role.LATENT for axis in axes)
     validation = cross_validate(inputs, outputs, folds, minor=minor)
     known = [axis.role is not Role.LATENT for axis in axes]
+    # What the error would be without latents tells whether they are worth knowing.
     blind = None if all(known) else float(np.median(cross_validate(inputs[:, known], outputs, folds).best))
     forward = fit_polynomial(inputs, outputs, validation.degree, minor=minor)
     effort = fit_polynomial(inputs, efforts[:, np.newaxis], min(_EFFORT_DEGREE, validation.degree))
@@ -150,6 +152,7 @@ def _find_axes(
         ends = pc.min_max(throws[key]).as_py()
         low, high = ends["min"], ends["max"]
         role = _role(dataset.config, key, parameters, context)
+        # A key that has one value says nothing, and would divide by zero when it is scaled.
         if low == high and low is not None:
             if key in parameters:
                 raise ConfigError(f"{key} has the value {low:g} in all throws", expected="a key that varies")
@@ -211,5 +214,6 @@ def _numbers(throws: pa.Table, column: str, dataset: Dataset) -> Array:
 def _folds(outputs: Array) -> NDArray[np.int64]:
     """Number of the fold of each throw; those that ended in one cell are in one fold."""
     cells = np.floor(outputs / _CELL).astype(np.int64)
+    # By a hash, so that a throw stays in its fold when others join, and on every processor.
     numbers = [hashlib.sha256(cell.tobytes()).digest()[0] % _FOLDS for cell in cells]
     return np.array(numbers, np.int64)

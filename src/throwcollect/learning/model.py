@@ -222,6 +222,7 @@ class Model:
             raise ConfigError(
                 "method: the dataset has no latents", expected="a dataset whose sweep varies the world", hint="try bias"
             )
+        # A throw lands where it does by its own scatter, and is predicted with the error of the model.
         deviation = float(np.hypot(scatter, self.file.trained_on.error))
         adapted = adapt(
             self.learned,

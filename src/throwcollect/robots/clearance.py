@@ -62,6 +62,7 @@ class Clearance:
             raise ConfigError(f"{robot.urdf_path}: its meshes cannot be read: {error}") from error
         for shape in geometry.geometryObjects:
             if isinstance(shape.geometry, pinocchio.coal.BVHModelBase):
+                # Bullet collides the convex hulls of meshes, so those are what has to stay apart.
                 shape.geometry.buildConvexHull(True, "Qt")
                 shape.geometry = shape.geometry.convex
         geometry.addAllCollisionPairs()
@@ -77,6 +78,8 @@ class Clearance:
         for request in self._distances.collisionRequests:
             request.security_margin = MARGIN_M
         self._broadphase = pinocchio.BroadPhaseManager_DynamicAABBTreeCollisionManager(model, geometry, self._distances)
+        # Postures that are clear by some distance vouch for those near them. Links with few joints between them are
+        # never clear by much, so they are looked at apart from the others.
         reaches = find_reaches(model, geometry)
         short = (reaches > 0).sum(axis=1) <= _SHORT_CHAIN
         self._clear = [

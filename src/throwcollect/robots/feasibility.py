@@ -97,6 +97,7 @@ class Feasibility:
                 f"{' and '.join(approach.links)} {_gap(approach.distance_m)} at {times[rows[approach.index]]:.3f} s; "
                 f"they must stay {MARGIN_M * 1000:.3g} mm apart"
             )
+        # A throw whose tool never moves is a mistake in the configuration, and not a short throw.
         if config.task.throws and np.ptp(positions[:, self._carrying], axis=0).max() <= _POSITION_SLACK_RAD:
             carrying = ", ".join(joints[column] for column in self._carrying)
             return f"task.end moves no joint that carries the {tool.name}; these do: {carrying}"
@@ -112,6 +113,7 @@ class Feasibility:
         joints, locked = self._robot.joints, find_locked_joints(config)
         positions, velocities, _ = motion
         limits = self._limits
+        # About the middle of its range, a joint has one limit in both directions.
         middle, half = (limits.upper + limits.lower) / 2, (limits.upper - limits.lower) / 2
         if worst := _worst(positions - middle, half + _POSITION_SLACK_RAD):
             row, joint = worst
@@ -127,6 +129,7 @@ class Feasibility:
                 f"its limit is {limits.velocity[joint]:.4g} rad/s"
             )
         limit = limits.effort * np.where([joint in locked for joint in joints], np.inf, config.robot.effort_scale)
+        # The cheap model decides most trials: only one that comes near a limit is worked out with all joints, and told.
         free = self._dynamics_of_free_joints(locked)
         shares = np.abs(free.efforts(config, self._tool_of(config), motion)) / limit[free.columns]
         if (shares <= _SURELY).all():
@@ -208,6 +211,7 @@ def _whole_body(
 
 def _spread(positions: NDArray[np.float64]) -> NDArray[np.intp]:
     """Rows between which some joint has moved by at least `_CLEARANCE_STEP_RAD`, with the first and the last row."""
+    # How far the fastest joint has gone by each instant: slow parts of a motion need few checks.
     travel = np.cumsum(np.abs(np.diff(positions, axis=0)).max(axis=1))
     passed = np.diff(np.floor(travel / _CLEARANCE_STEP_RAD), prepend=0.0) > 0
     passed[-1] = True

@@ -15,9 +15,17 @@ from typing import Literal
 from throwcollect import ros_installation
 from throwcollect.engine_packages import PACKAGES
 from throwcollect.errors import ConfigError
-from throwcollect.extras import EXTRA_OF, MissingExtraError, explain_missing, has_wheel, install_command, is_installed
+from throwcollect.extras import (
+    EXTRA_OF,
+    MissingExtraError,
+    MissingLibraryError,
+    explain_missing,
+    has_wheel,
+    install_command,
+    is_installed,
+)
 from throwcollect.members import names_of
-from throwcollect.robots.limits import joint_limits
+from throwcollect.robots.description import joint_model
 from throwcollect.robots.talos import TALOS
 from throwcollect.runtimes.registry import get_runtime
 from throwcollect.runtimes.runtime import Check
@@ -69,10 +77,9 @@ def _check_engine(name: str) -> Check:
 
 def _check_robot() -> Check:
     try:
-        joint_limits(TALOS)
-        _ = TALOS.rest_posture
+        joint_model(TALOS)
         return Check("robot", "ok", f"Talos of example-robot-data {version('example-robot-data')}, {TALOS.urdf_path}")
-    except (ConfigError, MissingExtraError) as error:
+    except (ConfigError, MissingExtraError, MissingLibraryError) as error:
         return Check("robot", "problem", "; try: ".join(filter(None, [error.message, error.hint])))
 
 

@@ -12,13 +12,11 @@ All of it is for its owner alone.
 
 from __future__ import annotations
 
-import errno
 import fcntl
 import json
 import os
 import secrets
 import shutil
-import tempfile
 import time
 from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, suppress
@@ -28,6 +26,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import TypeAdapter, ValidationError
+from pydantic_core import to_json
 
 from throwcollect.errors import ConfigError, ConflictError, NotFoundError
 from throwcollect.files import beside, write_all
@@ -35,13 +34,11 @@ from throwcollect.ros.connection import Connection
 from throwcollect.run_key import RunKey
 from throwcollect.runs.lock_file import is_locked
 from throwcollect.runs.record import VERSION, Record
+from throwcollect.runs.state_directory import state_directory, unusable
 from throwcollect.runtimes.registry import get_runtime
 from throwcollect.runtimes.runtime import Place
 from throwcollect.units import NS_PER_S
 from throwcollect.wording import command
-
-STATE_VARIABLE = "THROWCOLLECT_STATE"
-"""Names the directory of the records."""
 
 _REMEMBERED_S = 7 * 24 * 3600.0
 """Ended runs are remembered for this long."""
@@ -149,7 +146,7 @@ class OpenRun:
         try:
             self.directory.mkdir(mode=0o700, exist_ok=True)
         except OSError as error:
-            raise _unusable(self.directory, error) from error
+            raise unusable(self.directory, error) from error
         self.key.create()
 
     def write(self, record: Record) -> None:
@@ -164,7 +161,7 @@ class OpenRun:
             with beside(path, mode=0o600) as descriptor:
                 write_all(descriptor, _ADAPTER.dump_json(record, indent=1))
         except OSError as error:
-            raise _unusable(path, error) from error
+            raise unusable(path, error) from error
 
     def update(self, **changes: Any) -> None:
         """Change fields of the record, if they are not so already.
@@ -206,7 +203,7 @@ class Records:
             # Whoever may read in the directory above, which the user has named, shall see nothing of what is in here.
             self._runs.chmod(0o700)
         except OSError as error:
-            raise _unusable(self._runs, error) from error
+            raise unusable(self._runs, error) from error
 
     def new(self, name: str, *, run: str | None = None) -> OpenRun:
         """A new run, with a key but without a record yet; forgets what ended a week ago.
@@ -230,7 +227,7 @@ class Records:
                     raise ConflictError(f"there is a run {run} already") from error
                 continue
             except OSError as error:
-                raise _unusable(self._runs / f"{run}.lock", error) from error
+                raise unusable(self._runs / f"{run}.lock", error) from error
             fcntl.flock(lock, fcntl.LOCK_EX)
             made = OpenRun(self._runs, run, lock)
             with ExitStack() as undo:
@@ -252,7 +249,7 @@ class Records:
         try:
             lock = os.open(self._runs / f"{run}.lock", os.O_RDWR | os.O_CREAT, 0o600)
         except OSError as error:
-            raise _unusable(self._runs / f"{run}.lock", error) from error
+            raise unusable(self._runs / f"{run}.lock", error) from error
         deadline = time.monotonic() + _LOCK_PATIENCE_S
         while True:
             try:
@@ -283,6 +280,17 @@ class Records:
     def all(self) -> list[Run]:
         """All runs whose records can be read, the latest last."""
         return sorted(self._read_all(self.ids()), key=lambda each: each.record.started)
+
+    def into(self, directory: Path) -> list[Run]:
+        """Runs that collect, or have collected, into a directory and no volume; the latest last.
+
+        There may be thousands of records, so those that do not name the directory are not taken apart.
+        """
+        name = str(directory.absolute())
+        written = to_json(name)
+        runs = self._read_all(run for run in self.ids() if written in _read_bytes(self._runs / f"{run}.json"))
+        chosen = (run for run in runs if run.record.volume is None and run.record.directory == name)
+        return sorted(chosen, key=lambda each: each.record.started)
 
     def _read_all(self, runs: Iterable[str]) -> Iterator[Run]:
         for run in runs:
@@ -327,37 +335,16 @@ def _outlived(record: Record) -> bool:
         return True
 
 
-def state_directory() -> Path:
-    """A directory of this user alone; not that of the login, which vanishes when the last terminal is closed.
-
-    Raises:
-        ConfigError: If it cannot be made, or others own it or may write there.
-    """
-    named = os.environ.get(STATE_VARIABLE)
-    try:
-        path = Path(named).absolute() if named else Path(tempfile.gettempdir()) / f"throwcollect-{os.getuid()}"
-    except FileNotFoundError as error:
-        raise ConfigError(
-            "runs cannot be remembered: no directory for temporary files can be written",
-            hint=f"name a directory in {STATE_VARIABLE}",
-        ) from error
-    try:
-        path.mkdir(mode=0o700, parents=bool(named), exist_ok=True)
-        # A link that the user has named is the user's own choice.
-        owner = path.stat(follow_symlinks=bool(named))
-    except OSError as error:
-        raise _unusable(path, error) from error
-    # In a directory that all may write to, somebody else may have been faster.
-    if owner.st_uid != os.getuid() or owner.st_mode & (0o022 if named else 0o077):
-        raise ConfigError(
-            f"{path}: runs cannot be remembered there: it belongs to somebody else, or others may write there",
-            hint=f"name another directory in {STATE_VARIABLE}, or remove it",
-        )
-    return path
-
-
 def _key(runs: Path, run: str) -> RunKey:
     return RunKey(runs / run / "key")
+
+
+def _read_bytes(path: Path) -> bytes:
+    """Contents of a file; none if it cannot be read."""
+    try:
+        return path.read_bytes()
+    except OSError:
+        return b""
 
 
 def _read(path: Path) -> Record:
@@ -374,14 +361,6 @@ def _read(path: Path) -> Record:
     except FileNotFoundError as error:
         raise NotFoundError(f"no run {path.stem}", hint="throwcollect ps -a lists all") from error
     except OSError as error:
-        raise _unusable(path, error) from error
+        raise unusable(path, error) from error
     except (ValueError, ValidationError) as error:
         raise ConfigError(f"{path}: the record of the run is damaged", hint=hint) from error
-
-
-def _unusable(path: Path, error: OSError) -> ConfigError:
-    hint = "free space there" if error.errno == errno.ENOSPC else "check who may write there"
-    return ConfigError(
-        f"{path}: runs cannot be remembered there: {error.strerror}",
-        hint=f"{hint}, or name another directory in {STATE_VARIABLE}",
-    )

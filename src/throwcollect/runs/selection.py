@@ -113,8 +113,8 @@ def id_of(records: Records, named: str) -> str:
     ids = records.ids()
     if named in ids:
         return named
-    if into := _into(records, Path(named)):
-        return into[0].record.run
+    if into := records.into(Path(named)):
+        return into[-1].record.run
     alike = [run for run in ids if run.startswith(named)]
     if len(alike) == 1:
         return alike[0]
@@ -146,7 +146,7 @@ def find_left_in(records: Records, directory: Path, *, own: str | None = None) -
         ConfigError: If a run whose launcher lives collects into it.
         WorkerError: If such a run may be left, which cannot be found out in time.
     """
-    for run in _into(records, directory):
+    for run in reversed(records.into(directory)):
         if run.id == own:
             continue
         if run.status == "running":
@@ -162,12 +162,6 @@ def find_left_in(records: Records, directory: Path, *, own: str | None = None) -
                 hint=error.hint,
             ) from error
     return None
-
-
-def _into(records: Records, directory: Path) -> list[Run]:
-    """Runs that collect, or have collected, into a directory; the latest first."""
-    path = str(directory.absolute())
-    return [run for run in reversed(records.all()) if run.record.volume is None and run.record.directory == path]
 
 
 def busy(record: Record) -> ConflictError:

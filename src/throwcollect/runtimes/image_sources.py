@@ -25,7 +25,7 @@ UNKNOWN = "unknown"
 
 _PACKAGE = Path(__file__).parents[1]
 """This package, as it is installed."""
-_SOURCES = ("pyproject.toml", "README.md", "configs/quickstart.yaml", "src")
+_SOURCES = ("pyproject.toml", "configs/quickstart.yaml", "src")
 _INTERFACES = ("packaging/ros_interfaces", "packaging/ros_constraints.txt")
 """What the wheel with interfaces of ROS 2 is made from, besides sources."""
 _LEFT_OUT = re.compile(r"__pycache__|.*\.egg-info")

@@ -24,6 +24,7 @@ import sys
 import time
 import warnings
 from collections.abc import Mapping, Sequence
+from functools import partial
 from types import MappingProxyType
 from typing import BinaryIO, NoReturn
 
@@ -174,7 +175,7 @@ class NodeServer:
                 env=self._environment,
                 pass_fds=[there.fileno()],
                 start_new_session=True,
-                preexec_fn=die_with_parent,  # noqa: PLW1509 - it calls nothing that takes a lock
+                preexec_fn=partial(die_with_parent, os.getpid()),  # noqa: PLW1509 - it calls nothing that takes a lock
             )
         self._socket = here
         return here
@@ -240,6 +241,7 @@ def serve(connection: socket.socket) -> list[str]:
     gc.freeze()
     # The one other thread is that of Arrow's allocator, which knows of forks. From 3.12 on, Python warns of any.
     warnings.filterwarnings("ignore", "This process .* is multi-threaded", DeprecationWarning)
+    server = os.getpid()
     while True:
         ready, _, _ = select.select([connection, awake], [], [])
         if awake in ready:
@@ -251,6 +253,8 @@ def serve(connection: socket.socket) -> list[str]:
         if not packet:
             sys.exit()
         if (pid := os.fork()) == 0:
+            # By force: without router and simulations there is nothing that a coordinator could wait for.
+            die_with_parent(server)
             for each in (connection, awake, wake):
                 each.close()
             request = json.loads(packet)
@@ -276,8 +280,6 @@ def _send(connection: socket.socket, **message: int) -> None:
 
 def _become_node(log: int, core: int | None) -> None:
     """What a forked process does before it is a node like one that was started by itself."""
-    # By force: without router and simulations there is nothing that a coordinator could wait for.
-    die_with_parent()
     signal.set_wakeup_fd(-1)
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)
     os.setsid()
@@ -308,7 +310,8 @@ def main() -> None:
 def _leave(code: int) -> NoReturn:
     """End this process without taking the interpreter apart: it writes to all memory that is shared with other nodes.
 
-    Nodes have closed their files and sessions before. Libraries of genuine ROS 2 tidy up behind Python, so theirs end
+    Nodes have closed their files and sessions before. What Zenoh leaves of such a process in /dev/shm is removed by the
+    next one that ends as usual, which is the launcher. Libraries of genuine ROS 2 tidy up behind Python, so theirs end
     in the usual way.
     """
     # As `multiprocessing` ends what it forks.

@@ -17,7 +17,6 @@ from throwcollect.episode.record import Samples
 from throwcollect.episode.topics import Topic
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.robots.appearance import check_appearance
-from throwcollect.robots.description import full_description
 from throwcollect.ros import (
     DurabilityPolicy,
     HistoryPolicy,
@@ -54,7 +53,7 @@ _SAMPLED = QoSProfile(depth=100)
 _WHOLE = QoSProfile(history=HistoryPolicy.KEEP_ALL)
 """No episode is dropped, so each reaches every subscriber, however slow it is."""
 
-_IDLE_S = 0.2
+_IDLE_S = 0.1
 """Longest wait for messages: signals are heeded after it, as their handlers must not disturb an executor at work."""
 
 _REPEAT_S = 0.02
@@ -92,15 +91,15 @@ class SimulationNode(Node):
         config = simulation.config
         # The simulation is the source of its time, so the clock is set and not subscribed to.
         provide_time(self)
-        self._description = description = full_description(config)
-        self._publish_latched(Channels(config, description))
+        self._runner = TrialRunner(simulation)
+        self._description = self._runner.channels.robot
+        self._publish_latched(self._runner.channels)
         self._declare_description()
         self._declare_parameters(config)
-        self._runner = TrialRunner(simulation)
         self._leases = LeaseQueue(self._runner)
         self._live = [
             (topic, self.create_publisher(get_message(topic.type_name), topic.name.lstrip("/"), _SAMPLED))
-            for topic in Channels(_everything(config), description).recorded.values()
+            for topic in Channels(_everything(config), self._description).recorded.values()
         ]
         self._controllers = {name: ControllerNode(self, simulation, name) for name in simulation.limbs}
         self._manager = ControllerManager(self, simulation)

@@ -146,6 +146,7 @@ class Simulation:
         of_time, of_state, of_spawned = Scope.TIME in scope, Scope.STATE in scope, Scope.SPAWNED in scope
         if of_spawned:
             self.world.spawned.clear()
+            # What clients have said of entities belongs to the world that ends here.
             if of_time and of_state:
                 self.entities.forget_infos()
         if not (of_time or of_state):
@@ -156,6 +157,7 @@ class Simulation:
         setup = self.trial.setup
         start_ns = self.now_ns
         if of_time:
+            # Each trial has a slot of time of its own, so that stamps in a dataset never overlap.
             start_ns = 0 if setup.number < 0 else setup.config.trial_start_ns(setup.number)
         if of_state:
             self.world.reset(setup.config, start_ns=start_ns)
@@ -167,6 +169,7 @@ class Simulation:
             limb.reset(start_ns, posture, speed=setup.config.robot.speed_scale)
         self._collect_results()
         self._command = np.array([posture[joint] for joint in self.world.moving])
+        # After a reset of a part, what follows is not the trial that a plan has drawn.
         self._in_trial = setup.number >= 0 and of_time and of_state
         self._published = 0
 
@@ -220,6 +223,7 @@ class Simulation:
             watched: Whether somebody wants to see it happen: slices are short then.
         """
         began_s, since_ns, factor = time.monotonic(), self.now_ns, self.real_time_factor
+        # A long slice costs the least; a short one lets messages in between, which only those who watch need.
         slice_s = _SLICE_S if (self._in_trial or self._steps) and not (watched or factor) else _WATCHED_SLICE_S
         steps = max(1, round(slice_s * self.config.sim.physics_hz))
         if self._steps is not None:
@@ -228,6 +232,7 @@ class Simulation:
         if factor:
             steps = slice_steps(factor, self.config.sim.physics_hz, self._stride, self.world.steps % self._stride)
         self.step(steps)
+        # A trial ends when its rules say so; a motion by hand, when all joints have come to rest.
         if self._in_trial and self.world.end_reason is not None:
             self._running = False
         elif not self._in_trial and not any(limb.moves for limb in self.limbs.values()):

@@ -35,6 +35,9 @@ class _Begun:
 class TrialRunner:
     """Begins trials and hands over what they yielded; whoever uses it advances the simulation in between.
 
+    Attributes:
+        channels: What is recorded of a trial.
+
     Args:
         simulation: The simulation that they run in.
     """
@@ -43,7 +46,8 @@ class TrialRunner:
         self._simulation = simulation
         config = simulation.config
         self._settings = Settings(config)
-        self._encoder = ChunkEncoder(Channels(config, full_description(config)), level=config.record.zstd_level)
+        self.channels = Channels(config, full_description(config))
+        self._encoder = ChunkEncoder(self.channels, level=config.record.zstd_level)
         self._columns = task_of(config).columns
         self._begun: _Begun | None = None
 

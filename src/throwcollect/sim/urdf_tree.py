@@ -54,6 +54,7 @@ def check_tree(links: Sequence[str], joints: Sequence[Joint]) -> str:
             raise RequestError("RESOURCE_PARSE_ERROR", message)
         names.add(joint.name)
         carried[joint.child] = joint.name
+    # Every link hangs on one joint at most by now, so more than one root means parts, and none means a ring.
     roots = [link for link in links if link not in carried]
     if len(roots) > 1:
         raise RequestError("RESOURCE_PARSE_ERROR", f"links {roots[0]} and {roots[1]} are not connected")

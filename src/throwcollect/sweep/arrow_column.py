@@ -32,6 +32,7 @@ def make_column(values: Sequence[Any] | NDArray[Any], kind: pa.DataType) -> pa.A
     """
     if isinstance(values, np.ndarray):
         return _make_array_column(values, kind)
+    # The layout of Arrow's columnar format: a bitmap of what is there, then offsets and text, or numbers.
     nulls = sum(value is None for value in values)
     valid = np.packbits([value is not None for value in values], bitorder="little") if nulls else None
     if kind == pa.string():

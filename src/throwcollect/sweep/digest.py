@@ -62,8 +62,10 @@ def trial_digests(config: Config, points: Points, seeds: Iterable[int]) -> NDArr
     lines = {
         leaf.name: _line(leaf.name, leaf.value)
         for leaf in leaves(config)
+        # Keys that came later are left out at their defaults, so that digests of earlier versions stay.
         if leaf.key.determines_samples and not (leaf.key.later and leaf.is_default)
     }
+    # Places for what differs from trial to trial, sorted once for all of them.
     lines["seed"] = ""
     lines |= dict.fromkeys(points.keys, "")
     lines = dict(sorted(lines.items()))

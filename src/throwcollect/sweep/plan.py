@@ -141,6 +141,7 @@ class Plan:
         """
         with open_parquet(path) as file:
             metadata = file.schema_arrow.metadata or {}
+            # The first four columns are those of every plan; what was drawn for each trial follows.
             columns = file.schema_arrow.names[4:]
             keys = tuple(name for name in columns if not is_target(name))
             targets = tuple(name for name in columns if is_target(name))
@@ -154,6 +155,7 @@ class Plan:
                 )
             if metadata.get(_CONFIG_KEY, b"") != config_digest(config).encode():
                 raise ForeignPlanError("the plan belongs to another configuration", path=path)
+            # The digest above is that of the configuration alone: columns may have been changed all the same.
             for key in keys:
                 if reason := reason_not_sweepable(config, key):
                     raise DatasetError(f"is damaged: column {key!r}: {reason}", path=path)
@@ -163,6 +165,7 @@ class Plan:
         stored = metadata.get(_SLICE_KEY)
         if stored is not None:
             return cls(config, trials, Slice.parse(stored.decode()))
+        # Only a slice begins later than with trial 0.
         if trials.first:
             raise DatasetError(_MISNUMBERED, path=path)
         read_rounds(path, trials)

@@ -11,7 +11,9 @@ from throwcollect.config.schema import Config
 from throwcollect.coordinator.collection import TrialCollection
 from throwcollect.coordinator.lookahead import Lookahead
 from throwcollect.dataset.creation import create
+from throwcollect.dataset.provenance import read_provenance
 from throwcollect.episode.message import Delivery
+from throwcollect.errors import LossError
 from throwcollect.replay.throw import Replayer
 from throwcollect.sweep.plan import Plan, make_plan
 
@@ -66,6 +68,11 @@ def test_a_simulation_that_dies_costs_the_trial_that_ran_and_no_other(
         collection.write_one()
     assert collection.complete
     assert collection.progress().outcomes == {"landed": 5, "lost": 1}
+    with pytest.raises(LossError):
+        collection.finish(meanwhile=lambda: None, say=print)
+    provenance = read_provenance(tmp_path / "data")
+    assert provenance is not None
+    assert provenance.simulations == 2
 
 
 def test_more_is_given_when_half_is_done(collection: TrialCollection, deliveries: list[Delivery]) -> None:

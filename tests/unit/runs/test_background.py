@@ -16,7 +16,8 @@ from throwcollect.runs import background
 from throwcollect.runs.background import begin_run, carry_out
 from throwcollect.runs.onlooker import SILENT
 from throwcollect.runs.record import Origin
-from throwcollect.runs.records import STATE_VARIABLE, OpenRun, Records
+from throwcollect.runs.records import OpenRun, Records
+from throwcollect.runs.state_directory import STATE_VARIABLE
 
 ORIGIN = Origin("throws", 1, {"trials": 2})
 

@@ -21,7 +21,8 @@ from throwcollect.runs.component_container import ContainerOrder, check_order, l
 from throwcollect.runs.control import down
 from throwcollect.runs.onlooker import SILENT
 from throwcollect.runs.record import Kind, Origin, Record
-from throwcollect.runs.records import STATE_VARIABLE, OpenRun, Records
+from throwcollect.runs.records import OpenRun, Records
+from throwcollect.runs.state_directory import STATE_VARIABLE
 from throwcollect.runtimes.docker import component
 from throwcollect.runtimes.docker import watch as docker_watch
 from throwcollect.runtimes.docker.component import find_way

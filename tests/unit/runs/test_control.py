@@ -13,7 +13,8 @@ from throwcollect.run_key import RunKey
 from throwcollect.runs import control
 from throwcollect.runs.control import scale
 from throwcollect.runs.record import Record
-from throwcollect.runs.records import STATE_VARIABLE, Records, Run
+from throwcollect.runs.records import Records, Run
+from throwcollect.runs.state_directory import STATE_VARIABLE
 from throwcollect.runtimes.node_collection import MOST_SIMULATIONS, offer_scaling
 from throwcollect.runtimes.nodes import LAUNCHER
 

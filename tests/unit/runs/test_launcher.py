@@ -17,7 +17,8 @@ from throwcollect.coordinator.progress import Progress
 from throwcollect.errors import DatasetError, WorkerError
 from throwcollect.runs.launcher import launch
 from throwcollect.runs.record import Record
-from throwcollect.runs.records import STATE_VARIABLE, OpenRun, Records
+from throwcollect.runs.records import OpenRun, Records
+from throwcollect.runs.state_directory import STATE_VARIABLE
 from throwcollect.runtimes.docker import containers as docker_containers
 from throwcollect.runtimes.docker import watch as docker_watch
 from throwcollect.runtimes.docker.options import NODE_LABEL, RUN_LABEL

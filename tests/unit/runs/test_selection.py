@@ -9,7 +9,7 @@ from tests.unit.runtimes.docker.engine import Engine, engine_at
 
 from throwcollect.errors import ConfigError, DatasetError, Interrupted, ThrowcollectError, WorkerError
 from throwcollect.runs.record import Failure, Record
-from throwcollect.runs.records import STATE_VARIABLE, Records, Run
+from throwcollect.runs.records import Records, Run
 from throwcollect.runs.selection import (
     describe_death,
     find_held_runs,
@@ -18,6 +18,7 @@ from throwcollect.runs.selection import (
     to_change,
     to_watch,
 )
+from throwcollect.runs.state_directory import STATE_VARIABLE
 from throwcollect.runtimes.docker import engine as docker_engine
 from throwcollect.runtimes.docker.options import NODE_LABEL, RUN_LABEL
 

@@ -14,7 +14,8 @@ from throwcollect.coordinator.progress import Progress
 from throwcollect.dataset.inspect import digest, info
 from throwcollect.errors import Interrupted, WorkerError
 from throwcollect.replay.throw import Replayer
-from throwcollect.runs.records import STATE_VARIABLE, Records
+from throwcollect.runs.records import Records
+from throwcollect.runs.state_directory import STATE_VARIABLE
 from throwcollect.simulator import Simulator
 
 YAML = """\

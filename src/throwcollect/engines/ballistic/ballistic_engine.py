@@ -107,6 +107,7 @@ class BallisticEngine(Engine):
         for number, (position, velocity, touching) in enumerate(self._path(steps), start=1):
             self._joints, self._velocities = steps.targets[number], steps.velocities[number - 1]
             self._position, self._velocity, self._touching = position, velocity, touching
+            # An observer hears of changes only, as from engines with contacts.
             if touching != self._told:
                 self._told = touching
                 observer.on_touch(number, touching)
@@ -153,9 +154,11 @@ class BallisticEngine(Engine):
         """The ball in its seat, up to the step in which the tool would have to pull it."""
         place, turn = self._tool_path.along(steps.targets[1:])
         hz = self._physics.hz
+        # Joints go where they are told without delay, so the way of the seat is known for all steps at once.
         path = np.vstack((self._position, (place + matmul(turn, self._seat))[:, :, 0]))
         velocities = np.vstack((self._velocity, np.diff(path, axis=0) * hz))
         push = np.diff(velocities, axis=0) * hz
+        # What the tool has to do for the ball: the acceleration of its way, less that of gravity.
         push[:, 2] += self._physics.gravity_mps2
         x, y, z = (push * matmul(turn, self._opening)[:, :, 0]).T
         pulled = np.flatnonzero(x + y + z <= 0)

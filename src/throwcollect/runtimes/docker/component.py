@@ -244,6 +244,7 @@ class ComponentContainer:
         state = self._watch.state(container.handle) if self._watch is not None else None
         if state is not None and state.ended:
             container.wait_log(LOG_S)
+            # A container that has joined may fall with the run a moment before the record says that it ended.
             deadline = time.monotonic() + _OVER_S
             while state.code != 0 and self._way is not None and self._goes_on() and time.monotonic() < deadline:
                 time.sleep(_POLL_S)

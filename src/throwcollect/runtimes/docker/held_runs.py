@@ -92,6 +92,7 @@ def remove(client: DockerClient, run_id: str, *, volumes: bool) -> list[str]:
         containers = [*client.api.containers(all=True, filters=filters), *joined]
         networks = client.api.networks(filters=filters)
         found_volumes = client.api.volumes(filters=filters)["Volumes"] or []
+    # Containers first, side by side as each has some time to end: networks and volumes in use cannot be removed.
     with ThreadPoolExecutor(_AT_ONCE) as pool:
         for each in containers:
             pool.submit(attempt, each["Names"][0].lstrip("/"), partial(end, each))

@@ -102,10 +102,12 @@ class NodeContainer:
         container = None
         try:
             with _AT_ONCE:
+                # It may have been asked to end while it waited for its turn.
                 if self._unwanted.is_set():
                     return
                 with suppress(NotFound):
                     self._client.api.remove_container(options["name"], v=True, force=True)
+                # A launcher that takes over copies the log on from here, so the place is kept with the container.
                 with open(open_log(self._log), "ab") as log:
                     offset = log.tell()
                 labels = {**options["labels"], LOG_LABEL: str(offset)}

@@ -104,7 +104,7 @@ def test_the_context_is_what_the_dockerfile_copies_and_nothing_else(said: list[s
         assert any(name.startswith(source.removesuffix("*")) for name in engine.context), source
     files = {name for name, member in engine.context.items() if member.isfile()}
     assert {name for name in files if name.startswith("docker/wheelhouse/")} == {"docker/wheelhouse/numpy-2.whl"}
-    above = {"configs", "docker", "packaging", "pyproject.toml", "README.md", "src"}
+    above = {"configs", "docker", "packaging", "pyproject.toml", "src"}
     assert {name.partition("/")[0] for name in files} == above
     assert not [name for name in files if "__pycache__" in name or ".egg-info" in name]
     assert {member.uid for member in engine.context.values()} == {0}
