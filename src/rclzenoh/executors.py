@@ -127,6 +127,7 @@ class Executor:
                 raise ExternalShutdownException("the context was shut down")
             timer, wait = self._next_timer()
             queued = not self._queue.empty()
+            # Timers and messages take turns, so that a fast timer cannot keep messages waiting for ever.
             if timer is not None and wait <= 0 and not (self._timer_was_last and queued):
                 self._timer_was_last = True
                 timer.advance()

@@ -62,7 +62,7 @@ class NodeParameters:
         """
         if name in self._parameters:
             raise ParameterAlreadyDeclaredException(f"parameter {name!r} is declared already")
-        described = ParameterDescriptor() if descriptor is None else copy.deepcopy(descriptor)
+        described = ParameterDescriptor() if descriptor is None else copy.copy(descriptor)
         described.name = name
         if isinstance(value, ParameterKind):
             described.type, value = value.value, None
@@ -196,6 +196,7 @@ class NodeParameters:
             result = check(parameter, descriptors[parameter.name], is_declared=declared is None)
             if not result.successful:
                 return result
+        # All or none: nothing is stored before descriptors and callbacks have agreed to every parameter.
         for callback in list(self._on_set):
             result = callback(parameters)
             if not isinstance(result, SetParametersResult):
@@ -205,6 +206,7 @@ class NodeParameters:
         event = ParameterEvent()
         for parameter in parameters:
             name, message = parameter.name, parameter.to_parameter_msg()
+            # In rclpy, to set a parameter to nothing undeclares it.
             if declared is None and parameter.type_ is ParameterKind.NOT_SET:
                 self._parameters.pop(name, None)
                 self._descriptors.pop(name, None)

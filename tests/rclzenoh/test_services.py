@@ -1,5 +1,7 @@
 """Services and clients, through a real router."""
 
+import threading
+
 import numpy as np
 import pytest
 import zenoh
@@ -21,6 +23,18 @@ def answer(request, response):
 def pair(rig):
     server, client = rig.node("server"), rig.node("client")
     return server, client, client.create_client(SetBool, "/server/set")
+
+
+def test_a_service_that_is_seen_answers(rig, pair):
+    server, node, _ = pair
+    for number in range(50):
+        client = node.create_client(SetBool, f"/set{number}")
+        thread = threading.Thread(target=server.create_service, args=(SetBool, f"/set{number}", answer))
+        thread.start()
+        assert client.wait_for_service(10)
+        future = client.call_async(SetBool.Request(data=True))
+        thread.join()
+        assert rig.spin(future.done, timeout=2), f"the first request to {client.service_name} is lost"
 
 
 def test_the_wire_is_that_of_rmw_zenoh(rig, pair):

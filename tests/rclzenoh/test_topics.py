@@ -1,5 +1,6 @@
 """Publishers and subscriptions, through a real router."""
 
+import threading
 import time
 
 import numpy as np
@@ -79,6 +80,19 @@ def test_inputs_are_handled_in_order_of_arrival_across_topics(rig):
         publishers[i * i % 3].publish(String(data=text))
     assert rig.spin(lambda: len(heard) == 300)
     assert heard == order
+
+
+def test_whoever_is_seen_to_listen_hears_the_next_message(rig):
+    talker, listener = rig.node("talker"), rig.node("listener")
+    seen = talker.context.graph
+    for number in range(50):
+        publisher, heard = talker.create_publisher(String, f"t{number}", 10), []
+        thread = threading.Thread(target=listener.create_subscription, args=(String, f"t{number}", heard.append, 10))
+        thread.start()
+        assert seen.wait_for(publisher.get_subscription_count, 10, talker.context.ok)
+        publisher.publish(String(data="first"))
+        thread.join()
+        assert rig.spin(lambda heard=heard: heard, timeout=2), f"the first message of {publisher.topic_name} is lost"
 
 
 def test_garbage_on_a_topic_is_logged_once_and_does_not_stop_the_node(rig, capsys):

@@ -137,6 +137,7 @@ def _choose_installed(backend: str, rmw: str | None) -> Middleware:
     installed = rmws()
     if rmw is None or rmw in installed:
         return Middleware("rclpy", rmw or _DEFAULT_RMW)
+    # The embedded backend speaks the protocol of that RMW, so nodes of both meet.
     if backend == "auto" and rmw == EMBEDDED_RMW:
         return Middleware()
     raise ConfigError(

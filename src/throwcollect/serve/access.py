@@ -122,12 +122,15 @@ class Access:
 
         The latter is None if it is not known who it is.
         """
+        # Names first: a page of a foreign name that leads to this address must not learn even whether its token is
+        # right.
         if headers.get("host", "") not in self._hosts:
             return (421, "this server is not known by that name"), None
         if "origin" in headers and headers["origin"] not in self._origins:
             return (403, "pages of another origin may not connect"), None
         length = headers.get("content-length", "0")
         too_long = None if length.isdecimal() and int(length) <= _MOST_BODY else _TOO_LONG
+        # The page itself holds no secret: it gets its token by the address that was printed.
         if scope["type"] == "http" and _is_public(scope["path"]):
             return too_long, None
         may_change = self._keys.may_change(_token(scope, headers))

@@ -19,13 +19,14 @@ from throwcollect.errors import (
     ThrowcollectError,
     WorkerError,
 )
-from throwcollect.extras import MissingExtraError
+from throwcollect.extras import MissingExtraError, MissingLibraryError
 
 _STATUS: tuple[tuple[type[ThrowcollectError], int], ...] = (
     (NotFoundError, 404),
     (ConflictError, 409),
     (ConfigError, 422),
     (MissingExtraError, 503),
+    (MissingLibraryError, 503),
     (WorkerError, 503),
     (DatasetError, 500),
 )

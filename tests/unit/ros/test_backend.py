@@ -7,6 +7,7 @@ import subprocess
 import sys
 from importlib.machinery import PathFinder
 from pathlib import Path
+from shlex import quote
 from types import SimpleNamespace
 
 import pytest
@@ -89,7 +90,10 @@ def test_an_rclpy_without_all_interfaces_is_taken_only_if_asked_for_and_then_say
 @pytest.mark.parametrize(
     ("platform", "hint"),
     [
-        (("cpython", (3, 11, 2), "x86_64"), f"pip install {ROOT}/packaging/ros_interfaces -e '{ROOT}[ros]', or source"),
+        (
+            ("cpython", (3, 11, 2), "x86_64"),
+            f"pip install {quote(f'{ROOT}/packaging/ros_interfaces')} -e '{ROOT}[ros]', or",
+        ),
         (("cpython", (3, 12, 1), "x86_64"), "source the setup script of a ROS 2 Jazzy"),
         (("cpython", (3, 11, 2), "aarch64"), "by pip it is for CPython 3.11 on Linux, x86-64, with glibc alone"),
     ],

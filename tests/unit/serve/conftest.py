@@ -13,7 +13,8 @@ from starlette.testclient import TestClient, WebSocketTestSession
 from tests.e2e.collection import FAST, collect_here, write_config
 
 from throwcollect.runs.record import Record
-from throwcollect.runs.records import STATE_VARIABLE, OpenRun, Records
+from throwcollect.runs.records import OpenRun, Records
+from throwcollect.runs.state_directory import STATE_VARIABLE
 from throwcollect.serve.access import Access, Keys
 from throwcollect.serve.app import make_app
 from throwcollect.serve.catalogue import Catalogue

@@ -13,7 +13,7 @@ from throwcollect.errors import (
     ThrowcollectError,
     WorkerError,
 )
-from throwcollect.extras import MissingExtraError
+from throwcollect.extras import MissingExtraError, MissingLibraryError
 from throwcollect.serve.problems import answer
 
 
@@ -24,6 +24,7 @@ from throwcollect.serve.problems import answer
         (ConflictError("x"), 409),
         (ConfigError("x"), 422),
         (MissingExtraError("plotly", "report"), 503),
+        (MissingLibraryError("pinocchio"), 503),
         (WorkerError("x"), 503),
         (DatasetError("x"), 500),
         (ThrowcollectError("x"), 500),

@@ -174,6 +174,7 @@ class Bridge:
         self._looked_at = now
         wanted = self._connection
         there = wanted is not None and answers(wanted.endpoint)
+        # A router that is busy may miss one answer; clients are not cut off for that.
         self._misses = 0 if there else self._misses + 1
         if self._session is not None and (self._misses >= _MISSES or wanted != self._joined):
             self._lose()

@@ -7,6 +7,8 @@ octets are bytes and other arrays of numbers are typed arrays (RFC 8746), little
 from __future__ import annotations
 
 import base64
+import json
+import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -24,6 +26,7 @@ Frame = str | bytes
 
 _TAGS = {64: "u1", 69: "<u2", 70: "<u4", 71: "<u8", 72: "i1", 77: "<i2", 78: "<i4", 79: "<i8", 85: "<f4", 86: "<f8"}
 _TAG_OF = {np.dtype(kind): tag for tag, kind in _TAGS.items()}
+_NOT_ASCII = re.compile(r"[^\x00-\x7f]+")
 
 
 def read_frame(frame: Frame) -> Request:
@@ -67,8 +70,9 @@ def cbor_values(message: Any) -> Any:
 
 
 def json_text(fields: object) -> str:
-    """JSON in one line."""
-    return orjson.dumps(fields, option=orjson.OPT_SERIALIZE_NUMPY).decode()
+    """JSON in one line, in ASCII: ROS# takes every byte of a frame for a character."""
+    text = orjson.dumps(fields, option=orjson.OPT_SERIALIZE_NUMPY).decode()
+    return text if text.isascii() else _NOT_ASCII.sub(lambda found: json.dumps(found[0])[1:-1], text)
 
 
 def cbor_bytes(fields: object) -> bytes:

@@ -77,7 +77,7 @@ class Feed:
         self._type = ros.get_message(type_name)
         self._on_end = on_end
         self._listeners: list[Listener] = []
-        self._offered = find_offered_qos(node, topic)
+        self._offered = self._find_offered()
         self._subscription: Any = None
 
     @property
@@ -100,11 +100,15 @@ class Feed:
 
     def renew(self) -> None:
         """Hear the topic as its publishers offer it by now."""
-        offered = find_offered_qos(self._node, self._topic)
+        offered = self._find_offered()
         if _terms(offered) != _terms(self._offered):
             self._node.destroy_subscription(self._subscription)
             self._offered = offered
             self._subscribe()
+
+    def _find_offered(self) -> ros.QoSProfile:
+        # Whoever listens before there is a publisher needs no other subscription for most, and so misses nothing.
+        return find_offered_qos(self._node, self._topic, ros.ReliabilityPolicy.RELIABLE)
 
     def _subscribe(self) -> None:
         self._subscription = self._node.create_subscription(

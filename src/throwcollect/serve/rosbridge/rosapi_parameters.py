@@ -12,7 +12,6 @@ from throwcollect import ros
 from throwcollect.errors import ConfigError
 from throwcollect.ros.names import absolute_name, is_hidden
 from throwcollect.ros.values import plain
-from throwcollect.serve.rosbridge.codec import json_text
 from throwcollect.serve.rosbridge.guarded import refuse_leases
 from throwcollect.serve.rosbridge.peer import Peer
 from throwcollect.serve.rosbridge.questions import Questions
@@ -37,7 +36,7 @@ class Parameters:
         self._questions = questions
 
     def get(self, call: Call) -> None:
-        """Answer with the value of a parameter, or the default that the client gives.
+        """Answer with the value of a parameter, or the default that the client gives, in JSON or as a text.
 
         Raises:
             ConfigError: If it is no name of a parameter, or one that nobody may read.
@@ -46,11 +45,11 @@ class Parameters:
 
         def answer(value: Any) -> None:
             if value.type != _NOT_SET:
-                call.reply({"value": json_text(plain(ros.parameter_value_to_python(value)))})
+                call.reply({"value": orjson.dumps(plain(ros.parameter_value_to_python(value))).decode()})
             elif default:
-                call.reply({"value": default})
+                call.reply({"value": _as_json(default)})
             else:
-                call.fail(f"{call.fields.text('name')}: the node has no such parameter")
+                call.fail(f"{call.fields.text('name')}: there is no such node, or it has no such parameter")
 
         self._get(call, answer)
 
@@ -131,9 +130,13 @@ class Parameters:
             )
 
     def _get(self, call: Call, answer: Callable[[Any], None]) -> None:
+        """Have the value of a parameter, which is not set if there is no such node."""
         node, name = _read_name(call)
         request = ros.get_service("rcl_interfaces/srv/GetParameters").Request(names=[name])
         unset = ros.get_message("rcl_interfaces/msg/ParameterValue")()
+        if not self._is_offered(f"{node}/get_parameters"):
+            answer(unset)
+            return
         self._ask(
             call,
             node,
@@ -145,9 +148,12 @@ class Parameters:
 
     def _ask(self, call: Call, node: str, service: str, kind: str, request: Any, answer: Callable[[Any], None]) -> None:
         path = f"{node}/{service}"
-        if path not in dict(self._client.session.node.get_service_names_and_types()):
+        if not self._is_offered(path):
             raise ConfigError(f"{node}: there is no such node, or it tells nobody of its parameters")
         self._questions.ask(path, f"rcl_interfaces/srv/{kind}", request, answer, call.fail, _TIMEOUT_S)
+
+    def _is_offered(self, service: str) -> bool:
+        return service in dict(self._client.session.node.get_service_names_and_types())
 
 
 def _read_name(call: Call) -> tuple[str, str]:
@@ -164,6 +170,15 @@ def _read_name(call: Call) -> tuple[str, str]:
         )
     refuse_leases(name)
     return absolute_name(node), name
+
+
+def _as_json(default: str) -> str:
+    """What a client gives as a default: ROS# gives it as a text, all others in JSON."""
+    try:
+        orjson.loads(default)
+    except ValueError:
+        return orjson.dumps(default).decode()
+    return default
 
 
 def _first(value: Any) -> Any:

@@ -19,7 +19,7 @@ from tests.integration.robot import FOUND_BY_OTHERS_S, ON_DDS, discovery_server
 
 from throwcollect.ros import Context, ExternalShutdownException, Node, SingleThreadedExecutor, init
 from throwcollect.ros.connection import Connection
-from throwcollect.ros.middleware import Middleware
+from throwcollect.ros.middleware import Middleware, uses_rclpy
 from throwcollect.ros.router import router
 from throwcollect.run_key import RunKey
 from throwcollect.serve.rosbridge import Bridge, attend
@@ -136,8 +136,8 @@ def context(connection: Connection) -> Iterator[Context]:
 
 
 @pytest.fixture
-def node(context: Context) -> Iterator[Node]:
-    """A node of ROS, which spins."""
+def node(context: Context, bridge: Bridge) -> Iterator[Node]:
+    """A node of ROS, which spins; an embedded one the bridge sees no more when the next test begins."""
     node = Node("other", context=context)
     executor = SingleThreadedExecutor(context=context)
     executor.add_node(node)
@@ -154,3 +154,9 @@ def node(context: Context) -> Iterator[Node]:
     executor.shutdown()
     thread.join()
     node.destroy_node()
+    if uses_rclpy():
+        # What it has, such as actions, keeps a genuine node until Python collects it.
+        return
+    observer = Party(bridge)
+    wait_for(lambda: "/other" not in observer.call("rosapi/nodes")["nodes"], "the node is seen no more")
+    observer.client.close()

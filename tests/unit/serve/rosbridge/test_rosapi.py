@@ -123,6 +123,8 @@ def test_parameters_are_listed_read_and_set(party: Party, graph: Node) -> None:
     assert party.call("/rosapi/has_param", name="/other:mass") == {"exists": True}
     assert party.call("/rosapi/has_param", name="/other:none") == {"exists": False}
     assert party.call("/rosapi/get_param", name="/other:none", default_value="7") == {"value": "7"}
+    assert party.call("/rosapi/get_param", name="/gone:none", default_value="[1]") == {"value": "[1]"}
+    assert party.call("/rosapi/get_param", name="/gone:none", default_value="no JSON") == {"value": '"no JSON"'}
     # JavaScript knows no other one.
     assert party.call("/rosapi/set_param", name="/other:mass", value="1")["successful"]
     assert graph.get_parameter("mass").value == 1.0
@@ -134,8 +136,9 @@ def test_parameters_are_listed_read_and_set(party: Party, graph: Node) -> None:
     ("service", "arguments", "said"),
     [
         ("get_param", {"name": "/other"}, "'/other' is no name of a parameter; expected: node:parameter"),
-        ("get_param", {"name": "/gone:mass"}, "/gone: there is no such node, or it tells nobody of its parameters"),
-        ("get_param", {"name": "/other:none"}, "/other:none: the node has no such parameter"),
+        ("get_param", {"name": "/gone:mass"}, "/gone:mass: there is no such node, or it has no such parameter"),
+        ("get_param", {"name": "/other:none"}, "/other:none: there is no such node, or it has no such parameter"),
+        ("set_param", {"name": "/gone:mass", "value": "1"}, "/gone: there is no such node, or it tells nobody of its"),
         ("get_param", {"name": "/other:trial.leases"}, "nobody but the coordinator may have this parameter"),
         ("set_param", {"name": "/other:trial.leases", "value": "[]"}, "nobody but the coordinator may have this"),
         ("set_param", {"name": "/other:mass", "value": "{}"}, "value should be that of a parameter in JSON"),

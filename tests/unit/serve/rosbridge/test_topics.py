@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import threading
 import time
 from collections.abc import Callable
 from types import SimpleNamespace
@@ -12,7 +13,7 @@ from typing import Any
 import cbor2
 import numpy as np
 import pytest
-from tests.unit.serve.rosbridge.conftest import Party, wait_for, wait_for_listener
+from tests.unit.serve.rosbridge.conftest import PATIENCE_S, Party, wait_for, wait_for_listener
 
 from rclzenoh.interfaces import serialize
 from throwcollect.ros import DurabilityPolicy, Node, QoSProfile, get_message
@@ -58,6 +59,22 @@ def test_whoever_comes_late_hears_a_latched_topic_even_after_others(bridge: Brid
         each.ask(op="subscribe", topic="/latched")
         assert each.next(op="publish")["msg"] == {"data": "urdf"}
     other.client.close()
+
+
+def test_a_topic_that_is_published_later_is_heard_from_its_first_message(
+    bridge: Bridge, party: Party, node: Node
+) -> None:
+    party.ask(op="subscribe", topic="/soon", type="std_msgs/String")
+    wait_for(lambda: node.count_subscribers("/soon"))
+    go_on = threading.Event()
+    bridge.submit(lambda: (go_on.wait(PATIENCE_S), None)[1])
+    publisher = node.create_publisher(String, "/soon", 10)
+    wait_for_listener(publisher)
+    publisher.publish(String(data="first"))
+    # Before the bridge gets to what has come, it looks around: that it does once a second.
+    time.sleep(1.1)
+    go_on.set()
+    assert party.next(op="publish")["msg"]["data"] == "first"
 
 
 def test_a_topic_that_turns_out_to_be_latched_is_heard_from_its_beginning(party: Party, node: Node) -> None:

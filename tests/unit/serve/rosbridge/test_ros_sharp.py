@@ -1,0 +1,220 @@
+"""ROS#, by which Unity reaches ROS: frames of its RosBridgeClient 2.2.0, as they were recorded.
+
+It sends JSON in binary frames. In every frame that it gets, it takes bytes for characters, and it looks up fields
+without asking whether they are there: what it finds amiss ends its thread that listens.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pytest
+from tests.unit.serve.rosbridge.conftest import Party, wait_for, wait_for_listener
+
+from throwcollect.ros import ActionClient, ActionServer, Node, get_action, get_message, get_service
+
+String: Any = get_message("std_msgs/msg/String")
+Scan: Any = get_message("sensor_msgs/msg/LaserScan")
+SetBool: Any = get_service("std_srvs/srv/SetBool")
+FJT: Any = get_action("control_msgs/action/FollowJointTrajectory")
+
+SUBSCRIBE = (
+    b'{"topic":"/sharp/echo","type":"std_msgs/msg/String","throttle_rate":0,"queue_length":1,"fragment_size":2147483647,'
+    b'"compression":"none","op":"subscribe","id":"/sharp/echo:0"}'
+)
+UNSUBSCRIBE = b'{"topic":"/sharp/echo","op":"unsubscribe","id":"/sharp/echo:0"}'
+ADVERTISE = b'{"topic":"/sharp/words","type":"std_msgs/msg/String","op":"advertise","id":"/sharp/words"}'
+UNADVERTISE = b'{"topic":"/sharp/words","op":"unadvertise","id":"/sharp/words"}'
+PUBLISH = rb'{"topic":"/sharp/words","msg":{"data":"gr\u00FC\u00DFe \u00B0 \u5EA6"},"op":"publish","id":"/sharp/words"}'
+ADVERTISE_SCAN = b'{"topic":"/sharp/scan","type":"sensor_msgs/msg/LaserScan","op":"advertise","id":"/sharp/scan"}'
+SCAN = (
+    b'{"topic":"/sharp/scan","msg":{"header":{"stamp":{"sec":0,"nanosec":0},"frame_id":""},"angle_min":0,"angle_max":0,'
+    b'"angle_increment":0,"time_increment":0,"scan_time":0,"range_min":0,"range_max":30,'
+    b'"ranges":[1.5,0.100000001,2.99999989E-08],"intensities":[]},"op":"publish","id":"/sharp/scan"}'
+)
+CALL = (
+    b'{"service":"/sharp/call_my_lamp","args":{"data":true},"fragment_size":2147483647,"compression":"none",'
+    b'"op":"call_service","id":"/sharp/call_my_lamp:0"}'
+)
+OFFER = b'{"type":"std_srvs/srv/SetBool","service":"/sharp/lamp","op":"advertise_service","id":null}'
+RESPOND = (
+    b'{"service":"/sharp/lamp","values":{"success":true,"message":"from ROS#"},"result":true,"op":"service_response",'
+    b'"id":"ID"}'
+)
+WITHDRAW = b'{"service":"/sharp/lamp","op":"unadvertise_service","id":null}'
+SEND_GOAL = (
+    b'{"action":"/partner/follow","action_type":"control_msgs/action/FollowJointTrajectory","args":{"trajectory":{"header":'
+    b'{"stamp":{"sec":0,"nanosec":0},"frame_id":""},"joint_names":["arm_right_1_joint","arm_right_2_joint",'
+    b'"arm_right_3_joint","arm_right_4_joint","arm_right_5_joint","arm_right_6_joint","arm_right_7_joint"],"points":'
+    b'[{"positions":[-0.10000000000000001,-0.40000000000000002,0.10000000000000001,-1.5,0.10000000000000001,'
+    b'0.10000000000000001,0.10000000000000001],"velocities":[],"accelerations":[],"effort":[],"time_from_start":'
+    b'{"sec":1,"nanosec":0}}]},"multi_dof_trajectory":{"header":{"stamp":{"sec":0,"nanosec":0},"frame_id":""},'
+    b'"joint_names":[],"points":[]},"path_tolerance":[],"component_path_tolerance":[],"goal_tolerance":[],'
+    b'"component_goal_tolerance":[],"goal_time_tolerance":{"sec":0,"nanosec":0}},"feedback":true,'
+    b'"fragment_size":2147483647,"compression":"none","op":"send_action_goal","id":"/partner/follow:0"}'
+)
+CANCEL_GOAL = b'{"action":"/partner/follow","op":"cancel_action_goal","id":"/partner/follow:0"}'
+OFFER_ACTION = (
+    b'{"type":"control_msgs/action/FollowJointTrajectory","action":"/sharp/follow","op":"advertise_action","id":null}'
+)
+_POINT = b'{"positions":[],"velocities":[],"accelerations":[],"effort":[],"time_from_start":{"sec":0,"nanosec":0}}'
+_MOVES = b'{"transforms":[],"velocities":[],"accelerations":[],"time_from_start":{"sec":0,"nanosec":0}}'
+FEEDBACK = (
+    b'{"action":"/sharp/follow","values":{"header":{"stamp":{"sec":0,"nanosec":0},"frame_id":""},'
+    b'"joint_names":["step 0"],"desired":'
+    + _POINT
+    + b',"actual":'
+    + _POINT
+    + b',"error":'
+    + _POINT
+    + b',"multi_dof_joint_names":[],'
+    b'"multi_dof_desired":' + _MOVES + b',"multi_dof_actual":' + _MOVES + b',"multi_dof_error":' + _MOVES + b"},"
+    b'"op":"action_feedback","id":"ID"}'
+)
+RESULT = (
+    b'{"action":"/sharp/follow","values":{"error_code":0,"error_string":"followed"},"status":4,"result":true,'
+    b'"op":"action_result","id":"ID"}'
+)
+CANCELLED = (
+    b'{"action":"/sharp/follow","values":{"error_code":0,"error_string":"stopped"},"status":5,"result":true,'
+    b'"op":"action_result","id":"ID"}'
+)
+WITHDRAW_ACTION = b'{"action":"/sharp/follow","op":"unadvertise_action","id":null}'
+GET_NAME = (
+    b'{"service":"/rosapi/get_param","args":{"name":"talos:file_server2","default_value":"file_server2"},'
+    b'"fragment_size":2147483647,"compression":"none","op":"call_service","id":"/rosapi/get_param:0"}'
+)
+GET_DESCRIPTION = (
+    b'{"service":"/rosapi/get_param","args":{"name":"sim_0/sim_0:robot_description","default_value":"default_value"},'
+    b'"fragment_size":2147483647,"compression":"none","op":"call_service","id":"/rosapi/get_param:1"}'
+)
+HAS = (
+    b'{"service":"/rosapi/has_param","args":{"name":"/nobody:ball.mass_kg"},"fragment_size":2147483647,'
+    b'"compression":"none","op":"call_service","id":"/rosapi/has_param:1"}'
+)
+
+NEEDED = {
+    "publish": {"topic", "msg"},
+    "service_response": {"id", "values"},
+    "call_service": {"id", "service", "args"},
+    "send_action_goal": {"id", "action", "action_type", "args"},
+    "cancel_action_goal": {"id", "action"},
+    "action_feedback": {"id", "action", "values"},
+    "action_result": {"id", "action", "values", "status", "result"},
+}
+"""Fields that it looks up in what it gets."""
+
+
+def hear(party: Party, op: str) -> Any:
+    """What ROS# makes of the next frame with an operation."""
+    fields = party.next(op=op)
+    assert NEEDED[op] <= set(fields)
+    assert all(isinstance(frame, str) and frame.isascii() for frame in party.frames)
+    return fields
+
+
+def test_what_is_published_is_heard_letter_for_letter(party: Party, node: Node) -> None:
+    publisher = node.create_publisher(String, "/sharp/echo", 10)
+    party.client.receive(SUBSCRIBE)
+    wait_for_listener(publisher)
+    publisher.publish(String(data="grüße ° 度 \N{DIRECT HIT}"))
+    heard = hear(party, "publish")
+    assert (heard["topic"], heard["msg"]["data"]) == ("/sharp/echo", "grüße ° 度 \N{DIRECT HIT}")
+    party.client.receive(UNSUBSCRIBE)
+    wait_for(lambda: not publisher.get_subscription_count())
+
+
+def test_what_it_publishes_is_heard(party: Party, node: Node) -> None:
+    heard: list[Any] = []
+    node.create_subscription(String, "/sharp/words", heard.append, 10)
+    node.create_subscription(Scan, "/sharp/scan", heard.append, 10)
+    for advertise, topic, publish in ((ADVERTISE, "/sharp/words", PUBLISH), (ADVERTISE_SCAN, "/sharp/scan", SCAN)):
+        party.client.receive(advertise)
+        wait_for(lambda topic=topic: node.count_publishers(topic))  # type: ignore[misc]
+        before = len(heard)
+        # What is said before a subscription has found the publisher is heard by nobody.
+        wait_for(lambda: party.client.receive(publish) or len(heard) > before)  # noqa: B023
+    assert heard[0].data == "grüße ° 度"
+    assert heard[-1].ranges.tolist() == [1.5, pytest.approx(0.1), pytest.approx(3e-8)]
+    assert heard[-1].range_max == 30
+    party.client.receive(UNADVERTISE)
+    wait_for(lambda: not node.count_publishers("/sharp/words"))
+
+
+def test_services_are_called_both_ways(party: Party, node: Node) -> None:
+    lamp = node.create_client(SetBool, "/sharp/lamp")
+
+    async def ask_back(request: Any, response: Any) -> Any:
+        answer = await lamp.call_async(SetBool.Request(data=request.data))
+        response.success, response.message = answer.success, answer.message
+        return response
+
+    node.create_service(SetBool, "/sharp/call_my_lamp", ask_back)
+    party.client.receive(OFFER)
+    wait_for(lambda: "/sharp/call_my_lamp" in party.call("rosapi/services")["services"])
+    assert lamp.wait_for_service(10)
+    party.client.receive(CALL)
+    asked = hear(party, "call_service")
+    assert (asked["service"], asked["args"]) == ("/sharp/lamp", {"data": True})
+    party.client.receive(RESPOND.replace(b"ID", asked["id"].encode()))
+    answer = hear(party, "service_response")
+    assert answer["id"] == "/sharp/call_my_lamp:0"
+    assert answer["values"] == {"success": True, "message": "from ROS#"}
+    party.client.receive(WITHDRAW)
+    wait_for(lambda: not lamp.service_is_ready())
+
+
+def test_a_goal_is_sent_and_cancelled(party: Party, node: Node) -> None:
+    def follow(handle: Any) -> Any:
+        handle.publish_feedback(FJT.Feedback(joint_names=handle.request.trajectory.joint_names))
+        handle.succeed()
+        return FJT.Result(error_string="done")
+
+    ActionServer(node, FJT, "/partner/follow", follow)
+    wait_for(lambda: "/partner/follow" in party.call("rosapi/action_servers")["action_servers"])
+    party.client.receive(SEND_GOAL)
+    assert hear(party, "action_feedback")["values"]["joint_names"][6] == "arm_right_7_joint"
+    result = hear(party, "action_result")
+    assert (result["id"], result["status"], result["result"]) == ("/partner/follow:0", 4, True)
+    party.client.receive(CANCEL_GOAL)
+    assert "no goal with the id /partner/follow:0 is under way" in party.next(op="status")["msg"]
+
+
+@pytest.mark.parametrize(("end", "status", "text"), [(RESULT, 4, "followed"), (CANCELLED, 5, "stopped")])
+def test_a_goal_is_followed_and_cancelled(party: Party, node: Node, end: bytes, status: int, text: str) -> None:
+    party.client.receive(OFFER_ACTION)
+    client = ActionClient(node, FJT, "/sharp/follow")
+    assert client.wait_for_server(10)
+    feedback: list[Any] = []
+    sent = client.send_goal_async(FJT.Goal(), feedback_callback=feedback.append)
+    goal = hear(party, "send_action_goal")
+    assert goal["args"]["trajectory"]["points"] == []
+    number = goal["id"].encode()
+    wait_for(sent.done)
+    party.client.receive(FEEDBACK.replace(b"ID", number))
+    wait_for(lambda: feedback)
+    assert feedback[0].feedback.joint_names == ["step 0"]
+    if end is CANCELLED:
+        sent.result().cancel_goal_async()
+        assert hear(party, "cancel_action_goal")["id"] == goal["id"]
+    result = sent.result().get_result_async()
+    party.client.receive(end.replace(b"ID", number))
+    wait_for(result.done)
+    assert (result.result().status, result.result().result.error_string) == (status, text)
+    party.client.receive(WITHDRAW_ACTION)
+    wait_for(lambda: not client.server_is_ready())
+
+
+def test_a_robot_is_imported(party: Party, node: Node) -> None:
+    urdf = '<?xml version="1.0"?>\n<robot name="grün"/>'
+    node.declare_parameter("robot_description", urdf)
+    wait_for(lambda: "/other/get_parameters" in party.call("rosapi/services")["services"])
+    party.client.receive(GET_NAME)
+    assert json.loads(hear(party, "service_response")["values"]["value"]) == "file_server2"
+    party.client.receive(GET_DESCRIPTION.replace(b"sim_0/sim_0", b"other"))
+    value = hear(party, "service_response")["values"]["value"]
+    # Of JSON it knows quotation marks and ends of lines.
+    assert value[1:-1].replace('\\"', '"').replace("\\n", "\n") == urdf
+    party.client.receive(HAS)
+    assert hear(party, "service_response")["values"] == {"exists": False}
