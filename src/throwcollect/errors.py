@@ -8,6 +8,7 @@
     │   ├── NotFoundError            exit 2   what is named does not exist
     │   └── ConflictError            exit 2   it does, but in a state that does not allow what is asked for
     ├── MissingExtraError            exit 2   a package that an extra brings is not installed (`throwcollect.extras`)
+    ├── MissingLibraryError          exit 2   a library of the system is missing that such a package loads (likewise)
     ├── WorkerError                  exit 3   a process of the run could not be started or was lost for good
     ├── LossError                    exit 5   a dataset is there, but trials of it are lost or doubtful
     ├── DatasetError                 exit 4   a dataset is missing, torn or contradicts itself

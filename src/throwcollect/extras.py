@@ -74,11 +74,34 @@ class MissingExtraError(ThrowcollectError, ImportError):
 
 
 _INSTEAD = {
-    "pybullet": "`sim.engine: mujoco`, which computes other throws, or Python 3.11, such as that of `uv venv --python "
-    "3.11`; `up --runtime docker` needs none here",
+    "pybullet": "Python 3.11, such as that of `uv venv --python 3.11`; without it, `sim.engine: mujoco` simulates "
+    "other throws, `up --runtime docker` the same ones, and `dataset view` shows them",
     "mujoco": "Python 3.11 or later, or `sim.engine: bullet`",
 }
-"""What helps where an engine has no wheel for this Python."""
+"""What helps where an engine, which also draws pictures if it is Bullet, has no wheel for this Python."""
+
+
+_SYSTEM_LIBRARY_OF = MappingProxyType({"pinocchio": ("libgomp.so.1", "libgomp1")})
+"""The library that a package loads and no wheel brings, and the package of Debian that has it."""
+
+
+class MissingLibraryError(ThrowcollectError, ImportError):
+    """A package is installed, but this system lacks a library that it loads; nothing has been started.
+
+    Attributes:
+        package: Name under which the package is imported.
+        library: File name of the library.
+    """
+
+    exit_code = ConfigError.exit_code
+
+    def __init__(self, package: str) -> None:
+        self.package = package
+        self.library, system_package = _SYSTEM_LIBRARY_OF[package]
+        super().__init__(
+            f"{package} needs {self.library}, which this system lacks",
+            hint=f"apt install {system_package}, or what has it in another system than Debian and Ubuntu",
+        )
 
 
 def has_wheel(package: str) -> bool:
@@ -147,9 +170,23 @@ def lazily(name: str, *, extra: str | None = None) -> Any:
         extra: The extra to name where the package is missing; None for the one that `EXTRA_OF` has.
 
     Returns:
-        Stands for the module. Asking it for an attribute raises `MissingExtraError` if the package is not installed.
+        Stands for the module. Asking it for an attribute raises `MissingExtraError` if the package is not installed,
+        and `MissingLibraryError` if it is, without a library of the system that it loads.
     """
     return _LazyModule(name, extra)
+
+
+def _lacks_library(package: str) -> bool:
+    """Whether a package is there, and a library of the system that it loads is not."""
+    if package not in _SYSTEM_LIBRARY_OF or not is_installed(package):
+        return False
+    import ctypes  # takes 7 ms, and nobody needs it who has the library
+
+    try:
+        ctypes.CDLL(_SYSTEM_LIBRARY_OF[package][0])
+    except OSError:
+        return True
+    return False
 
 
 class _LazyModule:
@@ -160,7 +197,12 @@ class _LazyModule:
 
     def __getattr__(self, attribute: str) -> Any:
         with explain_missing(self._extra):
-            module = import_module(self._name)
+            try:
+                module = import_module(self._name)
+            except ImportError as error:
+                if _lacks_library(self._name):
+                    raise MissingLibraryError(self._name) from error
+                raise
         value = getattr(module, attribute)
         # The next look-up finds the value here and does not come by this function.
         setattr(self, attribute, value)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import platform
 import re
+import shlex
 import sys
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
@@ -83,7 +84,8 @@ def how_to_install() -> str:
         this = f"{platform.python_implementation()} {platform.python_version()} on {platform.system()}"
         return f"{_SETUP}: by pip it is for {_BY_PIP} alone, and this is {this}, {platform.machine()}"
     if (_CLONE / _INTERFACES).is_dir():
-        return f"pip install {_CLONE / _INTERFACES} -e '{_CLONE}[ros]', or {_SETUP}"
+        command = shlex.join(["pip", "install", str(_CLONE / _INTERFACES), "-e", f"{_CLONE}[ros]"])
+        return f"{command}, or {_SETUP}"
     return f"in a clone of throwcollect: pip install ./{_INTERFACES} '.[ros]', or {_SETUP}"
 
 

@@ -1,10 +1,21 @@
 import sys
 from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
 
 import pytest
 
+from throwcollect import extras
 from throwcollect.errors import ThrowcollectError
-from throwcollect.extras import EXTRA_OF, MissingExtraError, explain_missing, is_installed, lazily, require
+from throwcollect.extras import (
+    EXTRA_OF,
+    MissingExtraError,
+    MissingLibraryError,
+    explain_missing,
+    is_installed,
+    lazily,
+    require,
+)
 
 
 @pytest.fixture
@@ -51,6 +62,34 @@ def test_a_missing_module_that_no_extra_brings_is_not_explained_away() -> None:
     with pytest.raises(ModuleNotFoundError, match="throwcollect_of_tomorrow") as raised, explain_missing():
         import throwcollect_of_tomorrow  # noqa: F401
     assert not isinstance(raised.value, MissingExtraError)
+
+
+@pytest.fixture
+def needy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
+    """A package that is installed, and cannot be imported."""
+    (tmp_path / "needy.py").write_text("raise ImportError('as the loader says it')")
+    monkeypatch.syspath_prepend(tmp_path)
+    return lazily("needy")
+
+
+def test_a_library_that_the_system_lacks_is_told_with_what_has_it(needy: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(extras, "_SYSTEM_LIBRARY_OF", {"needy": ("libneedy.so.1", "libneedy1")})
+    with pytest.raises(MissingLibraryError) as raised:
+        _ = needy.anything
+    assert str(raised.value) == (
+        "needy needs libneedy.so.1, which this system lacks\n"
+        "  try: apt install libneedy1, or what has it in another system than Debian and Ubuntu"
+    )
+    assert (raised.value.package, raised.value.library, raised.value.exit_code) == ("needy", "libneedy.so.1", 2)
+
+
+@pytest.mark.parametrize("libraries", [{}, {"needy": ("libc.so.6", "libc6")}])
+def test_any_other_failure_of_an_import_is_an_error_as_ever(
+    libraries: dict[str, tuple[str, str]], needy: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(extras, "_SYSTEM_LIBRARY_OF", libraries)
+    with pytest.raises(ImportError, match="as the loader says it"):
+        _ = needy.anything
 
 
 def test_a_missing_package_does_not_count_as_installed(without_scipy) -> None:

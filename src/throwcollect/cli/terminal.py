@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING
 from throwcollect.runs.onlooker import Onlooker
 
 if TYPE_CHECKING:
+    from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
+
     from throwcollect.coordinator.progress import Progress
 
 _LINE_EVERY_S = 2.0
@@ -79,7 +81,15 @@ class _Bar(Display):
     def __init__(self) -> None:
         from rich import progress
         from rich.console import Console
+        from rich.live import Live
         from rich.table import Column
+        from rich.text import Text
+
+        class Counts(progress.ProgressColumn):
+            """The words, which give way where there is little room, so that the numbers beside them do not."""
+
+            def render(self, task: progress.Task) -> Text:
+                return Text(task.description, no_wrap=True, overflow="ellipsis")
 
         console = Console(stderr=True)
         self._bar = progress.BarColumn()
@@ -87,21 +97,25 @@ class _Bar(Display):
         self._progress = progress.Progress(
             self._bar,
             progress.MofNCompleteColumn(table_column=whole),
-            progress.TextColumn("{task.description}", table_column=whole.copy()),
+            Counts(),
             progress.TextColumn("ETA", table_column=whole.copy()),
             progress.TimeRemainingColumn(compact=True, table_column=whole.copy()),
             console=console,
         )
         self._task = self._progress.add_task("waiting for simulations", total=None)
+        self._live = Live(console=console, get_renderable=self._draw, refresh_per_second=10)
+
+    def _draw(self) -> RenderableType:
+        return _InPlace(self._progress.make_tasks_table(self._progress.tasks))
 
     def __enter__(self) -> _Bar:
-        self._progress.start()
+        self._live.start()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._progress.stop()
+        self._live.stop()
 
     def update(self, progress: Progress) -> None:
         completed, total = progress.steps
@@ -114,3 +128,28 @@ class _Bar(Display):
 
     def warn(self, line: str) -> None:
         self._progress.console.print(line, markup=False, highlight=False, soft_wrap=True)
+
+
+class _InPlace:
+    """A line that leaves no remains when the terminal is narrowed, which then breaks it into several.
+
+    The cursor waits at the start of the line: it stays there when the line is broken, so all that is to be erased lies
+    behind it. From the end of the line, nobody could tell how far up to go, as some terminals break lines and others
+    cut them. A line that is too long, because the terminal has not told of its new width yet, is cut at its edge.
+
+    Args:
+        line: What takes one line.
+    """
+
+    def __init__(self, line: RenderableType) -> None:
+        self._line = line
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        from rich.segment import ControlType, Segment
+
+        (segments,) = console.render_lines(self._line, options, pad=False)
+        # rich has erased this row. It has no names for what follows: the rows below are erased, and nothing is wrapped.
+        # Erased from its first row on, a screen would go into the history of tmux.
+        yield Segment("\x1b7\x1b[B\x1b[J\x1b8\x1b[?7l", None, [(ControlType.ERASE_IN_LINE, 0)])
+        yield from segments
+        yield Segment("\x1b[?7h\r", None, [(ControlType.CARRIAGE_RETURN,)])

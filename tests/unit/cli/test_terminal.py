@@ -1,3 +1,6 @@
+import io
+import re
+
 import pytest
 
 from throwcollect.cli.terminal import _Bar, display
@@ -40,4 +43,85 @@ def test_the_bar_fits_the_terminal_as_it_is_now_and_no_text_takes_a_second_line(
     console.width = columns
     shown.update(progress(3, landed=1, self_hit=1, lost=1))
     assert shown._bar.bar_width == cells
-    assert len(console.render_lines(shown._progress.get_renderable())) == 1
+    (line,) = console.render_lines(shown._progress.get_renderable())
+    text = "".join(segment.text for segment in line)
+    assert re.search(r" 3/10 1 landed.* ETA [-\d]+:[-\d]+", text)
+
+
+class Terminal(io.StringIO):
+    """A terminal that breaks its lines when it is narrowed, as most do; `rows` is what it shows."""
+
+    def __init__(self, width: int) -> None:
+        super().__init__()
+        self._width, self._wraps = width, True
+        self._row, self._column, self._saved = 0, 0, (0, 0)
+        self.rows = [""]
+
+    def isatty(self) -> bool:
+        return True
+
+    def write(self, text: str) -> int:
+        for code, character in re.findall(r"(\x1b(?:\[[?\d;]*\w|[78]))|(.)", text, flags=re.DOTALL):
+            self._obey(code) if code else self._put(character)
+        return len(text)
+
+    def _put(self, character: str) -> None:
+        if character in "\r\n":
+            self._column = 0
+            self._row += character == "\n"
+        else:
+            if self._column == self._width:
+                self._row, self._column = (self._row + 1, 0) if self._wraps else (self._row, self._width - 1)
+            self.rows.extend([""] * (self._row + 1 - len(self.rows)))
+            row = self.rows[self._row].ljust(self._column)
+            self.rows[self._row] = row[: self._column] + character + row[self._column + 1 :]
+            self._column += 1
+        self.rows.extend([""] * (self._row + 1 - len(self.rows)))
+
+    def _obey(self, code: str) -> None:
+        match code.removeprefix("\x1b"):
+            case "[2K":
+                self.rows[self._row] = ""
+            case "[J":
+                self.rows[self._row :] = [self.rows[self._row][: self._column]]
+            case "[1A":
+                self._row = max(self._row - 1, 0)
+            case "[B":
+                self._row = min(self._row + 1, len(self.rows) - 1)
+            case "7":
+                self._saved = self._row, self._column
+            case "8":
+                self._row, self._column = self._saved
+                self.rows.extend([""] * (self._row + 1 - len(self.rows)))
+            case "[?7l" | "[?7h":
+                self._wraps = code.endswith("h")
+            case other:
+                assert other[-1] == "m" or other in ("[?25l", "[?25h"), other
+
+    def narrow(self, width: int) -> None:
+        broken = [re.findall(f".{{1,{width}}}", row) or [""] for row in self.rows]
+        self._row = sum(map(len, broken[: self._row])) + self._column // width
+        self._column, self._width = self._column % width, width
+        self.rows = [part for parts in broken for part in parts]
+
+
+@pytest.mark.parametrize("told", [True, False])
+def test_a_terminal_that_is_narrowed_shows_no_remains_of_the_bar(monkeypatch: pytest.MonkeyPatch, told: bool) -> None:
+    terminal = Terminal(120)
+    monkeypatch.setattr("sys.stderr", terminal)
+    monkeypatch.setenv("TERM", "xterm")
+    shown = _Bar()
+    console = shown._progress.console
+    console.width, shown._live.auto_refresh = 120, False
+    with shown:
+        shown.say("plan: 10 trials")
+        shown.update(progress(1, landed=1))
+        shown._live.refresh()
+        assert [row[:4] for row in terminal.rows] == ["plan", "━━━━"]
+        terminal.narrow(40)
+        if not told:
+            shown._live.refresh()
+        console.width = 40
+        shown.update(progress(2, landed=2))
+        shown.warn("sim_0 was lost")
+    assert [row.strip(" ━╸╺")[:8] for row in terminal.rows] == ["plan: 10", "sim_0 wa", "2/10 2 l", ""]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json as jsonlib
 import re
+import shlex
 from typing import Annotated
 
 import typer
@@ -31,7 +32,8 @@ def view_dataset(
         f"{written.recording}: {written.throws} throw{'s' * (written.throws != 1)}, {written.duration_s:.0f} s, "
         f"{written.recording_bytes / 1e6:.1f} MB; meshes beside it: {written.mesh_bytes / 1e6:.1f} MB\n"
         f"Foxglove  open {written.recording.name}, then import the layout {written.layout}\n"
-        f"Rerun     ROS_PACKAGE_PATH={output.absolute()} rerun {written.recording}"
+        f"Rerun     ROS_PACKAGE_PATH={shlex.quote(str(output.absolute()))} "
+        f"rerun {shlex.quote(str(written.recording))}"
     )
 
 

@@ -91,7 +91,8 @@ def echo(
             value = plain(message)
             print(yaml_text(value if full else shorten(value, SHORT)), end="---\n", flush=True)
 
-        session.node.create_subscription(message_type, name, show, find_offered_qos(session.node, name))
+        qos = find_offered_qos(session.node, name, ros.ReliabilityPolicy.BEST_EFFORT)
+        session.node.create_subscription(message_type, name, show, qos)
         session.spin_until(lambda: once and heard)
 
 

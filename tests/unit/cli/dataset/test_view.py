@@ -61,7 +61,7 @@ def test_the_page_says_what_the_command_writes(tmp_path: Path, monkeypatch: pyte
 
 def test_the_command_says_what_to_do_next(tmp_path: Path) -> None:
     Collection({"trials": 1}).collect(tmp_path / "quick")
-    output = tmp_path / "view"
+    output = tmp_path / "my view"
     result = CliRunner().invoke(app, ["dataset", "view", str(tmp_path / "quick"), str(output)], catch_exceptions=False)
     assert result.stdout.startswith(f"{output}/throws.mcap: 1 throw, ")
-    assert f"ROS_PACKAGE_PATH={output} rerun {output}/throws.mcap" in result.stdout
+    assert f"ROS_PACKAGE_PATH='{output}' rerun '{output}/throws.mcap'" in result.stdout
