@@ -5,7 +5,6 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 READY_DEV := $(VENV)/.ready-dev
-READY_DOCS := $(VENV)/.ready-docs
 # Genuine ROS 2 has an environment of its own: where rclpy is, nodes run on it.
 ROS_VENV := .venv-ros
 ROS_WHEELS := build/wheelhouse-ros
@@ -25,24 +24,28 @@ up: $(READY)
 $(VENV)/bin/python:
 	@packaging/environment.sh $(VENV) $(PYTHON)
 
+# Pinocchio loads this library, and no wheel brings it. Who lacks it hears of it before anything is downloaded.
+define find_libgomp
+@$(BIN)/python -c 'import ctypes, sys; sys.platform != "linux" or ctypes.CDLL("libgomp.so.1")' 2> /dev/null || \
+    { echo "libgomp.so.1 is missing, which simulating needs: sudo apt install libgomp1, then make again" >&2; exit 1; }
+endef
+
 # pip shows what it downloads, as this takes minutes. Nothing may be compiled: a Bullet of one's own computes other bytes.
 INSTALL := $(BIN)/python -m pip install --no-compile --disable-pip-version-check --only-binary=pybullet
 
 $(READY): pyproject.toml | $(VENV)/bin/python
-	@echo "installing about 60 packages, 1.5 GB with the robot's description, into $(VENV)"
+	$(find_libgomp)
+	@echo "installing about 80 packages into $(VENV): 500 MB to download, 1.8 GB with the robot's description"
 	$(INSTALL) -e '.[collect,docker,report,export,serve]'
 	@touch $@
 
 $(READY_DEV): pyproject.toml | $(VENV)/bin/python
 	@$(BIN)/python -c 'import sys; sys.version_info < (3, 12) or sys.exit("the tests need pybullet, which has wheels for \
 	Python 3.10 and 3.11 alone, and $(VENV) has another: rm -r $(VENV), then make PYTHON=/path/to/python3.11 test")'
-	@echo "installing about 80 packages, 1.7 GB with the robot's description, into $(VENV)"
+	$(find_libgomp)
+	@echo "installing about 140 packages into $(VENV): 600 MB to download, 2 GB with the robot's description"
 	$(INSTALL) -e '.[dev]'
 	@touch $(READY) $@
-
-$(READY_DOCS): pyproject.toml | $(VENV)/bin/python
-	$(INSTALL) -e '.[docs]'
-	@touch $@
 
 # An environment with genuine rclpy on top of the one for development: `.venv-ros/bin/python -m pytest tests/ros`.
 ros: $(READY_DEV)
@@ -51,7 +54,8 @@ ros: $(READY_DEV)
 
 # NumPy and all that is not ROS comes from that other environment, so that it is there once, in one version.
 $(READY_ROS): $(ROS_WHEELS)/made-from.sha256 | $(READY_DEV)
-	$(BIN)/python -m venv --clear $(ROS_VENV)
+	rm -rf $(ROS_VENV)
+	packaging/environment.sh $(ROS_VENV) $(BIN)/python
 	$(ROS_VENV)/bin/python -m pip install --quiet --no-compile --disable-pip-version-check --no-deps \
 	    $$(ls $(ROS_WHEELS)/*.whl | grep -v /numpy-)
 	$(ROS_VENV)/bin/python -c "import sysconfig; print('import site; site.addsitedir(\'' \
@@ -60,8 +64,8 @@ $(READY_ROS): $(ROS_WHEELS)/made-from.sha256 | $(READY_DEV)
 	touch $@
 
 # What a contributor runs in between, in less than a minute on two cores: the rules of the house, the API of nodes on the embedded
-# backend, and all units but those that write, read, draw or simulate whole datasets.
-SLOW := cli dataset derive export replay report runs runtimes sim slimming test_simulator.py view wheels
+# backend, and all units but those that write, read, learn from, serve, draw or simulate whole datasets.
+SLOW := cli coordinator dataset derive engines export learning replay report runs runtimes serve sim slimming test_simulator.py view wheels
 test-fast: $(READY_DEV)
 	$(BIN)/python -m pytest -n logical tests/architecture tests/contract tests/unit $(addprefix --ignore=tests/unit/,$(SLOW))
 
@@ -102,7 +106,7 @@ test-processes:
 test-cluster:
 	$(call twice,$(BIN)/python -m pytest tests/cluster)
 
-# Format, lint, types, the direction of imports, and the rules of the house.
+# Format, lint, types, the direction of imports, and the rules of the house; its tests build the documentation site, too.
 check: $(READY_DEV)
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
@@ -111,7 +115,7 @@ check: $(READY_DEV)
 	$(BIN)/python -m pytest -q tests/architecture
 
 # The documentation site, build/site/index.html; a broken link fails.
-docs: $(READY_DOCS)
+docs: $(READY_DEV)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
 # Throws a second against the raw limit of the same machine, in the same run.
@@ -119,18 +123,19 @@ bench: $(READY_DEV) ros
 	$(BIN)/python -m bench
 	$(ROS_VENV)/bin/python -m bench.backends
 
-# A database as large as a published one, collected in peace and among crashes: the same files. Takes half an hour.
+# A database as large as a published one, collected in peace and among crashes, with either engine: the same files. Takes a quarter of an hour.
 bench-full: $(READY_DEV)
-	$(BIN)/python -m bench.full
+	$(BIN)/python -m bench.full --engine bullet
+	$(BIN)/python -m bench.full --engine mujoco
 
 # What is published (docs/releasing.md): checked, and tried in an environment of its own.
 dist: | $(VENV)/bin/python
 	rm -rf dist build/release build/tried
-	$(BIN)/python -m venv build/release
+	packaging/environment.sh build/release $(BIN)/python
 	build/release/bin/python -m pip install --quiet --disable-pip-version-check build twine
 	build/release/bin/python -m build
 	build/release/bin/twine check --strict dist/*
-	$(BIN)/python -m venv build/tried
+	packaging/environment.sh build/tried $(BIN)/python
 	build/tried/bin/python -m pip install --quiet --disable-pip-version-check dist/*.whl
 	build/tried/bin/throwcollect --version
 	build/tried/bin/throwcollect config configs/quickstart.yaml > build/tried/config.yaml

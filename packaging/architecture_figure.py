@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator, Mapping
-from html import escape
 from pathlib import Path
+
+import svg
 
 ROOT = Path(__file__).resolve().parents[1]
 SOURCE = ROOT / "src"
@@ -126,36 +127,26 @@ def _descend(room: str, graph: Mapping[str, set[str]]) -> set[str]:
 def draw() -> str:
     """Draw the figure as SVG."""
     imported, outside = read_imports()
-    lines = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {TOTAL_WIDTH} {GROUND + 110}" '
-        'font-family="sans-serif" font-size="12" text-anchor="middle">',
-        "<!-- Written by packaging/architecture_figure.py. -->",
-        '<defs><marker id="tip" viewBox="0 0 8 8" refX="8" refY="4" markerWidth="8" markerHeight="8" orient="auto">'
-        '<path d="M0 0 L8 4 L0 8 z" fill="#5b7083"/></marker></defs>',
-        '<rect width="100%" height="100%" fill="#ffffff"/>',
-    ]
+    parts = []
     for room, other in reduce_arrows(imported):
         (x, y), (to_x, to_y) = _centre(room), _centre(other)
-        lines.append(
-            f'<line x1="{x:g}" y1="{y + HEIGHT / 2:g}" x2="{to_x:g}" y2="{to_y - HEIGHT / 2:g}" stroke="#5b7083" '
-            'stroke-width="1.2" marker-end="url(#tip)"/>'
-        )
+        parts.append(svg.line(x, y + HEIGHT / 2, to_x, to_y - HEIGHT / 2))
     for room, (_, _, words) in PLACES.items():
-        lines += _box(*_centre(room), room, words, ", ".join(sorted(outside[room])))
+        parts += _box(*_centre(room), room, words, ", ".join(sorted(outside[room])))
     ground = sorted(imported.keys() - PLACES.keys())
-    lines += [
-        f'<rect x="20" y="{GROUND}" width="{TOTAL_WIDTH - 40}" height="74" rx="6" fill="#eef1f4" stroke="#9aa8b5"/>',
-        f'<text x="{TOTAL_WIDTH / 2:g}" y="{GROUND + 22}" fill="#52606d">below all of them, for any to import</text>',
+    middle = TOTAL_WIDTH / 2
+    parts += [
+        svg.rectangle(middle, GROUND + 37, TOTAL_WIDTH - 40, 74, "ground"),
+        svg.text(middle, GROUND + 22, "below all of them, for any to import", "words"),
         *(
-            f'<text x="{TOTAL_WIDTH / 2:g}" y="{y}" font-weight="bold">{" · ".join(part)}</text>'
+            svg.text(middle, y, " · ".join(part), "title")
             for y, part in ((GROUND + 42, ground[: len(ground) // 2]), (GROUND + 60, ground[len(ground) // 2 :]))
         ),
         _note(0, "An arrow is an import. Those that follow from others are left out:"),
         _note(1, "runs import runtimes, which import replay; so runs may import replay, too."),
         _note(2, "In colour: libraries that come in by this room."),
-        "</svg>",
     ]
-    return "\n".join(lines) + "\n"
+    return svg.figure(TOTAL_WIDTH, GROUND + 110, parts, script="architecture_figure.py")
 
 
 def _centre(room: str) -> tuple[float, float]:
@@ -165,18 +156,15 @@ def _centre(room: str) -> tuple[float, float]:
 
 def _box(x: float, y: float, room: str, words: str, libraries: str) -> list[str]:
     return [
-        f'<rect x="{x - WIDTH / 2:g}" y="{y - HEIGHT / 2:g}" width="{WIDTH}" height="{HEIGHT}" rx="6" '
-        'fill="#e3eefa" stroke="#34658f"/>',
-        f'<text x="{x:g}" y="{y - 9:g}" font-weight="bold" font-size="13">{room}</text>',
-        f'<text x="{x:g}" y="{y + 6:g}" font-size="10.5" fill="#333333">{escape(words)}</text>',
-        f'<text x="{x:g}" y="{y + 20:g}" font-size="10.5" fill="#a8470b">{libraries}</text>',
+        svg.rectangle(x, y, WIDTH, HEIGHT, "box"),
+        svg.text(x, y - 9, room, "title"),
+        svg.text(x, y + 6, words, "words"),
+        svg.text(x, y + 20, libraries, "library"),
     ]
 
 
-def _note(line: int, words: str) -> str:
-    return (
-        f'<text x="{TOTAL_WIDTH - 20}" y="{TOP + 9 * ROW + 18 * line}" text-anchor="end" fill="#52606d">{words}</text>'
-    )
+def _note(row: int, words: str) -> str:
+    return svg.text(TOTAL_WIDTH - 20, TOP + 9 * ROW + 18 * row, words, "words", anchor="end")
 
 
 if __name__ == "__main__":

@@ -38,13 +38,17 @@ uv=uv
 if ! command -v uv > /dev/null; then
     uv=build/uv/bin/uv
     if [ -z "$named" ] && ! [ -x "$uv" ] && fetch_uv; then
-        echo "no Python 3.10 or 3.11 is here that makes environments; uv, which fetches one, is in build/uv"
+        echo "no Python 3.10 or 3.11 is here that makes environments; uv, which does, is in build/uv"
     fi
 fi
 
-if [ -z "$named" ] && command -v "$uv" > /dev/null && "$uv" venv --quiet --seed --python 3.11 "$directory"; then
-    echo "environment: $directory, with Python 3.11 by uv"
-    exit
+if [ -z "$named" ] && command -v "$uv" > /dev/null; then
+    if { said=$("$uv" venv --quiet --seed --python 3.11 "$directory" 2>&1 >&3); } 3>&1; then
+        echo "environment: $directory, with Python 3.11 by uv"
+        exit
+    fi
+    # Its last line has the cause; the others have addresses.
+    echo "uv cannot have Python 3.11: ${said##*cause: }"
 fi
 
 because="for which pybullet has no wheel: MuJoCo simulates, whose throws land some millimetres elsewhere (docs/engines.md)"

@@ -58,8 +58,9 @@ def fill(directory: Path) -> bool:
     for wheel in directory.glob("*.whl"):
         wheel.unlink()
     command = [sys.executable, "-m", "pip", "wheel", "--quiet", "--disable-pip-version-check"]
-    # By the variable, as an option would not reach what builds.
-    environment = {**os.environ, "PIP_CONSTRAINT": str(CONSTRAINTS)}
+    # By variables, as options would not reach what builds. The constraints as an address, as there may be several
+    # files, with blanks between. PEP 517, as pip 23.0, that of Debian 12, otherwise needs `wheel`, which is missing.
+    environment = {**os.environ, "PIP_CONSTRAINT": CONSTRAINTS.as_uri(), "PIP_USE_PEP517": "1"}
     subprocess.run(
         [*command, f"--wheel-dir={directory}", str(INTERFACES), *requirements()], env=environment, check=True
     )

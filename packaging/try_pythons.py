@@ -34,9 +34,7 @@ class Tried:
 
     version: str
     light_s: float
-    light_bytes: int
     collect_s: float
-    collect_bytes: int
     engine: str
     throws_s: float
     digest: str
@@ -44,8 +42,8 @@ class Tried:
     def row(self) -> str:
         """Its row of the table."""
         return (
-            f"| {self.version} | {self.light_s:.0f} s, {self.light_bytes / 1e6:.0f} MB | {self.collect_s:.0f} s, "
-            f"{self.collect_bytes / 1e6:.0f} MB | `{self.engine}` | {self.throws_s:.1f} s | `{self.digest[:10]}` |"
+            f"| {self.version} | {self.light_s:.0f} s | {self.collect_s:.0f} s | `{self.engine}` | "
+            f"{self.throws_s:.1f} s | `{self.digest[:10]}` |"
         )
 
 
@@ -77,15 +75,14 @@ def run(words: list[str | Path], directory: Path, environment: Mapping[str, str]
     return done.stdout
 
 
-def install(python: str, wheel: str, directory: Path, environment: Mapping[str, str]) -> tuple[float, int]:
-    """Makes an environment with a wheel and its extras: how long it took [s], and how large it is [bytes]."""
+def install(python: str, wheel: str, directory: Path, environment: Mapping[str, str]) -> float:
+    """Makes an environment with a wheel and its extras, and says how long it took [s]."""
     began = time.monotonic()
     said = run([ROOT / "packaging" / "environment.sh", directory, python], directory.parent, environment)
     print(said.strip(), flush=True)
     pip: list[str | Path] = [directory / "bin" / "python", "-m", "pip", "install", "--quiet", "--no-compile"]
     run([*pip, "--disable-pip-version-check", "--only-binary=:all:", wheel], directory.parent, environment)
-    took_s = time.monotonic() - began
-    return took_s, sum(path.lstat().st_size for path in directory.rglob("*"))
+    return time.monotonic() - began
 
 
 def try_python(version: str, python: str, wheel: Path, directory: Path) -> Tried:
@@ -95,8 +92,8 @@ def try_python(version: str, python: str, wheel: Path, directory: Path) -> Tried
     environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
     environment["HOME"] = str(home)
     collecting, reading = directory / "collect", directory / "light"
-    light_s, light_bytes = install(python, str(wheel), reading, environment)
-    collect_s, collect_bytes = install(python, f"{wheel}[collect]", collecting, environment)
+    light_s = install(python, str(wheel), reading, environment)
+    collect_s = install(python, f"{wheel}[collect]", collecting, environment)
     engine = "bullet" if tuple(map(int, version.split("."))) <= LAST_WITH_BULLET else "mujoco"
     throwcollect, dataset = collecting / "bin" / "throwcollect", directory / "five throws"
     words: list[str | Path] = [
@@ -113,7 +110,7 @@ def try_python(version: str, python: str, wheel: Path, directory: Path) -> Tried
     run([*words, *settings, "--output", dataset], directory, environment)
     throws_s = time.monotonic() - began
     digest = run([reading / "bin" / "python", "-c", READ, dataset], directory, environment).strip()
-    return Tried(version, light_s, light_bytes, collect_s, collect_bytes, engine, throws_s, digest)
+    return Tried(version, light_s, collect_s, engine, throws_s, digest)
 
 
 def main() -> None:
@@ -122,7 +119,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory(prefix="try pythons ") as name:
         source = Path(name) / "source"
         source.mkdir()
-        for file in ("pyproject.toml", "README.md", "LICENSE"):
+        for file in ("pyproject.toml", "LICENSE"):
             shutil.copy(ROOT / file, source)
         shutil.copytree(ROOT / "src", source / "src", ignore=shutil.ignore_patterns("*.egg-info", "__pycache__"))
         pip: list[str | Path] = [

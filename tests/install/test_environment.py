@@ -31,7 +31,7 @@ def put(
     makes: bool = True,
     pip: str = "exit 1",
     fetch: str = "exit 1",
-    code: int = 0,
+    ends: str = "exit 0",
 ) -> None:
     """A command that tells of itself, and if it is asked with `-c`, whether its version is in the range asked for.
 
@@ -42,7 +42,7 @@ def put(
         makes: Whether it has the modules that make environments.
         pip: What it does as pip.
         fetch: What it does with `fetch_uv.py`.
-        code: How it ends otherwise.
+        ends: How it ends otherwise.
     """
     path = directory / name
     path.write_text(
@@ -58,7 +58,7 @@ case "$1$2$3" in
     */fetch_uv.py*) {fetch} ;;
 esac
 echo "{name}" "$@"
-exit {code}
+{ends}
 """
     )
     path.chmod(0o755)
@@ -100,9 +100,7 @@ def test_where_uv_is_missing_pip_fetches_it_or_a_script_without_pip(commands: Pa
         0,
         ["uv venv --quiet --seed --python 3.11 there", "environment: there, with Python 3.11 by uv"],
     )
-    assert out.startswith(
-        "no Python 3.10 or 3.11 is here that makes environments; uv, which fetches one, is in build/uv"
-    )
+    assert out.startswith("no Python 3.10 or 3.11 is here that makes environments; uv, which does, is in build/uv")
 
 
 @pytest.mark.parametrize(("version", "told"), [("3.13", ", for which pybullet has no wheel: "), ("3.11", "")])
@@ -144,10 +142,13 @@ def test_where_uv_is_not_to_be_had_or_fetches_nothing_mujoco_simulates(
 ) -> None:
     put(commands, "python3", version="3.13")
     if uv:
-        put(commands, "uv", code=2)
-    code, out, _ = made(cwd=tmp_path)
-    told, made_with = out.splitlines()[-2:]
-    assert (code, made_with) == (0, "python3 -m venv there")
+        put(commands, "uv", ends="echo 'error: x\n  cause: y https://z\n  cause: no name' >&2; exit 2")
+    code, out, err = made(cwd=tmp_path)
+    *before, told, made_with = out.splitlines()
+    assert (code, made_with, err) == (0, "python3 -m venv there", "")
+    assert before == (
+        ["uv venv --quiet --seed --python 3.11 there", "uv cannot have Python 3.11: no name"] if uv else []
+    )
     assert "for which pybullet has no wheel: MuJoCo simulates" in told
 
 
