@@ -24,9 +24,9 @@ import psutil
 from throwcollect.dataset.inspect import info
 from throwcollect.dataset.journal import read_journal
 from throwcollect.dataset.verify import verify
+from throwcollect.side_by_side import count_cores
 
 CONFIG = Path(__file__).parents[1] / "configs" / "quickstart.yaml"
-RESULT = Path("build/bench-full.json")
 LANDED = 9_824
 """Throws of the published database of the Jozef Stefan Institute."""
 VICTIMS = ("sim", "router", "coordinator", "launcher", "everything")
@@ -60,7 +60,8 @@ def _throwcollect(*arguments: str | Path) -> list[str]:
 
 def _nodes(launcher: psutil.Process) -> list[tuple[str, psutil.Process]]:
     found = [("launcher", launcher)]
-    for child in launcher.children():
+    # Nodes are forked by a child that has imported their libraries.
+    for child in launcher.children(recursive=True):
         words = child.cmdline()
         found += [(role, child) for role in ("sim", "router", "coordinator") if role in words]
     return found
@@ -77,20 +78,21 @@ def _kill(launcher: psutil.Process, victim: str) -> None:
         process.kill()
 
 
-def collect(directory: Path, *, landed: int, simulations: int, kills: list[tuple[int, str]]) -> Collected:
+def collect(directory: Path, *, engine: str, landed: int, simulations: int, kills: list[tuple[int, str]]) -> Collected:
     """Run the command to its end, and resume it as often as it takes.
 
     Args:
         directory: Directory of the dataset.
+        engine: What simulates.
         landed: Number of throws that have to land.
         simulations: Number of simulations.
         kills: After how many written episodes what is killed, in order.
     """
     collected = Collected()
     options = ["-n", str(simulations), "--runtime", "local", "--json"]
-    command = _throwcollect(
-        "up", CONFIG, "--output", directory, "--set", f"until.landed={landed}", "--set", "trials=null", *options
-    )
+    changes = (f"until.landed={landed}", "trials=null", f"sim.engine={engine}")
+    settings = [word for change in changes for word in ("--set", change)]
+    command = _throwcollect("up", CONFIG, "--output", directory, *settings, *options)
     journal = directory / "logs" / "journal.jsonl"
     left = list(kills)
     written = looked = 0
@@ -119,7 +121,7 @@ def collect(directory: Path, *, landed: int, simulations: int, kills: list[tuple
             raise RuntimeError(said)
         command = _throwcollect("resume", directory, *options)
     collected.wall_s = time.monotonic() - began
-    counts = Counter(event["event"] for event in read_journal(journal))
+    counts = Counter(entry.event for entry in read_journal(journal))
     collected.leases, collected.commits = counts["lease"], counts["commit"]
     return collected
 
@@ -128,7 +130,7 @@ def _fingerprints(directory: Path) -> dict[str, str]:
     return {
         path.name: hashlib.sha256(path.read_bytes()).hexdigest()
         for path in sorted(directory.iterdir())
-        if path.is_file() and path.name != "README.md"
+        if path.is_file() and path.name not in ("README.md", "provenance.json")
     }
 
 
@@ -136,6 +138,7 @@ def main() -> None:
     """Collect twice, compare, verify, and print the table."""
     parser = argparse.ArgumentParser(prog="python -m bench.full", description=__doc__)
     parser.add_argument("--landed", type=int, default=LANDED, help="throws that have to land [%(default)s]")
+    parser.add_argument("--engine", default="bullet", help="what simulates: bullet or mujoco [%(default)s]")
     parser.add_argument("-n", type=int, default=2, help="simulations [%(default)s]")
     parser.add_argument(
         "--seed", type=int, default=0, help="of the moments at which processes are killed [%(default)s]"
@@ -147,18 +150,18 @@ def main() -> None:
     with tempfile.TemporaryDirectory(prefix="throwcollect-bench-") as scratch:
         clean, disturbed = Path(scratch) / "clean", Path(scratch) / "disturbed"
         rows = {
-            "in peace": collect(clean, landed=arguments.landed, simulations=arguments.n, kills=[]),
-            "among crashes": collect(
-                disturbed,
-                landed=arguments.landed,
-                simulations=arguments.n,
-                kills=list(zip(when, victims, strict=True)),
-            ),
+            name: collect(
+                directory, engine=arguments.engine, landed=arguments.landed, simulations=arguments.n, kills=kills
+            )
+            for name, directory, kills in (
+                ("in peace", clean, []),
+                ("among crashes", disturbed, list(zip(when, victims, strict=True))),
+            )
         }
         same = _fingerprints(clean) == _fingerprints(disturbed)
         found = info(disturbed)
         began = time.monotonic()
-        findings = verify(disturbed)
+        findings = verify(disturbed, processes=count_cores())
         verify_s = time.monotonic() - began
     report = {
         "landed": found.outcomes["landed"],
@@ -170,9 +173,11 @@ def main() -> None:
         "bytes_per_throw": found.size_bytes / found.episodes,
         **{name: asdict(row) for name, row in rows.items()},
     }
-    RESULT.parent.mkdir(exist_ok=True)
-    RESULT.write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")
+    result = Path(f"build/bench-full-{arguments.engine}.json")
+    result.parent.mkdir(exist_ok=True)
+    result.write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")
     _print(report, rows, episodes=found.episodes)
+    print(f"all numbers: {result}")
     if not same or findings:
         raise SystemExit("the datasets differ" if not same else "verify found something")
 
@@ -194,7 +199,6 @@ def _print(report: dict, rows: dict[str, Collected], *, episodes: int) -> None:
     print(f"\n{report['bytes_per_throw'] / 1e3:.1f} kB a throw; verify took {report['verify_s']:.0f} s: ", end="")
     print("nothing wrong" if not report["findings"] else report["findings"])
     print("all files are the same" if report["same_files"] else "THE FILES DIFFER")
-    print(f"all numbers: {RESULT}")
 
 
 if __name__ == "__main__":

@@ -32,7 +32,7 @@ ROOT = Path(__file__).parents[2]
 BASE = "throwcollect-base:bookworm"
 PAGE = (ROOT / "docs" / "containers.md").read_text(encoding="utf-8")
 COMMANDS = re.findall(r"^ *(apptainer .*?throwcollect\.sif up [^#\n]*)", PAGE, flags=re.MULTILINE)
-PLACES = ("/tmp", "/var/tmp", "/home", "/dev/shm", "/run", "/opt")
+PLACES = ("/tmp", "/var/tmp", "/home", "/dev/shm", "/run", "/run/user", "/opt")
 """Where whoever shares the machine could be disturbed."""
 AUTOMATIC = CONFIG.replace("runtime: local, ", "")
 
@@ -77,7 +77,11 @@ def finish(process: subprocess.Popen[str]) -> str:
 
 def files_of(user: str) -> set[str]:
     """All files of a user in places that users share, apart from directories of tests, be it of others just now."""
-    words = ("find", *PLACES, "-name", f"{SHARED}*", "-prune", "-o", "-user", user, "-not", "-type", "d", "-print")
+    own = ("-user", user)
+    # In what is another's and not open to all, nobody can have written; to walk through it may take half a minute.
+    closed = ("-type", "d", "-not", *own, "-not", "-perm", "-o=w", "-prune")
+    tests = ("-name", f"{SHARED}*", "-prune", "-o", *closed, "-o", *own, "-not", "-type", "d", "-print")
+    words = ("find", *(place for place in PLACES if Path(place).exists()), "-mindepth", "1", *tests)
     # It complains of what others remove meanwhile.
     return set(subprocess.run(words, capture_output=True, text=True, check=False).stdout.splitlines())
 

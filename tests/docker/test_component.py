@@ -15,7 +15,8 @@ from throwcollect.runs import control
 from throwcollect.runs.background import begin_container, begin_run
 from throwcollect.runs.component_container import ContainerOrder
 from throwcollect.runs.record import Origin
-from throwcollect.runs.records import STATE_VARIABLE, Run
+from throwcollect.runs.records import Run
+from throwcollect.runs.state_directory import STATE_VARIABLE
 from throwcollect.runtimes.docker.image import default_tag
 from throwcollect.runtimes.docker.options import RUN_LABEL
 

@@ -20,6 +20,7 @@ from websockets.sync.client import ClientConnection, connect
 
 FLAGS = (
     "--headless=new",
+    "--hide-scrollbars",
     "--no-sandbox",
     "--disable-dev-shm-usage",
     "--ignore-gpu-blocklist",

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from throwcollect.runs.records import STATE_VARIABLE
+from throwcollect.runs.state_directory import STATE_VARIABLE
 
 
 @pytest.fixture(scope="session", autouse=True)

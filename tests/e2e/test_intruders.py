@@ -24,7 +24,8 @@ from tests.e2e.collection import FAST, Running, call, journal, start, write_conf
 from throwcollect.dataset.directory import CARD
 from throwcollect.run_key import RunKey
 from throwcollect.runs.record import Record
-from throwcollect.runs.records import STATE_VARIABLE, Records
+from throwcollect.runs.records import Records
+from throwcollect.runs.state_directory import STATE_VARIABLE
 
 pytestmark = [
     pytest.mark.e2e,

@@ -26,7 +26,8 @@ from tests.e2e.collection import (
     write_config,
 )
 from throwcollect.runs.record import Record
-from throwcollect.runs.records import STATE_VARIABLE, Records
+from throwcollect.runs.records import Records
+from throwcollect.runs.state_directory import STATE_VARIABLE
 
 pytestmark = pytest.mark.e2e
 TRIALS = 40

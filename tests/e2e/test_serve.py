@@ -26,7 +26,8 @@ from tests.e2e.page import wait_for
 from throwcollect import ros
 from throwcollect.ros.srv import GetParameters
 from throwcollect.run_key import RunKey
-from throwcollect.runs.records import STATE_VARIABLE, Records
+from throwcollect.runs.records import Records
+from throwcollect.runs.state_directory import STATE_VARIABLE
 from throwcollect.serve.finding import find_server, make_page_address
 
 pytestmark = pytest.mark.e2e

@@ -24,7 +24,7 @@ from tests.integration.robot import (
 from throwcollect.ros import Context
 from throwcollect.ros.middleware import Middleware
 from throwcollect.ros.router import router
-from throwcollect.runs.records import STATE_VARIABLE
+from throwcollect.runs.state_directory import STATE_VARIABLE
 
 NAME = "sim_0"
 

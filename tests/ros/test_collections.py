@@ -16,7 +16,8 @@ import pytest
 
 from tests.e2e.collection import Running, call, collect, fingerprints, journal, start, write_config
 from throwcollect.errors import WorkerError
-from throwcollect.runs.records import STATE_VARIABLE, Records
+from throwcollect.runs.records import Records
+from throwcollect.runs.state_directory import STATE_VARIABLE
 
 TRIALS = 12
 DOMAIN = "83"
