@@ -28,6 +28,13 @@ def ballistic_positions(
     ball, scene = config.ball, config.scene
     area = math.pi * ball.radius_m**2
     drag_per_m = 0.5 * scene.air_density_kgpm3 * ball.drag_coefficient * area / ball.mass_kg
+    if drag_per_m == 0:
+        # Sums from the first row to the last, as below, so the bits are the same.
+        velocities = np.full((steps + 1, 3), [0.0, 0.0, -scene.gravity_mps2 * dt])
+        velocities[0] = velocity
+        moves = np.add.accumulate(velocities) * dt
+        moves[0] = position
+        return np.add.accumulate(moves)
     x, y, z = map(float, position)
     vx, vy, vz = map(float, velocity)
     path = [(x, y, z)]

@@ -88,6 +88,22 @@ def test_ballistic_motion_converges_to_the_parabola_with_the_physics_rate():
     assert errors[1] / errors[2] == pytest.approx(2, rel=1e-6)
 
 
+@pytest.mark.parametrize("drag", [0.0, 0.47])
+def test_ballistic_motion_is_the_sum_of_its_steps_bit_for_bit(drag):
+    config = Config(ball={"drag_coefficient": drag}, sim={"physics_hz": 1000})
+    per_m = 0.5 * 1.2 * drag * (math.pi * 0.025**2) / 0.045
+    position, velocity = [0.3, -0.2, 1.1], [1.9, 0.4, 2.3]
+    expected = [list(position)]
+    for _ in range(700):
+        braking = per_m * math.sqrt(velocity[0] * velocity[0] + velocity[1] * velocity[1] + velocity[2] * velocity[2])
+        for axis, gravity in enumerate((0.0, 0.0, 9.81)):
+            velocity[axis] -= (gravity + braking * velocity[axis]) * (1 / 1000)
+            position[axis] += velocity[axis] * (1 / 1000)
+        expected.append(list(position))
+    path = ballistic_positions(np.array(expected[0]), np.array([1.9, 0.4, 2.3]), steps=700, config=config)
+    assert path.tolist() == expected
+
+
 def test_drag_slows_the_ball_towards_its_terminal_speed():
     config = Config(ball={"drag_coefficient": 0.47})
     path = ballistic_positions(np.zeros(3), np.zeros(3), steps=20_000, config=config)
