@@ -14,7 +14,8 @@ from throwcollect.config.containers import NodeContainerConfig
 from throwcollect.config.host_paths import DEVICES, SECRETS, is_allowed_device, refusal
 from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError, Problem, WorkerError
-from throwcollect.runtimes.docker.engine import engine_address, engine_errors
+from throwcollect.runtimes.docker.address import engine_address
+from throwcollect.runtimes.docker.engine import engine_errors
 from throwcollect.runtimes.docker.image import default_tag
 from throwcollect.runtimes.docker.options import RUN_LABEL, RunPlace, image, mount_source, section_of
 from throwcollect.runtimes.nodes import COORDINATOR, ROUTER

@@ -16,10 +16,11 @@ from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.ros.connection import Connection
 from throwcollect.ros.middleware import RMW_VARIABLE
 from throwcollect.run_key import RunKey
+from throwcollect.runtimes.docker.address import engine_address, is_local
 from throwcollect.runtimes.docker.checks import check_container
 from throwcollect.runtimes.docker.clock import EngineClock
 from throwcollect.runtimes.docker.containers import LOG_S, SILENCE_S, end_in_words
-from throwcollect.runtimes.docker.engine import ENGINE_ERRORS, connect, engine_address, is_local
+from throwcollect.runtimes.docker.engine import ENGINE_ERRORS, connect
 from throwcollect.runtimes.docker.node_container import NodeContainer
 from throwcollect.runtimes.docker.options import (
     API_VERSION,

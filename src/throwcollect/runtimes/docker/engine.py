@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -15,6 +14,7 @@ from urllib3.exceptions import HTTPError
 from urllib3.exceptions import TimeoutError as PoolTimeoutError
 
 from throwcollect.errors import WorkerError
+from throwcollect.runtimes.docker.address import no_answer
 
 # Connections that break in the middle of an answer or of a stream show as any of the last three.
 ENGINE_ERRORS = (DockerException, HTTPError, OSError, struct.error, json.JSONDecodeError)
@@ -24,17 +24,6 @@ PATIENCE_S = 30.0
 """How long a command waits for an answer of the engine, unless it knows better."""
 
 _TIMEOUTS = (Timeout, PoolTimeoutError, TimeoutError)
-_DEFAULT_HOST = "unix:///var/run/docker.sock"
-
-
-def engine_address() -> str:
-    """Where the engine is looked for: ``DOCKER_HOST``, or the usual socket."""
-    return os.environ.get("DOCKER_HOST") or _DEFAULT_HOST
-
-
-def is_local() -> bool:
-    """Whether the engine is that of this machine, so that its containers can be reached from here."""
-    return engine_address().startswith("unix:")
 
 
 def connect(*, timeout_s: float | None = None) -> DockerClient:
@@ -49,10 +38,7 @@ def connect(*, timeout_s: float | None = None) -> DockerClient:
     try:
         return DockerClient.from_env(timeout=timeout_s or PATIENCE_S)
     except ENGINE_ERRORS as error:
-        raise WorkerError(
-            f"no Docker engine answers at {engine_address()}: {in_words(error)}",
-            hint="start it, let DOCKER_HOST name another one, or use processes: --runtime local",
-        ) from error
+        raise no_answer(in_words(error)) from error
 
 
 def in_words(error: BaseException) -> str:

@@ -5,15 +5,14 @@ The client of the engine is imported when it is needed: most commands only ask w
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from contextlib import closing
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from throwcollect.errors import ConfigError, Problem, WorkerError
 from throwcollect.extras import is_installed
 from throwcollect.ros.middleware import Middleware
+from throwcollect.runtimes.docker.address import check_socket, engine_address, has_socket, is_local
 from throwcollect.runtimes.runtime import Check, HeldRun, Place, Runtime
 
 if TYPE_CHECKING:
@@ -25,7 +24,6 @@ if TYPE_CHECKING:
 _PROBE_S = 3.0
 """Where processes will do as well, an engine that takes longer to answer is as good as none."""
 _LOOK_S = 2.0
-_SOCKET = "/var/run/docker.sock"
 
 
 class DockerRuntime(Runtime):
@@ -37,7 +35,7 @@ class DockerRuntime(Runtime):
 
     def is_absent(self) -> bool:
         """Whether there is neither a client nor an engine to ask."""
-        return not is_installed("docker") or ("DOCKER_HOST" not in os.environ and not Path(_SOCKET).exists())
+        return not is_installed("docker") or not has_socket()
 
     def in_words(self, config: Config) -> str:
         """Where trials are simulated."""
@@ -60,6 +58,8 @@ class DockerRuntime(Runtime):
         self, config: Config, middleware: Middleware, *, say: Callable[[str], None], warn: Callable[[str], None]
     ) -> Middleware:
         """Have the image, and find out what carries the messages of containers; see `Runtime.prepare`."""
+        if is_installed("docker"):
+            check_socket()
         from throwcollect.runtimes.docker.engine import connect
         from throwcollect.runtimes.docker.image import ensure, is_outdated
         from throwcollect.runtimes.docker.options import image
@@ -74,7 +74,7 @@ class DockerRuntime(Runtime):
         """Whether an engine answers, and has the image of these sources."""
         from docker.errors import ImageNotFound
 
-        from throwcollect.runtimes.docker.engine import connect, engine_address, engine_errors
+        from throwcollect.runtimes.docker.engine import connect, engine_errors
         from throwcollect.runtimes.docker.image import default_tag, is_outdated
 
         try:
@@ -135,7 +135,6 @@ def _middleware_of_image(client: DockerClient, config: Config, launcher: Middlew
     Raises:
         ConfigError: If rclpy is asked for, and the image has none, or the launcher could not join its nodes.
     """
-    from throwcollect.runtimes.docker.engine import engine_address, is_local
     from throwcollect.runtimes.docker.image import rmw_of
     from throwcollect.runtimes.docker.options import image
 
