@@ -18,7 +18,8 @@ def follow_to_the_end(directory: Path, *, json: bool) -> None:
     from throwcollect.cli.dataset.info import print_summary
     from throwcollect.cli.interruptions import Interruptions
     from throwcollect.cli.terminal import display
-    from throwcollect.dataset.inspect import info, loss
+    from throwcollect.dataset.inspect import info
+    from throwcollect.dataset.summary import explain_loss
 
     run = ClusterRun.open(directory)
     progress = ProgressOfSlices(run)
@@ -31,7 +32,7 @@ def follow_to_the_end(directory: Path, *, json: bool) -> None:
         raise error
     found = info(directory)
     print_summary(found, directory, as_json=json)
-    if (lost := loss(found.outcomes, hint=None)) is not None:
+    if (lost := explain_loss(found.outcomes, hint=None)) is not None:
         raise lost
 
 

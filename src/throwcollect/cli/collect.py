@@ -205,13 +205,14 @@ def join_run(
 def join(directory: DatasetArgument, json: JsonOption = False) -> None:
     """Make one dataset of the slices that `up --slice` has collected."""
     from throwcollect.cli.dataset.info import print_summary
-    from throwcollect.dataset.inspect import info, loss
+    from throwcollect.dataset.inspect import info
     from throwcollect.dataset.join import join as join_slices
+    from throwcollect.dataset.summary import explain_loss
 
     join_slices(directory)
     found = info(directory)
     print_summary(found, directory, as_json=json)
-    if (lost := loss(found.outcomes, hint=None)) is not None:
+    if (lost := explain_loss(found.outcomes, hint=None)) is not None:
         raise lost
 
 
@@ -288,10 +289,10 @@ def _collect(
             return True
     # They read datasets; what takes long to import is not imported before nodes have begun to.
     from throwcollect.cli.dataset.info import print_summary
-    from throwcollect.dataset.inspect import loss
+    from throwcollect.dataset.summary import explain_loss
 
     print_summary(summary, run.directory, as_json=json)
-    if (lost := loss(summary.outcomes, hint=run.place.way_on)) is not None:
+    if (lost := explain_loss(summary.outcomes, hint=run.place.way_on)) is not None:
         raise lost
     return True
 

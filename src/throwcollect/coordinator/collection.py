@@ -21,7 +21,7 @@ from throwcollect.coordinator.lookahead import Lookahead
 from throwcollect.coordinator.progress import Progress
 from throwcollect.coordinator.replay_check import ReplayCheck
 from throwcollect.dataset.directory import find_known_directory
-from throwcollect.dataset.inspect import loss
+from throwcollect.dataset.summary import explain_loss
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.episode.message import Delivery, Episode
 from throwcollect.errors import DatasetError, Interrupted, WorkerError
@@ -335,7 +335,7 @@ class TrialCollection:
         if (said := self._replay.compare(self.writer.digests(), meanwhile=meanwhile)) is not None:
             say(said)
         outcomes = self.writer.finish(simulations=len(self._took_part) or None)
-        lost = loss(outcomes, hint=f"{command('resume', known)} runs them again" if known else None)
+        lost = explain_loss(outcomes, hint=f"{command('resume', known)} runs them again" if known else None)
         if lost is not None:
             raise lost
 

@@ -14,9 +14,7 @@ from throwcollect.dataset.journal import measure_collected_s
 from throwcollect.dataset.misses import summarise_misses
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.summary import Info
-from throwcollect.errors import DatasetError, LossError
-from throwcollect.tasks.result import LOST
-from throwcollect.wording import format_count
+from throwcollect.errors import DatasetError
 
 
 def info(directory: Path) -> Info:
@@ -65,20 +63,6 @@ def summary(dataset: Dataset) -> Info:
         noun=dataset.config.task.noun,
         misses=summarise_misses(dataset.config, dataset.throws),
     )
-
-
-def loss(outcomes: Mapping[str, int], *, hint: str | None) -> LossError | None:
-    """The error that says that trials of a finished dataset are lost; None if none is.
-
-    Args:
-        outcomes: Number of trials of each outcome.
-        hint: How to go on.
-    """
-    lost, all_of_them = outcomes.get(LOST, 0), sum(outcomes.values())
-    if not lost:
-        return None
-    verb = "is" if lost == 1 else "are"
-    return LossError(f"{lost} of {format_count(all_of_them, 'trial')} {verb} lost; throws.parquet says why", hint=hint)
 
 
 def _landing(throws: pa.Table) -> Mapping[str, tuple[float, float]] | None:

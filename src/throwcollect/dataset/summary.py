@@ -5,6 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 
+from throwcollect.errors import LossError
+from throwcollect.tasks.result import LOST
+from throwcollect.wording import format_count
+
 
 @dataclass(frozen=True)
 class MissSummary:
@@ -71,3 +75,17 @@ class Info:
     def as_dict(self) -> dict[str, object]:
         """The same for JSON."""
         return asdict(self)
+
+
+def explain_loss(outcomes: Mapping[str, int], *, hint: str | None) -> LossError | None:
+    """The error that says that trials of a finished dataset are lost; None if none is.
+
+    Args:
+        outcomes: Number of trials of each outcome.
+        hint: How to go on.
+    """
+    lost, all_of_them = outcomes.get(LOST, 0), sum(outcomes.values())
+    if not lost:
+        return None
+    verb = "is" if lost == 1 else "are"
+    return LossError(f"{lost} of {format_count(all_of_them, 'trial')} {verb} lost; throws.parquet says why", hint=hint)

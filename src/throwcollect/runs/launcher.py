@@ -15,8 +15,8 @@ from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.progress import Progress
 from throwcollect.dataset.directory import config_path
-from throwcollect.dataset.inspect import loss
 from throwcollect.dataset.lock import hold_together
+from throwcollect.dataset.summary import explain_loss
 from throwcollect.errors import ConfigError, Interrupted, LossError, ThrowcollectError, WorkerError
 from throwcollect.files import open_log
 from throwcollect.runs.events import EventLog
@@ -106,7 +106,7 @@ def launch_host(
             run.update(launcher=os.getpid(), nodes=(), endpoint=None, stopping=False)
             info = host.collect(session)
             summary = None if info is None else Summary(**vars(info), open=is_open)
-        lost = None if summary is None else loss(summary.outcomes, hint=place.way_on)
+        lost = None if summary is None else explain_loss(summary.outcomes, hint=place.way_on)
         code, failure = (0, None) if lost is None else (lost.exit_code, Failure.of(lost))
         return summary
     except ThrowcollectError as error:

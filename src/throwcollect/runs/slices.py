@@ -13,7 +13,6 @@ from throwcollect.config.schema import Config
 from throwcollect.coordinator.resume import refuse_changes
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.directory import METADATA, PLAN, config_path
-from throwcollect.dataset.inspect import loss
 from throwcollect.dataset.slice_directory import (
     find_attempts,
     find_finished,
@@ -23,6 +22,7 @@ from throwcollect.dataset.slice_directory import (
     remove_stopped,
     take_recordings,
 )
+from throwcollect.dataset.summary import explain_loss
 from throwcollect.errors import ConfigError, Interrupted, Problem
 from throwcollect.runs.onlooker import SILENT, Onlooker
 from throwcollect.runs.preparation import Request, prepare_run
@@ -92,7 +92,7 @@ def collect_slice(
                 mark_stopped(kept)
                 remove_stopped(earlier)
                 shutil.rmtree(attempt, ignore_errors=True)
-    if (lost := loss(summary.outcomes, hint=f"{again} runs them again")) is not None:
+    if (lost := explain_loss(summary.outcomes, hint=f"{again} runs them again")) is not None:
         raise lost
     publish(attempt, directory, slice)
     return True

@@ -5,6 +5,7 @@ The process that does so is the node ``/launcher``; setting its integer paramete
 
 from __future__ import annotations
 
+import importlib
 import math
 import os
 import time
@@ -116,6 +117,8 @@ class NodeCollection:
             self._session.event("adopted" if found else "started", simulations=self._simulations)
             self._supervisor.start(found=found)
             self._session.take_over([state for state in self._supervisor.states() if state.name in found])
+            # What reads the dataset at the end takes as long to import as the nodes take to start.
+            importlib.import_module("throwcollect.dataset.inspect")
             end = self._follow()
             if not self._host.place.collects:
                 return None
