@@ -16,7 +16,7 @@ from rclzenoh.context import Context, shutdown
 from rclzenoh.context import init as init
 from rclzenoh.exceptions import ExternalShutdownException, NameValidationException
 from rclzenoh.executors import Executor, SingleThreadedExecutor
-from rclzenoh.extensions import graph_changes, let_callbacks_wait, pass_on_log, provide_time, spin_some
+from rclzenoh.extensions import graph_changes, let_callbacks_wait, pass_on_log, provide_time, spin_some, stop_waiting
 from rclzenoh.interfaces import deserialize as deserialize_message
 from rclzenoh.interfaces import get_action, get_message, get_service
 from rclzenoh.interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
@@ -64,4 +64,5 @@ __all__ = [
     "provide_time",
     "shutdown",
     "spin_some",
+    "stop_waiting",
 ]

@@ -42,5 +42,10 @@ def spin_some(executor: Executor, timeout_sec: float) -> None:
         executor.spin_once(timeout_sec=0.0)
 
 
+def stop_waiting(executor: Executor) -> None:
+    """Have `spin_some` come back at once if it waits just now; for handlers of signals, in the thread that spins."""
+    executor.create_task(_nothing)
+
+
 def _nothing() -> None:
     """Work that marks a place among the inputs."""

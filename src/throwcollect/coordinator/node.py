@@ -20,7 +20,7 @@ from throwcollect.run_key import Signer
 from throwcollect.trial.conditions import conditions_from_json
 from throwcollect.trial.lease import Lease
 
-_DISCOVERY_PERIOD_S = 0.1
+_DISCOVERY_PERIOD_S = 0.05
 _REPORT_PERIOD_S = 0.2
 _UNREADABLE_PERIOD_S = 10.0
 """Time between two warnings of episodes that cannot be read, as whoever publishes such may do so often."""

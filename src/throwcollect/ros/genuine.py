@@ -227,6 +227,11 @@ def spin_some(executor: Executor, timeout_sec: float) -> None:
             wait = 0.0
 
 
+def stop_waiting(executor: Executor) -> None:
+    """Let an executor look around; `spin_some` still waits for as long as it was told to, a tenth of a second at most."""
+    executor.wake()
+
+
 def _is_of_request(error: BaseException) -> bool:
     """Whether rclpy itself stumbled over what a request says, such as a parameter of a type that there is not.
 
@@ -294,4 +299,5 @@ __all__ = [
     "provide_time",
     "shutdown",
     "spin_some",
+    "stop_waiting",
 ]

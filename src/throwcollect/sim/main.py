@@ -47,6 +47,7 @@ def run(config: Path, *, name: str, namespace: str | None = None) -> None:
     def stop(number: int, _frame: FrameType | None) -> None:
         nonlocal stopped
         stopped = number
+        ros.stop_waiting(executor)
 
     for number in stop_signals():
         signal.signal(number, stop)
