@@ -45,7 +45,7 @@ class LocalRuntime(Runtime):
     def begin(self, config: Config, middleware: Middleware) -> None:
         """Have what nodes need imported; see `Runtime.begin`."""
         self._server = _make_server(middleware)
-        self._server.begin()
+        self._server.begin(config)
 
     def close(self) -> None:
         """End what was begun; see `Runtime.close`."""

@@ -26,11 +26,13 @@ import warnings
 from collections.abc import Mapping, Sequence
 from functools import partial
 from types import MappingProxyType
-from typing import BinaryIO, NoReturn
+from typing import Any, BinaryIO, NoReturn
 
 from throwcollect.config import shape
+from throwcollect.config.schema import Config
 from throwcollect.errors import ThrowcollectError
 from throwcollect.interruption import die_with_parent
+from throwcollect.members import load_member
 from throwcollect.ros.middleware import Middleware
 
 _MESSAGE_BYTES = 1 << 16
@@ -96,10 +98,14 @@ class NodeServer:
         self._running: set[int] = set()
         self._ends: dict[int, int] = {}
 
-    def begin(self) -> None:
-        """Have libraries imported from now on, so that the first node does not wait for all of that."""
+    def begin(self, config: Config) -> None:
+        """Have libraries imported from now on, so that the first node does not wait for all of that.
+
+        Args:
+            config: Configuration of the nodes that will be started; what all of them make of it is made once.
+        """
         with contextlib.suppress(OSError), open(os.devnull, "wb") as nowhere:
-            self._connect(nowhere)
+            self._connect(nowhere).send(json.dumps({"configuration": config.model_dump(mode="json")}).encode())
             self._silent = True
 
     def start(
@@ -252,6 +258,10 @@ def serve(connection: socket.socket) -> list[str]:
         packet, logs, _, _ = socket.recv_fds(connection, _MESSAGE_BYTES, 1)
         if not packet:
             sys.exit()
+        if not logs:
+            _prepare_for(json.loads(packet)["configuration"])
+            gc.freeze()
+            continue
         if (pid := os.fork()) == 0:
             # By force: without router and simulations there is nothing that a coordinator could wait for.
             die_with_parent(server)
@@ -328,6 +338,22 @@ def _import_libraries() -> None:
         with contextlib.suppress(ImportError, ThrowcollectError):
             importlib.import_module(module)
     shape.root()
+
+
+def _prepare_for(values: Mapping[str, Any]) -> None:
+    """Make what all nodes of a configuration make, and keep; what is wrong is told by the node that needs it.
+
+    That are types and layouts of messages, a model of the robot, and the physics engine, which is only imported.
+    """
+    from throwcollect.episode.channels import Channels
+    from throwcollect.robots.description import full_description
+    from throwcollect.robots.tool_motion import ToolMotion
+
+    with contextlib.suppress(ImportError, ValueError, ThrowcollectError):
+        config = Config.model_validate(values)
+        load_member("engines", config.sim.engine)
+        Channels(config, full_description(config))
+        ToolMotion(config)
 
 
 if __name__ == "__main__":

@@ -8,6 +8,7 @@ from pathlib import Path
 import psutil
 import pytest
 
+from throwcollect.config.schema import Config
 from throwcollect.runtimes.node_server import ForkedNode, NodeServer
 
 WAIT_S = 30.0
@@ -128,7 +129,7 @@ def _handles(pid: int, number: signal.Signals) -> bool:
 def begin(server: NodeServer) -> psutil.Process:
     """Begin a server; its process, beside which there may be those of other tests."""
     before = set(psutil.Process().children())
-    server.begin()
+    server.begin(Config())
     (begun,) = set(psutil.Process().children()) - before
     return begun
 
