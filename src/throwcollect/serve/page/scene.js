@@ -18,6 +18,8 @@ const ZOOM = 1.15;
 const MOST_FINE = 1;
 /** A picture that takes longer than this on average [ms] is drawn with less. */
 const SLOW_MS = 70;
+/** Least time between pictures [ms] that are drawn by software: it leaves the processors to whoever simulates on them. */
+const SOFTWARE_STEP_MS = 95;
 /** How far robots stand from each other in a room. */
 const SPACING_M = 1.5;
 
@@ -67,6 +69,11 @@ export class Station {
   }
 }
 
+/** Whether pictures are drawn by a graphics processor, and not by software. */
+function hasGraphicsHardware() {
+  return document.createElement("canvas").getContext("webgl2", { failIfMajorPerformanceCaveat: true }) !== null;
+}
+
 /** Draws stations into a canvas. */
 export class View {
   /** @type {Map<string, Station>} */
@@ -88,7 +95,9 @@ export class View {
   #rows = 1;
   #changed = true;
   #mean = 0;
+  #waited = 0;
   #plain = false;
+  #leastMs = hasGraphicsHardware() ? 0 : SOFTWARE_STEP_MS;
 
   /**
    * @param {HTMLCanvasElement} canvas
@@ -102,7 +111,11 @@ export class View {
     this.orbit.maxPolarAngle = Math.PI / 2 - 0.02;
     this.orbit.minDistance = 0.6;
     this.orbit.maxDistance = 20;
-    this.orbit.addEventListener("change", () => this.touch());
+    this.orbit.addEventListener("change", () => {
+      // Whoever turns the view with a hand wants to see that at once.
+      this.#waited = Infinity;
+      this.touch();
+    });
     this.reset();
     const light = new DirectionalLight("#ffffff", 2);
     light.position.set(3, -2, 5);
@@ -250,14 +263,17 @@ export class View {
   }
 
   /**
-   * Draw a picture, if anything is new.
-   * @param {number} sinceMs time since the picture before
+   * Draw a picture, if anything is new and it is time for one.
+   * @param {number} sinceMs time since this was called before
    */
   draw(sinceMs) {
+    this.#waited += sinceMs;
     if (!this.#changed) {
       this.#mean = 0;
       return;
     }
+    if (this.#waited < this.#leastMs) return;
+    this.#waited = 0;
     this.#changed = false;
     this.#adapt(sinceMs);
     this.#choose();
