@@ -16,7 +16,9 @@ def main() -> None:
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, _leave)
     from throwcollect.cli.streams import open_streams
+    from throwcollect.own_process import claim_process
 
+    claim_process()
     open_streams()
     from throwcollect.cli.main import main as run_command
 

@@ -49,6 +49,19 @@ def test_no_process_of_a_collection_imports_pandas(yaml, tmp_path: Path) -> None
     assert not imported.exists(), imported.read_text()
 
 
+def test_a_collection_is_one_interpreter_and_what_is_forked_off_it(yaml, tmp_path: Path) -> None:
+    started = tmp_path / "started"
+    (tmp_path / "before").mkdir()
+    (tmp_path / "before" / "sitecustomize.py").write_text(
+        f"import sys\nopen({str(started)!r}, 'a').write(f'{{sys.orig_argv}}\\n')\n"
+    )
+    path = os.pathsep.join([str(tmp_path / "before"), *filter(None, [os.environ.get("PYTHONPATH")])])
+    words = ["up", "-n", "2", "--set", "run.replay=0", "--output", tmp_path / "data", yaml()]
+    command = [sys.executable, "-m", "throwcollect", *words]
+    subprocess.run(command, env={**os.environ, "PYTHONPATH": path}, check=True, capture_output=True)
+    assert len(started.read_text().splitlines()) == 1, started.read_text()
+
+
 def test_what_was_begun_ends_with_a_run_that_is_refused_or_left(yaml, tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="all refused"):
         runs.prepare(yaml(least=0.1, most=0.11), output=tmp_path / "data", ahead=True)

@@ -228,7 +228,7 @@ def spin_some(executor: Executor, timeout_sec: float) -> None:
 
 
 def stop_waiting(executor: Executor) -> None:
-    """Let an executor look around; `spin_some` still waits for as long as it was told to, a tenth of a second at most."""
+    """Let an executor look around; `spin_some` waits on for as long as it was told to, a tenth of a second at most."""
     executor.wake()
 
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from throwcollect.errors import WorkerError
 from throwcollect.files import open_log
+from throwcollect.own_process import may_be_forked
 from throwcollect.ros.middleware import Middleware
 from throwcollect.runtimes.node_logs import NodeLogs
 from throwcollect.runtimes.node_server import ForkedNode, NodeServer
@@ -45,7 +46,8 @@ class LocalRuntime(Runtime):
     def begin(self, config: Config, middleware: Middleware) -> None:
         """Have what nodes need imported; see `Runtime.begin`."""
         self._server = _make_server(middleware)
-        self._server.begin(config)
+        # Genuine ROS 2 takes its settings from the environment when it is loaded, which may have happened here.
+        self._server.begin(config, fork=may_be_forked() and middleware.backend == "embedded")
 
     def close(self) -> None:
         """End what was begun; see `Runtime.close`."""

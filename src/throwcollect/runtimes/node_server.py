@@ -34,6 +34,7 @@ from throwcollect.errors import ThrowcollectError
 from throwcollect.interruption import die_with_parent
 from throwcollect.members import load_member
 from throwcollect.ros.middleware import Middleware
+from throwcollect.runtimes.forked_process import ForkedProcess
 
 _MESSAGE_BYTES = 1 << 16
 _ANSWER_S = 60.0
@@ -92,20 +93,22 @@ class NodeServer:
 
     def __init__(self, environment: Mapping[str, str]) -> None:
         self._environment = dict(environment)
-        self._process: subprocess.Popen[bytes] | None = None
+        self._process: subprocess.Popen[bytes] | ForkedProcess | None = None
         self._socket: socket.socket | None = None
         self._silent = False
         self._running: set[int] = set()
         self._ends: dict[int, int] = {}
 
-    def begin(self, config: Config) -> None:
+    def begin(self, config: Config, *, fork: bool = False) -> None:
         """Have libraries imported from now on, so that the first node does not wait for all of that.
 
         Args:
             config: Configuration of the nodes that will be started; what all of them make of it is made once.
+            fork: Whether this process is forked for that, and what it has imported is not imported once more.
         """
         with contextlib.suppress(OSError), open(os.devnull, "wb") as nowhere:
-            self._connect(nowhere).send(json.dumps({"configuration": config.model_dump(mode="json")}).encode())
+            connection = self._fork() if fork else self._connect(nowhere)
+            connection.send(json.dumps({"configuration": config.model_dump(mode="json")}).encode())
             self._silent = True
 
     def start(
@@ -183,6 +186,19 @@ class NodeServer:
                 start_new_session=True,
                 preexec_fn=partial(die_with_parent, os.getpid()),  # noqa: PLW1509 - it calls nothing that takes a lock
             )
+        self._socket = here
+        return here
+
+    def _fork(self) -> socket.socket:
+        """The socket to a server that is forked off this process.
+
+        Raises:
+            OSError: If there can be none.
+        """
+        here, there = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        with there:
+            work = partial(_run, there)
+            self._process = ForkedProcess(work, environment=self._environment, kept=there.fileno())
         self._socket = here
         return here
 
@@ -301,20 +317,32 @@ def _become_node(log: int, core: int | None) -> None:
 
 
 def main() -> None:
-    """Serve the connection whose file descriptor the command line names, and be a node where one is forked."""
-    import setproctitle
+    """Serve the connection whose file descriptor the command line names."""
+    _run(socket.socket(fileno=int(sys.argv[1])))
 
+
+def _run(connection: socket.socket) -> None:
+    """Serve a connection, and be a node where one is forked."""
+    _show("throwcollect.runtimes.node_server", str(connection.fileno()))
     _import_libraries()
-    arguments = serve(socket.socket(fileno=int(sys.argv[1])))
-    # What `ps` shows; the interpreter's own command line would be that of the server.
-    setproctitle.setproctitle(" ".join([sys.executable, "-m", "throwcollect", *arguments]))
+    arguments = serve(connection)
+    _show("throwcollect", *arguments)
     sys.argv[1:] = arguments
+    # A command that was forked for this has it, and would not import it once more.
+    sys.modules.pop("throwcollect.__main__", None)
     try:
         runpy.run_module("throwcollect", run_name="__main__", alter_sys=True)
     except SystemExit as end:
         if Middleware.of_process().backend != "embedded" or not isinstance(end.code, int):
             raise
         _leave(end.code)
+
+
+def _show(module: str, *arguments: str) -> None:
+    """Have `ps` show what this process does, and not what the one was started for that it was forked off."""
+    import setproctitle
+
+    setproctitle.setproctitle(" ".join([sys.executable, "-m", module, *arguments]))
 
 
 def _leave(code: int) -> NoReturn:
@@ -343,15 +371,20 @@ def _import_libraries() -> None:
 def _prepare_for(values: Mapping[str, Any]) -> None:
     """Make what all nodes of a configuration make, and keep; what is wrong is told by the node that needs it.
 
-    That are types and layouts of messages, a model of the robot, and the physics engine, which is only imported.
+    That are the digest of what computes, types and layouts of messages, and a model of the robot; the task and the
+    physics engine are only imported.
     """
+    from throwcollect.build import build_digest
     from throwcollect.episode.channels import Channels
     from throwcollect.robots.description import full_description
     from throwcollect.robots.tool_motion import ToolMotion
+    from throwcollect.tasks.task import task_of
 
     with contextlib.suppress(ImportError, ValueError, ThrowcollectError):
         config = Config.model_validate(values)
         load_member("engines", config.sim.engine)
+        task_of(config)
+        build_digest(config.sim.engine)
         Channels(config, full_description(config))
         ToolMotion(config)
 

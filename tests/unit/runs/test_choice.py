@@ -32,8 +32,13 @@ def choose() -> Callable[..., tuple[str, list[str]]]:
     return choose
 
 
+@pytest.fixture(autouse=True)
+def socket_is_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("DOCKER_HOST", f"unix://{tmp_path}")
+
+
 @pytest.fixture
-def no_engine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def no_engine(socket_is_there, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("DOCKER_HOST", f"unix://{tmp_path}/nothing.sock")
 
 

@@ -1,0 +1,45 @@
+"""Where the Docker engine is looked for, without its client."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from throwcollect.errors import WorkerError
+from throwcollect.runtimes.docker.address import check_socket, has_socket, is_local
+
+CHOOSES = """
+import sys
+from throwcollect.config.schema import Config
+from throwcollect.runs.choice import choose
+
+choose(Config(), say=print, warn=print)
+print(sorted({"docker", "requests", "urllib3"} & sys.modules.keys()))
+"""
+
+
+def test_a_socket_that_is_not_there_is_told_as_the_client_would(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setenv("DOCKER_HOST", f"unix://{tmp_path}/none.sock")
+    assert not has_socket()
+    with pytest.raises(WorkerError, match=r"no Docker engine answers at unix:///\S+/none.sock: No such file") as caught:
+        check_socket()
+    assert "--runtime local" in str(caught.value)
+
+
+@pytest.mark.parametrize(("host", "local"), [("unix://{}", True), ("tcp://127.0.0.1:1", False), ("ssh://lab", False)])
+def test_engines_that_may_be_there_are_left_to_the_client(tmp_path: Path, monkeypatch, host: str, local: bool) -> None:
+    monkeypatch.setenv("DOCKER_HOST", host.format(tmp_path))
+    check_socket()
+    assert is_local() == local
+
+
+def test_where_no_engine_is_its_client_is_not_imported(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", CHOOSES],
+        env={"DOCKER_HOST": f"unix://{tmp_path}/none.sock"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout.splitlines()[-1] == "[]"
