@@ -62,7 +62,7 @@ def _nodes(launcher: psutil.Process) -> list[tuple[str, psutil.Process]]:
     found = [("launcher", launcher)]
     # Nodes are forked by a child that has imported their libraries.
     for child in launcher.children(recursive=True):
-        words = child.cmdline()
+        words = " ".join(child.cmdline()).split()
         found += [(role, child) for role in ("sim", "router", "coordinator") if role in words]
     return found
 

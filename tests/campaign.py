@@ -27,7 +27,7 @@ from pathlib import Path
 
 import psutil
 
-from tests.e2e.collection import Running, collect, fingerprints, launched, start, write_config
+from tests.e2e.collection import Running, collect, fingerprints, launched, start, words_of, write_config
 from tests.unit.dataset.conftest import Collection
 from tests.unit.dataset.test_forgeries import FORGED, FORGERIES, problems
 from throwcollect.config.loader import load
@@ -118,7 +118,9 @@ def kills(config: Path, reference: Path, scratch: Path, count: int, source: rand
         elif fingerprints(directory) != wanted:
             result.missed.append(f"other files after {said}")
         if left := [
-            each for each in psutil.process_iter(["cmdline"]) if str(directory) in (each.info["cmdline"] or [])
+            each
+            for each in psutil.process_iter(["cmdline"])
+            if str(directory) in " ".join(each.info["cmdline"] or []).split()
         ]:
             result.missed.append(f"{len(left)} processes left after {said}")
     return result
@@ -141,7 +143,7 @@ def _disturbances(running: Running, source: random.Random) -> Iterator[str]:
         parties = [launcher, *launcher.children(), *running.nodes()]
         victim, number = source.choice(parties), source.choice(SIGNALS)
         try:
-            name = " ".join(victim.cmdline()[-1:])
+            name = " ".join(words_of(victim)[-1:])
             victim.send_signal(number)
             if number == signal.SIGSTOP:
                 time.sleep(source.uniform(0.0, _FROZEN_S))

@@ -71,6 +71,11 @@ INPROCESS = ("--runtime", "inprocess")
 """For tests that only need the dataset: no node has to be started."""
 
 
+def words_of(process: psutil.Process) -> list[str]:
+    """Words of a command line, as `ps` shows it: psutil gives a node's in one piece, and free room behind it."""
+    return " ".join(process.cmdline()).split()
+
+
 def write_config(directory: Path, *, trials: int, text: str = CONFIG, sim: str = "") -> Path:
     path = directory / "small.yaml"
     path.write_text(text.format(trials=trials) + (f"sim: {{{sim}}}\n" if sim else ""))
@@ -91,7 +96,7 @@ class Running:
     def node(self, *words: str) -> psutil.Process:
         """The node whose command line ends with these words."""
         for node in self.nodes():
-            if node.cmdline()[-len(words) :] == list(words):
+            if words_of(node)[-len(words) :] == list(words):
                 return node
         raise LookupError(words)
 

@@ -26,6 +26,7 @@ from tests.e2e.collection import (
     fingerprints,
     journal,
     start,
+    words_of,
     write_config,
 )
 
@@ -238,7 +239,7 @@ def test_a_power_cut_costs_what_had_not_reached_the_disk(
 def test_a_killed_router_costs_nothing(config: Path, reference: Path, tmp_path: Path, started: list[Running]) -> None:
     running, nodes = begin(started, config, tmp_path / "data", "--set", "run.trial_timeout_s=5")
     in_the_middle(running, whole=reference)
-    next(node for node in nodes if "router" in node.cmdline()).kill()
+    next(node for node in nodes if "router" in words_of(node)).kill()
     code, out, err = running.finish()
     assert code == 0, err
     # Where nobody looks, progress is plain lines.

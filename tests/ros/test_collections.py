@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from tests.e2e.collection import Running, call, collect, fingerprints, journal, start, write_config
+from tests.e2e.collection import Running, call, collect, fingerprints, journal, start, words_of, write_config
 from throwcollect.errors import WorkerError
 from throwcollect.runs.records import Records
 from throwcollect.runs.state_directory import STATE_VARIABLE
@@ -120,7 +120,7 @@ def test_the_trial_of_a_simulation_that_was_killed_is_given_to_another_though_th
     running.node("--name", "sim_0").kill()
     killed = time.time()
     time.sleep(1.0)
-    (router,) = [each for each in running.nodes() if "router" in each.cmdline()]
+    (router,) = [each for each in running.nodes() if "router" in words_of(each)]
     router.kill()
     code, _, err = running.finish()
     assert code == 0, err

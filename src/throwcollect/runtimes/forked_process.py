@@ -65,6 +65,8 @@ def _do(work: Callable[[], object], parent: int, environment: Mapping[str, str],
 
 def _start_afresh(parent: int, environment: Mapping[str, str], kept: int) -> None:
     """Be as a process that has just been started: let go of what is the parent's."""
+    import setproctitle
+
     die_with_parent(parent)
     os.setsid()
     atexit._clear()
@@ -72,6 +74,8 @@ def _start_afresh(parent: int, environment: Mapping[str, str], kept: int) -> Non
         if callable(signal.getsignal(number)):
             signal.signal(number, signal.SIG_DFL)
     signal.signal(signal.SIGINT, signal.default_int_handler)
+    # It finds what `ps` shows only as long as the environment is the one that the program was started with.
+    setproctitle.getproctitle()
     os.environ.clear()
     os.environ.update(environment)
     nowhere = os.open(os.devnull, os.O_RDWR)

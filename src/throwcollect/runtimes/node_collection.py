@@ -117,8 +117,6 @@ class NodeCollection:
             self._session.event("adopted" if found else "started", simulations=self._simulations)
             self._supervisor.start(found=found)
             self._session.take_over([state for state in self._supervisor.states() if state.name in found])
-            # What reads the dataset at the end takes as long to import as the nodes take to start.
-            importlib.import_module("throwcollect.dataset.inspect")
             end = self._follow()
             if not self._host.place.collects:
                 return None
@@ -210,6 +208,8 @@ class NodeCollection:
         node.declare_parameter(CONFIGURATION, dump_yaml(self._host.config), ros.ParameterDescriptor(read_only=True))
         most = 1 if self._host.config.run.root_namespace else MOST_SIMULATIONS
         offer_scaling(node, self._simulations, self._want, most=most)
+        # What reads the dataset at the end takes as long to import as simulations take to start.
+        importlib.import_module("throwcollect.dataset.inspect")
 
     def _want(self, simulations: int) -> None:
         # Not done here: whoever asks shall not have to wait for nodes that are slow to end.
