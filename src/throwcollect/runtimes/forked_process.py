@@ -6,7 +6,6 @@ import atexit
 import os
 import signal
 import sys
-import traceback
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 
@@ -57,9 +56,8 @@ def _do(work: Callable[[], object], parent: int, environment: Mapping[str, str],
         code = 0
     except SystemExit as end:
         code = end.code if isinstance(end.code, int) else 1
-    except BaseException:  # noqa: BLE001 - it must not get to what the parent would do about it
-        traceback.print_exc()
     finally:
+        # Any other exception ends here, too, and unseen: its streams lead nowhere, and the terminal is the parent's.
         os._exit(code)
 
 
