@@ -96,6 +96,7 @@ class NodeServer:
         self._process: subprocess.Popen[bytes] | ForkedProcess | None = None
         self._socket: socket.socket | None = None
         self._silent = False
+        self._answer_s = _ANSWER_S
         self._running: set[int] = set()
         self._ends: dict[int, int] = {}
 
@@ -110,6 +111,7 @@ class NodeServer:
             connection = self._fork() if fork else self._connect(nowhere)
             connection.send(json.dumps({"configuration": config.model_dump(mode="json")}).encode())
             self._silent = True
+            self._answer_s = min(_ANSWER_S, config.run.start_timeout_s)
 
     def start(
         self,
@@ -208,7 +210,7 @@ class NodeServer:
         Raises:
             OSError: If none comes.
         """
-        deadline = time.monotonic() + _ANSWER_S
+        deadline = time.monotonic() + self._answer_s
         while time.monotonic() < deadline:
             for message in self._read(_LOOK_S):
                 if (pid := message.get("started")) is not None:
@@ -216,7 +218,7 @@ class NodeServer:
             if self._socket is None:
                 raise OSError("the process that nodes are forked from has ended")
         self.close()
-        raise OSError(f"the process that nodes are forked from has not answered for {_ANSWER_S:g} s")
+        raise OSError(f"the process that nodes are forked from has not answered for {self._answer_s:g} s")
 
     def _read(self, timeout_s: float) -> list[dict[str, int]]:
         """Take in what the server says, which it is given some time [s] for; ends are kept until they are asked for."""
