@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import os
 import signal
 import subprocess
 import sys
@@ -19,6 +18,7 @@ from typing import Any
 import psutil
 import pytest
 
+from tests.commands import Command, command, start_command
 from throwcollect.cli.main import main
 from throwcollect.interruption import stop_signals
 
@@ -37,12 +37,10 @@ run: {{runtime: local, replay: 0}}
 """Its sampler draws without a library that takes each command a second to import."""
 
 
-def command(*arguments: str | Path) -> list[str]:
-    return [sys.executable, "-m", "throwcollect", *map(str, arguments)]
-
-
-def call(*arguments: str | Path, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(command(*arguments), capture_output=True, text=True, timeout=120, cwd=cwd, check=False)
+def call(*arguments: str | Path, cwd: Path | None = None, **environment: str) -> subprocess.CompletedProcess[str]:
+    process = start_command(*arguments, cwd=cwd, **environment)
+    out, err = process.communicate(timeout=120)
+    return subprocess.CompletedProcess(command(*arguments), process.wait(), out, err)
 
 
 def call_here(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
@@ -86,7 +84,7 @@ def write_config(directory: Path, *, trials: int, text: str = CONFIG, sim: str =
 class Running:
     """A running `throwcollect up`."""
 
-    process: subprocess.Popen[str]
+    process: Command
     directory: Path
 
     def nodes(self) -> list[psutil.Process]:
@@ -124,14 +122,7 @@ def start(config: Path, directory: Path, simulations: int, *options: str, **envi
 
 def launched(directory: Path, *arguments: str | Path, **environment: str) -> Running:
     """A running command that collects into a directory."""
-    process = subprocess.Popen(
-        command(*arguments),
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env={**os.environ, **environment},
-    )
-    return Running(process, directory)
+    return Running(start_command(*arguments, **environment), directory)
 
 
 def collect(config: Path, directory: Path, simulations: int, *options: str, **environment: str) -> dict[str, object]:

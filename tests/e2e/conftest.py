@@ -5,6 +5,7 @@ from collections.abc import Iterator
 
 import pytest
 
+from tests.commands import command_server
 from throwcollect.runs.state_directory import STATE_VARIABLE
 
 
@@ -16,4 +17,5 @@ def environment(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv(STATE_VARIABLE, str(tmp_path_factory.mktemp("state")))
         patch.setenv("PYTHONPATH", str(extras_alone), prepend=os.pathsep)
-        yield
+        with command_server():
+            yield

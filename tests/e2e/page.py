@@ -5,15 +5,14 @@ from __future__ import annotations
 import json
 import os
 import signal
-import subprocess
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
+from tests.commands import start_command
 from tests.e2e.chromium import Tab
-from tests.e2e.collection import command
 from throwcollect.runs.records import Records
 
 CHANGED = "ERR_NETWORK_CHANGED"
@@ -24,7 +23,7 @@ CHANGED = "ERR_NETWORK_CHANGED"
 def served(catalogue: Path, datasets: Path, models: Path | None = None) -> Iterator[dict[str, Any]]:
     """Serve a catalogue, and models; gives what `throwcollect serve --json` tells."""
     options = ("--port", "0", "--datasets", datasets, "--models", models or datasets, "--json")
-    with subprocess.Popen(command("serve", catalogue, *options), stdout=subprocess.PIPE, text=True) as server:
+    with start_command("serve", catalogue, *options, stderr=None) as server:
         assert server.stdout is not None
         try:
             yield json.loads(server.stdout.readline())

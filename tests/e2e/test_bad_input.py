@@ -15,7 +15,8 @@ from typing import NamedTuple
 
 import pytest
 
-from tests.e2e.collection import FAST, INPROCESS, call_here, collect_here, command, write_config
+from tests.commands import command
+from tests.e2e.collection import FAST, INPROCESS, call_here, collect_here, write_config
 from throwcollect.robots.talos import TALOS
 from throwcollect.runs.records import Records
 

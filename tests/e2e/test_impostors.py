@@ -9,7 +9,8 @@ from typing import Any
 
 import pytest
 
-from tests.e2e.collection import FAST, call, command, write_config
+from tests.commands import Command, start_command
+from tests.e2e.collection import FAST, call, write_config
 from throwcollect import ros
 from throwcollect.config.loader import load
 from throwcollect.dataset.reader import Dataset
@@ -61,8 +62,8 @@ def spinning(context: ros.Context, *nodes: ros.Node) -> Iterator[None]:
 
 
 @contextmanager
-def started(*arguments: str | Path, log: Path) -> Iterator[subprocess.Popen[bytes]]:
-    with log.open("wb") as file, subprocess.Popen(command(*arguments), stdout=file, stderr=file) as process:
+def started(*arguments: str | Path, log: Path) -> Iterator[Command]:
+    with log.open("wb") as file, start_command(*arguments, stdout=file.fileno(), stderr=subprocess.STDOUT) as process:
         # Also when what is tried meanwhile fails; the process is waited for either way.
         try:
             yield process

@@ -19,6 +19,7 @@ from pathlib import Path
 import pytest
 
 from rclzenoh.session_config import OVERRIDE_VARIABLE, Key, client_override
+from tests.commands import command
 from tests.e2e.collection import (
     CONFIG,
     FAST,
@@ -26,7 +27,6 @@ from tests.e2e.collection import (
     call,
     call_here,
     collect_here,
-    command,
     fingerprints,
     launched,
 )

@@ -15,12 +15,12 @@ from typing import Any
 import psutil
 import pytest
 
+from tests.commands import command, start_command
 from tests.e2e.collection import (
     FAST,
     call,
     call_here,
     collect_here,
-    command,
     fingerprints,
     start,
     write_config,
@@ -239,14 +239,8 @@ def test_a_run_in_the_foreground_is_a_run_like_any_other(config: Path, records: 
     )
     # Somebody whose records do not have the run is kept out as well, before anything is changed.
     plan = (tmp_path / "data" / "plan.parquet").read_bytes()
-    third = subprocess.run(
-        command("resume", tmp_path / "data", "--trials", str(MANY + 1)),
-        env={**os.environ, STATE_VARIABLE: str(tmp_path / "other")},
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-    )
+    elsewhere = {STATE_VARIABLE: str(tmp_path / "other")}
+    third = call("resume", tmp_path / "data", "--trials", str(MANY + 1), **elsewhere)
     assert (third.returncode, third.stdout) == (4, "")
     assert f"throwcollect: {tmp_path / 'data'}: another process collects into it" in third.stderr
     assert (tmp_path / "data" / "plan.parquet").read_bytes() == plan
@@ -284,9 +278,7 @@ def test_a_run_whose_record_cannot_be_written_goes_on(config: Path, records: Rec
 
 def test_ctrl_c_leaves_a_run_that_is_only_watched(config: Path, records: Records, tmp_path: Path) -> None:
     run = detach(config, tmp_path / "data", "-n", "1", *UNTIL_STOPPED)
-    watchers = [
-        subprocess.Popen(command("wait"), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) for _ in range(2)
-    ]
+    watchers = [start_command("wait") for _ in range(2)]
     for watcher in watchers:
         assert watcher.stderr is not None
         assert f"/{MANY} throws: " in watcher.stderr.readline()
@@ -301,8 +293,8 @@ def test_ctrl_c_leaves_a_run_that_is_only_watched(config: Path, records: Records
 
 def test_logs_follow_a_run_to_its_end(config: Path, records: Records, tmp_path: Path) -> None:
     run = detach(config, tmp_path / "data", "--trials", "12")
-    following = subprocess.Popen(command("logs", "-f"), stdout=subprocess.PIPE, text=True)
-    documents = subprocess.Popen(command("events", "--json"), stdout=subprocess.PIPE, text=True)
+    following = start_command("logs", "-f", stderr=None)
+    documents = start_command("events", "--json", stderr=None)
     out, _ = following.communicate(timeout=120)
     assert records.get(run).status == "ended"
     lines = out.splitlines()
@@ -375,12 +367,7 @@ def test_a_failure_is_told_to_whoever_waits(config: Path, tmp_path: Path, monkey
 
 
 def test_ctrl_c_while_a_run_is_being_started_ends_it(config: Path, records: Records, tmp_path: Path) -> None:
-    starting = subprocess.Popen(
-        command("up", "-d", config, "--output", tmp_path / "data"),
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    starting = start_command("up", "-d", config, "--output", tmp_path / "data")
     log = tmp_path / "data" / "logs" / "launcher.log"
     until(log.exists)
     starting.send_signal(signal.SIGINT)

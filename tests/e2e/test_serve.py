@@ -21,7 +21,8 @@ import pytest
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
-from tests.e2e.collection import FAST, call_here, collect_here, command, fingerprints, write_config
+from tests.commands import start_command
+from tests.e2e.collection import FAST, call_here, collect_here, fingerprints, write_config
 from tests.e2e.page import wait_for
 from throwcollect import ros
 from throwcollect.ros.srv import GetParameters
@@ -87,10 +88,8 @@ class Place:
 
     def serve(self, *options: str) -> Server:
         """A server of its own."""
-        words = command("serve", "catalogue.yaml", "--port", "0", "--json", *options)
-        process = subprocess.Popen(
-            words, cwd=self.directory, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
-        )
+        words = ("serve", "catalogue.yaml", "--port", "0", "--json", *options)
+        process = start_command(*words, cwd=self.directory, stderr=subprocess.DEVNULL)
         assert process.stdout is not None
         line = process.stdout.readline()
         assert line, "no server starts"
@@ -333,9 +332,9 @@ def test_a_server_speaks_ipv6_and_tls(place: Place, tmp_path: Path, monkeypatch:
     key = RunKey(tmp_path / "key")
     key.create()
     monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "state"))
-    words = command("serve", "--host", "::1", "--port", "0", "--json")
+    words = ("serve", "--host", "::1", "--port", "0", "--json")
     options = ("--tls-cert", str(key.certificate), "--tls-key", str(key.private_key))
-    with subprocess.Popen([*words, *options], cwd=tmp_path, stdout=subprocess.PIPE, text=True) as process:
+    with start_command(*words, *options, cwd=tmp_path, stderr=None) as process:
         assert process.stdout is not None
         url = json.loads(process.stdout.readline())["url"]
         assert url.startswith("https://[::1]:")
