@@ -14,7 +14,8 @@ READY_ROS := $(ROS_VENV)/.ready
 export PYTHONDONTWRITEBYTECODE :=
 
 .PHONY: up ros dist test test-fast \
-    test-units test-ros test-ros-client test-containers test-processes test-cluster check docs bench bench-full clean
+    test-units test-ros test-ros-client test-containers test-processes test-cluster \
+    check check-format check-types check-imports check-house docs bench bench-full clean
 
 # Where the Python is too new for pybullet, MuJoCo simulates; `packaging/environment.sh` has said so.
 up: $(READY)
@@ -69,13 +70,14 @@ SLOW := cli coordinator dataset derive engines export learning replay report run
 test-fast: $(READY_DEV)
 	$(BIN)/python -m pytest -n logical tests/architecture tests/contract tests/unit $(addprefix --ignore=tests/unit/,$(SLOW))
 
-# Continuous integration makes the image meanwhile, and names the process that does.
-test: check
-	$(MAKE) --no-print-directory test-units
+# What waits for others is run beside what computes, so that both cores always have something to do. Continuous integration
+# makes the image meanwhile, and names the process that does.
+BESIDE := --no-print-directory --output-sync=target
+test: $(READY_DEV)
+	$(MAKE) $(BESIDE) -j 2 check
+	$(MAKE) $(BESIDE) -j 2 test-units test-ros
 	@while [ -n "$(MAKES_IMAGE)" ] && kill -0 $(MAKES_IMAGE) 2> /dev/null; do sleep 1; done
-	$(MAKE) --no-print-directory ros
-	$(MAKE) --no-print-directory test-ros
-	$(MAKE) --no-print-directory -j 3 --output-sync=target test-containers test-processes test-cluster
+	$(MAKE) $(BESIDE) -j 3 test-containers test-processes test-cluster
 
 # The ROS client alone, on the embedded backend: what somebody runs who changes it.
 test-ros-client: $(READY_DEV)
@@ -91,10 +93,10 @@ test-units:
 	$(call twice,$(BIN)/python -m pytest -n logical tests/unit tests/install tests/rclzenoh tests/contract tests/physics)
 
 # On Fast DDS, nodes at times do not find each other on a busy machine. A run starts them again; so do its tests.
-test-ros:
-	$(call twice,$(ROS_VENV)/bin/python -m pytest -n 3 --dist loadfile tests/contract tests/ros)
+test-ros: ros
+	$(call twice,$(ROS_VENV)/bin/python -m pytest -n 2 --dist loadfile tests/contract tests/ros)
 
-# The next three wait most of the time, so they run side by side. Tests with an engine look at all that is on it, so one by one.
+# Tests with an engine look at all that is on it, so one by one.
 test-containers:
 	$(call twice,$(BIN)/python -m pytest tests/docker)
 
@@ -107,11 +109,19 @@ test-cluster:
 	$(call twice,$(BIN)/python -m pytest tests/cluster)
 
 # Format, lint, types, the direction of imports, and the rules of the house; its tests build the documentation site, too.
-check: $(READY_DEV)
+check: check-format check-types check-imports check-house
+
+check-format: $(READY_DEV)
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
+
+check-types: $(READY_DEV)
 	$(BIN)/mypy
+
+check-imports: $(READY_DEV)
 	$(BIN)/lint-imports
+
+check-house: $(READY_DEV)
 	$(BIN)/python -m pytest -q tests/architecture
 
 # The documentation site, build/site/index.html; a broken link fails.
