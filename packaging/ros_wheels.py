@@ -7,8 +7,10 @@ built from this clone. A directory that was filled from the same files is left a
 
 from __future__ import annotations
 
+import fcntl
 import hashlib
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -42,6 +44,9 @@ def digest() -> str:
 def fill(directory: Path) -> bool:
     """Fill a directory, unless it is up to date.
 
+    Two processes may ask for the same directory at the same time, as the tests with ROS and the image do in continuous
+    integration: the second one waits, and finds the directory up to date.
+
     Args:
         directory: Where the wheels go; those in it are replaced.
 
@@ -51,12 +56,19 @@ def fill(directory: Path) -> bool:
     Raises:
         subprocess.CalledProcessError: If wheels cannot be had or built; pip has said why.
     """
-    stamp = directory / STAMP
-    if stamp.is_file() and stamp.read_text(encoding="ascii") == digest():
-        return False
-    stamp.unlink(missing_ok=True)
-    for wheel in directory.glob("*.whl"):
-        wheel.unlink()
+    directory.parent.mkdir(parents=True, exist_ok=True)
+    with directory.with_name(f"{directory.name}.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        stamp = directory / STAMP
+        if stamp.is_file() and stamp.read_text(encoding="ascii") == digest():
+            return False
+        shutil.rmtree(directory, ignore_errors=True)
+        _collect(directory)
+        stamp.write_text(digest(), encoding="ascii")
+        return True
+
+
+def _collect(directory: Path) -> None:
     command = [sys.executable, "-m", "pip", "wheel", "--quiet", "--disable-pip-version-check"]
     # By variables, as options would not reach what builds. The constraints as an address, as there may be several
     # files, with blanks between. PEP 517, as pip 23.0, that of Debian 12, otherwise needs `wheel`, which is missing.
@@ -64,8 +76,6 @@ def fill(directory: Path) -> bool:
     subprocess.run(
         [*command, f"--wheel-dir={directory}", str(INTERFACES), *requirements()], env=environment, check=True
     )
-    stamp.write_text(digest(), encoding="ascii")
-    return True
 
 
 def main(directory: Path) -> None:

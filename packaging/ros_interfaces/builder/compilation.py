@@ -6,7 +6,6 @@ import os
 import subprocess
 import sys
 import sysconfig
-from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,6 +25,7 @@ _RUNTIME = (
     "rosidl_typesupport_fastrtps_cpp",
     "rosidl_typesupport_introspection_c",
 )
+_DESCRIPTION = "__description"
 _SUPPORTS = ("rosidl_typesupport_c", *IMPLEMENTATIONS)
 
 
@@ -66,27 +66,23 @@ def compile_all(project: Project, generated: Generated, prefix: Path, work: Path
     flags += [f"-I{path}" for path in (*ours, *headers, prefix / "include")]
     c = [*c, "-std=gnu11", *flags, f"-I{sysconfig.get_path('include')}", f"-I{np.get_include()}"]
     cxx = [*cxx, "-std=c++17", *flags]
-    objects = work / "objects"
-    targets = _Targets(work / "libraries", generated, prefix, cxx[0])
+    targets = [
+        target
+        for package in project.packages
+        for target in _Targets(work / "libraries", generated, prefix, cxx[0]).of(package)
+    ]
+    units = {target.library: _join_sources(target, work / "units") for target in targets}
+
+    def compile_unit(unit: Path) -> None:
+        _run([*(cxx if unit.suffix == ".cpp" else c), "-c", str(unit), "-o", str(_object_of(unit))])
+
     with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
-
-        def compiled(sources: Iterable[Path]) -> list[Path]:
-            return [objects / source.relative_to(work).with_suffix(f"{source.suffix}.o") for source in sources]
-
-        def compile_one(source: Path) -> None:
-            (target,) = compiled([source])
-            target.parent.mkdir(parents=True, exist_ok=True)
-            _run([*(cxx if source.suffix == ".cpp" else c), "-c", str(source), "-o", str(target)])
-
-        sources = [
-            source for package in project.packages for target in targets.of(package) for source in target.sources
-        ]
-        list(pool.map(compile_one, sources))
-    for package in project.packages:
-        for target in targets.of(package):
-            target.library.path.parent.mkdir(parents=True, exist_ok=True)
-            _run([*target.command, *map(str, compiled(target.sources)), *target.links])
-    return [target.library for package in project.packages for target in targets.of(package)]
+        list(pool.map(compile_unit, [unit for target in targets for unit in units[target.library]]))
+    for target in targets:
+        target.library.path.parent.mkdir(parents=True, exist_ok=True)
+        objects = [str(_object_of(unit)) for unit in units[target.library]]
+        _run([*target.command, *objects, *target.links])
+    return [target.library for target in targets]
 
 
 @dataclass(frozen=True)
@@ -139,6 +135,25 @@ class _Targets:
             command.append(f"-Wl,-soname={library.path.name}")
         runtime = [f"-L{self.prefix / 'lib'}", *(f"-l{name}" for name in _RUNTIME), "-l:libfastcdr.so.2"]
         return _Target(library, sources, [*command, "-o", str(library.path)], [*links, *runtime])
+
+
+def _join_sources(target: _Target, directory: Path) -> list[Path]:
+    """Write the files that the compiler is given for a library: one that includes nearly all of its sources.
+
+    The compiler reads the headers of ROS, which take most of its time, once for each file that it is given. Sources that
+    describe types are given to it one by one, as each defines static names that the next one defines again.
+    """
+    joined = [source for source in target.sources if not source.stem.endswith(_DESCRIPTION)]
+    if not joined:
+        return target.sources
+    unit = directory / target.library.path.with_suffix(joined[0].suffix).name
+    unit.parent.mkdir(parents=True, exist_ok=True)
+    unit.write_text("".join(f'#include "{source}"\n' for source in joined), encoding="utf-8")
+    return [unit, *(source for source in target.sources if source not in joined)]
+
+
+def _object_of(unit: Path) -> Path:
+    return unit.with_suffix(f"{unit.suffix}.o")
 
 
 def _run(command: list[str]) -> None:

@@ -2,6 +2,8 @@
 
 import subprocess
 import sys
+import threading
+from concurrent.futures import ThreadPoolExecutor, wait
 from pathlib import Path
 from types import ModuleType
 
@@ -21,17 +23,20 @@ def wheels(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
 def test_wheels_are_collected_again_only_when_something_has_changed(
     wheels: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    directory = tmp_path / "wheels"
     commands: list[list[str]] = []
 
     def run(command: list[str], **_: object) -> None:
         commands.append(command)
-        (tmp_path / "new.whl").touch()
+        directory.mkdir()
+        (directory / "new.whl").touch()
 
     monkeypatch.setattr(wheels.subprocess, "run", run)
-    (tmp_path / "old.whl").touch()
-    assert wheels.fill(tmp_path)
-    assert [path.name for path in tmp_path.glob("*.whl")] == ["new.whl"]
-    assert not wheels.fill(tmp_path)
+    directory.mkdir()
+    (directory / "old.whl").touch()
+    assert wheels.fill(directory)
+    assert [path.name for path in directory.glob("*.whl")] == ["new.whl"]
+    assert not wheels.fill(directory)
     (command,) = commands
     assert command[:4] == [sys.executable, "-m", "pip", "wheel"]
     assert command[-3:] == [str(wheels.INTERFACES), *wheels.requirements()]
@@ -40,10 +45,30 @@ def test_wheels_are_collected_again_only_when_something_has_changed(
     monkeypatch.setattr(wheels, "DEFINITIONS", changed)
     monkeypatch.setattr(wheels, "requirements", lambda: ["ros"])
     changed.mkdir()
-    assert wheels.fill(tmp_path)
+    assert wheels.fill(directory)
     (changed / "New.msg").touch()
-    assert wheels.fill(tmp_path)
-    assert not wheels.fill(tmp_path)
+    assert wheels.fill(directory)
+    assert not wheels.fill(directory)
+
+
+def test_two_who_ask_at_once_collect_once(wheels: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    directory = tmp_path / "wheels"
+    begun, may_end = threading.Event(), threading.Event()
+
+    def run(*_: object, **__: object) -> None:
+        begun.set()
+        assert may_end.wait(10)
+        directory.mkdir()
+        (directory / "new.whl").touch()
+
+    monkeypatch.setattr(wheels.subprocess, "run", run)
+    with ThreadPoolExecutor(2) as pool:
+        first = pool.submit(wheels.fill, directory)
+        assert begun.wait(10)
+        second = pool.submit(wheels.fill, directory)
+        assert wait([second], timeout=0.2).not_done
+        may_end.set()
+        assert (first.result(10), second.result(10)) == (True, False)
 
 
 def test_a_collection_that_fails_is_begun_anew_next_time(
