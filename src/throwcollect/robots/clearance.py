@@ -17,7 +17,7 @@ MARGIN_M = 0.002
 """Least distance between links. It covers how far the spoon, 1 m from the torso's axis, cuts into a body of the head's
 curvature on a path between two postures 0.02 rad apart."""
 _SHORT_CHAIN = 2
-"""Links with so few joints between them are always close, so that others are not looked at for their sake."""
+"""Links with at most so many joints between them are always close to each other."""
 
 
 @dataclass(frozen=True)
@@ -44,8 +44,8 @@ class Clearance:
 
     Args:
         robot: The robot.
-        model: The robot with all joints.
-        tool: What it holds.
+        model: Its model with all joints.
+        tool: The tool that it holds.
 
     Raises:
         ConfigError: If the robot's meshes cannot be read.
@@ -78,8 +78,8 @@ class Clearance:
         for request in self._distances.collisionRequests:
             request.security_margin = MARGIN_M
         self._broadphase = pinocchio.BroadPhaseManager_DynamicAABBTreeCollisionManager(model, geometry, self._distances)
-        # Postures that are clear by some distance vouch for those near them. Links with few joints between them are
-        # never clear by much, so they are looked at apart from the others.
+        # Links with few joints between them are never clear by much, so a posture would show little about those near
+        # it if the same object looked at these links and at all others.
         reaches = find_reaches(model, geometry)
         short = (reaches > 0).sum(axis=1) <= _SHORT_CHAIN
         self._clear = [
@@ -89,15 +89,15 @@ class Clearance:
         ]
 
     def first_approach(self, configurations: NDArray[np.float64]) -> Approach | None:
-        """First posture in which two links are closer than `MARGIN_M`, and the closest links in it.
+        """Find the first posture in which two links are closer than `MARGIN_M`, and the closest links in it.
 
-        Most postures are near others that were clear by more than the way between them, and so are clear, too.
+        Most postures need no computation: a posture near them was clear by more than the way between the two.
 
         Args:
-            configurations: In the order of the model [rad], shape ``(n, 32)``.
+            configurations: In the order of the model [rad], shape ``(n, n_joints)``.
 
         Returns:
-            None when no posture has such links.
+            None if no posture has such links.
         """
         unknown = [known.find_unknown(configurations) for known in self._clear]
         for index, configuration in enumerate(configurations):
@@ -119,7 +119,7 @@ class Clearance:
         """Find the lowest link of a posture, by the boxes around its shapes.
 
         Args:
-            configuration: In the order of the model [rad], shape ``(32,)``.
+            configuration: In the order of the model [rad], shape ``(n_joints,)``.
 
         Returns:
             Its name, and the height of its lowest point above the base [m].
@@ -135,7 +135,7 @@ class Clearance:
         return self._links[lowest], heights[lowest]
 
     def _is_clear(self, configurations: NDArray[np.float64], unknown: list[NDArray[np.bool_]]) -> bool:
-        """Whether the first of some postures is known to be clear; of others, takes note in `unknown`."""
+        """Say whether the first posture is clear, and remove from `unknown` the postures that it shows to be clear."""
         for known, rows in zip(self._clear, unknown, strict=True):
             if rows[0]:
                 rows[:] &= known.look_at_first(configurations)

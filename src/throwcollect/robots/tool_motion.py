@@ -1,4 +1,4 @@
-"""Where the tool is and how fast it moves, from the measured joints."""
+"""Position and velocity of the tool, computed from the measured joints."""
 
 from __future__ import annotations
 
@@ -15,10 +15,7 @@ from throwcollect.tools.tool import tool_of
 
 
 class ToolMotion:
-    """Place and velocity of the point of the tool in which a resting ball has its centre; world frame.
-
-    Args:
-        config: Configuration of the trial.
+    """Position and velocity of the seat: the point of the tool in which a resting ball has its centre; world frame.
 
     Raises:
         ConfigError: If the robot's files cannot be read, or the ball does not fit the tool.
@@ -32,7 +29,7 @@ class ToolMotion:
         self._base = np.array([0.0, 0.0, config.robot.base_height_m])
 
     def place(self, position: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Where the point is [m], shape ``(3,)``.
+        """Compute the position of the seat [m], shape ``(3,)``.
 
         Args:
             position: Of the joints [rad], shape ``(n_joints,)``, in the order of `Robot.joints`.
@@ -44,7 +41,7 @@ class ToolMotion:
         return place
 
     def velocity(self, position: NDArray[np.float64], velocity: NDArray[np.float64]) -> NDArray[np.float64]:
-        """How fast the point moves [m/s], shape ``(3,)``.
+        """Compute the velocity of the seat [m/s], shape ``(3,)``.
 
         Args:
             position: Of the joints [rad], shape ``(n_joints,)``, in the order of `Robot.joints`.
@@ -54,7 +51,7 @@ class ToolMotion:
         actual = position + self._offsets
         pinocchio.forwardKinematics(model.model, model.data, actual[model.order], velocity[model.order])
         hand = pinocchio.updateFramePlacement(model.model, model.data, model.hand)
-        # Of the point, first along the axes of the seat, then along those of the world.
+        # The velocity of the seat, first along the axes of the seat, then along those of the world.
         along_seat = self._seat.actInv(pinocchio.getFrameVelocity(model.model, model.data, model.hand))
         turn = pinocchio.SE3((hand * self._seat).rotation, np.zeros(3))
         velocity_in_world: NDArray[np.float64] = turn.act(along_seat).linear
@@ -62,7 +59,7 @@ class ToolMotion:
 
 
 class _JointModel:
-    """A robot with all joints, its kinematics, and for each of its joints the place in `Robot.joints`."""
+    """The kinematics of all joints of a robot; `order` gives the place of each model joint in `Robot.joints`."""
 
     def __init__(self, robot: Robot) -> None:
         self.model = joint_model(robot)
@@ -72,7 +69,7 @@ class _JointModel:
 
 
 class _ModelsOfThread(threading.local):
-    """The models that a thread has made; to make one costs a hundred times as much as to use it."""
+    """The models that a thread has made: making one costs a hundred times as much as using it, which changes it."""
 
     def __init__(self) -> None:
         self._models: dict[Robot, _JointModel] = {}
