@@ -1,4 +1,4 @@
-"""The values that describe an episode, free of any encoding."""
+"""The values that describe an episode, independent of any encoding."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True)
 class Samples:
-    """Recorded samples of one trial, one row a sample, evenly spaced; world frame: x forward, y left, z up.
+    """Recorded samples of one trial, one row per sample, evenly spaced; world frame: x forward, y left, z up.
 
     Attributes:
         stamps_ns: Simulated time [ns], shape ``(n_samples,)``, int64.
@@ -43,7 +43,7 @@ class Samples:
 
 @dataclass(frozen=True)
 class ControllerSamples:
-    """Set points of one joint trajectory controller, one row a sample, joints in the controller's order.
+    """Set points of one joint trajectory controller, one row per sample, joints in the controller's order.
 
     Attributes:
         elapsed_ns: Time since the start of its trajectory [ns], shape ``(n_samples,)``, int64.
@@ -96,17 +96,17 @@ class GoalOutcome:
 
 
 EndReason = Literal["landed", "rest", "timeout"]
-"""Why a trial ended: the ball has crossed the landing plane; it and the arm rest; the longest duration is over."""
+"""Reasons for the end of a trial: the ball has crossed the landing plane; ball and arm rest; its time is over."""
 
 
 @dataclass(frozen=True)
 class EpisodeHeader:
-    """What is known of an episode besides its samples.
+    """The facts of an episode besides its samples.
 
     Attributes:
         trial: Number of the trial.
         start_ns: Simulated time of the first sample [ns].
-        end_reason: Why it ended.
+        end_reason: Reason for its end.
         contacts: All contacts of the ball, by start time.
         goals: One entry per controller that had a goal.
         samples: Number of samples.
@@ -121,7 +121,7 @@ class EpisodeHeader:
 
 
 def find_infinite_columns(samples: Samples) -> Iterator[str]:
-    """Columns that hold numbers that are not finite, a sentence each."""
+    """Find columns with numbers that are not finite, and make a sentence for each."""
     for field in fields(samples):
         finite = np.isfinite(getattr(samples, field.name))
         if not finite.all():
