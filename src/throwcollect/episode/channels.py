@@ -139,11 +139,7 @@ class Channels:
         return tuple(tuple(channel.id for channel in chunk) for chunk in (self.recorded, *self.sensors))
 
     def fit(self, numbers: tuple[tuple[int, ...], ...]) -> bool:
-        """Say whether the chunks of an episode have the right channels; a sensor may lack some, as it may have no data.
-
-        Args:
-            numbers: Numbers of the channels of each of its chunks.
-        """
+        """Say whether chunks with these channels fit; that of a sensor may lack some, as it may have no data."""
         state, *sensors = self.numbers
         return (
             len(numbers) == len(self.numbers)

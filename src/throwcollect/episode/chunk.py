@@ -250,12 +250,6 @@ class ChunkEncoder:
 def encode_message(topic: Topic, samples: Samples, index: int, controllers: Mapping[str, ControllerSamples]) -> bytes:
     """Write the message of the sample at an index, byte for byte as `ChunkEncoder.lay_out` writes it.
 
-    Args:
-        topic: The topic, recorded or not.
-        samples: Samples.
-        index: Index of the sample.
-        controllers: Set points of the controllers, by name.
-
     Raises:
         KeyError: If the set points of the topic's controller are missing.
     """

@@ -35,13 +35,8 @@ _PARTS = ("header", "result", "conditions", "hashes", "chunk", "signature")
 _HASH_BYTES = 32
 _SHA256 = re.compile(r"[0-9a-f]{64}")
 _HEADER = TypeAdapter(EpisodeHeader)
-_LATEST_NS = 2**62
-_MOST_SAMPLES = 2**32
-"""Number of sequence numbers that message records can have."""
-_LONGEST_NAME, _LONGEST_TEXT = 256, 10_000
-"""Most characters in names and messages; those of robots and of their controllers are far shorter."""
-_STATUSES = range(7)
-"""Of action_msgs/msg/GoalStatus."""
+_LONGEST_NAME = 256
+"""Most characters of a recorded name that a message shows."""
 _COUNT = struct.Struct("<I")
 
 
@@ -57,11 +52,7 @@ class Episode:
         state: The state chunk.
         sensors: Chunks of sensors, in the order of the channels that they hold.
 
-    Args:
-        header: The facts besides the samples.
-        chunk: The state chunk.
-        said_sha256: SHA-256 of its records, as it was written beside them; None if it is not known yet.
-        sensors: Chunks of sensors.
+    The arguments `chunk` and `said_sha256` are those of `RecordedChunk`.
     """
 
     def __init__(
@@ -162,23 +153,9 @@ def header_from_json(text: bytes | str) -> EpisodeHeader:
         first = error.errors()[0]
         place = ".".join(map(str, first["loc"]))
         raise DatasetError(f"episode header: {place}: {first['msg']}; {error.error_count()} problems in all") from error
-    if header.trial < 0 or not 1 <= header.samples <= _MOST_SAMPLES:
-        raise DatasetError(f"episode header: trial {header.trial} with {header.samples} samples")
-    instants = [header.start_ns, *(instant for each in header.contacts for instant in (each.start_ns, each.end_ns))]
-    if any(instant is not None and not 0 <= instant <= _LATEST_NS for instant in instants):
-        raise DatasetError("episode header: an instant that no clock shows", expected=f"0 to {_LATEST_NS} ns")
     for contact in header.contacts:
-        if not 1 <= len(contact.body) <= _LONGEST_NAME:
-            raise DatasetError(f"episode header: a contact with a body whose name has {len(contact.body)} characters")
         if contact.end_ns is not None and contact.end_ns < contact.start_ns:
             raise DatasetError(f"episode header: a contact with {contact.body} that ends before it begins")
-    for goal in header.goals:
-        if (
-            len(goal.controller) > _LONGEST_NAME
-            or len(goal.error_string) > _LONGEST_TEXT
-            or goal.status not in _STATUSES
-        ):
-            raise DatasetError(f"episode header: goal of {goal.controller[:_LONGEST_NAME]!r}: cannot be")
     return header
 
 
@@ -278,12 +255,7 @@ def unpack(message: bytes, signer: Signer) -> Delivery | Refusal:
 
 
 def make_episode(header: bytes | str, hashes: Sequence[str], chunks: Sequence[Chunk]) -> Episode:
-    """Make an episode of its parts.
-
-    Args:
-        header: The header in JSON.
-        hashes: SHA-256 of the records of each chunk, in hexadecimal.
-        chunks: The chunks, the state chunk first.
+    """Make an episode of its header in JSON, its chunks, the state chunk first, and the SHA-256 of their records.
 
     Raises:
         DatasetError: If the header has other JSON than `header_to_json` writes, a hash is no SHA-256 in hexadecimal, or

@@ -48,10 +48,6 @@ class FirstRow:
     Attributes:
         columns: Place of each channel's record in a row, by the channel's number.
 
-    Args:
-        contents: Uncompressed records of all rows.
-        samples: Number of samples.
-
     Raises:
         DatasetError: If the contents cannot be so many rows, or the first one is not one message per channel.
     """
@@ -107,13 +103,11 @@ class FirstRow:
 class MessageTable:
     """The records of a chunk seen as a table, without a copy; every row has the same channels at the same places.
 
+    Views of a bytearray are writable.
+
     Attributes:
         columns: Place of each channel's record in a row, by the channel's number.
         log_times: Time of each row's first record [ns], shape ``(n_samples,)``, uint64.
-
-    Args:
-        contents: Uncompressed records; views of a bytearray are writable.
-        samples: Number of samples.
 
     Raises:
         DatasetError: If the records are not such a table.
@@ -201,9 +195,6 @@ class MessageList:
         headers: Fields of the records' headers, shape ``(n_messages,)``: ``channel``, ``sequence``, ``log_time`` and
             ``publish_time`` [ns] among them.
         offsets: Places of the records [bytes], shape ``(n_messages,)``.
-
-    Args:
-        contents: Uncompressed records.
 
     Raises:
         DatasetError: If the contents are anything but such records, at least one.

@@ -4,10 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
+
+Instant = Annotated[int, Field(ge=0, le=2**62)]
+"""Simulated time [ns]; no clock shows later ones."""
+_Name = Annotated[str, Field(max_length=256)]
+"""Name of a link or a controller; those of robots are far shorter."""
 
 
 @dataclass(frozen=True)
@@ -73,9 +79,9 @@ class Contact:
         end_ns: Simulated time of the first physics step without [ns]; None when it lasted to the end.
     """
 
-    body: str
-    start_ns: int
-    end_ns: int | None
+    body: Annotated[_Name, Field(min_length=1)]
+    start_ns: Instant
+    end_ns: Instant | None
 
 
 @dataclass(frozen=True)
@@ -89,10 +95,10 @@ class GoalOutcome:
         error_string: Of the action's result.
     """
 
-    controller: str
-    status: int
+    controller: _Name
+    status: Annotated[int, Field(ge=0, le=6)]
     error_code: int
-    error_string: str
+    error_string: Annotated[str, Field(max_length=10_000)]
 
 
 EndReason = Literal["landed", "rest", "timeout"]
@@ -101,7 +107,7 @@ EndReason = Literal["landed", "rest", "timeout"]
 
 @dataclass(frozen=True)
 class EpisodeHeader:
-    """The facts of an episode besides its samples.
+    """The facts of an episode besides its samples; `header_from_json` checks the bounds.
 
     Attributes:
         trial: Number of the trial.
@@ -109,15 +115,15 @@ class EpisodeHeader:
         end_reason: Reason for its end.
         contacts: All contacts of the ball, by start time.
         goals: One entry per controller that had a goal.
-        samples: Number of samples.
+        samples: Number of samples; at most as many as sequence numbers of message records can count.
     """
 
-    trial: int
-    start_ns: int
+    trial: Annotated[int, Field(ge=0)]
+    start_ns: Instant
     end_reason: EndReason
     contacts: tuple[Contact, ...]
     goals: tuple[GoalOutcome, ...]
-    samples: int
+    samples: Annotated[int, Field(ge=1, le=2**32)]
 
 
 def find_infinite_columns(samples: Samples) -> Iterator[str]:

@@ -34,12 +34,7 @@ class _OfEachThread(threading.local):
 
 
 class Restamper:
-    """Gives episodes of one configuration other numbers; threads may share a restamper.
-
-    Args:
-        config: Configuration of the trials, but for swept values.
-        channels: Its channels.
-    """
+    """Gives episodes of one configuration other numbers; threads may share a restamper."""
 
     def __init__(self, config: Config, channels: Channels) -> None:
         self._config = config

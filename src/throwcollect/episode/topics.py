@@ -185,12 +185,8 @@ def _fill_clock(rows: Rows, recording: Recording) -> None:
 def transforms(frames: tuple[MovingFrame, ...], joints: Sequence[str]) -> Topic:
     """``/tf``: tf2_msgs/TFMessage with the ball in world and every frame that a joint moves.
 
-    Args:
-        frames: The frames.
-        joints: All joints of the robot, in the order of the samples.
-
     Raises:
-        ValueError: If the joint of a frame is none of them.
+        ValueError: If the joint of a frame is not among `joints`, all joints in the order of the samples.
     """
     kind = "tf2_msgs/msg/TFMessage"
     columns = [joints.index(frame.joint) for frame in frames]

@@ -28,7 +28,7 @@ class ClearPostures:
 
     A joint that turns by an angle moves no point of the links beyond it by more than the angle times a reach, which is
     the same in all postures. So links at a distance d stay apart by at least d minus the sum of angles times reaches
-    over the joints between the two.
+    over the joints between the two. Postures are in the order of the model.
 
     Args:
         model: The robot with all joints.
@@ -57,11 +57,7 @@ class ClearPostures:
         self._steepness = np.empty((0, model.nq))
 
     def find_unknown(self, postures: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Find the postures that are not known to be clear, shape ``(n,)``.
-
-        Args:
-            postures: In the order of the model [rad], shape ``(n, n_joints)``, n at least 1.
-        """
+        """Find the postures [rad], shape ``(n, n_joints)``, that are not known to be clear, shape ``(n,)``."""
         lowest, highest = postures.min(axis=0), postures.max(axis=0)
         gaps = np.maximum(np.maximum(lowest - self._postures, self._postures - highest), 0.0)
         near = np.flatnonzero((gaps * self._steepness).sum(axis=1) < 1)
@@ -74,11 +70,7 @@ class ClearPostures:
     def look_at_first(self, postures: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Compute whether the first posture is clear, and find the postures that are not known to be clear then.
 
-        Args:
-            postures: In the order of the model [rad], shape ``(n, n_joints)``, n at least 1.
-
-        Returns:
-            True for postures that are not known to be clear, shape ``(n,)``.
+        Shapes are those of `find_unknown`.
         """
         unknown: NDArray[np.bool_] = np.ones(len(postures), bool)
         if not self._tries:

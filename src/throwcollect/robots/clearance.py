@@ -42,11 +42,6 @@ class Clearance:
     that the SRDF excludes are not checked, nor are links of one gripper (their mimic joints are rigid in the model),
     nor the tool with the hand and forearm that hold it, where the handle reaches into the fingers.
 
-    Args:
-        robot: The robot.
-        model: Its model with all joints.
-        tool: The tool that it holds.
-
     Raises:
         ConfigError: If the robot's meshes cannot be read.
     """
@@ -89,15 +84,12 @@ class Clearance:
         ]
 
     def first_approach(self, configurations: NDArray[np.float64]) -> Approach | None:
-        """Find the first posture in which two links are closer than `MARGIN_M`, and the closest links in it.
+        """Find the first posture in which two links are closer than `MARGIN_M`, and the closest links in it, if any.
 
         Most postures need no computation: a posture near them was clear by more than the way between the two.
 
         Args:
             configurations: In the order of the model [rad], shape ``(n, n_joints)``.
-
-        Returns:
-            None if no posture has such links.
         """
         unknown = [known.find_unknown(configurations) for known in self._clear]
         for index, configuration in enumerate(configurations):
@@ -116,13 +108,10 @@ class Clearance:
         return None
 
     def find_lowest(self, configuration: NDArray[np.float64]) -> tuple[str, float]:
-        """Find the lowest link of a posture, by the boxes around its shapes.
+        """Find the lowest link of a posture by boxes around its shapes: its name, and its height above the base [m].
 
         Args:
             configuration: In the order of the model [rad], shape ``(n_joints,)``.
-
-        Returns:
-            Its name, and the height of its lowest point above the base [m].
         """
         pinocchio.updateGeometryPlacements(self._model, self._data, self.geometry, self._distances, configuration)
         heights = []

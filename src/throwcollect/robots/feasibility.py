@@ -35,9 +35,6 @@ class Feasibility:
     One object serves all trials of a collection: each check sets posture, masses, gravity and limits of its trial, and
     only a trial with another tool costs the time to rebuild its shapes.
 
-    Args:
-        config: Configuration of the collection.
-
     Raises:
         ConfigError: If the robot's files cannot be read, or lack something.
     """

@@ -78,12 +78,7 @@ class Robot:
         raise KeyError(joint)
 
     def graph_name(self, controller: str, naming: str) -> str:
-        """Return the name of a controller in the ROS graph.
-
-        Args:
-            controller: Name of one of `controllers`.
-            naming: ``ros2`` or ``ros1``.
-        """
+        """Return the name of a controller in the ROS graph, by the naming ``ros2`` or ``ros1``."""
         return self.ros1_names.get(controller, controller) if naming == "ros1" else controller
 
     @property

@@ -24,16 +24,12 @@ class ToolMotion:
     def __init__(self, config: Config) -> None:
         tool = tool_of(config.tool)
         self._seat = tool.mount * pinocchio.SE3(np.eye(3), np.array(tool.ball_seat(config.ball.radius_m)))
-        self._model = _MODELS.of(robot_of(config))
+        self._model = _model_of(robot_of(config))
         self._offsets = joint_offsets(config)
         self._base = np.array([0.0, 0.0, config.robot.base_height_m])
 
     def place(self, position: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Compute the position of the seat [m], shape ``(3,)``.
-
-        Args:
-            position: Of the joints [rad], shape ``(n_joints,)``, in the order of `Robot.joints`.
-        """
+        """Compute the position of the seat [m], shape ``(3,)``, from those of `Robot.joints` [rad]."""
         model = self._model
         pinocchio.forwardKinematics(model.model, model.data, (position + self._offsets)[model.order])
         hand = pinocchio.updateFramePlacement(model.model, model.data, model.hand)
@@ -41,12 +37,7 @@ class ToolMotion:
         return place
 
     def velocity(self, position: NDArray[np.float64], velocity: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Compute the velocity of the seat [m/s], shape ``(3,)``.
-
-        Args:
-            position: Of the joints [rad], shape ``(n_joints,)``, in the order of `Robot.joints`.
-            velocity: Of the joints [rad/s], shape ``(n_joints,)``.
-        """
+        """Compute the velocity of the seat [m/s], ``(3,)``, from positions and velocities of `Robot.joints` [rad/s]."""
         model = self._model
         actual = position + self._offsets
         pinocchio.forwardKinematics(model.model, model.data, actual[model.order], velocity[model.order])
@@ -68,17 +59,12 @@ class _JointModel:
         self.hand = self.model.getFrameId(robot.hand, pinocchio.BODY)
 
 
-class _ModelsOfThread(threading.local):
-    """The models that a thread has made: making one costs a hundred times as much as using it, which changes it."""
-
-    def __init__(self) -> None:
-        self._models: dict[Robot, _JointModel] = {}
-
-    def of(self, robot: Robot) -> _JointModel:
-        """Return the model of a robot."""
-        if robot not in self._models:
-            self._models[robot] = _JointModel(robot)
-        return self._models[robot]
+_of_this_thread = threading.local()
 
 
-_MODELS = _ModelsOfThread()
+def _model_of(robot: Robot) -> _JointModel:
+    """Return this thread's model of a robot: making one takes a hundred times as long as using it, which changes it."""
+    models: dict[Robot, _JointModel] = _of_this_thread.__dict__.setdefault("models", {})
+    if robot not in models:
+        models[robot] = _JointModel(robot)
+    return models[robot]

@@ -26,11 +26,9 @@ def encode_table(table: Any) -> bytes:
 
 
 def encode_pieces(table: Any, put: Callable[[bytes], object]) -> None:
-    """Encode an Arrow table as `encode_table` does, piece by piece and one column of a million rows after the other.
+    """Encode an Arrow table as `encode_table` does, and `put` its bytes piece by piece, in order.
 
-    Args:
-        table: The table; columns that consist of one piece are not copied.
-        put: Called with the bytes, in order.
+    Columns of the table that consist of one piece are not copied.
     """
     import pyarrow.parquet as pq
 

@@ -25,11 +25,7 @@ def rounds_path(plan: Path) -> Path:
 
 
 def append_round(plan: Path, trials: Trials) -> None:
-    """Add a round to a plan on disk, whole or not at all; after that it survives a power cut.
-
-    Args:
-        plan: File of the plan.
-        trials: The trials of the round; they follow those that are on disk.
+    """Add a round, which follows the trials on disk, to a plan, whole or not at all; then it survives a power cut.
 
     Raises:
         DatasetError: If it cannot be written.
@@ -57,11 +53,7 @@ def append_round(plan: Path, trials: Trials) -> None:
 
 
 def read_rounds(plan: Path, trials: Trials) -> None:
-    """Append the rounds that lie beside the file of a plan to the trials that this file has.
-
-    Args:
-        plan: File of the plan.
-        trials: Its trials; rounds that they contain already are skipped.
+    """Append the rounds that lie beside the file of a plan to the trials that this file has; skip those among them.
 
     Raises:
         DatasetError: If a round is damaged, or does not begin where the one before it ends.

@@ -44,10 +44,8 @@ class Rounds:
         self._places = Rows(np.empty((0, targets)))
         self._waiting = bytearray()
         """For each trial, 1 until its result is known."""
-        self._running: list[int] = []
-        """For each round, the number of trials without a result."""
-        self._succeeded: list[int] = []
-        """For each round, the number of successes."""
+        self._succeeded = bytearray()
+        """For each trial, 1 if it is known to be a success."""
         self._ended = 0
         """Number of rounds, from the first one on, with all results known."""
         self._succeeded_in_ended = 0
@@ -73,8 +71,11 @@ class Rounds:
     def due(self) -> bool:
         """All results that the next trials depend on are known."""
         decisive = self._decisive
-        while self._ended < decisive and not self._running[self._ended]:
-            self._succeeded_in_ended += self._succeeded[self._ended]
+        while self._ended < decisive:
+            trials = slice(self._ended * ROUND_TRIALS, (self._ended + 1) * ROUND_TRIALS)
+            if any(self._waiting[trials]):
+                break
+            self._succeeded_in_ended += sum(self._succeeded[trials])
             self._ended += 1
         return self._ended == decisive
 
@@ -87,21 +88,15 @@ class Rounds:
         """Take in trials of the plan, which follow those that were taken in before."""
         self._values.append(trials.values)
         self._places.append(np.full((len(trials), self._places.all.shape[1]), np.nan))
-        for number in trials.numbers:
-            if number % ROUND_TRIALS == 0:
-                self._running.append(0)
-                self._succeeded.append(0)
-            runs = number not in trials.refused
-            self._running[-1] += runs
-            self._waiting.append(runs)
+        self._waiting += bytes(number not in trials.refused for number in trials.numbers)
+        self._succeeded += bytes(len(trials))
 
     def tell(self, number: int, result: Result) -> None:
         """Take in the result of a trial; a second result of the same trial changes nothing."""
         if not self._waiting[number]:
             return
         self._waiting[number] = False
-        self._running[number // ROUND_TRIALS] -= 1
-        self._succeeded[number // ROUND_TRIALS] += result.outcome.value == self._success
+        self._succeeded[number] = result.outcome.value == self._success
         if self._sampler is not None:
             values = dict(zip(self._points.keys, self._values.all[number].tolist(), strict=True))
             self._places.all[number] = self._sampler.place(values, result)

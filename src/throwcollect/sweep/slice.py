@@ -46,11 +46,7 @@ class Slice:
         return tuple(cls(index, count) for index in range(count))
 
     def trials_of(self, trials: int, *, trials_per_shard: int) -> range:
-        """List the numbers of its trials; two slices of a plan differ by at most one shard.
-
-        Args:
-            trials: Number of trials of the plan.
-            trials_per_shard: Trials in one MCAP file.
+        """List the numbers of its trials in a plan of `trials`; two slices of a plan differ by at most one shard.
 
         Raises:
             ConfigError: If there are fewer shards than slices.

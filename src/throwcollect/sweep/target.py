@@ -26,12 +26,7 @@ class TargetSampler:
     """Draws round after round, each from the results of rounds up to two before it.
 
     The points are a pure function of the configuration and these results: a new sampler that gets the same results from
-    the first round on draws the same points.
-
-    Args:
-        config: Configuration with the sweep.
-        target: Its landing targets.
-        first: Number of the first round that is drawn from results.
+    the first round on draws the same points. `first` is the number of the first round that it draws.
     """
 
     def __init__(self, config: Config, target: TargetConfig, *, first: int) -> None:
@@ -55,12 +50,7 @@ class TargetSampler:
         return len(self._cells.shape)
 
     def place(self, values: Mapping[str, float], result: Result) -> NDArray[np.float64]:
-        """Find the landing place of a trial for `draw`, in bins, shape ``(n_targets,)``; NaN if it did not land.
-
-        Args:
-            values: Value of each swept key of the trial.
-            result: Its result.
-        """
+        """Find the landing place of a trial for `draw`, in bins, shape ``(n_targets,)``; NaN if it did not land."""
         if not isinstance(result, ThrowResult) or result.outcome is not ThrowOutcome.LANDED:
             return np.full(self.dimensions, np.nan)
         return self._cells.place(values, result)

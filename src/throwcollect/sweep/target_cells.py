@@ -27,9 +27,6 @@ class Cells:
     Attributes:
         shape: Number of bins of each target, ``(n_targets,)``.
         count: Number of cells.
-
-    Args:
-        target: The targets and their bins.
     """
 
     def __init__(self, target: TargetConfig) -> None:
@@ -41,12 +38,7 @@ class Cells:
         self.count = math.prod(self.shape)
 
     def place(self, values: Mapping[str, float], result: ThrowResult) -> NDArray[np.float64]:
-        """Find the landing place of a throw in bins, shape ``(n_targets,)``; NaN if it has no landing.
-
-        Args:
-            values: Value of each swept key of its trial.
-            result: Its result.
-        """
+        """Find the landing place of a throw in bins, shape ``(n_targets,)``; NaN if it has no landing."""
         measured = dict.fromkeys(self._names, math.nan)
         if result.landing is not None and result.hit_angle_rad is not None:
             measured = {
@@ -114,10 +106,7 @@ class Thinness:
         return taken
 
     def doubt(self, cells: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Give back cells without a promising throw; from now on each counts as missed `_DOUBT` times more.
-
-        Args:
-            cells: Cells that `take` has chosen, shape ``(n_cells,)``.
+        """Give back chosen cells without a promising throw; from now on each counts as missed `_DOUBT` times more.
 
         Returns:
             True for cells that are given back: `take` may choose a cell again after a doubt, which then keeps it.

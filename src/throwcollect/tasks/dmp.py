@@ -54,9 +54,6 @@ def dmp_trajectory(
         family: Weights and constants of the DMP.
         points_hz: Points per second.
 
-    Returns:
-        The trajectory; its last point is at rest, exactly at `end`.
-
     Raises:
         ConfigError: If the motion has not settled after 5 tau.
     """
@@ -146,15 +143,9 @@ def roll_out(
 
 
 def basis(phase: NDArray[np.float64], *, count: int, alpha_x: float) -> NDArray[np.float64]:
-    """Compute the normalised basis functions times the phase; the forcing term is their product with the weights.
+    """Compute the normalised basis functions times the phase x, shapes ``(n, count)`` and ``(n,)``.
 
-    Args:
-        phase: x, shape ``(n,)``.
-        count: Number of basis functions, at least 2.
-        alpha_x: Decay constant of the phase.
-
-    Returns:
-        Shape ``(n, count)``.
+    The forcing term is their product with the weights.
     """
     centres, variances = kernels(count=count, alpha_x=alpha_x)
     exponents = (phase[:, None] - centres) ** 2 / (-2 * variances)

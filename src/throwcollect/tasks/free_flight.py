@@ -51,16 +51,9 @@ def ballistic_positions(
 def ballistic_steps(
     position: NDArray[np.float64], velocity: NDArray[np.float64], *, steps: int, config: Config
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Compute the states of many balls after some steps of free flight, by the arithmetic of `ballistic_positions`.
+    """Compute positions and velocities of many balls, each of shape ``(n, 3)``, after some steps of free flight.
 
-    Args:
-        position: Ball centres at the start [m], shape ``(n, 3)``.
-        velocity: At the start [m/s], shape ``(n, 3)``.
-        steps: Number of physics steps.
-        config: Gravity, air, ball and physics rate.
-
-    Returns:
-        Positions [m] and velocities [m/s] after the last step, each of shape ``(n, 3)``.
+    The arithmetic and the arguments are those of `ballistic_positions`.
     """
     dt, drag_per_m = 1 / config.sim.physics_hz, _drag_per_m(config)
     gravity = np.array([0.0, 0.0, -config.scene.gravity_mps2])

@@ -25,10 +25,7 @@ def minimum_jerk_trajectory(
         end: Angle [rad] of each moving joint; its order is that of the trajectory's joints.
         duration_s: T, the time from rest to rest [s].
         family: The time warp.
-        points_hz: Points per second; the end is always a point.
-
-    Returns:
-        The trajectory; its last point is at rest, exactly at `end`.
+        points_hz: Points per second; the last point is at rest, exactly at `end`.
     """
     exponent = 3 * family.gamma - 2
     times = point_times(duration_s, points_hz=points_hz)

@@ -60,11 +60,6 @@ class ResultColumns(Generic[AnyResult]):
 
     Attributes:
         columns: First those of the measures that the task adds, then those that all tasks have.
-
-    Args:
-        results: Class of the results.
-        joints: Joints that the task moves.
-        tool: Name of the tool.
     """
 
     def __init__(self, results: type[AnyResult], joints: Sequence[str], *, tool: str) -> None:

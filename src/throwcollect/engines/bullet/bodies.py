@@ -6,7 +6,6 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
 import pybullet
 
 from throwcollect.engines.bullet.scenery import BASE, Surface, boxes, collide_with_everything, connect, links
@@ -15,8 +14,6 @@ from throwcollect.errors import RequestError
 
 _JOINT_TYPE, _LARGEST_EFFORT, _LINK_NAME = 2, 10, 12
 _INERTIAL_POSITION, _INERTIAL_ORIENTATION = 3, 4
-_STL = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-_STL_TITLE = bytes(80)
 
 
 class BulletBodies(Bodies):
@@ -126,11 +123,8 @@ def _load(client: int, model: BodyModel, start: BodyState, *, flags: int = pybul
     with tempfile.TemporaryDirectory(prefix="throwcollect-") as directory:
         path = Path(directory, "entity.urdf")
         path.write_text(model.urdf, encoding="utf-8")
-        for number, triangles in enumerate(model.meshes):
-            records = np.zeros(len(triangles), _STL)
-            records["corners"] = triangles
-            count = len(triangles).to_bytes(4, "little")
-            path.with_name(f"{number}.stl").write_bytes(_STL_TITLE + count + records.tobytes())
+        for name, content in model.encode_meshes().items():
+            path.with_name(name).write_bytes(content)
         try:
             return int(
                 pybullet.loadURDF(

@@ -68,12 +68,7 @@ class Renderer:
                 raise ConfigError(f"Bullet cannot load the robot's description: {error}") from error
 
     def place(self, joints: Mapping[str, float], ball: Vector) -> None:
-        """Put robot and ball into a pose.
-
-        Args:
-            joints: Angle of each joint that is not at 0 [rad].
-            ball: Centre of the ball in world [m].
-        """
+        """Put joints at angles [rad], and the centre of the ball at a place in world [m]; other joints stay at 0."""
         for name, angle in joints.items():
             pybullet.resetJointState(self._robot, self._joints[name], angle, physicsClientId=self._client)
         pybullet.resetBasePositionAndOrientation(self._ball, ball, _UPRIGHT, physicsClientId=self._client)

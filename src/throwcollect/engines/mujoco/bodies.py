@@ -7,16 +7,12 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import mujoco
-import numpy as np
-from numpy.typing import NDArray
 
 from throwcollect.engines.engine import Bodies, BodyModel, BodyState, Box
 from throwcollect.engines.mujoco.frames import rotation, turn, turn_back
 from throwcollect.engines.mujoco.scenery import Surface, boxes, collide_with_everything, read_urdf, watch
 from throwcollect.errors import RequestError
 
-_STL = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-_STL_TITLE = bytes(80)
 _FREE_JOINT = "free"
 
 
@@ -101,7 +97,7 @@ class MujocoBodies(Bodies):
         """
         for name, body in self._bodies.items():
             text, body.links = _rename_links(body.model.urdf)
-            child = read_urdf(text, {f"{number}.stl": _stl(mesh) for number, mesh in enumerate(body.model.meshes)})
+            child = read_urdf(text, body.model.encode_meshes())
             for joint in child.joints:
                 joint.frictionloss = max(joint.actfrcrange[1], 0.0)
                 joint.actfrclimited = mujoco.mjtLimited.mjLIMITED_FALSE
@@ -176,9 +172,3 @@ def _rename_links(urdf: str) -> tuple[str, list[str]]:
     for end in (end for both in ends for end in both if end is not None):
         end.set("link", numbers[end.get("link", "")])
     return ElementTree.tostring(robot, encoding="unicode"), links
-
-
-def _stl(triangles: NDArray[np.float32]) -> bytes:
-    records = np.zeros(len(triangles), _STL)
-    records["corners"] = triangles
-    return _STL_TITLE + len(triangles).to_bytes(4, "little") + records.tobytes()

@@ -262,11 +262,8 @@ class MujocoEngine(Engine):
 def _find_sample(model: mujoco.MjModel, order: Sequence[int]) -> Callable[[list[float]], Sample]:
     """Make a function that picks a sample from all positions, velocities and forces.
 
-    The ball's angular velocity is still in the frame of the ball then.
-
-    Args:
-        model: The world.
-        order: Place of each moving joint among those of the model.
+    The ball's angular velocity is still in the frame of the ball then. `order` is the place of each moving joint among
+    those of the model.
     """
     ball = len(order)
     x, y, z, w, i, j, k = range(ball, ball + 7)
