@@ -275,12 +275,7 @@ class Engine(ABC):
 
     @abstractmethod
     def rest(self, joints: Sequence[float], seat: Vector) -> None:
-        """Put the joints into positions and the ball into the tool, all at rest.
-
-        Args:
-            joints: Position of each moving joint [rad].
-            seat: Centre of the ball in the frame of the tool's link [m].
-        """
+        """Put the joints into positions [rad] and the ball at its seat in the frame of the tool's link [m], at rest."""
 
     @abstractmethod
     def reset(self, state: State) -> None:

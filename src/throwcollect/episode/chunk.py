@@ -67,10 +67,7 @@ def encode_records(*parts: records.McapRecord) -> bytes:
 def encode_message_index(channel: int, log_times: NDArray[np.uint64], offsets: NDArray[np.integer[Any]]) -> bytes:
     """Encode the MCAP Message Index record of one channel.
 
-    Args:
-        channel: Number of the channel.
-        log_times: Times of its messages [ns], shape ``(n,)``.
-        offsets: Places of their records in the uncompressed chunk [bytes], shape ``(n,)``.
+    It has the times [ns] of its messages and the offsets of their records in the uncompressed chunk [bytes].
     """
     entries = np.empty((len(log_times), 2), "<u8")
     entries[:, 0] = log_times
@@ -221,11 +218,7 @@ class ChunkEncoder:
         return self.compress(self.lay_out(samples, controllers), samples)
 
     def lay_out(self, samples: Samples, controllers: Mapping[str, ControllerSamples] | None = None) -> memoryview:
-        """Write the message records of an episode.
-
-        Args:
-            samples: The samples, at least one.
-            controllers: Set points of each controller whose state is recorded, by its name.
+        """Write the message records of an episode, with set points of each controller whose state is recorded, by name.
 
         Raises:
             KeyError: If the set points of a recorded controller are missing.

@@ -78,11 +78,9 @@ class FrameTree:
 
 @lru_cache(maxsize=4)
 def read_frames(urdf: str, *, base_height: float) -> FrameTree:
-    """Read the frames of a robot; they are cached, as several parts of a process need those of its only robot.
+    """Read the frames of a robot whose root link is at a height above the ground [m].
 
-    Args:
-        urdf: URDF text of the robot.
-        base_height: Height of its root link above the ground [m].
+    They are cached, as several parts of a process need those of its only robot.
 
     Raises:
         ConfigError: If the text is not a URDF, or a joint of it is neither fixed nor revolute.

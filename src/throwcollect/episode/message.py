@@ -221,10 +221,6 @@ def _prefix(sizes: list[int]) -> bytes:
 def unpack(message: bytes, signer: Signer) -> Delivery | Refusal:
     """Read the message that `pack` writes, without decompressing chunks.
 
-    Args:
-        message: CDR bytes of a std_msgs/UInt8MultiArray.
-        signer: The signer of the run.
-
     Raises:
         DatasetError: If it is another message, or is signed with another key.
     """

@@ -13,14 +13,10 @@ _SEEN = ("visual", "material")
 
 
 def check_appearance(description: str, drawn: str) -> None:
-    """Refuse a description that changes more of a robot than its appearance.
-
-    Args:
-        description: URDF text of the robot that is simulated.
-        drawn: URDF text that viewers are to draw.
+    """Refuse a URDF for viewers that changes more of the simulated robot's description than its appearance.
 
     Raises:
-        ConfigError: If that is no URDF.
+        ConfigError: If it is no URDF.
         ConflictError: If it has other joints, masses or collision shapes.
     """
     if differing := _physics_of(description) ^ _physics_of(drawn):

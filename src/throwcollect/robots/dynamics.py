@@ -20,12 +20,9 @@ Motion = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
 
 
 class Dynamics:
-    """Inverse dynamics of a robot, of all its joints or with some of them locked.
+    """Inverse dynamics of a robot, of all its joints or with some of them locked at angles [rad], which is faster.
 
-    Args:
-        robot: The robot.
-        model: The robot with all joints, without a tool.
-        locked: Angle [rad] of each joint that is rigid; the fewer joints move, the faster the computation.
+    The model is that of all joints, without a tool.
     """
 
     def __init__(self, robot: Robot, model: pinocchio.Model, locked: Mapping[str, float]) -> None:

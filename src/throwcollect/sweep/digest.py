@@ -22,7 +22,7 @@ _DIGEST = re.compile(r"[0-9a-f]{64}")
 
 
 def is_digest(value: object) -> bool:
-    """Whether a value is a digest in hexadecimal."""
+    """Say whether a value is a digest in hexadecimal."""
     return isinstance(value, str) and bool(_DIGEST.fullmatch(value))
 
 

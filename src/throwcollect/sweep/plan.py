@@ -174,12 +174,9 @@ class Plan:
 
 
 def make_plan(config: Config, *, check: Check | None = None, directory: Path | None = None) -> Plan:
-    """Draw all trials of a sweep; of one that grows, its first two rounds (see `rounds`).
+    """Draw all trials of a sweep in this process; of one that grows, its first two rounds (see `rounds`).
 
-    Args:
-        config: Configuration with the sweep.
-        check: Checks each trial; all are accepted when None.
-        directory: Directory at which a relative `sweep.file` starts; the current one when None.
+    Benchmarks and tests make their plans by it; `coordinator.prepare.draw_plan` makes large ones in several processes.
 
     Raises:
         PlanError: If the sweep has no point, or every trial is refused.

@@ -39,7 +39,7 @@ class Trial:
 
 
 class Trials(Sequence[Trial]):
-    """Trials in order and without gaps; a slice of them stays as it is when others are appended to these.
+    """Trials in order and without gaps; appending trials does not change slices that were cut before.
 
     Attributes:
         keys: Swept dotted keys.

@@ -42,12 +42,7 @@ class Columns(ABC):
 
     @abstractmethod
     def declare(self, name: str, joints: Sequence[str]) -> list[Column]:
-        """List the columns.
-
-        Args:
-            name: Name of the field.
-            joints: Joints that the task moves.
-        """
+        """List the columns of the field `name`, for the joints that the task moves."""
 
     def split(self, value: Any, joints: Sequence[str]) -> Sequence[object]:
         """Split a value of the field, which is not None, into one value for each column."""

@@ -28,13 +28,6 @@ def measure_joints(
 ) -> AnyResult | None:
     """Measure how close the joints came to their limits, and how well they followed their trajectory.
 
-    Args:
-        result: A result without measures.
-        samples: The recorded trial, at least two samples.
-        start_ns: Its start, at which the trajectory starts [ns].
-        config: Configuration of the trial.
-        trajectory: The trajectory that the controllers followed as a quintic curve and then held at its end.
-
     Returns:
         The result with these measures; None if the samples of the joints are not finite.
     """

@@ -84,7 +84,7 @@ class Task(ABC, Generic[AnyResult]):
         The first of these that holds is the outcome; everything that can be measured is measured in any case:
 
         1. ``tracking_failed``: a sample is not finite (then nothing is measured), or a goal was canceled or aborted.
-        2. What the task itself finds wrong (see `assess`).
+        2. The failure that the task itself finds (see `assess`).
         3. ``limit_violated``: a joint violated a limit (see `explain_violation`).
         4. The success of the task.
 

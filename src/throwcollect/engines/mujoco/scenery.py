@@ -49,11 +49,7 @@ class Surface:
 
 
 def read_urdf(text: str, meshes: dict[str, bytes] | None = None) -> mujoco.MjSpec:
-    """Read a description, whose links all become bodies.
-
-    Args:
-        text: The description.
-        meshes: Contents of its mesh files; None if they are on disk.
+    """Read a description, whose links all become bodies; `meshes` are its mesh files unless these are on disk.
 
     Raises:
         ValueError: If MuJoCo cannot read it.

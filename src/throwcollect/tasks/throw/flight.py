@@ -37,12 +37,7 @@ class Flight:
     velocities: NDArray[np.float64]
 
     def state_at(self, time_s: float, *, knot: int) -> BallState:
-        """Interpolate the ball between two knots.
-
-        Args:
-            time_s: Since the start of the trial [s].
-            knot: Index of the knot before that time; it is not the last one.
-        """
+        """Interpolate the ball at a time between a knot, which is not the last one, and the next."""
         before, after = self.times[knot : knot + 2].tolist()
         span = after - before
         u = (time_s - before) / span
@@ -103,12 +98,7 @@ def flight_after(samples: Samples, *, start_ns: int, release_ns: int) -> Flight:
 
 
 def without_impact(flight: Flight, impact_s: float, *, config: Config) -> Flight:
-    """Cut a flight off at its impact on the ground, and end it as if the ground were not there.
-
-    Args:
-        flight: The ball from its release on.
-        impact_s: Time since the start of the trial of the first step in which the ground pressed on the ball [s].
-        config: Configuration of the trial.
+    """Cut a flight off at its impact, the first step in which the ground pressed on the ball, and continue it freely.
 
     Returns:
         The knots before the impact, and at the time of the next knot the state to which free flight leads; the flight
