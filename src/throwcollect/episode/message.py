@@ -203,8 +203,8 @@ def pack(handed: Delivery | Refusal, signer: Signer) -> bytes:
             episode.header_json.encode(),
             handed.result.encode(),
             handed.conditions.encode(),
-            b"".join(bytes.fromhex(each.records_sha256) for each in episode.chunks),
-            b"".join(each.chunk.record() for each in episode.chunks),
+            b"".join(bytes.fromhex(chunk.records_sha256) for chunk in episode.chunks),
+            b"".join(chunk.chunk.record() for chunk in episode.chunks),
         ]
     signature = signer.sign(*parts).encode()
     return b"".join((_prefix([*map(len, parts), len(signature)]), *parts, signature))

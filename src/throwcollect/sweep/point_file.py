@@ -76,7 +76,7 @@ def encode_points(points: Points) -> bytes:
 def _make_points(names: tuple[str, ...], values: NDArray[np.float64], config: Config) -> Points:
     """Separate keys from targets, and put targets into the order of the task."""
     keys = [column for column, name in enumerate(names) if not is_target(name)]
-    targets = tuple(each.name for each in config.task.target_columns if each.name in names)
+    targets = tuple(column.name for column in config.task.target_columns if column.name in names)
     aims = Targets(targets, values[:, [names.index(name) for name in targets]]) if targets else None
     return Points(tuple(names[column] for column in keys), values[:, keys], aims)
 

@@ -114,7 +114,7 @@ def places(parameter: Parameter, values: NDArray[np.float64]) -> NDArray[np.floa
 
 
 def _grid(parameters: dict[str, Parameter], trials: int | None) -> Points:
-    size = math.prod(len(each.values) if isinstance(each, Values) else _count(each) for each in parameters.values())
+    size = math.prod(len(key.values) if isinstance(key, Values) else _count(key) for key in parameters.values())
     if trials is None and size > _MOST_TRIALS:
         raise PlanError(
             [Problem(f"the grid has {size} points", key="sweep.parameters")], expected=f"at most {_MOST_TRIALS}"

@@ -74,7 +74,7 @@ def _direction_numbers(dimensions: int) -> NDArray[np.uint32]:
         entries = (line.split() for line in lines if not line.startswith("#"))
         for row, (_, degree, coefficients, *first) in zip(numbers[1:], islice(entries, dimensions - 1), strict=True):
             s, a = int(degree), int(coefficients)
-            row[:s] = [int(each) for each in first]
+            row[:s] = [int(word) for word in first]
             for j in range(s, BITS):
                 number = row[j - s] ^ (row[j - s] << s)
                 for k in range(1, s):

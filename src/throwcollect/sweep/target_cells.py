@@ -31,10 +31,10 @@ class Cells:
 
     def __init__(self, target: TargetConfig) -> None:
         self._names = tuple(target.dimensions)
-        bins = target.dimensions.values()
-        self._low = np.array([each.min for each in bins])
-        self._width = np.array([(each.max - each.min) / each.bins for each in bins])
-        self.shape = tuple(each.bins for each in bins)
+        dimensions = target.dimensions.values()
+        self._low = np.array([dimension.min for dimension in dimensions])
+        self._width = np.array([(dimension.max - dimension.min) / dimension.bins for dimension in dimensions])
+        self.shape = tuple(dimension.bins for dimension in dimensions)
         self.count = math.prod(self.shape)
 
     def place(self, values: Mapping[str, float], result: ThrowResult) -> NDArray[np.float64]:
