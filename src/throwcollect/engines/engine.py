@@ -1,7 +1,7 @@
-"""What a physics engine is: one world that is loaded from a scene, put into a state, and stepped by joint commands.
+"""The kind of part `Engine`: one world that is loaded from a scene, put into a state, and stepped by joint commands.
 
-An engine knows neither configurations nor trials: it gets values and gives numbers. The rules of a trial, such as when
-it ends, are those of `throwcollect.sim`, and the same on every engine.
+An engine knows neither configurations nor trials: it gets values and gives numbers. `throwcollect.sim` has the rules of
+a trial, such as when it ends; they are the same on every engine.
 
 Frames and units: world with x forward, y left, z up; metres, radians, seconds, kilograms; quaternions are xyzw.
 """
@@ -23,13 +23,17 @@ Box = tuple[Vector, Vector]
 
 Sample = tuple[float, ...]
 """Robot and ball at one instant: positions [rad], velocities [rad/s] and motor torques [Nm] of all moving joints, then
-position, orientation, linear and angular velocity of the ball. Bare numbers, as there is one every few steps."""
+position, orientation, linear and angular velocity of the ball. These are bare numbers, as an engine makes a sample
+every few steps and objects would slow it down."""
 
 BALL_NUMBERS = 13
-"""How many numbers of a sample, the last ones, are those of the ball."""
+"""The last so many numbers of a sample belong to the ball."""
 
 GROUND = "ground"
-"""Name of the ground among what touches the ball."""
+"""Name of the ground in contacts of the ball."""
+
+_STL = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+"""A triangle in a binary STL file, which has a title of 80 bytes and the number of triangles before them."""
 
 
 @dataclass(frozen=True)
@@ -51,12 +55,12 @@ class BodyState:
 
 @dataclass(frozen=True)
 class ToolLink:
-    """What the robot throws with.
+    """The tool that the robot throws with.
 
     Attributes:
         link: Its link in the robot's description.
-        name: Its name among what touches the ball.
-        opening: Unit vector in the frame of the link: where the tool is open, so that it cannot pull the ball back.
+        name: Its name in contacts of the ball.
+        opening: Unit vector in the frame of the link; in this direction the tool is open and cannot hold the ball back.
     """
 
     link: str
@@ -66,14 +70,14 @@ class ToolLink:
 
 @dataclass(frozen=True)
 class Scene:
-    """What a world is made of; another scene takes another world.
+    """The parts of a world; another scene needs another world.
 
     Attributes:
         urdf: The robot's description. All its movable joints are in `moving`, mesh paths are absolute, and its files
             can be trusted.
         moving: The joints that are commanded, in the order of every command and sample.
         base_height_m: Height of its fixed base above the ground.
-        tool: What it throws with.
+        tool: The tool.
         ground_is_solid: Whether the ground stops the ball; it stops other bodies in any case.
         ball_radius_m: Radius of the ball.
     """
@@ -88,7 +92,7 @@ class Scene:
 
 @dataclass(frozen=True)
 class Physics:
-    """Numbers that the physics of a scene depends on; an engine may leave out what it has no use for.
+    """Numbers that the physics of a scene depends on; an engine may ignore those that it has no use for.
 
     Attributes:
         hz: Physics steps per simulated second.
@@ -96,9 +100,9 @@ class Physics:
         gravity_mps2: Gravity, downwards.
         ball_mass_kg: Mass of the ball.
         ball_friction: Coulomb friction of the ball [-].
-        ball_restitution: Coefficient of restitution between the ball and whatever it touches [-].
+        ball_restitution: Coefficient of restitution between the ball and everything that it touches [-].
         surface_friction: Coulomb friction of robot, tool, ground and bodies that are added [-].
-        efforts: The most torque of each moving joint [Nm].
+        efforts: Largest torque of each moving joint [Nm].
         position_gain_per_s: Velocity that a motor adds per radian of position error.
         velocity_gain: Share of the velocity error that a motor removes in one step [-].
     """
@@ -130,15 +134,15 @@ class State:
 
 @dataclass(frozen=True)
 class Steps:
-    """Physics steps to take, and what is wanted in each.
+    """Physics steps to take, with their commands.
 
     Attributes:
-        targets: Positions of the moving joints [rad], shape ``(n_steps + 1, n_moving)``: a step begins where one row
-            is wanted, and ends where the next one is.
+        targets: Commanded positions of the moving joints [rad], shape ``(n_steps + 1, n_moving)``: one row at the begin
+            of each step, and one at the end of the last.
         velocities: Velocities that lead from each row to the next [rad/s], shape ``(n_steps, n_moving)``.
         first_sample: Number of the first step after which a sample is due; the first step is number 1.
         stride: Steps from one sample to the next.
-        drag_kgpm: The air's force on the ball is this times the square of the ball's speed.
+        drag_kgpm: Force of the air on the ball over the square of the ball's speed.
     """
 
     targets: NDArray[np.float64]
@@ -149,10 +153,10 @@ class Steps:
 
 
 class Observer:
-    """Sees what happens while steps are taken, and may stop them; this one sees nothing."""
+    """Is called while an engine takes steps, and may stop it; this one ignores all calls."""
 
     def on_touch(self, step: int, bodies: frozenset[str]) -> None:
-        """Other bodies than before press on the ball.
+        """Take note that other bodies than before press on the ball.
 
         Args:
             step: Number of the first step in which they do.
@@ -160,10 +164,10 @@ class Observer:
         """
 
     def on_sample(self, step: int, sample: Sample) -> bool:
-        """A sample is due after a step; what touches the ball in that step was told before.
+        """Take a sample after a step; the engine has called `on_touch` for that step before.
 
         Returns:
-            Whether this was the last step, so that the others are not taken.
+            True if this step is the last one that the engine takes.
         """
         del step, sample
         return False
@@ -174,11 +178,11 @@ class BodyModel:
     """A body that can be added to a world.
 
     Attributes:
-        name: Name that its description gives itself.
-        urdf: Its description, checked and written anew; its meshes are called ``0.stl``, ``1.stl`` and so on.
+        name: Its name in its description.
+        urdf: Its description, checked and rewritten; its meshes are called ``0.stl``, ``1.stl`` and so on.
         meshes: Corners of the triangles of these meshes, each of shape ``(n_triangles, 3, 3)``.
         joints: Number of joints that can move.
-        is_fixed: Whether it is attached to the world.
+        is_fixed: The body is attached to the world.
     """
 
     name: str
@@ -187,26 +191,30 @@ class BodyModel:
     joints: int
     is_fixed: bool
 
+    def encode_meshes(self) -> dict[str, bytes]:
+        """Encode the meshes as binary STL, by the names that the description has for them."""
+        files = {}
+        for number, triangles in enumerate(self.meshes):
+            records = np.zeros(len(triangles), _STL)
+            records["corners"] = triangles
+            files[f"{number}.stl"] = bytes(80) + len(triangles).to_bytes(4, "little") + records.tobytes()
+        return files
+
     @property
     def is_static(self) -> bool:
-        """Whether no part of it ever moves on its own."""
+        """Say whether no part of it ever moves on its own."""
         return self.is_fixed and not self.joints
 
 
 class Bodies(ABC):
-    """Bodies in a world besides robot, ground and ball, by name. They collide with everything, and with each other."""
+    """Bodies in a world besides robot, ground and ball, by name; they collide with these and with each other."""
 
     @abstractmethod
     def __contains__(self, name: object) -> bool: ...
 
     @abstractmethod
     def add(self, name: str, model: BodyModel, start: BodyState) -> None:
-        """Put a body into the world.
-
-        Args:
-            name: Its name, which no other body has.
-            model: What it is.
-            start: Its state; only the pose matters.
+        """Put a body into the world under a new name; of its state `start`, only the pose matters.
 
         Raises:
             RequestError: ``RESOURCE_PARSE_ERROR`` if the engine does not take it.
@@ -218,28 +226,28 @@ class Bodies(ABC):
 
     @abstractmethod
     def state(self, name: str) -> BodyState:
-        """Where the root link of a body is and how it moves."""
+        """Find pose and velocity of the root link of a body."""
 
     @abstractmethod
     def place(self, name: str, state: BodyState) -> None:
-        """Put the root link of a body somewhere; its joints stay as they are."""
+        """Set pose and velocity of the root link of a body; its joints stay as they are."""
 
     @abstractmethod
     def boxes(self, name: str) -> list[Box]:
-        """Boxes along the axes of the world around the links of a body."""
+        """Find the boxes around the links of a body, along the axes of the world."""
 
     @abstractmethod
     def bounds(self, name: str) -> list[Box]:
-        """Boxes along the axes of a body's root link around its links."""
+        """Find the boxes around the links of a body, along the axes of its root link."""
 
 
 class Engine(ABC):
     """One world with a robot, a ball and the ground.
 
-    What follows from a state and commands does not depend on what happened in the world before, to the last bit.
+    The results of a state and commands do not depend on anything that happened in the world before, to the last bit.
 
     Attributes:
-        bodies: Further bodies; None if the engine takes none.
+        bodies: Further bodies; None if the engine has no place for them.
     """
 
     bodies: Bodies | None = None
@@ -250,7 +258,7 @@ class Engine(ABC):
 
     @abstractmethod
     def load(self, scene: Scene) -> None:
-        """Make the world of a scene; bodies that were added are gone. It may keep what is as the scene wants it.
+        """Make the world of a scene without added bodies; the engine may keep parts that are the same as before.
 
         Raises:
             ConfigError: If the engine does not take the robot's description.
@@ -259,24 +267,19 @@ class Engine(ABC):
     @property
     @abstractmethod
     def is_as_loaded(self) -> bool:
-        """Whether nothing was added since the world was loaded; otherwise it must be loaded before the next trial."""
+        """Say whether no body was added since the world was loaded; otherwise the next trial needs a new world."""
 
     @abstractmethod
     def configure(self, physics: Physics) -> None:
-        """Set all numbers of the physics, so that nothing of earlier ones remains."""
+        """Set all numbers of the physics, so that no earlier one remains."""
 
     @abstractmethod
     def rest(self, joints: Sequence[float], seat: Vector) -> None:
-        """Put the joints somewhere and the ball into the tool, all at rest.
-
-        Args:
-            joints: Position of each moving joint [rad].
-            seat: Centre of the ball in the frame of the tool's link [m].
-        """
+        """Put the joints into positions [rad] and the ball at its seat in the frame of the tool's link [m], at rest."""
 
     @abstractmethod
     def reset(self, state: State) -> None:
-        """Put robot and ball into a state, leaving nothing behind of what went on before."""
+        """Put robot and ball into a state, and leave no trace of earlier ones in the world."""
 
     @property
     @abstractmethod
@@ -287,7 +290,7 @@ class Engine(ABC):
     def run(self, steps: Steps, observer: Observer) -> int:
         """Take steps until the observer stops them.
 
-        An engine may compute ahead, but what it tells, and the state that it ends in, are those of the last step.
+        An engine may compute ahead, but it ends in the state of the last step that the observer wants.
 
         Returns:
             Number of steps taken.
@@ -295,18 +298,18 @@ class Engine(ABC):
 
     @abstractmethod
     def place_ball(self, ball: BodyState) -> None:
-        """Put the ball somewhere."""
+        """Set pose and velocity of the ball."""
 
     @abstractmethod
     def ball_boxes(self) -> list[Box]:
-        """A box along the axes of the world around the ball."""
+        """Find the box around the ball, along the axes of the world."""
 
     @abstractmethod
     def robot_boxes(self) -> list[Box]:
-        """Boxes along the axes of the world around the links of the robot; none if the engine knows no shapes."""
+        """Find the boxes around the links of the robot, along the axes of the world; none if it knows no shapes."""
 
 
 def ball_of(sample: Sample) -> BodyState:
-    """The ball of a sample."""
+    """Read the ball from a sample."""
     x, y, z, qx, qy, qz, qw, vx, vy, vz, wx, wy, wz = sample[-BALL_NUMBERS:]
     return BodyState((x, y, z), (qx, qy, qz, qw), (vx, vy, vz), (wx, wy, wz))

@@ -1,1 +1,1 @@
-"""What one trial yielded: samples, contacts and results, and the MCAP chunk they travel and rest in."""
+"""The recording of one trial: samples, contacts and results of goals, and the MCAP chunks that hold them."""

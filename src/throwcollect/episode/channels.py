@@ -30,7 +30,7 @@ _TF_ID = 6
 _FIRST_CONTROLLER_ID = 7
 
 _INFINITE_S, _INFINITE_NS = 9223372036, 854775807
-"""A duration without end in rmw: 2^63 - 1 ns."""
+"""An infinite duration in rmw: 2^63 - 1 ns."""
 
 
 @dataclass(frozen=True)
@@ -38,8 +38,8 @@ class Qos:
     """Offered quality of service of a reliable publisher that keeps the last messages.
 
     Attributes:
-        durability: Whether late subscribers are sent the last messages.
-        depth: How many messages are kept.
+        durability: ``transient_local`` if late subscribers get the last messages.
+        depth: Number of messages that are kept.
     """
 
     durability: Literal["volatile", "transient_local"]
@@ -101,17 +101,13 @@ std_msgs/Header. No sensor is simulated yet: a camera adds its channels here, wi
 
 
 class Channels:
-    """What is recorded for a configuration.
+    """The channels of the recordings of a configuration.
 
     Attributes:
-        latched: Channels with one message a file: ``/robot_description`` and ``/tf_static``.
-        recorded: Channels with one message a sample, in the order of their numbers, and what fills them.
+        latched: Channels with one message per file: ``/robot_description`` and ``/tf_static``.
+        recorded: Channels with one message per sample, in the order of their numbers, with their topics.
         sensors: Channels of each chunk that follows the state chunk of an episode.
         robot: URDF text of the robot.
-
-    Args:
-        config: The configuration.
-        urdf: URDF text of the robot.
 
     Raises:
         ConfigError: If the text is not a URDF.
@@ -143,24 +139,16 @@ class Channels:
         return tuple(tuple(channel.id for channel in chunk) for chunk in (self.recorded, *self.sensors))
 
     def fit(self, numbers: tuple[tuple[int, ...], ...]) -> bool:
-        """Whether the chunks of an episode have the channels that they should have.
-
-        Args:
-            numbers: Numbers of the channels of each of its chunks; a sensor that had nothing to say has left some out.
-        """
+        """Say whether chunks with these channels fit; that of a sensor may lack some, as it may have no data."""
         state, *sensors = self.numbers
         return (
             len(numbers) == len(self.numbers)
             and numbers[0] == state
-            and all(set(found) <= set(known) for found, known in zip(numbers[1:], sensors, strict=True))
+            and all(set(recorded) <= set(known) for recorded, known in zip(numbers[1:], sensors, strict=True))
         )
 
     def encode_latched_messages(self, stamp_ns: int) -> dict[Channel, bytes]:
-        """CDR messages of the latched channels.
-
-        Args:
-            stamp_ns: Stamp of the static transforms [ns].
-        """
+        """Encode the CDR messages of the latched channels; `stamp_ns` is the stamp of the static transforms [ns]."""
         description, static = self.latched
         fixed = [
             transform_message(frame.parent, frame.child, frame.translation, frame.rotation_xyzw, stamp_ns)

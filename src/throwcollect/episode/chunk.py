@@ -1,4 +1,4 @@
-"""MCAP chunks: how samples of one trial are encoded into one, and how chunks are packed, indexed and read again.
+"""MCAP chunks: encodes the samples of a trial into one, and packs, indexes and reads chunks.
 
 The state chunk of an episode holds one Message record per channel and sample, samples in order of time and channels by
 number (MCAP specification, records Message, Chunk and Message Index); `message_table` reads it.
@@ -28,16 +28,16 @@ from throwcollect.errors import DatasetError
 
 _COMPRESSION = b"zstd"
 _CHUNK_HEADER = struct.Struct("<BQQQQII4sQ")
-"""Opcode, length, start and end time, uncompressed size and CRC, length and name of the compression, data's length."""
+"""Opcode, length, start and end time, uncompressed size and CRC, length and name of the compression, size of data."""
 CHUNK_HEADER_BYTES = _CHUNK_HEADER.size
 CHUNK_MARK_OFFSET = 37
 CHUNK_MARK = struct.pack("<I4s", len(_COMPRESSION), _COMPRESSION)
 """Bytes that the record of every chunk has at `CHUNK_MARK_OFFSET`: the length and the name of the compression."""
 MOST_RATIO = 4096
-"""Uncompressed bytes that one compressed byte may stand for. Each message has a stamp of its own, so recordings stay
-far below; zstd by itself reaches 30,000."""
+"""Most uncompressed bytes per compressed byte. Each message has a stamp of its own, so recordings stay far below this;
+zstd by itself reaches 30,000, with which a small file could fill all memory."""
 RECORD_PREFIX_BYTES = 9
-"""Opcode and length of a record, which its length leaves out."""
+"""Size of opcode and length of a record; the length does not count them."""
 MESSAGE_HEADER = struct.Struct("<BQHIQQ")
 """Opcode, length, channel, sequence, log time, publish time."""
 _MESSAGE_INDEX_HEADER = struct.Struct("<BQHI")
@@ -47,7 +47,7 @@ _INDEX_ENTRY_BYTES = 16
 
 
 class _OfEachThread(threading.local):
-    """A decompressor must not be shared; making one takes almost as long as it then takes to decompress a chunk."""
+    """A decompressor for each thread: threads must not share one, and making one takes as long as using it."""
 
     def __init__(self) -> None:
         self.decompressor = zstandard.ZstdDecompressor()
@@ -57,7 +57,7 @@ _of_this_thread = _OfEachThread()
 
 
 def encode_records(*parts: records.McapRecord) -> bytes:
-    """Bytes of MCAP records, one after the other."""
+    """Encode MCAP records, one after the other."""
     builder = RecordBuilder()
     for part in parts:
         part.write(builder)
@@ -65,12 +65,9 @@ def encode_records(*parts: records.McapRecord) -> bytes:
 
 
 def encode_message_index(channel: int, log_times: NDArray[np.uint64], offsets: NDArray[np.integer[Any]]) -> bytes:
-    """The MCAP Message Index record of one channel.
+    """Encode the MCAP Message Index record of one channel.
 
-    Args:
-        channel: Number of the channel.
-        log_times: Times of its messages [ns], shape ``(n,)``.
-        offsets: Where their records begin in the uncompressed chunk [bytes], shape ``(n,)``.
+    It has the times [ns] of its messages and the offsets of their records in the uncompressed chunk [bytes].
     """
     entries = np.empty((len(log_times), 2), "<u8")
     entries[:, 0] = log_times
@@ -80,7 +77,7 @@ def encode_message_index(channel: int, log_times: NDArray[np.uint64], offsets: N
 
 
 def count_indexed(index: bytes) -> int:
-    """Number of messages that a Message Index record, as `encode_message_index` writes it, announces."""
+    """Count the messages in a Message Index record of `encode_message_index`."""
     return (len(index) - _MESSAGE_INDEX_HEADER.size) // _INDEX_ENTRY_BYTES
 
 
@@ -89,7 +86,7 @@ class Chunk:
     """A compressed MCAP chunk.
 
     Attributes:
-        data: Compressed records (zstd); a view of the bytes that they came in spares a copy.
+        data: Compressed records (zstd); may be a view of the message or file that they came in.
         uncompressed_size: Size of the records [bytes].
         crc: CRC-32 of the records.
         start_ns: Time of the first message [ns].
@@ -104,22 +101,15 @@ class Chunk:
 
     @classmethod
     def of(cls, contents: bytes | bytearray | memoryview, data: bytes, *, start_ns: int, end_ns: int) -> Chunk:
-        """The chunk of some records.
-
-        Args:
-            contents: The records.
-            data: The same, compressed.
-            start_ns: Time of the first message [ns].
-            end_ns: Time of the last message [ns].
-        """
+        """Make the chunk of records, which are given both uncompressed and compressed."""
         return cls(data, len(contents), crc32(contents), start_ns, end_ns)
 
     def record(self) -> bytes:
-        """The MCAP Chunk record, with its opcode and length."""
+        """Encode the MCAP Chunk record, with its opcode and length."""
         return self.record_header() + self.data
 
     def record_header(self) -> bytes:
-        """Everything of the record that comes before the data."""
+        """Encode the part of the record that comes before the data."""
         return _CHUNK_HEADER.pack(
             Opcode.CHUNK,
             self.record_size - RECORD_PREFIX_BYTES,
@@ -134,30 +124,26 @@ class Chunk:
 
     @property
     def record_size(self) -> int:
-        """Size of what `record` gives [bytes]."""
+        """Size of the record [bytes]."""
         return _CHUNK_HEADER.size + len(self.data)
 
     @staticmethod
     def read_announced_size(header: bytes) -> int:
-        """Size of the record that begins with these bytes; 0 if that is no chunk as `record` writes it.
-
-        Args:
-            header: The first `CHUNK_HEADER_BYTES` of it.
-        """
+        """Read the size of a record from its first `CHUNK_HEADER_BYTES`; 0 if `record` has not written them."""
         if len(header) != _CHUNK_HEADER.size:
             return 0
         opcode, length, *_, name_length, name, stored = _CHUNK_HEADER.unpack(header)
-        alike = (opcode, name_length, name, length) == (
+        is_ours = (opcode, name_length, name, length) == (
             Opcode.CHUNK, len(_COMPRESSION), _COMPRESSION, stored + _CHUNK_HEADER.size - RECORD_PREFIX_BYTES
         )  # fmt: skip
-        return _CHUNK_HEADER.size + stored if alike else 0
+        return _CHUNK_HEADER.size + stored if is_ours else 0
 
     @classmethod
     def parse_all(cls, records: memoryview) -> list[Chunk]:
-        """Read MCAP Chunk records that follow each other, at least one.
+        """Read MCAP Chunk records that follow each other, at least one, without decompressing them.
 
         Raises:
-            DatasetError: If the bytes are anything else; contents are not looked at.
+            DatasetError: If the bytes are anything else.
         """
         chunks: list[Chunk] = []
         while records or not chunks:
@@ -168,26 +154,22 @@ class Chunk:
 
     @classmethod
     def parse(cls, record: bytes | memoryview) -> Chunk:
-        """Read an MCAP Chunk record as `record` writes it.
+        """Read an MCAP Chunk record that `record` has written, without decompressing it.
 
         Raises:
-            DatasetError: If the bytes are anything else; contents are not looked at.
+            DatasetError: If the bytes are anything else.
         """
-        if len(record) < _CHUNK_HEADER.size:
-            raise DatasetError(f"chunk: {len(record)} bytes", expected=f"at least {_CHUNK_HEADER.size}")
-        opcode, length, start, end, size, crc, name_length, name, stored = _CHUNK_HEADER.unpack_from(record)
-        if opcode != Opcode.CHUNK or (name_length, name) != (len(_COMPRESSION), _COMPRESSION):
-            raise DatasetError("chunk: not the record of a chunk compressed with zstd")
-        data = record[_CHUNK_HEADER.size :]
-        if stored != len(data) or length != len(record) - RECORD_PREFIX_BYTES:
-            raise DatasetError(f"chunk: announces {stored} bytes of data; got {len(data)}")
-        return cls(data, size, crc, start, end)
+        announced = cls.read_announced_size(bytes(record[:CHUNK_HEADER_BYTES]))
+        if not announced or announced != len(record):
+            raise DatasetError(f"chunk: {len(record)} bytes are not one record of a chunk compressed with zstd")
+        _, _, start, end, size, crc, *_ = _CHUNK_HEADER.unpack_from(record)
+        return cls(record[_CHUNK_HEADER.size :], size, crc, start, end)
 
     def check_size(self) -> None:
-        """Check that the announced size of the records can be believed; no contents are decompressed.
+        """Check that the announced size of the records is plausible, without decompressing them.
 
         Raises:
-            DatasetError: If the data are no zstd frame of that size, or it is more than such data can hold.
+            DatasetError: If the data are no zstd frame of that size, or the size is more than `MOST_RATIO` allows.
         """
         try:
             size = zstandard.frame_content_size(self.data)
@@ -202,7 +184,7 @@ class Chunk:
             )
 
     def decompress(self) -> bytes:
-        """The uncompressed records.
+        """Decompress the records.
 
         Raises:
             DatasetError: If the data are not one zstd frame of the announced size, or the CRC differs.
@@ -218,12 +200,7 @@ class Chunk:
 
 
 class ChunkEncoder:
-    """Encodes samples for one configuration.
-
-    Args:
-        channels: What is recorded.
-        level: zstd compression level.
-    """
+    """Encodes samples for one configuration, with a level of zstd."""
 
     def __init__(self, channels: Channels, *, level: int) -> None:
         self._topics = {topic.name: topic for topic in channels.recorded.values()}
@@ -241,11 +218,7 @@ class ChunkEncoder:
         return self.compress(self.lay_out(samples, controllers), samples)
 
     def lay_out(self, samples: Samples, controllers: Mapping[str, ControllerSamples] | None = None) -> memoryview:
-        """The message records of an episode.
-
-        Args:
-            samples: The samples, at least one.
-            controllers: Set points of each controller whose state is recorded, by its name.
+        """Write the message records of an episode, with set points of each controller whose state is recorded, by name.
 
         Raises:
             KeyError: If the set points of a recorded controller are missing.
@@ -262,19 +235,13 @@ class ChunkEncoder:
         return table.data.cast("B")
 
     def compress(self, contents: memoryview, samples: Samples) -> Chunk:
-        """The chunk of the records that were laid out of samples."""
+        """Make the chunk of the records that `lay_out` has written for samples."""
         start, end = int(samples.stamps_ns[0]), int(samples.stamps_ns[-1])
         return Chunk.of(contents, self._compressor.compress(contents), start_ns=start, end_ns=end)
 
 
 def encode_message(topic: Topic, samples: Samples, index: int, controllers: Mapping[str, ControllerSamples]) -> bytes:
-    """The message of one sample on a topic, byte for byte as `ChunkEncoder.encode` writes it.
-
-    Args:
-        topic: The topic, recorded or not.
-        samples: Samples.
-        index: Number of the sample, counted from 0.
-        controllers: Set points of the controllers, by name.
+    """Write the message of the sample at an index, byte for byte as `ChunkEncoder.lay_out` writes it.
 
     Raises:
         KeyError: If the set points of the topic's controller are missing.

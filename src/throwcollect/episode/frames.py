@@ -1,4 +1,4 @@
-"""Coordinate frames of a robot, from its URDF: which never move, and how the others follow from joint angles."""
+"""Coordinate frames of a robot, from its URDF: those that never move, and those that joints turn."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ WORLD = "world"
 
 @dataclass(frozen=True)
 class Frame:
-    """Where a frame lies in its parent when its joint is at 0.
+    """A frame and its pose in its parent when its joint is at 0.
 
     Attributes:
         parent: Name of the parent frame.
@@ -47,7 +47,7 @@ class MovingFrame(Frame):
     axis: tuple[float, float, float]
 
     def rotation_at(self, angle: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Unit quaternions (x, y, z, w), frame to parent, shape ``(n, 4)``, at angles [rad] of shape ``(n,)``."""
+        """Compute unit quaternions (x, y, z, w), frame to parent, ``(n, 4)``, at angles [rad] of shape ``(n,)``."""
         half = angle / 2
         sine, w2 = sin(half), cos(half)
         x2, y2, z2 = (component * sine for component in self.axis)
@@ -78,11 +78,9 @@ class FrameTree:
 
 @lru_cache(maxsize=4)
 def read_frames(urdf: str, *, base_height: float) -> FrameTree:
-    """Frames of a robot; they are remembered, as several parts of a process ask for those of its only robot.
+    """Read the frames of a robot whose root link is at a height above the ground [m].
 
-    Args:
-        urdf: URDF text of the robot.
-        base_height: Height of its root link above the ground [m].
+    They are cached, as several parts of a process need those of its only robot.
 
     Raises:
         ConfigError: If the text is not a URDF, or a joint of it is neither fixed nor revolute.
@@ -127,7 +125,7 @@ def _vector(joint: ElementTree.Element, tag: str, key: str, default: str) -> tup
 
 
 def _quaternion(roll: float, pitch: float, yaw: float) -> tuple[float, float, float, float]:
-    """Rotation about the fixed axes x, y, z in this order, as URDF defines it, as (x, y, z, w)."""
+    """Make the unit quaternion (x, y, z, w) of rotations about the fixed axes x, y, z in this order, as in URDF."""
     (sr, cr), (sp, cp), (sy, cy) = ((math.sin(angle / 2), math.cos(angle / 2)) for angle in (roll, pitch, yaw))
     return (
         sr * cp * cy - cr * sp * sy,

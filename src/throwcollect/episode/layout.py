@@ -39,7 +39,7 @@ def _align(offset: int, size: int) -> int:
 
 
 def _walk(message: Message, path: str, offset: int) -> Generator[_Numbers, None, int]:
-    """Places of all numbers of a message, in order; returns where it ends."""
+    """Find the places of all numbers of a message, in order; returns the place of its end."""
     for field in message.FIELDS:
         if field.sequence:
             offset = _align(offset, 4) + 4
@@ -74,7 +74,7 @@ class MessageLayout:
         dtype: Structured type as large as the template; its fields are the variable ones, named by their dotted paths.
 
     Args:
-        message: A message with the strings and sequence lengths that all messages will have.
+        message: A message with the strings and sequence lengths of all messages.
         variable: Dotted paths of the fields that vary, such as ``header.stamp.sec`` or ``position``; elements of
             sequences of messages are numbered. A path of a message whose numbers are all of one type and lie side by
             side, such as a vector, stands for all of them.
@@ -104,24 +104,16 @@ class MessageLayout:
         self._fixed = int.from_bytes(self.template, "little") & self._fixed_bits
 
     def describes_message(self, message: bytes | bytearray) -> bool:
-        """The same as `describes` for one message, in a tenth of the time.
-
-        Args:
-            message: Its bytes.
-        """
-        # One operation on a number as long as the message is faster than a handful on arrays.
+        """Say the same as `describes` of one message, in a tenth of the time."""
+        # One operation on an integer as long as the message is faster than several on arrays.
         fixed = int.from_bytes(message, "little") & self._fixed_bits
         return len(message) == len(self.template) and fixed == self._fixed
 
     def describes(self, rows: NDArray[np.uint8]) -> bool:
-        """Whether messages differ from the template in nothing but the variable fields.
-
-        Args:
-            rows: Messages, shape ``(n, size)``.
-        """
+        """Say whether messages, shape ``(n, size)``, differ from the template in nothing but the variable fields."""
         if rows.shape[1] != len(self.template):
             return False
-        # Copied, so that they lie side by side, bytes are compared in a fraction of the time that arrays take.
+        # Copying the parts into contiguous bytes and comparing these takes a fraction of the time that arrays take.
         return all(rows[:, part].tobytes() == self.template[part] * len(rows) for part in self._fixed_parts)
 
 

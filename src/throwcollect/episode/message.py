@@ -1,9 +1,9 @@
 """The one message that carries an episode from a simulation to the coordinator: std_msgs/UInt8MultiArray.
 
-Its layout names the parts of its data: ``header``, an `EpisodeHeader` in JSON; ``result``, what came of the trial, in
-JSON; ``conditions``, what it was simulated with, in JSON; ``hashes``, the SHA-256 of the records of each chunk as 32
-bytes; ``chunk``, one MCAP Chunk record or several after each other; and ``signature``, that of everything before it.
-Whoever has the key of the run is believed, so nothing is decompressed, hashed or judged twice on the way.
+Its layout names the parts of its data: ``header``, an `EpisodeHeader` in JSON; ``result``, the result of the trial in
+JSON; ``conditions``, the conditions of the episode in JSON; ``hashes``, the SHA-256 of the records of each chunk as 32
+bytes; ``chunk``, one or more MCAP Chunk records; and ``signature``, that of all parts before it. The coordinator trusts
+a sender who has the key of the run, so it does not decompress, hash or judge the episode again.
 
 The same message carries a refusal: its header and its chunk are empty, its result is the reason, and its conditions
 are the token of the lease that was refused.
@@ -35,33 +35,24 @@ _PARTS = ("header", "result", "conditions", "hashes", "chunk", "signature")
 _HASH_BYTES = 32
 _SHA256 = re.compile(r"[0-9a-f]{64}")
 _HEADER = TypeAdapter(EpisodeHeader)
-_LATEST_NS = 2**62
-_MOST_SAMPLES = 2**32
-"""As many as sequence numbers of message records can count."""
-_LONGEST_NAME, _LONGEST_TEXT = 256, 10_000
-"""Characters in names and messages; those of robots and of their controllers stay far below."""
-_STATUSES = range(7)
-"""Of action_msgs/msg/GoalStatus."""
+_LONGEST_NAME = 256
+"""Most characters of a recorded name that a message shows."""
 _COUNT = struct.Struct("<I")
 
 
 class Episode:
-    """What one trial yielded, as it travels and rests: a list of chunks; each is decompressed when it is looked at.
+    """The recording of one trial, in a message and on disk: a header and chunks, which are decompressed when needed.
 
     The state chunk comes first and holds one message per channel and sample. Chunks of sensors may follow it, with
-    messages of any size at rates of their own. The digest covers header and state chunk alone, so a throw keeps its
-    digest whatever else is recorded of it; each chunk of a sensor has a hash of its own beside it.
+    messages of any size at rates of their own. The digest covers header and state chunk alone, so a throw has the same
+    digest with and without sensors; each chunk of a sensor has a hash of its own beside it.
 
     Attributes:
-        header: What is known besides the samples.
+        header: The facts besides the samples.
         state: The state chunk.
         sensors: Chunks of sensors, in the order of the channels that they hold.
 
-    Args:
-        header: What is known besides the samples.
-        chunk: The state chunk.
-        said_sha256: SHA-256 of its records, as it was written beside them; None if it is not known yet.
-        sensors: Chunks of sensors.
+    The arguments `chunk` and `said_sha256` are those of `RecordedChunk`.
     """
 
     def __init__(
@@ -100,13 +91,13 @@ class Episode:
         return MessageTable(self.state.contents, self.header.samples)
 
     def samples(self, joints: Sequence[str] | None = None) -> Samples:
-        """The samples, as views of the records where possible.
+        """Read the samples, as views of the records where possible.
 
         Args:
-            joints: The joints that must have been recorded, in this order; None for whichever were.
+            joints: The joints that must have been recorded, in this order; None accepts any.
 
         Raises:
-            DatasetError: If the chunk is damaged, its messages are laid out otherwise than they are written, or other
+            DatasetError: If the chunk is damaged, its messages have another layout than this version writes, or other
                 joints were recorded.
         """
         if joints is not None:
@@ -120,7 +111,7 @@ class Episode:
         return hashlib.sha256(self.header_json.encode() + b"\0" + records).hexdigest()
 
     def channels(self) -> tuple[tuple[int, ...], ...]:
-        """Numbers of the channels of each chunk.
+        """List the numbers of the channels of each chunk.
 
         Raises:
             DatasetError: If a chunk is damaged.
@@ -146,12 +137,12 @@ def _require_joints(recorded: tuple[str, ...], wanted: tuple[str, ...]) -> None:
 
 
 def header_to_json(header: EpisodeHeader) -> str:
-    """The header in JSON: keys in the order of their declaration, no blanks; equal headers give equal text."""
+    """Write a header in JSON: keys in the order of their declaration, no blanks; equal headers give equal text."""
     return _HEADER.dump_json(header).decode()
 
 
 def header_from_json(text: bytes | str) -> EpisodeHeader:
-    """Read what `header_to_json` writes.
+    """Read the text that `header_to_json` writes.
 
     Raises:
         DatasetError: If the text is anything else.
@@ -162,23 +153,9 @@ def header_from_json(text: bytes | str) -> EpisodeHeader:
         first = error.errors()[0]
         place = ".".join(map(str, first["loc"]))
         raise DatasetError(f"episode header: {place}: {first['msg']}; {error.error_count()} problems in all") from error
-    if header.trial < 0 or not 1 <= header.samples <= _MOST_SAMPLES:
-        raise DatasetError(f"episode header: trial {header.trial} with {header.samples} samples")
-    instants = [header.start_ns, *(instant for each in header.contacts for instant in (each.start_ns, each.end_ns))]
-    if any(instant is not None and not 0 <= instant <= _LATEST_NS for instant in instants):
-        raise DatasetError("episode header: an instant that no clock shows", expected=f"0 to {_LATEST_NS} ns")
     for contact in header.contacts:
-        if not 1 <= len(contact.body) <= _LONGEST_NAME:
-            raise DatasetError(f"episode header: a contact with a body whose name has {len(contact.body)} characters")
         if contact.end_ns is not None and contact.end_ns < contact.start_ns:
             raise DatasetError(f"episode header: a contact with {contact.body} that ends before it begins")
-    for goal in header.goals:
-        if (
-            len(goal.controller) > _LONGEST_NAME
-            or len(goal.error_string) > _LONGEST_TEXT
-            or goal.status not in _STATUSES
-        ):
-            raise DatasetError(f"episode header: goal of {goal.controller[:_LONGEST_NAME]!r}: cannot be")
     return header
 
 
@@ -191,12 +168,12 @@ def _layout() -> MessageLayout:
 
 
 class Delivery(NamedTuple):
-    """What a simulation hands over.
+    """An episode that a simulation hands over.
 
     Attributes:
         episode: The episode.
-        result: What came of the trial, in JSON; empty if the simulation was not asked for it.
-        conditions: What it was simulated with, in JSON.
+        result: Result of the trial in JSON; empty if the simulation has not judged it.
+        conditions: Conditions of the episode in JSON.
     """
 
     episode: Episode
@@ -205,10 +182,10 @@ class Delivery(NamedTuple):
 
 
 class Refusal(NamedTuple):
-    """Why a simulation does not do a trial.
+    """A refusal of a simulation to do a trial.
 
     Attributes:
-        token: That of the trial's lease.
+        token: Token of the trial's lease.
         reason: The reason.
     """
 
@@ -217,7 +194,7 @@ class Refusal(NamedTuple):
 
 
 def pack(handed: Delivery | Refusal, signer: Signer) -> bytes:
-    """The CDR bytes of the message that carries an episode or a refusal."""
+    """Encode the CDR message that carries an episode or a refusal."""
     if isinstance(handed, Refusal):
         parts = [b"", handed.reason.encode(), handed.token.encode(), b"", b""]
     else:
@@ -226,15 +203,15 @@ def pack(handed: Delivery | Refusal, signer: Signer) -> bytes:
             episode.header_json.encode(),
             handed.result.encode(),
             handed.conditions.encode(),
-            b"".join(bytes.fromhex(each.records_sha256) for each in episode.chunks),
-            b"".join(each.chunk.record() for each in episode.chunks),
+            b"".join(bytes.fromhex(chunk.records_sha256) for chunk in episode.chunks),
+            b"".join(chunk.chunk.record() for chunk in episode.chunks),
         ]
     signature = signer.sign(*parts).encode()
     return b"".join((_prefix([*map(len, parts), len(signature)]), *parts, signature))
 
 
 def _prefix(sizes: list[int]) -> bytes:
-    """What comes before the data: the layout, and at the end the data's size."""
+    """Encode everything before the data: the layout, and at the end the size of the data."""
     prefix = bytearray(_layout().template)
     np.frombuffer(prefix, _layout().dtype)[0] = tuple(size for size in sizes for _ in ("size", "stride"))
     _COUNT.pack_into(prefix, len(prefix) - _COUNT.size, sum(sizes) % 2**32)
@@ -242,15 +219,10 @@ def _prefix(sizes: list[int]) -> bytes:
 
 
 def unpack(message: bytes, signer: Signer) -> Delivery | Refusal:
-    """Read the message that carries an episode or a refusal.
-
-    Args:
-        message: CDR bytes of a std_msgs/UInt8MultiArray.
-        signer: That of the run.
+    """Read the message that `pack` writes, without decompressing chunks.
 
     Raises:
-        DatasetError: If it is not what `pack` writes, or is signed with another key; the contents of the chunk are not
-            looked at yet.
+        DatasetError: If it is another message, or is signed with another key.
     """
     layout = _layout()
     length = len(layout.template)
@@ -259,7 +231,7 @@ def unpack(message: bytes, signer: Signer) -> Delivery | Refusal:
     sizes = list(np.frombuffer(message, layout.dtype, count=1)[0].item()[::2])
     if message[:length] != _prefix(sizes):
         raise DatasetError(f"episode: not a UInt8MultiArray of the parts {', '.join(_PARTS)}")
-    # Some RMWs hand over what they have padded.
+    # Some RMWs hand over messages with padding behind them.
     if len(message) < length + sum(sizes):
         raise DatasetError(f"episode: {len(message) - length} bytes of data", expected=f"{sum(sizes)} as announced")
     whole = memoryview(message)
@@ -279,16 +251,11 @@ def unpack(message: bytes, signer: Signer) -> Delivery | Refusal:
 
 
 def make_episode(header: bytes | str, hashes: Sequence[str], chunks: Sequence[Chunk]) -> Episode:
-    """An episode from its parts as they rest.
-
-    Args:
-        header: The header in JSON.
-        hashes: SHA-256 of the records of each chunk, in hexadecimal.
-        chunks: The chunks, the state chunk first.
+    """Make an episode of its header in JSON, its chunks, the state chunk first, and the SHA-256 of their records.
 
     Raises:
-        DatasetError: If the header is not what `header_to_json` writes, a hash not one in hexadecimal, or there are not
-            as many hashes as chunks.
+        DatasetError: If the header has other JSON than `header_to_json` writes, a hash is no SHA-256 in hexadecimal, or
+            there are not as many hashes as chunks.
     """
     for said in hashes:
         if not _SHA256.fullmatch(said):

@@ -1,7 +1,7 @@
-"""Message records of a chunk as they lie there: rows of equal size, or one after the other.
+"""Message records of an uncompressed chunk, seen in place as rows of equal size or as a list.
 
-As every message of a channel of the state chunk has the same size, that chunk is a table: one row a sample, at a
-constant place in each row the record of each channel. The chunks of sensors are no tables: their messages may vary in
+As all messages of a channel of the state chunk have the same size, that chunk is a table: one row per sample, with the
+record of each channel at a constant place in each row. The chunks of sensors are no tables: their messages may vary in
 size, and each of their channels may have a rate of its own.
 """
 
@@ -29,28 +29,24 @@ _HEADERS = np.dtype(
 )
 """`MESSAGE_HEADER`, of many records at once."""
 _ALIKE_BYTES = 11
-"""Opcode, length and channel: what is the same at the start of all records of a channel."""
+"""Size of opcode, length and channel, which are the same in all records of a channel."""
 _STAMP = np.dtype([("sec", "<i4"), ("nanosec", "<u4")])
 _STAMP_OFFSET = 4
-"""Where the stamp of a message lies that begins with its std_msgs/Header: behind the CDR encapsulation [bytes]."""
+"""Place of the stamp in a message that begins with its std_msgs/Header: behind the CDR encapsulation [bytes]."""
 
 
 class Column(NamedTuple):
-    """Where the records of one channel lie in each row."""
+    """Place of the records of one channel in each row."""
 
     offset: int
     size: int
 
 
 class FirstRow:
-    """The first row of a state chunk, which has one message of each channel and shows how the others are laid out.
+    """The first row of a state chunk, which has one message of each channel and shows the layout of all rows.
 
     Attributes:
         columns: Place of each channel's record in a row, by the channel's number.
-
-    Args:
-        contents: Uncompressed records of all rows.
-        samples: Number of samples.
 
     Raises:
         DatasetError: If the contents cannot be so many rows, or the first one is not one message per channel.
@@ -87,10 +83,10 @@ class FirstRow:
         return read_joint_names(bytes(self._message(JOINT_STATES_ID, "/joint_states")))
 
     def check_layout(self, channel: int, topic: Topic) -> None:
-        """Compare the message of a channel, which stands for the layout of all, with that of a topic.
+        """Check that the message of a channel has the layout of a topic.
 
         Raises:
-            DatasetError: If there is no such channel, or its message is laid out otherwise.
+            DatasetError: If there is no such channel, or its message has another layout.
         """
         if not topic.layout.describes_message(self._message(channel, topic.name)):
             raise DatasetError(
@@ -105,17 +101,13 @@ class FirstRow:
 
 
 class MessageTable:
-    """The records of a chunk seen as a table, without a copy.
+    """The records of a chunk seen as a table, without a copy; every row has the same channels at the same places.
 
-    Holding one guarantees that every row has the same channels at the same places.
+    Views of a bytearray are writable.
 
     Attributes:
         columns: Place of each channel's record in a row, by the channel's number.
         log_times: Time of each row's first record [ns], shape ``(n_samples,)``, uint64.
-
-    Args:
-        contents: Uncompressed records; what is seen of a bytearray can be written to.
-        samples: Number of samples.
 
     Raises:
         DatasetError: If the records are not such a table.
@@ -125,7 +117,7 @@ class MessageTable:
         self._first = FirstRow(contents, samples)
         self.columns = self._first.columns
         self._table: NDArray[np.uint8] = np.frombuffer(contents, np.uint8).reshape(samples, -1)
-        # Opcode, length and channel are the first bytes of a record: where they repeat, so does the layout.
+        # Opcode, length and channel are the first bytes of a record: if they repeat in each row, so does the layout.
         for channel, column in self.columns.items():
             alike = self._table[:, column.offset : column.offset + _ALIKE_BYTES]
             if alike.tobytes() != alike[0].tobytes() * samples:
@@ -136,7 +128,7 @@ class MessageTable:
         return len(self._table)
 
     def headers(self, channel: int) -> Rows:
-        """Sequence numbers and times of one channel's records, shape ``(n_samples,)``; a view.
+        """View sequence numbers and times of one channel's records, shape ``(n_samples,)``.
 
         Raises:
             KeyError: If the chunk has no such channel.
@@ -145,7 +137,7 @@ class MessageTable:
         return self._table[:, column.offset : column.offset + _HEADERS.itemsize].view(_HEADERS)[:, 0]
 
     def are_timed_by(self, stamps_ns: NDArray[np.int64]) -> bool:
-        """Whether all records are numbered from 0 and logged and published at these times [ns], ``(n_samples,)``."""
+        """Say whether all records are numbered from 0, with these times of logging and publication [ns]."""
         return all(
             np.array_equal(headers["sequence"], np.arange(len(self)))
             and np.array_equal(headers["log_time"], stamps_ns)
@@ -154,7 +146,7 @@ class MessageTable:
         )
 
     def messages(self, channel: int) -> NDArray[np.uint8]:
-        """CDR messages of one channel, shape ``(n_samples, size)``.
+        """View the CDR messages of one channel, shape ``(n_samples, size)``.
 
         Raises:
             KeyError: If the chunk has no such channel.
@@ -163,7 +155,7 @@ class MessageTable:
         return self._table[:, column.offset + MESSAGE_HEADER.size : column.offset + column.size]
 
     def message_index(self, channel: int) -> bytes:
-        """The MCAP Message Index record of one channel: log time and offset in the chunk of each of its messages.
+        """Encode the MCAP Message Index record of one channel: log time and offset in the chunk of each message.
 
         Raises:
             KeyError: If the chunk has no such channel.
@@ -185,7 +177,8 @@ class MessageTable:
         """The samples; joint columns and the ball's pose are views of the records.
 
         Raises:
-            DatasetError: If joint states or the ball's odometry are missing, or not laid out as they are written here.
+            DatasetError: If joint states or the ball's odometry are missing, or have another layout than this version
+                writes.
         """
         topics = {JOINT_STATES_ID: joint_states(self.joints), BALL_ODOMETRY_ID: ball_odometry()}
         return read_samples(*(self._read(channel, topic) for channel, topic in topics.items()))
@@ -196,15 +189,12 @@ class MessageTable:
 
 
 class MessageList:
-    """The records of a chunk of any messages that begin with their std_msgs/Header, in order, without a copy.
+    """The records of a chunk with messages that begin with their std_msgs/Header, in order, without a copy.
 
     Attributes:
         headers: Fields of the records' headers, shape ``(n_messages,)``: ``channel``, ``sequence``, ``log_time`` and
             ``publish_time`` [ns] among them.
-        offsets: Where the records begin [bytes], shape ``(n_messages,)``.
-
-    Args:
-        contents: Uncompressed records; what is seen of a bytearray can be written to.
+        offsets: Places of the records [bytes], shape ``(n_messages,)``.
 
     Raises:
         DatasetError: If the contents are anything but such records, at least one.
@@ -244,16 +234,12 @@ class MessageList:
         return times
 
     def message_index(self, channel: int) -> bytes:
-        """The MCAP Message Index record of one channel."""
+        """Encode the MCAP Message Index record of one channel."""
         rows = self.headers["channel"] == channel
         return encode_message_index(channel, self.headers["log_time"][rows], self.offsets[rows])
 
     def move(self, by_ns: int) -> None:
-        """Change all times and stamps, in the contents themselves, which are a bytearray.
-
-        Args:
-            by_ns: How much later they are to be [ns].
-        """
+        """Move all times and stamps by `by_ns` [ns], in the contents themselves, which must be a bytearray."""
         stamps = self._gather(MESSAGE_HEADER.size + _STAMP_OFFSET, _STAMP)
         stamps["sec"], stamps["nanosec"] = np.divmod(self.stamps_ns + by_ns, NS_PER_S)
         for time in ("log_time", "publish_time"):
@@ -262,11 +248,11 @@ class MessageList:
         self._scatter(0, self.headers)
 
     def _gather(self, start: int, kind: np.dtype[np.void]) -> Rows:
-        """A copy of what lies in each record from byte `start` on."""
+        """Copy a value of each record from byte `start` on."""
         places = self.offsets[:, np.newaxis] + start + np.arange(kind.itemsize)
         return self._bytes[places].view(kind)[:, 0]
 
     def _scatter(self, start: int, values: Rows) -> None:
-        """Put back what `_gather` gives."""
+        """Write values to the places from which `_gather` copies them."""
         places = self.offsets[:, np.newaxis] + start + np.arange(values.itemsize)
         self._bytes[places] = values[:, np.newaxis].view(np.uint8)

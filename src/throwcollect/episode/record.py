@@ -1,18 +1,24 @@
-"""The values that describe an episode, free of any encoding."""
+"""The values that describe an episode, independent of any encoding."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
+
+Instant = Annotated[int, Field(ge=0, le=2**62)]
+"""Simulated time [ns]; no clock shows later ones."""
+_Name = Annotated[str, Field(max_length=256)]
+"""Name of a link or a controller; those of robots are far shorter."""
 
 
 @dataclass(frozen=True)
 class Samples:
-    """Recorded samples of one trial, one row a sample, evenly spaced; world frame: x forward, y left, z up.
+    """Recorded samples of one trial, one row per sample, evenly spaced; world frame: x forward, y left, z up.
 
     Attributes:
         stamps_ns: Simulated time [ns], shape ``(n_samples,)``, int64.
@@ -43,7 +49,7 @@ class Samples:
 
 @dataclass(frozen=True)
 class ControllerSamples:
-    """Set points of one joint trajectory controller, one row a sample, joints in the controller's order.
+    """Set points of one joint trajectory controller, one row per sample, joints in the controller's order.
 
     Attributes:
         elapsed_ns: Time since the start of its trajectory [ns], shape ``(n_samples,)``, int64.
@@ -73,9 +79,9 @@ class Contact:
         end_ns: Simulated time of the first physics step without [ns]; None when it lasted to the end.
     """
 
-    body: str
-    start_ns: int
-    end_ns: int | None
+    body: Annotated[_Name, Field(min_length=1)]
+    start_ns: Instant
+    end_ns: Instant | None
 
 
 @dataclass(frozen=True)
@@ -89,39 +95,39 @@ class GoalOutcome:
         error_string: Of the action's result.
     """
 
-    controller: str
-    status: int
+    controller: _Name
+    status: Annotated[int, Field(ge=0, le=6)]
     error_code: int
-    error_string: str
+    error_string: Annotated[str, Field(max_length=10_000)]
 
 
 EndReason = Literal["landed", "rest", "timeout"]
-"""Why a trial ended: the ball has crossed the landing plane; it and the arm rest; the longest duration is over."""
+"""Reasons for the end of a trial: the ball has crossed the landing plane; ball and arm rest; its time is over."""
 
 
 @dataclass(frozen=True)
 class EpisodeHeader:
-    """What is known of an episode besides its samples.
+    """The facts of an episode besides its samples; `header_from_json` checks the bounds.
 
     Attributes:
         trial: Number of the trial.
         start_ns: Simulated time of the first sample [ns].
-        end_reason: Why it ended.
+        end_reason: Reason for its end.
         contacts: All contacts of the ball, by start time.
         goals: One entry per controller that had a goal.
-        samples: Number of samples.
+        samples: Number of samples; at most as many as sequence numbers of message records can count.
     """
 
-    trial: int
-    start_ns: int
+    trial: Annotated[int, Field(ge=0)]
+    start_ns: Instant
     end_reason: EndReason
     contacts: tuple[Contact, ...]
     goals: tuple[GoalOutcome, ...]
-    samples: int
+    samples: Annotated[int, Field(ge=1, le=2**32)]
 
 
 def find_infinite_columns(samples: Samples) -> Iterator[str]:
-    """Columns that hold numbers that are not finite, a sentence each."""
+    """Find columns with numbers that are not finite, and make a sentence for each."""
     for field in fields(samples):
         finite = np.isfinite(getattr(samples, field.name))
         if not finite.all():

@@ -11,7 +11,7 @@ from throwcollect.errors import DatasetError
 
 
 class RecordedChunk:
-    """A chunk that is decompressed and hashed when that is asked for, and once.
+    """A chunk that is decompressed and hashed once, when that is needed.
 
     Attributes:
         chunk: The recorded messages, compressed.
@@ -34,10 +34,10 @@ class RecordedChunk:
 
     @cached_property
     def records_sha256(self) -> str:
-        """SHA-256 of the uncompressed message records in hexadecimal: as it was said, or else worked out.
+        """SHA-256 of the uncompressed message records in hexadecimal: `said_sha256`, or else computed.
 
         Raises:
-            DatasetError: If it has to be worked out and the chunk is damaged.
+            DatasetError: If it has to be computed and the chunk is damaged.
         """
         return self.said_sha256 or self._contents_sha256
 
@@ -46,7 +46,7 @@ class RecordedChunk:
         """The message records of a sensor.
 
         Raises:
-            DatasetError: If the chunk is damaged, or holds anything else.
+            DatasetError: If the chunk is damaged, or is no chunk of a sensor.
         """
         return MessageList(self.contents)
 
@@ -55,10 +55,10 @@ class RecordedChunk:
         return hashlib.sha256(self.contents).hexdigest()
 
     def check_records(self) -> None:
-        """Hash the message records, whatever was said of them; once, as they do not change.
+        """Hash the message records once and compare the hash with the one that was written beside them.
 
         Raises:
-            DatasetError: If the chunk is damaged, or `records_sha256` is not that of its records.
+            DatasetError: If the chunk is damaged, or the hashes differ.
         """
         actual = self._contents_sha256
         if actual != self.records_sha256:

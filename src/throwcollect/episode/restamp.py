@@ -1,7 +1,6 @@
-"""The same episode under another number, in that trial's slot of time: as if it had been recorded there.
+"""Gives an episode another trial number and moves it into that trial's slot of time.
 
-Nothing in an episode depends on when it happened but its stamps, so what a simulation records in another slot are the
-same bytes but for them.
+Nothing in an episode but its stamps depends on its slot, so the result has the same bytes as a recording in that slot.
 """
 
 from __future__ import annotations
@@ -24,23 +23,18 @@ from throwcollect.errors import DatasetError
 from throwcollect.units import NS_PER_S
 
 _SECONDS = ("stamp.sec", "clock.sec")
-"""How paths of fields end that hold the seconds of a stamp; durations, such as `time_from_start`, stay as they are."""
+"""Ends of the paths of fields with the seconds of a stamp; durations, such as `time_from_start`, do not change."""
 
 
 class _OfEachThread(threading.local):
-    """A compressor must not be shared."""
+    """A compressor for each thread, as threads must not share one."""
 
     def __init__(self, level: int) -> None:
         self.compressor = zstandard.ZstdCompressor(level=level)
 
 
 class Restamper:
-    """Gives episodes of one configuration other numbers; threads may share one.
-
-    Args:
-        config: Configuration of the trials, but for what is swept.
-        channels: What it records.
-    """
+    """Gives episodes of one configuration other numbers; threads may share a restamper."""
 
     def __init__(self, config: Config, channels: Channels) -> None:
         self._config = config
@@ -51,14 +45,11 @@ class Restamper:
         self._of_this_thread = _OfEachThread(config.record.zstd_level)
 
     def restamp(self, episode: Episode, trial: int) -> Episode:
-        """An episode as trial `trial` of the configuration would have yielded it.
-
-        Args:
-            episode: The episode; its hash is checked.
-            trial: Its new number.
+        """Make the episode that trial `trial` of the configuration would have yielded.
 
         Raises:
-            DatasetError: If the episode is damaged, or its messages are not those that the configuration records.
+            DatasetError: If the episode is damaged, its hash is wrong, or its messages are not those that the
+                configuration records.
         """
         episode.check_records()
         by_ns = self._config.trial_start_ns(trial) - episode.header.start_ns
@@ -68,7 +59,7 @@ class Restamper:
         state = self._pack(contents, episode.state.chunk, by_ns)
         sensors = [self._move_sensor(sensor, by_ns) for sensor in episode.sensors]
         moved = Episode(_move_header(episode.header, trial, by_ns), state.chunk, state.said_sha256, sensors)
-        # What has just been compressed need not be decompressed.
+        # The table is at hand, so the new chunk need not be decompressed for it.
         moved.table = table
         return moved
 
@@ -78,7 +69,7 @@ class Restamper:
         return self._pack(contents, sensor.chunk, by_ns)
 
     def _pack(self, contents: bytearray, like: Chunk, by_ns: int) -> RecordedChunk:
-        """The chunk of records that are `by_ns` later than those of another."""
+        """Make the chunk of records that are `by_ns` later than those of the chunk `like`."""
         data = self._of_this_thread.compressor.compress(contents)
         chunk = Chunk.of(contents, data, start_ns=like.start_ns + by_ns, end_ns=like.end_ns + by_ns)
         return RecordedChunk(chunk, hashlib.sha256(contents).hexdigest())
@@ -88,7 +79,7 @@ class Restamper:
             raise DatasetError(f"chunk: has the channels {list(table.columns)}", expected=f"{list(self._topics)}")
         for channel, (topic, fields) in self._topics.items():
             messages = table.messages(channel)
-            if not topic.layout.describes(messages[:1]):
+            if not topic.layout.describes_message(messages[0].tobytes()):
                 raise DatasetError(f"chunk: messages of {topic.name} are not laid out as {topic.type_name} is here")
             headers = table.headers(channel)
             for time in ("log_time", "publish_time"):

@@ -1,4 +1,4 @@
-"""The recorded topics: how samples become the numbers of their messages, and back."""
+"""The recorded topics: turns samples into the numbers of their messages, and back."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ BALL = "ball"
 _JOINT_STATE = "sensor_msgs/msg/JointState"
 _STAMP = ("header.stamp.sec", "header.stamp.nanosec")
 _MOST_ROBOTS = 8
-"""Robots whose layouts are kept: a file may name as many as it likes."""
+"""Most robots with cached layouts; there has to be a limit, as files may name any number of robots."""
 
 Rows = NDArray[np.void]
-"""Messages of one topic, one a sample: an array of the layout's structured type."""
+"""Messages of one topic, one per sample: an array of the layout's structured type."""
 
 
 @dataclass(frozen=True)
 class Recording:
-    """Everything that messages are made from.
+    """The values from which messages are made.
 
     Attributes:
         samples: The samples.
@@ -51,7 +51,7 @@ class Topic:
         name: Name of the topic.
         type_name: Its message type, ``package/msg/Type``.
         layout: Layout of its messages.
-        fill: Writes what varies into messages that are copies of the layout's template.
+        fill: Writes the varying fields into messages that are copies of the layout's template.
     """
 
     name: str
@@ -65,17 +65,17 @@ def _put_stamps(rows: Rows, prefix: str, stamps_ns: NDArray[np.int64]) -> None:
 
 
 def rotate(quaternion_xyzw: NDArray[np.float64], *vectors: NDArray[np.float64], inverse: bool) -> NDArray[np.float64]:
-    """Vectors turned by unit quaternions, element by element: a row's result does not depend on other rows.
+    """Turn vectors by unit quaternions, element by element: a row's result does not depend on other rows.
 
     Args:
         quaternion_xyzw: Shape ``(n, 4)``.
         vectors: Each of shape ``(n, 3)``.
-        inverse: Turn the other way.
+        inverse: Turn in the opposite direction.
 
     Returns:
         Shape ``(len(vectors), n, 3)``.
     """
-    # Recorded columns lie far apart in memory; everything below reads them many times.
+    # The elements of recorded columns lie far apart in memory, and the code below reads them many times.
     *axis, w = np.ascontiguousarray(quaternion_xyzw.T)
     u = _twice((np.negative(axis) if inverse else np.array(axis))[:, np.newaxis])
     v = _twice(np.array([vector.T for vector in vectors]).swapaxes(0, 1))
@@ -85,23 +85,19 @@ def rotate(quaternion_xyzw: NDArray[np.float64], *vectors: NDArray[np.float64], 
 
 
 def _twice(axes: NDArray[np.float64]) -> NDArray[np.float64]:
-    """x, y, z, x, y, z along the first axis, so that the next axes but one are slices."""
+    """Repeat the first axis, x, y, z, x, y, z, so that cyclic permutations of the axes are slices."""
     return np.concatenate([axes, axes])
 
 
 def _cross(left: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Cross products of what `_twice` gives."""
+    """Compute the cross products of two results of `_twice`."""
     crossed: NDArray[np.float64] = left[1:4] * right[2:5] - left[2:5] * right[1:4]
     return crossed
 
 
 @lru_cache(maxsize=_MOST_ROBOTS)
 def joint_states(joints: tuple[str, ...]) -> Topic:
-    """``/joint_states``: sensor_msgs/JointState with all joints of a robot.
-
-    Args:
-        joints: Their names, in the order of the samples; at least one.
-    """
+    """``/joint_states``: sensor_msgs/JointState with all joints of a robot, at least one, in the samples' order."""
     zeros = np.zeros(len(joints))
     message = get_message(_JOINT_STATE)(name=list(joints), position=zeros, velocity=zeros, effort=zeros)
     layout = MessageLayout(message, [*_STAMP, "position", "velocity", "effort"])
@@ -109,7 +105,7 @@ def joint_states(joints: tuple[str, ...]) -> Topic:
 
 
 def read_joint_names(message: bytes) -> tuple[str, ...]:
-    """Names of the joints that a message of `joint_states` is about, in the order of its numbers.
+    """Read the names of the joints in a message of `joint_states`, in the order of its numbers.
 
     Raises:
         DatasetError: If it is no such message, or names no joint.
@@ -155,14 +151,9 @@ def _fill_ball_odometry(rows: Rows, recording: Recording) -> None:
 
 
 def read_samples(joint_rows: Rows, ball_rows: Rows) -> Samples:
-    """Samples from the messages of `joint_states` and `ball_odometry`.
+    """Read samples from the messages of `joint_states` and `ball_odometry`, each of shape ``(n_samples,)``.
 
-    Args:
-        joint_rows: Joint states, shape ``(n_samples,)``.
-        ball_rows: Odometry of the ball, shape ``(n_samples,)``.
-
-    Returns:
-        The samples; joint columns and the ball's pose are views of the messages, velocities are turned back to world.
+    Joint columns and the ball's pose are views of the messages; velocities are turned back into world.
     """
     orientation = ball_rows["pose.pose.orientation"]
     linear, angular = rotate(
@@ -194,12 +185,8 @@ def _fill_clock(rows: Rows, recording: Recording) -> None:
 def transforms(frames: tuple[MovingFrame, ...], joints: Sequence[str]) -> Topic:
     """``/tf``: tf2_msgs/TFMessage with the ball in world and every frame that a joint moves.
 
-    Args:
-        frames: The frames.
-        joints: All joints of the robot, in the order of the samples.
-
     Raises:
-        ValueError: If the joint of a frame is none of them.
+        ValueError: If the joint of a frame is not among `joints`, all joints in the order of the samples.
     """
     kind = "tf2_msgs/msg/TFMessage"
     columns = [joints.index(frame.joint) for frame in frames]
@@ -227,15 +214,7 @@ def transform_message(
     rotation_xyzw: tuple[float, float, float, float],
     stamp_ns: int,
 ) -> Any:
-    """A geometry_msgs/TransformStamped.
-
-    Args:
-        parent: Name of the parent frame.
-        child: Name of the child frame.
-        translation: Child's origin in the parent [m].
-        rotation_xyzw: Unit quaternion, child to parent.
-        stamp_ns: Stamp [ns].
-    """
+    """Make a geometry_msgs/TransformStamped of the child's pose in its parent: origin [m] and unit quaternion."""
     sec, nanosec = divmod(stamp_ns, NS_PER_S)
     header = _header(parent)
     header.stamp = get_message("builtin_interfaces/msg/Time")(sec=sec, nanosec=nanosec)
@@ -252,10 +231,6 @@ def controller_state(robot: Robot, controller: str) -> Topic:
     """``/<controller>/controller_state``: control_msgs/JointTrajectoryControllerState of one controller.
 
     Reference, feedback and error have positions and velocities, the reference has accelerations, the output positions.
-
-    Args:
-        robot: The robot.
-        controller: Name of one of its controllers.
 
     Raises:
         KeyError: If the robot has no such controller.

@@ -1,7 +1,7 @@
-"""The numbers of a trajectory in the rows of a state chunk: every column at a constant place in every row.
+"""The numbers of a trajectory in the rows of a state chunk, where every column has a constant place in every row.
 
-One structured type, laid onto the uncompressed chunk, shows all columns without a copy, and they are gathered as runs
-of bytes: a whole row of a column at a time, aligned or not.
+A view of the uncompressed chunk with one structured type shows all columns without a copy. A field is a run of bytes,
+so that NumPy copies a whole row of a column at a time, aligned or not.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from throwcollect.episode.topics import ball_odometry, joint_states
 from throwcollect.units import NS_PER_S
 
 STAMPS = "stamps_ns"
-"""A pair of 32-bit numbers until `to_nanoseconds` makes one of it."""
+"""A pair of 32-bit numbers until `to_nanoseconds` turns it into one number."""
 JOINT_COLUMNS = ("joints.position", "joints.velocity", "joints.effort")
 BALL_VELOCITIES = ("ball.velocity", "ball.angular_velocity")
-"""In the frame of the ball as they are recorded."""
+"""These are recorded in the frame of the ball."""
 BALL_ORIENTATION = "ball.orientation_xyzw"
 
 _FIELDS = {
@@ -37,17 +37,12 @@ _FIELDS = {
         BALL_VELOCITIES[1]: "twist.twist.angular",
     },
 }
-"""Columns, and the fields of the messages that hold them."""
+"""By channel: the columns, and the fields of its messages that hold them."""
 _STAMP_BYTES = 8
 
 
 def column_shapes(samples: int, joints: int) -> Mapping[str, tuple[int, ...]]:
-    """Shapes of the columns of some samples, by name.
-
-    Args:
-        samples: Number of samples.
-        joints: Number of joints that the columns of joints have.
-    """
+    """List the shapes of the columns by name, for a number of samples and a number of joints."""
     ball = dict(ball_odometry().layout.dtype.fields or {})
     return {
         STAMPS: (samples,),
@@ -57,36 +52,24 @@ def column_shapes(samples: int, joints: int) -> Mapping[str, tuple[int, ...]]:
 
 
 @cache
-def _fields(joints: tuple[str, ...]) -> Mapping[str, tuple[int, int]]:
-    """Where each column begins in its message, and its size [bytes], by name."""
-    fields = {}
-    for topic, columns in zip((joint_states(joints), ball_odometry()), _FIELDS.values(), strict=True):
+def _row_type(joints: tuple[str, ...], starts: tuple[int, ...], size: int) -> np.dtype[np.void]:
+    """Make the type of a row of `size` bytes with the records of joint states and odometry at `starts`."""
+    names, formats, offsets = [], [], []
+    for topic, start, columns in zip((joint_states(joints), ball_odometry()), starts, _FIELDS.values(), strict=True):
         places = dict(topic.layout.dtype.fields or {})
         for name, field in columns.items():
             kind, offset = places[field][:2]
-            fields[name] = (offset, _STAMP_BYTES if name == STAMPS else kind.itemsize)
-    return fields
-
-
-@cache
-def _row_type(joints: tuple[str, ...], starts: tuple[int, ...], size: int) -> np.dtype[np.void]:
-    """Type of a row in which the records of joint states and odometry begin at `starts`."""
-    fields = _fields(joints)
-    places = {
-        name: start + MESSAGE_HEADER.size + fields[name][0]
-        for start, columns in zip(starts, _FIELDS.values(), strict=True)
-        for name in columns
-    }
-    formats = [f"V{fields[name][1]}" for name in places]
-    return np.dtype({"names": list(places), "formats": formats, "offsets": [*places.values()], "itemsize": size})
+            names.append(name)
+            formats.append(f"V{_STAMP_BYTES if name == STAMPS else kind.itemsize}")
+            offsets.append(start + MESSAGE_HEADER.size + offset)
+    return np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": size})
 
 
 def trajectory_rows(contents: bytes, samples: int, joints: tuple[str, ...]) -> NDArray[np.void]:
-    """Uncompressed records of a state chunk seen as a table, without a copy.
+    """View the uncompressed records of a state chunk as a table, without a copy.
 
     Args:
-        contents: Records that their CRC has been compared with; the first message of a channel stands for the layout
-            of all.
+        contents: Records with a valid CRC; so only the layout of the first message of each channel is checked.
         samples: Number of samples.
         joints: Joints that must have been recorded, in this order.
 
@@ -94,7 +77,7 @@ def trajectory_rows(contents: bytes, samples: int, joints: tuple[str, ...]) -> N
         Shape ``(samples,)``; the fields are the columns, as bytes.
 
     Raises:
-        DatasetError: If they are not rows with joint states of these joints and odometry as they are written here.
+        DatasetError: If they are not rows with joint states of these joints and odometry, as this version writes them.
     """
     row = FirstRow(contents, samples)
     for channel, topic in zip(_FIELDS, (joint_states(joints), ball_odometry()), strict=True):
@@ -104,13 +87,13 @@ def trajectory_rows(contents: bytes, samples: int, joints: tuple[str, ...]) -> N
 
 
 def view_as_bytes(array: NDArray[np.float64] | NDArray[np.int64]) -> NDArray[np.void]:
-    """A contiguous array of one or two dimensions, seen as one run of bytes a row; shape ``(n,)``."""
+    """View a contiguous array of one or two dimensions as one run of bytes per row, shape ``(n,)``."""
     width = array.shape[1] if array.ndim > 1 else 1
     rows: NDArray[np.void] = array.reshape(len(array), width).view(f"V{width * array.itemsize}")[:, 0]
     return rows
 
 
 def to_nanoseconds(stamps: NDArray[np.int64]) -> None:
-    """Make numbers [ns] of stamps as they are recorded, in place."""
+    """Turn recorded stamps into numbers [ns], in place."""
     pairs = stamps.view([("sec", "<i4"), ("nanosec", "<u4")])
     stamps[:] = pairs["sec"].astype(np.int64) * NS_PER_S + pairs["nanosec"]

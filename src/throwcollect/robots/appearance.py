@@ -1,4 +1,4 @@
-"""What a robot looks like: of its description, that may be changed while it is simulated, and nothing else."""
+"""Compares robot descriptions: of a robot that is simulated, nothing but its appearance may change."""
 
 from __future__ import annotations
 
@@ -9,23 +9,17 @@ from pathlib import Path
 from throwcollect.errors import ConfigError, ConflictError
 
 _SEEN = ("visual", "material")
-"""Elements that say what is seen. Tooltips of links, which viewers bind plots to, are no part of the physics either."""
+"""Elements of links that the physics ignores."""
 
 
-def check_appearance(description: str, wanted: str) -> None:
-    """Refuse a description by which a robot would be another one, and not only look otherwise.
-
-    Args:
-        description: URDF text of the robot that is simulated.
-        wanted: URDF text that viewers are to draw.
+def check_appearance(description: str, drawn: str) -> None:
+    """Refuse a URDF for viewers that changes more of the simulated robot's description than its appearance.
 
     Raises:
-        ConfigError: If that is no URDF.
-        ConflictError: If anything but shapes and colours to be seen differs: joints, masses, collision shapes.
+        ConfigError: If it is no URDF.
+        ConflictError: If it has other joints, masses or collision shapes.
     """
-    root = _parse(wanted, "robot_description")
-    differing = _physics_of_own(description) ^ _physics_of(root)
-    if differing:
+    if differing := _physics_of(description) ^ _physics_of(drawn):
         first = min(text.split(">", 1)[0].removeprefix("<") for text in differing)
         raise ConflictError(
             f"robot_description: should differ in what is seen alone, but {first} is another one",
@@ -34,7 +28,7 @@ def check_appearance(description: str, wanted: str) -> None:
 
 
 def read_urdf(path: Path) -> str:
-    """URDF text of a file.
+    """Read the URDF text of a file.
 
     Raises:
         ConfigError: If it cannot be read, or is no URDF.
@@ -58,17 +52,16 @@ def _parse(text: str, name: str) -> ElementTree.Element:
 
 
 @lru_cache(maxsize=4)
-def _physics_of_own(description: str) -> frozenset[str]:
-    return _physics_of(ElementTree.fromstring(description))  # noqa: S314 - it is ours
+def _physics_of(description: str) -> frozenset[str]:
+    """Links and joints without their appearance, each in the canonical form of XML.
 
-
-def _physics_of(robot: ElementTree.Element) -> frozenset[str]:
-    """Links and joints without what is seen, each as text that does not depend on how it was written."""
+    Only these are compared: tooltips of links, to which viewers bind plots, are no part of the physics either.
+    """
     texts = []
-    for element in robot:
+    for element in _parse(description, "robot_description"):
         if element.tag not in ("link", "joint"):
             continue
-        for seen in [each for each in element if each.tag in _SEEN]:
-            element.remove(seen)
+        for visible in [child for child in element if child.tag in _SEEN]:
+            element.remove(visible)
         texts.append(ElementTree.canonicalize(ElementTree.tostring(element, encoding="unicode"), strip_text=True))
     return frozenset(texts)

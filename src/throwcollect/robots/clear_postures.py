@@ -1,4 +1,4 @@
-"""Postures that are known to be clear of collisions, and with them all that are near."""
+"""Postures that are known to be clear of collisions; they show that all postures near them are clear, too."""
 
 from __future__ import annotations
 
@@ -10,32 +10,32 @@ from numpy.typing import NDArray
 from throwcollect.pinocchio_library import pinocchio
 
 _DOUBT_M = 1e-4
-"""By how much a computed distance may be too large; the search for it ends at a hundredth of that."""
+"""How much a computed distance may exceed the true one; the search for it ends at a hundredth of that."""
 _FAR_M = 0.3
-"""The distance between links that are farther apart than this need not be known exactly."""
+"""A lower bound suffices for the distance of links that are at least so far apart."""
 _FEW_PAIRS = 10
-"""So many distances are computed faster than all links are sorted by where they are."""
+"""Up to so many distances are computed faster one by one than in a tree of all links."""
 _MOST_TRIES = 300
-"""Postures that may be taken in: with more, to find one that is near would take longer than it saves."""
+"""Most postures that are examined: with more, finding a near one would take longer than it saves."""
 _LEAST_WORTH = 3
-"""Postures on the way that a posture has to vouch for, itself among them, to be kept."""
+"""A posture is kept if it shows that so many postures of the motion are clear, itself among them."""
 _UNBOUNDED_M = 1e9
-"""Reach of links beyond a joint that does not turn about an axis, as nothing is known of their way."""
+"""Reach of links beyond a joint that does not turn about an axis: how they move is unknown."""
 
 
 class ClearPostures:
-    """Postures in which pairs of links are apart by more than a margin, and how far around each of them that is so.
+    """Postures in which pairs of links are farther apart than a margin, and how far around each of them this holds.
 
     A joint that turns by an angle moves no point of the links beyond it by more than the angle times a reach, which is
-    the same in all postures. So links that are apart by d stay apart by d minus the sum of angles times reaches, over
-    the joints between the two, at least.
+    the same in all postures. So links at a distance d stay apart by at least d minus the sum of angles times reaches
+    over the joints between the two. Postures are in the order of the model.
 
     Args:
         model: The robot with all joints.
         geometry: Its shapes, and the pairs of them that must stay apart.
-        reaches: As `find_reaches` gives them.
-        pairs: Which of the pairs are looked at, shape ``(n,)`` with at least one.
-        margin_m: By more than that [m].
+        reaches: The result of `find_reaches`.
+        pairs: Numbers of the pairs that this object looks at, shape ``(n,)`` with at least one.
+        margin_m: Distance that a clear pair exceeds [m].
     """
 
     def __init__(
@@ -57,14 +57,7 @@ class ClearPostures:
         self._steepness = np.empty((0, model.nq))
 
     def find_unknown(self, postures: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Which postures are not known to be clear.
-
-        Args:
-            postures: In the order of the model [rad], shape ``(n, n_joints)``, n at least 1.
-
-        Returns:
-            Shape ``(n,)``.
-        """
+        """Find the postures [rad], shape ``(n, n_joints)``, that are not known to be clear, shape ``(n,)``."""
         lowest, highest = postures.min(axis=0), postures.max(axis=0)
         gaps = np.maximum(np.maximum(lowest - self._postures, self._postures - highest), 0.0)
         near = np.flatnonzero((gaps * self._steepness).sum(axis=1) < 1)
@@ -75,13 +68,9 @@ class ClearPostures:
         return np.asarray((spent >= 1).all(axis=1))
 
     def look_at_first(self, postures: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Find out whether the first of some postures is clear, and which others are then, too.
+        """Compute whether the first posture is clear, and find the postures that are not known to be clear then.
 
-        Args:
-            postures: In the order of the model [rad], shape ``(n, n_joints)``, n at least 1.
-
-        Returns:
-            Which are not known to be clear, shape ``(n,)``.
+        Shapes are those of `find_unknown`.
         """
         unknown: NDArray[np.bool_] = np.ones(len(postures), bool)
         if not self._tries:
@@ -101,14 +90,14 @@ class ClearPostures:
         return unknown
 
     def _find_least_distances(self, posture: NDArray[np.float64]) -> NDArray[np.float64]:
-        """How far the links of each pair are apart at least [m]; exact to `_DOUBT_M` where that is below `_FAR_M`."""
+        """Find lower bounds of the distance of each pair [m]; exact to `_DOUBT_M` for those below `_FAR_M`."""
         if not len(self._postures):
             return self._compute_distances(posture)
         away = np.abs(self._postures - posture)
         nearest = int(np.argmin(away @ self._reaches.max(axis=0)))
         least: NDArray[np.float64] = self._distances[nearest] - self._reaches @ away[nearest]
         close = np.flatnonzero(least < _FAR_M)
-        # One by one, each distance takes three times as long.
+        # A distance that is computed alone takes three times as long as one of all that are computed together.
         if 3 * len(close) > len(self._geometry.collisionPairs):
             return self._compute_distances(posture)
         self._place(posture)
@@ -132,11 +121,7 @@ class ClearPostures:
 
 
 def find_reaches(model: pinocchio.Model, geometry: pinocchio.GeometryModel) -> NDArray[np.float64]:
-    """How far a turn of each joint moves the links of each pair against each other at most [m/rad].
-
-    Args:
-        model: The robot with all joints.
-        geometry: Its shapes and the pairs of them.
+    """Find how far a turn of each joint moves the links of each pair against each other at most [m/rad].
 
     Returns:
         Shape ``(n_pairs, n_joints)``, in the order of the model; 0 for joints that are not between the two.
@@ -149,7 +134,7 @@ def find_reaches(model: pinocchio.Model, geometry: pinocchio.GeometryModel) -> N
 
 
 def _find_reach(model: pinocchio.Model, shape: pinocchio.GeometryObject) -> NDArray[np.float64]:
-    """How far from each joint that carries it a shape can come, whatever the joints between do [m]; 0 for others."""
+    """Largest distance of a shape from each joint that carries it, in any posture [m]; 0 for other joints."""
     shape.geometry.computeLocalAABB()
     box = shape.geometry.aabb_local
     corners = [shape.placement.act(np.array(corner)) for corner in product(*zip(box.min_, box.max_, strict=True))]

@@ -17,7 +17,7 @@ MARGIN_M = 0.002
 """Least distance between links. It covers how far the spoon, 1 m from the torso's axis, cuts into a body of the head's
 curvature on a path between two postures 0.02 rad apart."""
 _SHORT_CHAIN = 2
-"""Links with so few joints between them are always close, so that others are not looked at for their sake."""
+"""Links with at most so many joints between them are always close to each other."""
 
 
 @dataclass(frozen=True)
@@ -41,11 +41,6 @@ class Clearance:
     Shapes are the convex hulls of the collision meshes, as the physics loads them, and the boxes of the tool. Pairs
     that the SRDF excludes are not checked, nor are links of one gripper (their mimic joints are rigid in the model),
     nor the tool with the hand and forearm that hold it, where the handle reaches into the fingers.
-
-    Args:
-        robot: The robot.
-        model: The robot with all joints.
-        tool: What it holds.
 
     Raises:
         ConfigError: If the robot's meshes cannot be read.
@@ -78,8 +73,8 @@ class Clearance:
         for request in self._distances.collisionRequests:
             request.security_margin = MARGIN_M
         self._broadphase = pinocchio.BroadPhaseManager_DynamicAABBTreeCollisionManager(model, geometry, self._distances)
-        # Postures that are clear by some distance vouch for those near them. Links with few joints between them are
-        # never clear by much, so they are looked at apart from the others.
+        # Links with few joints between them are never clear by much, so a posture would show little about those near
+        # it if the same object looked at these links and at all others.
         reaches = find_reaches(model, geometry)
         short = (reaches > 0).sum(axis=1) <= _SHORT_CHAIN
         self._clear = [
@@ -89,15 +84,12 @@ class Clearance:
         ]
 
     def first_approach(self, configurations: NDArray[np.float64]) -> Approach | None:
-        """First posture in which two links are closer than `MARGIN_M`, and the closest links in it.
+        """Find the first posture in which two links are closer than `MARGIN_M`, and the closest links in it, if any.
 
-        Most postures are near others that were clear by more than the way between them, and so are clear, too.
+        Most postures need no computation: a posture near them was clear by more than the way between the two.
 
         Args:
-            configurations: In the order of the model [rad], shape ``(n, 32)``.
-
-        Returns:
-            None when no posture has such links.
+            configurations: In the order of the model [rad], shape ``(n, n_joints)``.
         """
         unknown = [known.find_unknown(configurations) for known in self._clear]
         for index, configuration in enumerate(configurations):
@@ -116,13 +108,10 @@ class Clearance:
         return None
 
     def find_lowest(self, configuration: NDArray[np.float64]) -> tuple[str, float]:
-        """Find the lowest link of a posture, by the boxes around its shapes.
+        """Find the lowest link of a posture by boxes around its shapes: its name, and its height above the base [m].
 
         Args:
-            configuration: In the order of the model [rad], shape ``(32,)``.
-
-        Returns:
-            Its name, and the height of its lowest point above the base [m].
+            configuration: In the order of the model [rad], shape ``(n_joints,)``.
         """
         pinocchio.updateGeometryPlacements(self._model, self._data, self.geometry, self._distances, configuration)
         heights = []
@@ -135,7 +124,7 @@ class Clearance:
         return self._links[lowest], heights[lowest]
 
     def _is_clear(self, configurations: NDArray[np.float64], unknown: list[NDArray[np.bool_]]) -> bool:
-        """Whether the first of some postures is known to be clear; of others, takes note in `unknown`."""
+        """Say whether the first posture is clear, and remove from `unknown` the postures that it shows to be clear."""
         for known, rows in zip(self._clear, unknown, strict=True):
             if rows[0]:
                 rows[:] &= known.look_at_first(configurations)

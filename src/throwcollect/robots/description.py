@@ -1,4 +1,4 @@
-"""A robot's description in URDF, with its tool: in full for onlookers, and reduced to what the physics has to move."""
+"""A robot's description in URDF, with its tool: in full for viewers, and reduced to moving parts for the physics."""
 
 from __future__ import annotations
 
@@ -58,9 +58,6 @@ def start_posture(config: Config) -> Mapping[str, float]:
 
     A joint's angle is that of ``task.start``, else of ``robot.posture``, else of the robot's posture at rest.
 
-    Args:
-        config: The configuration of the trial.
-
     Raises:
         ConfigError: If the robot's files cannot be read.
     """
@@ -68,7 +65,7 @@ def start_posture(config: Config) -> Mapping[str, float]:
 
 
 def joint_offsets(config: Config) -> NDArray[np.float64]:
-    """Tell by how much farther each joint stands than it says [rad], shape ``(n_joints,)``, as `Robot.joints`."""
+    """List the true angle minus the measured one of each joint [rad], shape ``(n_joints,)``, as `Robot.joints`."""
     offsets = config.robot.joint_offsets
     return np.array([offsets.get(joint, 0.0) for joint in robot_of(config).joints])
 
@@ -76,8 +73,7 @@ def joint_offsets(config: Config) -> NDArray[np.float64]:
 def find_locked_joints(config: Config) -> Mapping[str, float]:
     """Find the joints that are simulated as rigid and their angles [rad], in the order of `Robot.joints`.
 
-    Args:
-        config: The configuration; of ``robot.locked``, ``auto`` locks what the task does not move.
+    For ``robot.locked: auto``, these are all joints that the task does not move.
 
     Raises:
         ConfigError: If a joint that is to be locked is unknown or moved by the task, or the robot's files
@@ -110,9 +106,6 @@ def full_description(config: Config) -> str:
 
     The hand has no collision shapes, as its fingers reach into the tool's handle.
 
-    Args:
-        config: The configuration; its sections ``robot`` and ``tool`` matter.
-
     Raises:
         ConfigError: If the robot's files cannot be read.
     """
@@ -139,7 +132,7 @@ def joint_model(robot: Robot) -> pinocchio.Model:
     Raises:
         ConfigError: If the robot's files cannot be read, or lack something.
     """
-    # What they lack is looked for before the URDF's parser prints it in its own words.
+    # These raise our errors for what the files lack; pinocchio's parser would print its own words to the terminal.
     joint_limits(robot)
     _ = robot.rest_posture
     return _whole(robot, _read_description(robot))
@@ -149,13 +142,8 @@ def physics_description(config: Config) -> Description:
     """Write a URDF of the robot with its tool in which every fixed or locked joint is merged away, except the tool's.
 
     A link carries the name of the link that its joint moves in the robot's URDF, and the mass, inertia and collision
-    shapes of everything that is rigidly attached to it. There are no visual shapes.
-
-    Args:
-        config: The configuration; of it ``robot``, ``tool`` and ``task`` matter.
-
-    Returns:
-        The same text, byte for byte, for the same configuration.
+    shapes of everything that is rigidly attached to it. There are no visual shapes. Equal configurations give equal
+    bytes.
 
     Raises:
         ConfigError: If the choice of locked joints is wrong, or the robot's files cannot be read.
@@ -163,7 +151,7 @@ def physics_description(config: Config) -> Description:
     robot, tool = robot_of(config), tool_of(config.tool)
     locked = find_locked_joints(config)
     source = _read_description(robot)
-    model = _reduce(robot, source, locked)
+    model = lock_joints(_whole(robot, source), locked)
     joints = {joint.get("name"): joint for joint in source.iter("joint")}
     names = [_root_link(source), *(_child(joints[name]) for name in model.names[1:])]
 
@@ -216,8 +204,8 @@ def _whole(robot: Robot, source: ElementTree.Element) -> pinocchio.Model:
     return model
 
 
-def _reduce(robot: Robot, source: ElementTree.Element, locked: Mapping[str, float]) -> pinocchio.Model:
-    model = _whole(robot, source)
+def lock_joints(model: pinocchio.Model, locked: Mapping[str, float]) -> pinocchio.Model:
+    """Make a model in which some joints are fixed at angles [rad]; the given model stays as it is."""
     configuration = pinocchio.neutral(model)
     numbers = [model.getJointId(joint) for joint in locked]
     for number, angle in zip(numbers, locked.values(), strict=True):

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
 from throwcollect.pinocchio_library import pinocchio
+from throwcollect.robots.description import lock_joints
 from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.robot import Robot
 from throwcollect.tools.tool import Tool
@@ -19,28 +20,23 @@ Motion = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
 
 
 class Dynamics:
-    """Inverse dynamics of a robot, of all its joints or with some of them locked.
+    """Inverse dynamics of a robot, of all its joints or with some of them locked at angles [rad], which is faster.
 
-    Attributes:
-        columns: Which of `Robot.joints` are not locked, in the order of the model, shape ``(n_free,)``.
-
-    Args:
-        robot: The robot.
-        model: The robot with all joints, without a tool.
-        locked: Angle [rad] of each joint that is rigid; it costs nothing then.
+    The model is that of all joints, without a tool.
     """
 
     def __init__(self, robot: Robot, model: pinocchio.Model, locked: Mapping[str, float]) -> None:
-        self._model = _lock(model, locked) if locked else model.copy()
+        self._model = lock_joints(model, locked) if locked else model.copy()
         self._data = self._model.createData()
-        self.columns = np.array([robot.joints.index(name) for name in list(self._model.names)[1:]], dtype=np.intp)
+        # Columns of `Robot.joints` that are not locked, in the order of the model.
+        self._columns = np.array([robot.joints.index(name) for name in list(self._model.names)[1:]], dtype=np.intp)
         hand = self._model.frames[self._model.getFrameId(robot.hand, pinocchio.BODY)]
         self._hand, self._hand_placement = hand.parentJoint, hand.placement.copy()
         self._bare_hand = self._model.inertias[self._hand].copy()
-        self._damping = joint_limits(robot).damping[self.columns]
+        self._damping = joint_limits(robot).damping[self._columns]
 
     def efforts(self, config: Config, tool: Tool, motion: Motion) -> NDArray[np.float64]:
-        """Torques that a motion needs, with tool and ball in the hand.
+        """Compute the torques that a motion needs, with tool and ball in the hand.
 
         Args:
             config: Configuration of the trial.
@@ -48,7 +44,7 @@ class Dynamics:
             motion: Of all joints; the locked ones rest where they are locked.
 
         Returns:
-            [Nm], shape ``(n, n_free)``, in the order of `columns`.
+            [Nm], shape ``(n, n_joints)``, in the order of `Robot.joints`; 0 for locked joints.
 
         Raises:
             ConfigError: If the ball does not fit the tool.
@@ -58,16 +54,9 @@ class Dynamics:
         load = tool.inertia + pinocchio.SE3(np.eye(3), seat).act(ball)
         self._model.inertias[self._hand] = self._bare_hand + (self._hand_placement * tool.mount).act(load)
         self._model.gravity.linear = np.array([0.0, 0.0, -config.scene.gravity_mps2])
-        positions, velocities, accelerations = (np.ascontiguousarray(each[:, self.columns]) for each in motion)
+        positions, velocities, accelerations = (np.ascontiguousarray(array[:, self._columns]) for array in motion)
         rows = zip(positions, velocities, accelerations, strict=True)
         torques = np.array([pinocchio.rnea(self._model, self._data, *row) for row in rows])
-        needed: NDArray[np.float64] = torques + self._damping * velocities
+        needed = np.zeros_like(motion[0])
+        needed[:, self._columns] = torques + self._damping * velocities
         return needed
-
-
-def _lock(model: pinocchio.Model, locked: Mapping[str, float]) -> pinocchio.Model:
-    posture = pinocchio.neutral(model)
-    joints = [model.getJointId(joint) for joint in locked]
-    for joint, angle in zip(joints, locked.values(), strict=True):
-        posture[model.idx_qs[joint]] = angle
-    return pinocchio.buildReducedModel(model, joints, posture)

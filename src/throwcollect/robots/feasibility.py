@@ -1,4 +1,4 @@
-"""Whether a robot can throw with a joint trajectory: limits, collisions with itself, and a tool that holds the ball."""
+"""Checks joint trajectories: the robot's limits, its collisions with itself, and a tool that holds the ball."""
 
 from __future__ import annotations
 
@@ -24,19 +24,16 @@ _CHECKED_LEAST = 100
 _CLEARANCE_STEP_RAD = 0.02
 _POSITION_SLACK_RAD = 1e-6
 _LOWEST_WAY_OUT_RAD = -0.02
-"""A way out that goes down less than this is level but for rounding: the ball takes a second or more to leave."""
+"""A way out that goes down by less than this counts as level: the ball takes a second or more to leave on it."""
 _SURELY = 1 - 1e-6
-"""Share of a limit below which torques that were rounded otherwise cannot exceed it: they agree to 1e-12."""
+"""A torque below this share of its limit is within it on any model: results of different models agree to 1e-12."""
 
 
 class Feasibility:
     """Checks joint trajectories against the limits of a robot.
 
-    One object serves all trials of a collection: what a trial changes (posture, masses, gravity, limits) is set per
-    check, and only another tool costs the time to rebuild its shapes.
-
-    Args:
-        config: Configuration of the collection.
+    One object serves all trials of a collection: each check sets posture, masses, gravity and limits of its trial, and
+    only a trial with another tool costs the time to rebuild its shapes.
 
     Raises:
         ConfigError: If the robot's files cannot be read, or lack something.
@@ -60,20 +57,15 @@ class Feasibility:
         self._clearance = Clearance(self._robot, self._model, self._tool)
 
     def check(self, config: Config, trajectory: JointTrajectory) -> str | None:
-        """Reason why the robot cannot do a trial with a trajectory, if there is one.
+        """Explain why the robot cannot do a trial with a trajectory.
 
         The curve between the points is checked at 100 Hz and at 100 instants at least, for collisions whenever a joint
         has gone on by 0.02 rad. Joints that the trajectory does not move rest at the trial's start posture. Torques are
         those of inverse dynamics plus viscous friction; the tool and the ball count as part of the hand throughout,
         also after the ball has left. The effort of locked joints is not limited, as they are simulated as rigid.
-        Joints stand where they do and not where they say (`robot.joint_offsets`), and motions take the time that they
-        take (`robot.speed_scale`). Collisions are those of the robot and the tool; what the ball hits is for the judge
-        of the throw. The tool has to move if the task throws, and to hold the ball in the start posture (see
-        `Tool.way_out`).
-
-        Args:
-            config: Configuration of the trial.
-            trajectory: Its joint trajectory.
+        Angles are true ones (`robot.joint_offsets`), and motions have their true speed (`robot.speed_scale`).
+        Collisions are those of the robot and the tool; the task judges what the ball hits. The tool has to move if the
+        task throws, and to hold the ball in the start posture (see `Tool.way_out`).
 
         Returns:
             None if it is feasible, else one sentence with joint or links, instant, value and limit: of the first kind
@@ -129,12 +121,13 @@ class Feasibility:
                 f"its limit is {limits.velocity[joint]:.4g} rad/s"
             )
         limit = limits.effort * np.where([joint in locked for joint in joints], np.inf, config.robot.effort_scale)
-        # The cheap model decides most trials: only one that comes near a limit is worked out with all joints, and told.
-        free = self._dynamics_of_free_joints(locked)
-        shares = np.abs(free.efforts(config, self._tool_of(config), motion)) / limit[free.columns]
-        if (shares <= _SURELY).all():
+        # The model without locked joints is faster and decides most trials. A trial near a limit is computed again
+        # with all joints, so that its numbers do not depend on which joints are locked.
+        tool = self._tool_of(config)
+        efforts = self._dynamics_of_free_joints(locked).efforts(config, tool, motion)
+        if (np.abs(efforts) / limit <= _SURELY).all():
             return None
-        efforts = self.efforts(config, motion)
+        efforts = self._dynamics.efforts(config, tool, motion)
         if worst := _worst(efforts, limit):
             row, joint = worst
             return (
@@ -144,7 +137,7 @@ class Feasibility:
         return None
 
     def _loss(self, config: Config, posture: NDArray[np.float64]) -> str | None:
-        """Reason why the ball does not stay in the tool of the still robot, if there is one."""
+        """Explain why the ball does not stay in the tool of the still robot."""
         pinocchio.forwardKinematics(self._model, self._data, self._model_order(posture))
         tool, radius = self._tool_of(config), config.ball.radius_m
         up = (self._data.oMi[self._hand] * self._hand_placement * tool.mount).rotation[2]
@@ -158,39 +151,21 @@ class Feasibility:
             f"out, {-slope:.3g} rad downwards; up to {safe:.3g} rad, a tilt in any direction is safe"
         )
 
-    def efforts(self, config: Config, motion: Motion) -> NDArray[np.float64]:
-        """Torques that a motion needs, with tool and ball in the hand.
-
-        Args:
-            config: Configuration of the trial.
-            motion: Positions [rad], velocities [rad/s] and accelerations [rad/s²], each of shape ``(n, n_joints)``
-                in the order of `Robot.joints`.
-
-        Returns:
-            [Nm], shape ``(n, n_joints)``, in the order of `Robot.joints`.
-
-        Raises:
-            ConfigError: If the ball does not fit the tool.
-        """
-        efforts = np.empty_like(motion[0])
-        efforts[:, self._dynamics.columns] = self._dynamics.efforts(config, self._tool_of(config), motion)
-        return efforts
-
     def _dynamics_of_free_joints(self, locked: Mapping[str, float]) -> Dynamics:
-        """Return what gives the torques of all joints but locked ones, at a fraction of the cost."""
+        """Return the dynamics of all joints but locked ones."""
         if locked != self._locked:
             self._locked, self._free_dynamics = dict(locked), Dynamics(self._robot, self._model, locked)
         return self._free_dynamics
 
     def _tool_of(self, config: Config) -> Tool:
-        """Return the tool of a trial, and see that `_clearance` has it, too."""
+        """Return the tool of a trial; if it is another one than before, `_clearance` gets its shapes."""
         if config.tool != self._tool_config:
             self._tool_config, self._tool = config.tool, tool_of(config.tool)
             self._clearance = Clearance(self._robot, self._model, self._tool)
         return self._tool
 
     def _model_order(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Values of joints in the order of the model; the last axis is that of the joints."""
+        """Reorder values of joints as the model has them; the last axis is that of the joints."""
         ordered = np.empty_like(values)
         ordered[..., self._columns] = values
         return ordered
@@ -199,7 +174,7 @@ class Feasibility:
 def _whole_body(
     robot: Robot, trajectory: JointTrajectory, times: NDArray[np.float64], posture: NDArray[np.float64], config: Config
 ) -> Motion:
-    """Motion of all joints, each array of shape ``(n, n_joints)``, in the order of `Robot.joints`."""
+    """Sample the motion of all joints, each array of shape ``(n, n_joints)``, in the order of `Robot.joints`."""
     columns = [robot.joints.index(joint) for joint in trajectory.joints]
     offsets, speed = joint_offsets(config)[columns], config.robot.speed_scale
     whole = tuple(np.tile(rest, (len(times), 1)) for rest in (posture, np.zeros_like(posture), np.zeros_like(posture)))
@@ -210,8 +185,8 @@ def _whole_body(
 
 
 def _spread(positions: NDArray[np.float64]) -> NDArray[np.intp]:
-    """Rows between which some joint has moved by at least `_CLEARANCE_STEP_RAD`, with the first and the last row."""
-    # How far the fastest joint has gone by each instant: slow parts of a motion need few checks.
+    """Choose rows between which some joint moves by `_CLEARANCE_STEP_RAD`, with the first and the last row."""
+    # The sum of the largest moves from row to row: slow parts of a motion need few checks.
     travel = np.cumsum(np.abs(np.diff(positions, axis=0)).max(axis=1))
     passed = np.diff(np.floor(travel / _CLEARANCE_STEP_RAD), prepend=0.0) > 0
     passed[-1] = True
@@ -219,7 +194,7 @@ def _spread(positions: NDArray[np.float64]) -> NDArray[np.intp]:
 
 
 def _worst(values: NDArray[np.float64], limits: NDArray[np.float64]) -> tuple[int, int] | None:
-    """Row and column of the largest magnitude over its limit; None when no limit is exceeded."""
+    """Find row and column of the largest magnitude over its limit; None if no limit is exceeded."""
     shares = np.abs(values) / limits
     row, column = np.unravel_index(int(np.argmax(shares)), shares.shape)
     return (int(row), int(column)) if shares[row, column] > 1 else None

@@ -39,14 +39,16 @@ def joint_limits(robot: Robot) -> JointLimits:
         ConfigError: If the URDF cannot be read or lacks a joint or its limits.
     """
     path = robot.urdf_path
-    joints = {joint.get("name"): joint for joint in read_xml(path).iter("joint") if joint.find("limit") is not None}
+    elements = {
+        joint.get("name"): (limit, joint.find("dynamics"))
+        for joint in read_xml(path).iter("joint")
+        if (limit := joint.find("limit")) is not None
+    }
     rows = []
     for name in robot.joints:
-        joint = joints.get(name)
-        limit = joint.find("limit") if joint is not None else None
-        if joint is None or limit is None:
+        if name not in elements:
             raise ConfigError(f"{path}: joint {name} is missing or has no limit")
-        dynamics = joint.find("dynamics")
+        limit, dynamics = elements[name]
         damping = dynamics.get("damping", "0") if dynamics is not None else "0"
         try:
             numbers = [float(limit.attrib[key]) for key in ("lower", "upper", "velocity", "effort")]

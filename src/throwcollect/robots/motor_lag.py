@@ -1,4 +1,4 @@
-"""How motors go after their commands with a lag of the first order."""
+"""Motors that follow their commands with a lag of the first order."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 def lag_behind(
     commands: NDArray[np.float64], start: NDArray[np.float64], *, hz: float, lag_s: float
 ) -> NDArray[np.float64]:
-    """Where motors go when they are told where to be.
+    """Compute the positions of motors that follow commands.
 
-    In each step, a motor makes up for the share ``1 - exp(-1 / (hz lag_s))`` of what it lacks.
+    In each step, a motor covers the share ``1 - exp(-1 / (hz lag_s))`` of the way to its command.
 
     Args:
-        commands: Positions wanted at the end of each step [rad], shape ``(n_steps, n_joints)``.
-        start: Where the motors are before the first step [rad], shape ``(n_joints,)``.
+        commands: Commanded positions at the end of each step [rad], shape ``(n_steps, n_joints)``.
+        start: Positions of the motors before the first step [rad], shape ``(n_joints,)``.
         hz: Steps per second.
         lag_s: Time constant [s], above 0.
 

@@ -14,7 +14,7 @@ _ORDERS = np.arange(6)
 def sample_quintic(
     trajectory: JointTrajectory, times: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Positions, velocities and accelerations of a trajectory at given times.
+    """Compute positions, velocities and accelerations of a trajectory at given times.
 
     Each segment is the polynomial of degree 5 that takes position, velocity and acceleration of both its points;
     outside the trajectory the values are those of its nearest end.
@@ -36,14 +36,7 @@ def sample_quintic(
 
 
 def sample_positions(trajectory: JointTrajectory, times: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Positions alone of `sample_quintic`, at a fraction of its cost.
-
-    Args:
-        trajectory: At least two points.
-        times: Time since the start [s], shape ``(n,)``.
-
-    Returns:
-        [rad], shape ``(n, n_joints)``.
+    """Compute the positions of `sample_quintic` alone, at a fraction of its cost.
 
     Raises:
         ValueError: If the trajectory has fewer than two points.
@@ -55,7 +48,11 @@ def sample_positions(trajectory: JointTrajectory, times: NDArray[np.float64]) ->
 def _polynomials_at(
     trajectory: JointTrajectory, times: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Of the segment at each time: coefficients ``(6, n_joints, n)``, and ``(n,)`` each: u, and its length [s].
+    """Find the segment at each time.
+
+    Returns:
+        Coefficients of its polynomials ``(6, n_joints, n)``, the place u in it from 0 to 1 and its length [s], both of
+        shape ``(n,)``.
 
     Raises:
         ValueError: If the trajectory has fewer than two points.
@@ -73,12 +70,12 @@ def _polynomials_at(
     spans = spans[segments]
     u = np.minimum(np.maximum((times - knots[segments]) / spans, 0.0), 1.0)
     rows = coefficients.reshape(len(coefficients), -1).take(segments, axis=0)
-    # With time as the last axis, arithmetic runs along memory.
+    # Time is the last axis, so that arithmetic runs along memory.
     return np.ascontiguousarray(rows.T).reshape(*coefficients.shape[1:], len(times)), u, spans
 
 
 def _values(coefficients: NDArray[np.float64], u: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Values of polynomials in u, ``(n_joints, n)``; coefficients ``(n_orders, n_joints, n)``, lowest order first."""
+    """Evaluate polynomials in u, ``(n_joints, n)``; coefficients ``(n_orders, n_joints, n)``, lowest order first."""
     values: NDArray[np.float64] = coefficients[-1].copy()
     for coefficient in coefficients[-2::-1]:
         values *= u

@@ -1,4 +1,4 @@
-"""What a robot is: joints, the controllers that command them, and where its description is."""
+"""The kind of part `Robot`: its joints, the controllers that command them, and the place of its description."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ class Robot:
     Attributes:
         name: Its name in configurations, such as ``talos``.
         title: Its name in sentences, such as ``Talos``.
-        kind: What it is, as it stands before its title where somebody reads of it for the first time, such as ``the
-            humanoid robot``; empty if the title says enough.
+        kind: Words before the title where a text first mentions the robot, such as ``the humanoid robot``; empty if
+            the title says enough.
         controllers: Joint trajectory controller of each limb and its joints, in order.
         share: Returns the directory that ``package://`` paths of the description are relative to; raises `ConfigError`
             if the package that brings it is not installed.
@@ -28,15 +28,15 @@ class Robot:
         srdf: Path of the SRDF in that directory; it says which links may overlap, and holds the posture at rest.
         rest: Name of the SRDF's posture that joints have unless a configuration says otherwise.
         hand: Link that the tool is fixed to.
-        open_hand: How the names of the links begin that have no collision shapes, as the tool reaches into them.
-        holding: How the names of the links begin that are not checked for collisions with the tool that they hold.
-        rigid: For each group of links that only mimic joints move: how their names begin. Links of a group are not
-            checked for collisions with each other.
+        open_hand: Prefix of the names of links that have no collision shapes, as the tool reaches into them.
+        holding: Prefixes of the names of links that hold the tool and are not checked for collisions with it.
+        rigid: Prefix of the names of links for each group of links that only mimic joints move. Links of a group are
+            not checked for collisions with each other.
         ros1_names: Name of each controller on the robot's ROS 1 software; empty if they are the same.
-        goal_tolerance_rad: How far each joint may be from the end of a trajectory whose goal brings no tolerances of
-            its own; 0 is not checked.
-        goal_time_s: How long after the end of such a trajectory it may get there; 0 waits for ever.
-        stopped_velocity_radps: Largest velocity that its controllers say they take for standing still.
+        goal_tolerance_rad: Largest distance of each joint from the end of a trajectory whose goal has no tolerances
+            of its own; 0 is not checked.
+        goal_time_s: Longest time after the end of such a trajectory in which it may get there; 0 waits for ever.
+        stopped_velocity_radps: Largest velocity that its controllers take for standing still.
     """
 
     name: str
@@ -78,12 +78,7 @@ class Robot:
         raise KeyError(joint)
 
     def graph_name(self, controller: str, naming: str) -> str:
-        """Return the name of a controller in the ROS graph.
-
-        Args:
-            controller: Name of one of `controllers`.
-            naming: ``ros2`` or ``ros1``: whose names it has.
-        """
+        """Return the name of a controller in the ROS graph, by the naming ``ros2`` or ``ros1``."""
         return self.ros1_names.get(controller, controller) if naming == "ros1" else controller
 
     @property

@@ -1,4 +1,4 @@
-"""Where the tool is and how fast it moves, from the measured joints."""
+"""Position and velocity of the tool, computed from the measured joints."""
 
 from __future__ import annotations
 
@@ -15,10 +15,7 @@ from throwcollect.tools.tool import tool_of
 
 
 class ToolMotion:
-    """Place and velocity of the point of the tool in which a resting ball has its centre; world frame.
-
-    Args:
-        config: Configuration of the trial.
+    """Position and velocity of the seat: the point of the tool in which a resting ball has its centre; world frame.
 
     Raises:
         ConfigError: If the robot's files cannot be read, or the ball does not fit the tool.
@@ -27,16 +24,12 @@ class ToolMotion:
     def __init__(self, config: Config) -> None:
         tool = tool_of(config.tool)
         self._seat = tool.mount * pinocchio.SE3(np.eye(3), np.array(tool.ball_seat(config.ball.radius_m)))
-        self._model = _MODELS.of(robot_of(config))
+        self._model = _model_of(robot_of(config))
         self._offsets = joint_offsets(config)
         self._base = np.array([0.0, 0.0, config.robot.base_height_m])
 
     def place(self, position: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Where the point is [m], shape ``(3,)``.
-
-        Args:
-            position: Of the joints [rad], shape ``(n_joints,)``, in the order of `Robot.joints`.
-        """
+        """Compute the position of the seat [m], shape ``(3,)``, from those of `Robot.joints` [rad]."""
         model = self._model
         pinocchio.forwardKinematics(model.model, model.data, (position + self._offsets)[model.order])
         hand = pinocchio.updateFramePlacement(model.model, model.data, model.hand)
@@ -44,17 +37,12 @@ class ToolMotion:
         return place
 
     def velocity(self, position: NDArray[np.float64], velocity: NDArray[np.float64]) -> NDArray[np.float64]:
-        """How fast the point moves [m/s], shape ``(3,)``.
-
-        Args:
-            position: Of the joints [rad], shape ``(n_joints,)``, in the order of `Robot.joints`.
-            velocity: Of the joints [rad/s], shape ``(n_joints,)``.
-        """
+        """Compute the velocity of the seat [m/s], ``(3,)``, from positions and velocities of `Robot.joints` [rad/s]."""
         model = self._model
         actual = position + self._offsets
         pinocchio.forwardKinematics(model.model, model.data, actual[model.order], velocity[model.order])
         hand = pinocchio.updateFramePlacement(model.model, model.data, model.hand)
-        # Of the point, first along the axes of the seat, then along those of the world.
+        # The velocity of the seat, first along the axes of the seat, then along those of the world.
         along_seat = self._seat.actInv(pinocchio.getFrameVelocity(model.model, model.data, model.hand))
         turn = pinocchio.SE3((hand * self._seat).rotation, np.zeros(3))
         velocity_in_world: NDArray[np.float64] = turn.act(along_seat).linear
@@ -62,7 +50,7 @@ class ToolMotion:
 
 
 class _JointModel:
-    """A robot with all joints, its kinematics, and for each of its joints the place in `Robot.joints`."""
+    """The kinematics of all joints of a robot; `order` gives the place of each model joint in `Robot.joints`."""
 
     def __init__(self, robot: Robot) -> None:
         self.model = joint_model(robot)
@@ -71,17 +59,12 @@ class _JointModel:
         self.hand = self.model.getFrameId(robot.hand, pinocchio.BODY)
 
 
-class _ModelsOfThread(threading.local):
-    """The models that a thread has made; to make one costs a hundred times as much as to use it."""
-
-    def __init__(self) -> None:
-        self._models: dict[Robot, _JointModel] = {}
-
-    def of(self, robot: Robot) -> _JointModel:
-        """Return the model of a robot."""
-        if robot not in self._models:
-            self._models[robot] = _JointModel(robot)
-        return self._models[robot]
+_of_this_thread = threading.local()
 
 
-_MODELS = _ModelsOfThread()
+def _model_of(robot: Robot) -> _JointModel:
+    """Return this thread's model of a robot: making one takes a hundred times as long as using it, which changes it."""
+    models: dict[Robot, _JointModel] = _of_this_thread.__dict__.setdefault("models", {})
+    if robot not in models:
+        models[robot] = _JointModel(robot)
+    return models[robot]

@@ -1,1 +1,1 @@
-"""The sweep: which values each trial has, frozen as a plan before anything runs."""
+"""The sweep: the values of each trial, frozen as a plan before anything runs."""

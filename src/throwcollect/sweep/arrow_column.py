@@ -1,6 +1,6 @@
-"""Arrow columns of Python values, without what `pyarrow.array` does first: import pandas, wherever that is installed.
+"""Makes Arrow columns of Python values without `pyarrow.array`, which imports pandas wherever that is installed.
 
-To import it takes 0.3 s of a processor, in each process that writes a table; nothing here uses it.
+That import costs each process that writes a table 0.3 s of a processor, and nothing here uses pandas.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ _CODES = {pa.int64(): "q", pa.uint64(): "Q", pa.float64(): "d"}
 
 
 def make_column(values: Sequence[Any] | NDArray[Any], kind: pa.DataType) -> pa.Array:
-    """What ``pyarrow.array(values, kind)`` gives.
+    """Make the column that ``pyarrow.array(values, kind)`` makes.
 
     Args:
-        values: Numbers or texts; None for what is null. In an array, which must have the very kind, texts are bytes of
-            one length, and nothing is null.
+        values: Numbers or texts; None for null. An array must have exactly the kind and holds no nulls; texts in an
+            array are bytes of one length.
         kind: ``int64``, ``uint64``, ``float64`` or ``string``.
 
     Raises:
@@ -32,7 +32,7 @@ def make_column(values: Sequence[Any] | NDArray[Any], kind: pa.DataType) -> pa.A
     """
     if isinstance(values, np.ndarray):
         return _make_array_column(values, kind)
-    # The layout of Arrow's columnar format: a bitmap of what is there, then offsets and text, or numbers.
+    # Arrow's columnar format: a bitmap of the values that are not null, then offsets and text, or numbers.
     nulls = sum(value is None for value in values)
     valid = np.packbits([value is not None for value in values], bitorder="little") if nulls else None
     if kind == pa.string():
@@ -52,29 +52,28 @@ def _make_array_column(values: NDArray[Any], kind: pa.DataType) -> pa.Array:
 
 
 def read_numbers(column: pa.Array) -> NDArray[Any]:
-    """The numbers of a column, ``(n_rows,)``; any number stands for what is null. Not to be written to.
+    """View the numbers of a column of ``int64``, ``uint64`` or ``float64``, ``(n_rows,)``; read-only.
 
-    Args:
-        column: Of ``int64``, ``uint64`` or ``float64``.
+    Where the column is null, the number is arbitrary.
     """
     dtype = np.dtype(_CODES[column.type])
     return np.frombuffer(column.buffers()[1], dtype, len(column), dtype.itemsize * column.offset)
 
 
 def null_where_nan(values: NDArray[np.float64]) -> Sequence[float | None] | NDArray[np.float64]:
-    """A column of numbers as `make_column` takes it, in which what is not a number is null."""
+    """Replace NaN by None, so that `make_column` makes it null."""
     if not np.isnan(values).any():
         return values
     return [None if isnan(value) else value for value in values.tolist()]
 
 
 def nan_where_null(column: pa.Array) -> NDArray[np.float64]:
-    """The numbers of a ``float64`` column, ``(n_rows,)``; NaN for those that are null."""
+    """Read the numbers of a ``float64`` column, ``(n_rows,)``; NaN for null."""
     return np.where(read_validity(column), read_numbers(column), np.nan)
 
 
 def read_validity(column: pa.Array) -> NDArray[np.bool_]:
-    """Which values of a column are not null, ``(n_rows,)``."""
+    """Find the rows of a column that are not null, ``(n_rows,)``."""
     bits = column.buffers()[0]
     if bits is None:
         return np.ones(len(column), np.bool_)
@@ -83,11 +82,6 @@ def read_validity(column: pa.Array) -> NDArray[np.bool_]:
 
 
 def make_table(columns: Sequence[Sequence[Any] | NDArray[Any]], schema: pa.Schema) -> pa.Table:
-    """The Arrow table of columns of Python values.
-
-    Args:
-        columns: The columns, each as `make_column` takes it, in the order of the schema.
-        schema: Their names and types.
-    """
+    """Make the Arrow table of columns of Python values, in the order of the schema; see `make_column`."""
     pairs = zip(columns, schema.types, strict=True)
     return pa.Table.from_arrays([make_column(column, kind) for column, kind in pairs], schema=schema)

@@ -1,4 +1,4 @@
-"""Hashes over what determines a plan and a trial."""
+"""Hashes over everything that determines a plan or a trial."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ _DIGEST = re.compile(r"[0-9a-f]{64}")
 
 
 def is_digest(value: object) -> bool:
-    """Whether a value is a digest in hexadecimal."""
+    """Say whether a value is a digest in hexadecimal."""
     return isinstance(value, str) and bool(_DIGEST.fullmatch(value))
 
 
 def config_digest(config: Config) -> str:
-    """Hash a configuration, SHA-256 in hex; how and where it is run does not count.
+    """Hash a configuration, SHA-256 in hex; keys that say how and where it is run do not count.
 
     Keys that came later count where they differ from their defaults, so that older digests hold.
     """
@@ -36,7 +36,7 @@ def config_digest(config: Config) -> str:
 
 
 def _name_uncounted(section: Section) -> dict[str, Any]:
-    """Name the fields of a section, and of those in it, that do not count, as pydantic wants to have them named."""
+    """Name the fields of a section and of its inner sections that do not count, in the form of pydantic's `exclude`."""
     uncounted: dict[str, Any] = {}
     for name, value in section.__dict__.items():
         key = key_of_field(type(section), name)
@@ -51,21 +51,15 @@ def trial_digests(config: Config, points: Points, seeds: Iterable[int]) -> NDArr
     """Hash everything that determines the samples of each trial, SHA-256, shape ``(n_trials, 32)``.
 
     The hashed text has one line ``key=value`` for each effective key of the trial's configuration, sorted by key, so
-    it does not matter whether a value was swept or fixed. Keys that came later have a line where they differ from their
-    defaults.
-
-    Args:
-        config: Configuration that the trials vary.
-        points: Values of the trials.
-        seeds: Seeds of the trials.
+    it does not matter whether a value was swept or fixed. Keys that came later have no line at their defaults, so that
+    digests of earlier versions stay.
     """
     lines = {
         leaf.name: _line(leaf.name, leaf.value)
         for leaf in leaves(config)
-        # Keys that came later are left out at their defaults, so that digests of earlier versions stay.
         if leaf.key.determines_samples and not (leaf.key.later and leaf.is_default)
     }
-    # Places for what differs from trial to trial, sorted once for all of them.
+    # Empty lines for everything that differs from trial to trial, so that the lines are sorted once for all trials.
     lines["seed"] = ""
     lines |= dict.fromkeys(points.keys, "")
     lines = dict(sorted(lines.items()))

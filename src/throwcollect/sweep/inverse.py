@@ -1,4 +1,4 @@
-"""An inverse model of throws that is learned on the way: from a place to land at to parameters."""
+"""An inverse model of throws, which is learned during a collection: from a landing place to parameters."""
 
 from __future__ import annotations
 
@@ -10,37 +10,33 @@ from throwcollect.sweep.neighbours import Neighbours
 from throwcollect.sweep.rows import Rows
 
 _BASES = 8
-"""Number of landed throws near a goal from each of which a way to it is looked for."""
+"""Number of landed throws near a goal from which steps towards it begin."""
 _NEIGHBOURS_PER_PARAMETER = 3
 _RIDGE = 1e-3
 """Ridge of the linear models, as a share of the mean square spread of the neighbours along a parameter."""
 _LEAST = 1e-300
-"""Smallest ridge: it keeps the models solvable where all neighbours are one point."""
+"""Smallest ridge; it keeps a model solvable whose neighbours are all the same point."""
 _DAMPING_BINS = 0.1
 """Error in the target [bins] that a step may leave in order to be smaller."""
 _LONGEST_STEP = 0.3
 _ALONG_NOISE = 0.1
-"""Standard deviation of the noise that, by the model, does not change where the ball lands."""
+"""Standard deviation of the noise along directions in which, by the model, the ball lands at the same place."""
 _NOISE = 0.02
 """Standard deviation of the noise in all directions."""
 _JUDGES = 8
-"""Number of ended throws near a proposal that say how likely it lands."""
+"""Number of ended throws near a proposal from which the probability that it lands is estimated."""
 _PROGRESS = 0.7
-"""A proposal is promising if it is predicted to land this much nearer to its goal than any throw has."""
+"""A proposal is promising if its predicted distance from its goal is at most this share of the smallest so far."""
 _CLOSE_BINS = 0.5
-"""A proposal is promising, too, if it is predicted to land as near to its goal as this."""
+"""A proposal within this distance of its goal is promising, too."""
 _FAILURE_BINS = 2.0
-"""A proposal that surely fails is as bad as one that is so many bins off."""
+"""A proposal that certainly fails counts as one that lands so many bins away from its goal."""
 
 
 class InverseModel:
     """Proposes parameters by local linear models around throws that landed.
 
-    Parameters are places in the unit cube, targets are in bins.
-
-    Args:
-        parameters: Number of parameters.
-        targets: Number of targets.
+    Parameters are places in the unit cube, targets are in bins; the arguments are the numbers of them.
     """
 
     def __init__(self, parameters: int, targets: int) -> None:
@@ -54,8 +50,8 @@ class InverseModel:
 
         Args:
             tried: Their parameters, shape ``(n_throws, n_parameters)``.
-            landed: Which of them landed, shape ``(n_throws,)``.
-            places: Where those that landed did, shape ``(n_landed, n_targets)``.
+            landed: True for those that landed, shape ``(n_throws,)``.
+            places: Landing places of these, shape ``(n_landed, n_targets)``.
         """
         self._success.append(landed)
         self._all.append(tried)
@@ -64,31 +60,31 @@ class InverseModel:
 
     @property
     def usable(self) -> bool:
-        """Whether enough throws have landed to make a model of so many parameters."""
+        """Say whether enough throws have landed to make a model of so many parameters."""
         landed, parameters = self._landed.points.shape
         return bool(landed >= parameters + 2)
 
     def away(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Distance of places from the nearest landing [bins], shape ``(n_places,)``."""
+        """Compute the distance of places from the nearest landing [bins], shape ``(n_places,)``."""
         return self._landings.find(places, 1)[0][:, 0]
 
     def propose(
         self, goals: NDArray[np.float64], randomness: np.random.Generator
     ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        """Parameters that should bring the ball to one of some goals each.
+        """Propose parameters, each of which should bring the ball to one of several goals.
 
-        From each of the landed throws that are nearest to a goal one way is tried: the shortest step that, by a
-        linear model of its neighbours, leads to the goal, and noise, most of it along directions that do not change
-        the landing, so that throws at one cell differ. The way with the smallest predicted error is taken; that
-        throws near its end failed counts as error, too.
+        One step begins at each of the landed throws that are nearest to a goal: the shortest step that, by a linear
+        model of the throw's neighbours, leads to the goal, plus noise, most of it along directions that do not change
+        the landing, so that throws at one cell differ. The step with the smallest error is chosen: the predicted
+        distance from the goal, plus a penalty for failed throws near its end.
 
         Args:
-            goals: Where to land, shape ``(n_proposals, n_goals, n_targets)``.
+            goals: Landing places, shape ``(n_proposals, n_goals, n_targets)``.
             randomness: Source of the noise.
 
         Returns:
-            Places in the unit cube, shape ``(n_proposals, n_parameters)``; and which of them are promising: predicted
-            to land at their goal, or clearly nearer to it than any throw before.
+            Places in the unit cube, shape ``(n_proposals, n_parameters)``; and True for promising ones: predicted to
+            land at their goal, or clearly nearer to it than any throw before.
         """
         flat = goals.reshape(-1, goals.shape[-1])
         bases = self._landings.find(flat, _BASES)[1]
@@ -115,7 +111,7 @@ class InverseModel:
         return chosen, promising.reshape(len(goals), -1)[proposals, best]
 
     def _linear_models(self, bases: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """How landings change with parameters around throws that landed, and the damped inverses of that.
+        """Find the slopes of landings over parameters around throws that landed, and the damped inverses of them.
 
         Returns:
             Shapes ``(n_bases, n_targets, n_parameters)`` and ``(n_bases, n_parameters, n_targets)``.

@@ -1,4 +1,4 @@
-"""Nearest neighbours among points to which others are appended, without all that are there being sorted each time."""
+"""Nearest neighbours among points; appending points does not sort all of them again."""
 
 from __future__ import annotations
 
@@ -14,18 +14,15 @@ from throwcollect.sweep.rows import Rows
 spatial = lazily("scipy.spatial")
 
 _FEW = 1 << 16
-"""So many points are sorted into one tree each time, which takes some milliseconds."""
+"""Most points of the smallest tree, which is made again whenever points are appended; that takes some milliseconds."""
 _GROWTH = 8
 
 
 class Neighbours:
-    """Points in order, and which of them are near to others.
+    """Points in order, and a search for those that are near a place.
 
     They lie in a few trees of consecutive points, each several times as large as the next one: when points are
-    appended, most often the smallest tree alone is made anew. Which trees there are follows from the number of points.
-
-    Args:
-        dimensions: Number of coordinates of a point.
+    appended, most often the smallest tree alone is made again. The number of points alone determines the trees.
     """
 
     def __init__(self, dimensions: int) -> None:
@@ -46,11 +43,11 @@ class Neighbours:
             self._trees[first, stop] = spatial.cKDTree(self.points[first:stop]) if tree is None else tree
 
     def find(self, places: NDArray[np.float64], count: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-        """The points that are nearest to some places; of those that are equally far in different trees, the first.
+        """Find the points that are nearest to some places; of equally near ones in different trees, the first.
 
         Args:
             places: Shape ``(n_places, n_dimensions)``.
-            count: How many are wanted of each.
+            count: Number of points to find for each place.
 
         Returns:
             Their distances, nearest first, and their indices; both of shape ``(n_places, count)``, or with as many
@@ -69,7 +66,7 @@ class Neighbours:
 
 
 def _spans(count: int) -> Iterator[tuple[int, int]]:
-    """First and last but one of the points of each tree, the largest first."""
+    """List the first point of each tree and the one behind its last point, the largest tree first."""
     size = _FEW
     while size * _GROWTH <= count:
         size *= _GROWTH

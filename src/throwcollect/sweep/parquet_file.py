@@ -1,4 +1,4 @@
-"""Parquet files of a dataset: equal tables are written as equal bytes; what is read may have been made to do harm."""
+"""Parquet files of a dataset: equal tables give equal bytes, and reading is safe for files of strangers."""
 
 from __future__ import annotations
 
@@ -15,22 +15,20 @@ _OPENED = "/proc/self/fd/{}"
 _MOST_ROWS = 20_000_000
 _MOST_VALUES = 2_000_000_000
 _BUFFER_BYTES = 1 << 20
-"""How much of a column is read at once."""
+"""Number of bytes of a column that are read at once."""
 
 
 def encode_table(table: Any) -> bytes:
-    """Parquet bytes of an Arrow table; equal tables give equal bytes."""
+    """Encode an Arrow table as Parquet; equal tables give equal bytes."""
     pieces: list[bytes] = []
     encode_pieces(table, pieces.append)
     return b"".join(pieces)
 
 
 def encode_pieces(table: Any, put: Callable[[bytes], object]) -> None:
-    """Encode an Arrow table as `encode_table` does, piece by piece and one column of a million rows after the other.
+    """Encode an Arrow table as `encode_table` does, and `put` its bytes piece by piece, in order.
 
-    Args:
-        table: The table; of columns that are in one piece, no copy is made.
-        put: Called with the bytes, in order.
+    Columns of the table that consist of one piece are not copied.
     """
     import pyarrow.parquet as pq
 
@@ -52,7 +50,7 @@ class _Sink(io.RawIOBase):
 
 
 def read_parquet(path: Path) -> Any:
-    """The Arrow table of a Parquet file, every value of which is valid.
+    """Read the Arrow table of a Parquet file and check every value of it.
 
     Raises:
         DatasetError: If the file is missing or damaged, or announces more than any table of a dataset holds.
@@ -65,7 +63,7 @@ def read_parquet(path: Path) -> Any:
 
 @contextmanager
 def open_parquet(path: Path) -> Iterator[Any]:
-    """A Parquet file, to be read bit by bit; what goes wrong while it is read counts as damage to it.
+    """Open a Parquet file; an error of Arrow inside of the ``with`` block counts as damage of the file.
 
     Yields:
         A `pyarrow.parquet.ParquetFile`, whose values are not validated yet.
@@ -85,8 +83,8 @@ def open_parquet(path: Path) -> Iterator[Any]:
     except OSError as error:
         raise unreadable(path, error) from error
     try:
-        # By its descriptor's name and not as a Python object: Arrow's own threads would call or free that, and one that
-        # still waits for the interpreter when this process ends takes the process down.
+        # Arrow gets the descriptor's name and not a Python object: its own threads would call or free the object, and a
+        # thread that still waits for the interpreter when this process ends makes the process crash.
         with (
             open(descriptor, "rb"),
             pq.ParquetFile(
@@ -98,7 +96,7 @@ def open_parquet(path: Path) -> Iterator[Any]:
                 raise DatasetError(f"is damaged: announces {rows} rows of {columns} columns", path=path)
             yield file
     except (OSError, ValueError, MemoryError, pa.ArrowException) as error:
-        # A name or a text whose bytes are not valid ends as one of these errors, at the latest when it is validated.
+        # Names and texts with invalid bytes raise one of these errors, too, at the latest when they are validated.
         raise DatasetError(f"is damaged: {_first_line(error)}", path=path) from error
 
 

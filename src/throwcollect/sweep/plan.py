@@ -38,7 +38,7 @@ FIRST_TRIALS = 2 * ROUND_TRIALS
 """Number of trials in the rounds that depend on no result."""
 
 Check = Callable[[Config], str | None]
-"""Says of the configuration of a trial why it cannot be run, or None when it can."""
+"""Explains why a trial with this configuration cannot be run; None if it can."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Plan:
         return self.trials.keys
 
     def trial(self, number: int) -> Trial:
-        """The trial of a number.
+        """Return the trial of a number.
 
         Raises:
             IndexError: If the plan has no such trial.
@@ -72,7 +72,7 @@ class Plan:
         return self.trials[index]
 
     def slice_of(self, wanted: Slice) -> Plan:
-        """A slice of the plan.
+        """Cut a slice out of the plan.
 
         Raises:
             ConfigError: If the plan has fewer shards than there are slices.
@@ -81,11 +81,11 @@ class Plan:
         return Plan(self.config, self.trials[numbers.start : numbers.stop], wanted)
 
     def config_of(self, trial: Trial) -> Config:
-        """Configuration of one trial."""
+        """Make the configuration of one trial."""
         return with_values(self.config, trial.values)
 
     def write(self, path: Path) -> None:
-        """Write the plan as a Parquet file, whole or not at all; rounds that lay beside it are in it then.
+        """Write the plan as a Parquet file, whole or not at all, and remove the rounds beside it, which it contains.
 
         Raises:
             DatasetError: If the file cannot be written.
@@ -94,7 +94,7 @@ class Plan:
         remove(rounds_path(path))
 
     def take_in_rounds(self, path: Path) -> None:
-        """Write the plan as a whole if rounds lie beside its file, as its trials have these.
+        """Write the plan as a whole if rounds lie beside its file; this plan contains them.
 
         Raises:
             DatasetError: If the file cannot be written.
@@ -103,7 +103,7 @@ class Plan:
             self.write(path)
 
     def encode(self) -> bytes:
-        """Bytes of the plan's Parquet file; equal plans give equal bytes.
+        """Encode the plan as Parquet; equal plans give equal bytes.
 
         Columns: ``trial`` int64, ``digest`` string, ``seed`` uint64, ``refused`` string or null, then one float64
         column per swept key, named like it, and one per column of targets, null where a trial has none.
@@ -132,7 +132,7 @@ class Plan:
         Args:
             path: File that `write` wrote; rounds that were added since lie beside it.
             config: The configuration; its section `run` may differ.
-            slice: Which slice of the plan that the file holds is wanted; None for all that it holds.
+            slice: Slice to cut out of the plan of the file; None for all of it.
 
         Raises:
             DatasetError: If the file is missing, damaged, or no plan.
@@ -141,21 +141,21 @@ class Plan:
         """
         with open_parquet(path) as file:
             metadata = file.schema_arrow.metadata or {}
-            # The first four columns are those of every plan; what was drawn for each trial follows.
+            # The first four columns are those of every plan; the values that were drawn for each trial follow.
             columns = file.schema_arrow.names[4:]
             keys = tuple(name for name in columns if not is_target(name))
             targets = tuple(name for name in columns if is_target(name))
-            found = metadata.get(_FORMAT_KEY, b"none").decode(errors="replace")
-            if found != _FORMAT or not file.schema_arrow.equals(_schema(keys, targets)) or not file.metadata.num_rows:
+            version = metadata.get(_FORMAT_KEY, b"none").decode(errors="replace")
+            if version != _FORMAT or not file.schema_arrow.equals(_schema(keys, targets)) or not file.metadata.num_rows:
                 raise DatasetError(
                     "not a plan that this version reads",
                     path=path,
                     expected=f"plan format {_FORMAT}",
-                    evidence=f"got {found}",
+                    evidence=f"got {version}",
                 )
             if metadata.get(_CONFIG_KEY, b"") != config_digest(config).encode():
                 raise ForeignPlanError("the plan belongs to another configuration", path=path)
-            # The digest above is that of the configuration alone: columns may have been changed all the same.
+            # The digest above covers the configuration alone, so somebody may have changed the columns.
             for key in keys:
                 if reason := reason_not_sweepable(config, key):
                     raise DatasetError(f"is damaged: column {key!r}: {reason}", path=path)
@@ -169,20 +169,14 @@ class Plan:
         if trials.first:
             raise DatasetError(_MISNUMBERED, path=path)
         read_rounds(path, trials)
-        if slice is not None:
-            wanted = slice.trials_of(len(trials), trials_per_shard=config.record.trials_per_shard)
-            trials = trials[wanted.start : wanted.stop]
-        return cls(config, trials, slice)
+        plan = cls(config, trials)
+        return plan if slice is None else plan.slice_of(slice)
 
 
 def make_plan(config: Config, *, check: Check | None = None, directory: Path | None = None) -> Plan:
-    """Draw all trials of a sweep; of one that grows, its first two rounds (see `rounds`).
+    """Draw all trials of a sweep in this process; of one that grows, its first two rounds (see `rounds`).
 
-    Args:
-        config: Configuration with the sweep.
-        check: Says of the configuration of a trial why it cannot be run, or None when it can. A ConfigError that it
-            raises is such a reason, too.
-        directory: Directory at which a relative `sweep.file` starts; the current one when None.
+    Benchmarks and tests make their plans by it; `coordinator.prepare.draw_plan` makes large ones in several processes.
 
     Raises:
         PlanError: If the sweep has no point, or every trial is refused.
@@ -196,11 +190,9 @@ def make_plan(config: Config, *, check: Check | None = None, directory: Path | N
 
 
 def draw_first_points(config: Config, *, directory: Path) -> Points:
-    """The points of all trials that are known before anything runs; of a plan that grows, of its first two rounds.
+    """Draw the points of all trials that are known before anything runs; of a plan that grows, of its first two rounds.
 
-    Args:
-        config: Configuration with the sweep.
-        directory: Directory at which a relative `sweep.file` starts.
+    A relative `sweep.file` starts at `directory`.
 
     Raises:
         PlanError: If the sweep has no point.
@@ -211,17 +203,11 @@ def draw_first_points(config: Config, *, directory: Path) -> Points:
 
 
 def make_trials(config: Config, points: Points, *, first: int = 0) -> Trials:
-    """The trials of points, none of which is refused.
-
-    Args:
-        config: Configuration that the trials vary.
-        points: Their values.
-        first: Number of the first one.
-    """
+    """Make trials of points, with numbers from `first` on; none of them is refused."""
     count = len(points.values)
     seeds = np.fromiter((_seed(config.seed, number) for number in range(first, first + count)), np.uint64, count)
     digests = trial_digests(config, points, seeds)
-    return Trials(points.keys, points.values, seeds, digests, first=first, targets=points.targets)
+    return Trials(points, seeds, digests, first=first)
 
 
 def _seed(root: int, number: int) -> int:
@@ -229,12 +215,7 @@ def _seed(root: int, number: int) -> int:
 
 
 def refusal(config: Config, check: Check) -> str | None:
-    """Why the plan refuses a trial; None if it does not.
-
-    Args:
-        config: Configuration of the trial.
-        check: Says why it cannot be run; a ConfigError that it raises is a reason, too.
-    """
+    """Explain why the plan refuses a trial; None if it does not. A ConfigError of the check is a reason, too."""
     try:
         return check(config)
     except ConfigError as error:
@@ -250,7 +231,7 @@ def check_some_left(trials: Trials) -> None:
     reasons = list(trials.refused.values())
     if len(reasons) < len(trials):
         return
-    # Reasons that differ only in their numbers are one; the first of them speaks for all.
+    # Reasons that differ only in their numbers count as one, and the first of them is shown.
     kinds = [blank_numbers(reason) for reason in reasons]
     examples = dict(zip(reversed(kinds), reversed(reasons), strict=True))
     listed = [f"{count} × {examples[kind]}" for kind, count in Counter(kinds).most_common(_MOST_REASONS)]
@@ -261,13 +242,7 @@ def check_some_left(trials: Trials) -> None:
 
 
 def _read_trials(file: Any, keys: tuple[str, ...], targets: tuple[str, ...], path: Path) -> Trials:
-    """The trials of a plan's file, some after the other, as Arrow's memory for all of them is several times theirs.
-
-    Args:
-        file: The open file.
-        keys: Swept dotted keys.
-        targets: Columns of targets.
-        path: Its path, for messages.
+    """Read the trials of an open plan in batches, as Arrow's memory for all rows is several times that of the trials.
 
     Raises:
         DatasetError: If the numbers have gaps, or a digest is none.
@@ -298,17 +273,14 @@ def _trials_of(rows: Any, keys: tuple[str, ...], targets: tuple[str, ...], first
     if wrong := [number for number, digest in enumerate(digests, first) if not is_digest(digest)]:
         raise DatasetError("is damaged: has a digest that is no SHA-256", path=path, place=f"trial {wrong[0]}")
     values = np.column_stack([np.empty((len(rows), 0)), *(read_numbers(rows[key]) for key in keys)])
+    aims = Targets(targets, np.column_stack([nan_where_null(rows[name]) for name in targets])) if targets else None
     reasons = enumerate(rows["refused"].to_pylist(), first)
     return Trials(
-        keys,
-        values,
+        Points(keys, values, aims),
         read_numbers(rows["seed"]),
         np.frombuffer(bytes.fromhex("".join(digests)), np.uint8).reshape(-1, DIGEST_BYTES),
         first=first,
         refused={number: reason for number, reason in reasons if reason is not None},
-        targets=Targets(targets, np.column_stack([nan_where_null(rows[name]) for name in targets]))
-        if targets
-        else None,
     )
 
 

@@ -1,4 +1,4 @@
-"""Points from a CSV or Parquet file: one row a trial, dotted keys as columns, and columns of targets."""
+"""Points from a CSV or Parquet file: one row per trial, dotted keys as columns, and columns of targets."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from throwcollect.sweep.points import Points, Targets
 
 _MOST_PROBLEMS = 20
 _UNNAMED_INDEX = re.compile(r"__index_level_\d+__")
-"""Column in which pandas keeps the numbers of rows of which some were taken out; an index with a name may be a key."""
+"""Columns in which pandas keeps row numbers after rows were removed; an index with a name of its own may be a key."""
 
 
 @dataclass(frozen=True)
 class _Rows:
-    """The rows that hold numbers throughout, where each of them is in the file, and what is wrong with the others."""
+    """The rows that hold only numbers, the line or row number of each of them, and the problems of the others."""
 
     points: Points
     numbers: NDArray[np.intp]
@@ -39,7 +39,7 @@ def read_points(path: Path, config: Config) -> Points:
 
     Args:
         path: File that ends in ``.csv`` (UTF-8, comma, a header line) or ``.parquet``.
-        config: Configuration whose keys the columns are, and whose task says which targets there may be.
+        config: Configuration with the keys that the columns name; its task declares the columns of targets.
 
     Raises:
         ConfigError: If the file cannot be read, or its columns or values cannot be used; it holds all problems, or
@@ -61,7 +61,7 @@ def read_points(path: Path, config: Config) -> Points:
 
 
 def encode_points(points: Points) -> bytes:
-    """Parquet bytes that `read_points` reads; equal points give equal bytes."""
+    """Encode points as Parquet for `read_points`; equal points give equal bytes."""
     import pyarrow as pa
 
     from throwcollect.sweep.arrow_column import make_column, null_where_nan
@@ -74,11 +74,11 @@ def encode_points(points: Points) -> bytes:
 
 
 def _make_points(names: tuple[str, ...], values: NDArray[np.float64], config: Config) -> Points:
-    """Tell keys from targets, which are in the order of the task then, wherever they stand."""
+    """Separate keys from targets, and put targets into the order of the task."""
     keys = [column for column, name in enumerate(names) if not is_target(name)]
-    targets = tuple(each.name for each in config.task.target_columns if each.name in names)
-    wanted = Targets(targets, values[:, [names.index(name) for name in targets]]) if targets else None
-    return Points(tuple(names[column] for column in keys), values[:, keys], wanted)
+    targets = tuple(column.name for column in config.task.target_columns if column.name in names)
+    aims = Targets(targets, values[:, [names.index(name) for name in targets]]) if targets else None
+    return Points(tuple(names[column] for column in keys), values[:, keys], aims)
 
 
 def _read_csv(path: Path, config: Config) -> _Rows:
@@ -111,7 +111,7 @@ def _read_csv(path: Path, config: Config) -> _Rows:
 
 
 def _row(names: tuple[str, ...], cells: list[str], path: Path, line: int) -> tuple[list[float], list[Problem]]:
-    """The numbers of a row, NaN for targets that it leaves out."""
+    """Read the numbers of a row, NaN for targets that it leaves out."""
     if len(cells) != len(names):
         return [], [Problem(f"should have {len(names)} values, got {len(cells)}", "", path, line)]
     row, problems = [], []
@@ -150,7 +150,7 @@ def _read_parquet(path: Path, config: Config) -> _Rows:
         column = table[field.name]
         if not (pa.types.is_floating(field.type) or pa.types.is_integer(field.type)):
             problems.append(Problem(f"should be a column of numbers, got {field.type}", field.name, path))
-            # Without it no row would have a whole target, which is no further mistake.
+            # Without this column no row has a whole target; to report all rows for that would repeat the problem.
             good &= not is_target(field.name)
             continue
         valid = column.is_valid().to_numpy()
@@ -190,7 +190,7 @@ def _check_columns(names: tuple[str, ...], path: Path, config: Config, *, line: 
 
 
 def _find_target_problems(rows: _Rows, path: Path, config: Config) -> Iterator[Problem]:
-    """Rows with parts of a target."""
+    """Find rows with incomplete targets."""
     if (targets := rows.points.targets) is None or not len(rows.numbers):
         return
     there = ~np.isnan(targets.values)
@@ -203,7 +203,7 @@ def _find_target_problems(rows: _Rows, path: Path, config: Config) -> Iterator[P
 
 
 def _of_row(sentence: str, key: str, path: Path, number: int) -> Problem:
-    """A problem of a row: CSV has lines, and Parquet rows."""
+    """Make a problem of a row, which CSV counts in lines and Parquet in rows."""
     if path.suffix == ".csv":
         return Problem(sentence, key, path, number)
     return Problem(f"row {number}: {sentence}", key, path)
@@ -213,7 +213,7 @@ def _find_value_problems(rows: _Rows, path: Path, config: Config) -> Iterator[Pr
     if not len(rows.numbers):
         return
     for key, column in zip(rows.points.keys, rows.points.values.T, strict=True):
-        # What a key allows is an interval, so when both ends fit, all do.
+        # The allowed values of a key are an interval, so if the extreme values are allowed, all are.
         if not _refusals(config, key, np.array([column.min(), column.max()])):
             continue
         for row, sentence in _refusals(config, key, column):

@@ -1,4 +1,4 @@
-"""Points of a parameter space: what samplers draw and tables hold."""
+"""Points of a parameter space, which samplers draw and tables hold."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, eq=False)
 class Targets:
-    """Where trials should end, one row a trial; no trial depends on it.
+    """Places where trials should end, one row per trial; the simulation does not depend on them.
 
     Attributes:
         names: Columns of targets that the task declares, ``(n_targets,)``.
@@ -32,19 +32,19 @@ class Targets:
     __hash__ = None  # type: ignore[assignment]
 
     def row(self, number: int) -> dict[str, float]:
-        """The target of a row by column, without those that it does not have; empty if it has none."""
+        """Return the target of a row by column, without missing values; empty if it has none."""
         pairs = zip(self.names, self.values[number].tolist(), strict=True)
         return {name: value for name, value in pairs if not math.isnan(value)}
 
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """Values of the swept keys, one row a trial.
+    """Values of the swept keys, one row per trial.
 
     Attributes:
         keys: Dotted configuration keys, ``(n_keys,)``.
         values: In the units of the keys, shape ``(n_trials, n_keys)``.
-        targets: Where the trials should end; None if nobody says so.
+        targets: Places where the trials should end; None if no trial has one.
     """
 
     keys: tuple[str, ...]
@@ -62,5 +62,5 @@ class Points:
         return Points(self.keys, self.values[rows], self.targets and self.targets[rows])
 
     def first(self, count: int) -> Points:
-        """The first `count` points."""
+        """Return the first `count` points."""
         return self[:count]

@@ -1,7 +1,7 @@
-"""Rounds that a plan has got since its file was written; they lie beside it until it is written again, as a whole.
+"""Rounds that were added to a plan since its file was written; they lie beside it until it is written again as a whole.
 
 The file ``plan.rounds.part`` has a line of JSON for each round, so adding one costs the same however long the plan is.
-A line that has no end was being written when its writer was killed, and none of its trials has begun by then.
+A line without a line end is incomplete, because its writer was killed; no trial of it has begun.
 """
 
 from __future__ import annotations
@@ -15,20 +15,17 @@ import numpy as np
 from throwcollect.errors import DatasetError
 from throwcollect.files import is_there, open_regular, sync_directory, unreadable, unwritable, write_all
 from throwcollect.sweep.digest import is_digest
+from throwcollect.sweep.points import Points
 from throwcollect.sweep.trials import DIGEST_BYTES, Trials
 
 
 def rounds_path(plan: Path) -> Path:
-    """Where the rounds lie that the file of a plan does not have yet."""
+    """Name the file of the rounds that the file of a plan does not have yet."""
     return plan.with_name(f"{plan.stem}.rounds.part")
 
 
 def append_round(plan: Path, trials: Trials) -> None:
-    """Add a round to a plan on disk, whole or not at all; it survives a power cut from when this returns.
-
-    Args:
-        plan: File of the plan.
-        trials: The trials of the round, numbered on from those that are there.
+    """Add a round, which follows the trials on disk, to a plan, whole or not at all; then it survives a power cut.
 
     Raises:
         DatasetError: If it cannot be written.
@@ -42,28 +39,24 @@ def append_round(plan: Path, trials: Trials) -> None:
         "refused": [trials.refused.get(number) for number in trials.numbers],
     }
     try:
-        begun = is_there(path)
+        exists = is_there(path)
         descriptor = open_regular(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
         try:
             write_all(descriptor, json.dumps(line).encode() + b"\n")
             os.fsync(descriptor)
         finally:
             os.close(descriptor)
-        if not begun:
+        if not exists:
             sync_directory(path.parent)
     except OSError as error:
         raise unwritable(path, error) from error
 
 
 def read_rounds(plan: Path, trials: Trials) -> None:
-    """Append the rounds that lie beside the file of a plan to the trials that this file has.
-
-    Args:
-        plan: File of the plan.
-        trials: Its trials; rounds that are among them already stay as they are.
+    """Append the rounds that lie beside the file of a plan to the trials that this file has; skip those among them.
 
     Raises:
-        DatasetError: If a round is damaged, or does not go on where those before it end.
+        DatasetError: If a round is damaged, or does not begin where the one before it ends.
     """
     path = rounds_path(plan)
     if not is_there(path):
@@ -87,21 +80,20 @@ def _take(line: bytes, trials: Trials, path: Path, number: int) -> None:
 
 
 def _parse(line: bytes, keys: tuple[str, ...]) -> Trials:
-    """The trials of a line.
+    """Read the trials of a line.
 
     Raises:
-        ValueError: If it is none that `append_round` writes; or another of the errors that `_take` knows.
+        ValueError: If `append_round` did not write it; other errors that `_take` catches are possible, too.
     """
-    found = json.loads(line)
-    count = len(found["seeds"])
-    if not all(map(is_digest, found["digests"])):
+    entry = json.loads(line)
+    count = len(entry["seeds"])
+    if not all(map(is_digest, entry["digests"])):
         raise ValueError("no digests")
-    digests = np.frombuffer(bytes.fromhex("".join(found["digests"])), np.uint8)
+    digests = np.frombuffer(bytes.fromhex("".join(entry["digests"])), np.uint8)
     trials = Trials(
-        keys,
-        np.array(found["values"], np.float64).reshape(count, len(keys)),
-        np.array(found["seeds"], np.uint64),
+        Points(keys, np.array(entry["values"], np.float64).reshape(count, len(keys))),
+        np.array(entry["seeds"], np.uint64),
         digests.reshape(count, DIGEST_BYTES),
-        first=int(found["first"]),
+        first=int(entry["first"]),
     )
-    return trials.refuse([None if reason is None else str(reason) for reason in found["refused"]])
+    return trials.refuse([None if reason is None else str(reason) for reason in entry["refused"]])

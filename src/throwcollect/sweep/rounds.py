@@ -1,8 +1,8 @@
-"""Rounds, by which a plan grows while it is collected: which trials come next, from results and nothing else.
+"""Rounds of 64 trials, by which a plan grows while it is collected.
 
-A round has 64 trials. Whether there is a round r, and which trials are in it, depends on the configuration and on the
-results of rounds up to r - 2, all of which have ended by then: while the last trials of a round end, simulations are
-busy with the next one, and the order in which results arrive does not matter. The first two rounds depend on nothing.
+The configuration and the results of rounds up to r - 2 determine whether there is a round r, and its trials. All these
+rounds have ended by then, so the order in which results arrive does not matter; and while the last trials of a round
+end, simulations are busy with the next one. The first two rounds depend on no results.
 """
 
 from __future__ import annotations
@@ -28,10 +28,7 @@ _FIRST_ROUNDS = FIRST_TRIALS // ROUND_TRIALS
 
 
 class Rounds:
-    """The rounds of one plan.
-
-    Args:
-        config: A configuration whose plan grows.
+    """The rounds of the plan of a configuration that grows.
 
     Raises:
         PlanError: If nothing is swept, or `trials` does not fit the sampler.
@@ -46,84 +43,80 @@ class Rounds:
         self._values = Rows(np.empty((0, len(self._points.keys))))
         self._places = Rows(np.empty((0, targets)))
         self._waiting = bytearray()
-        """Of each trial, whether its result is still to come."""
-        self._running: list[int] = []
-        self._succeeded: list[int] = []
+        """For each trial, 1 until its result is known."""
+        self._succeeded = bytearray()
+        """For each trial, 1 if it is known to be a success."""
         self._ended = 0
-        """Number of rounds, from the first one on, of which every result is known."""
+        """Number of rounds, from the first one on, with all results known."""
         self._succeeded_in_ended = 0
 
     @property
     def limit(self) -> int:
-        """Number of trials that there may be at most."""
+        """Largest number of trials that the plan may reach."""
         return len(self._points.values)
 
     @property
     def planned(self) -> int:
-        """Number of trials that there are."""
+        """Number of trials in the plan."""
         return len(self._waiting)
 
     @property
     def over(self) -> bool:
-        """Whether no trial will follow."""
+        """No trial will follow."""
         if self.planned >= self.limit:
             return True
         return self._wanted is not None and self._decisive > 0 and self.due and self._succeeded_in_ended >= self._wanted
 
     @property
     def due(self) -> bool:
-        """Whether every result that the next trials depend on is known."""
+        """All results that the next trials depend on are known."""
         decisive = self._decisive
-        while self._ended < decisive and not self._running[self._ended]:
-            self._succeeded_in_ended += self._succeeded[self._ended]
+        while self._ended < decisive:
+            trials = slice(self._ended * ROUND_TRIALS, (self._ended + 1) * ROUND_TRIALS)
+            if any(self._waiting[trials]):
+                break
+            self._succeeded_in_ended += sum(self._succeeded[trials])
             self._ended += 1
         return self._ended == decisive
 
     @property
     def _decisive(self) -> int:
-        """Number of rounds whose results decide on the next trials."""
+        """Number of rounds whose results determine the next trials."""
         return max(0, self.planned // ROUND_TRIALS - 1)
 
     def add(self, trials: Trials) -> None:
-        """Take in trials that are in the plan.
-
-        Args:
-            trials: Numbered on from those that are there.
-        """
+        """Take in trials of the plan, which follow those that were taken in before."""
         self._values.append(trials.values)
         self._places.append(np.full((len(trials), self._places.all.shape[1]), np.nan))
-        for number in trials.numbers:
-            if number % ROUND_TRIALS == 0:
-                self._running.append(0)
-                self._succeeded.append(0)
-            runs = number not in trials.refused
-            self._running[-1] += runs
-            self._waiting.append(runs)
+        self._waiting += bytes(number not in trials.refused for number in trials.numbers)
+        self._succeeded += bytes(len(trials))
 
     def tell(self, number: int, result: Result) -> None:
-        """Take in what came of a trial; a second result of the same trial changes nothing."""
+        """Take in the result of a trial; a second result of the same trial changes nothing."""
         if not self._waiting[number]:
             return
         self._waiting[number] = False
-        self._running[number // ROUND_TRIALS] -= 1
-        self._succeeded[number // ROUND_TRIALS] += result.outcome.value == self._success
+        self._succeeded[number] = result.outcome.value == self._success
         if self._sampler is not None:
             values = dict(zip(self._points.keys, self._values.all[number].tolist(), strict=True))
             self._places.all[number] = self._sampler.place(values, result)
 
     def draw(self) -> Points | None:
-        """Go a step further towards the next trials, which must be due, with `over` not true.
+        """Draw one round, as `due` and not `over` allow.
+
+        The sampler of `sweep.target` learns from round to round, so after a resumption it first draws all rounds that
+        are in the plan already, one with each call.
 
         Returns:
-            Their points, to the end of a round; None if the step was to go through a round that is in the plan already.
+            The points of the next trials, to the end of their round; None if this round is in the plan already.
         """
-        number, there = divmod(self.planned, ROUND_TRIALS)
+        number, present = divmod(self.planned, ROUND_TRIALS)
         if self._sampler is None or number < _FIRST_ROUNDS:
-            return Points(self._points.keys, self._values_of(number)[there:])
+            return Points(self._points.keys, self._values_of(number)[present:])
         drawn = self._sampler.next_round
         known = (drawn - 1) * ROUND_TRIALS
         values = self._sampler.draw(self._values_of(drawn), self._values.all[:known], self._places.all[:known])
-        return Points(self._points.keys, values[there:]) if drawn == number else None
+        return Points(self._points.keys, values[present:]) if drawn == number else None
 
     def _values_of(self, number: int) -> NDArray[np.float64]:
         return self._points.values[number * ROUND_TRIALS : (number + 1) * ROUND_TRIALS]
@@ -132,7 +125,7 @@ class Rounds:
 def _target_sampler(config: Config) -> TargetSampler | None:
     if config.sweep.target is None:
         return None
-    # Importing scipy.spatial takes about a second, so only those who need it do, and not in the middle of a collection.
+    # Importing scipy.spatial takes about a second: only plans that need it do so, and before the collection begins.
     from throwcollect.sweep.target import TargetSampler
 
     return TargetSampler(config, config.sweep.target, first=_FIRST_ROUNDS)

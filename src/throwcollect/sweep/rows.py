@@ -1,4 +1,4 @@
-"""Rows of an array to which others are appended, without all that are there being copied each time."""
+"""An array that grows by rows and copies those that it has only seldom."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _Element = TypeVar("_Element", bound=np.generic)
 
 
 class Rows(Generic[_Element]):
-    """Rows of an array; appending costs as much as what is appended, taken over all of it.
+    """Rows of an array; on average, the cost of appending depends on the number of appended rows alone.
 
     Args:
         rows: The first rows, shape ``(n_rows, ...)``; never written to.
@@ -23,7 +23,7 @@ class Rows(Generic[_Element]):
 
     @property
     def all(self) -> NDArray[_Element]:
-        """All rows, shape ``(n_rows, ...)``; those that are there by now, also when others follow."""
+        """All rows, shape ``(n_rows, ...)``; the array stays as it is when others are appended."""
         return self._room[: self._count]
 
     def append(self, rows: NDArray[Any]) -> None:

@@ -1,4 +1,4 @@
-"""Samplers: from declared ranges to points. All randomness comes from the root seed."""
+"""Samplers, which draw points from declared ranges; all randomness comes from the root seed."""
 
 from __future__ import annotations
 
@@ -19,21 +19,17 @@ from throwcollect.sweep.sobol import MOST_DIMENSIONS, draw_sobol
 
 _MOST_TRIALS = 10_000_000
 _TRIALS_PER_SUCCESS = 10
-"""Trials for each throw that should land, at most, where a configuration says how many should and no more."""
+"""Most trials per wanted success, for configurations with `until` and without `trials`."""
 
 UnitSampler = Callable[[int, int, np.random.Generator], NDArray[np.float64]]
 """Number of points, number of keys, randomness → points of the unit cube, shape ``(n_trials, n_keys)``."""
 
 
 def draw_points(config: Config, *, directory: Path) -> Points:
-    """Draw the points of all trials; those of a plan that grows are the most that it may come to.
+    """Draw the points of all trials; for a plan that grows, as many as it may reach.
 
-    The first points of `uniform` and `sobol` do not depend on how many follow, so more trials keep those that exist.
-    `grid` goes through its points with the last key fastest.
-
-    Args:
-        config: Configuration with the sweep.
-        directory: Directory at which a relative `sweep.file` starts.
+    The first points of `uniform` and `sobol` do not depend on the number of points, so more trials keep those that
+    exist. In a `grid`, the last key varies fastest. A relative `sweep.file` starts at `directory`.
 
     Raises:
         PlanError: If nothing is swept, or `trials` does not fit the sampler.
@@ -66,7 +62,7 @@ def _uniform(count: int, dimensions: int, randomness: np.random.Generator) -> ND
 
 
 def _latin_hypercube(count: int, dimensions: int, randomness: np.random.Generator) -> NDArray[np.float64]:
-    """Points of which each of `count` equal strips along each key holds one, as those of SciPy."""
+    """Draw points so that each of `count` equal strips along each key holds one; they are the points of SciPy."""
     (own,) = randomness.spawn(1)
     places = own.uniform(size=(count, dimensions))
     strips = np.tile(np.arange(1, count + 1), (dimensions, 1))
@@ -92,7 +88,7 @@ UNIT_SAMPLERS = MappingProxyType[str, UnitSampler](
 
 
 def spread(parameter: Parameter, unit: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Values at places from 0 to 1 along a parameter, 1 excluded; sets of values get equal shares of the interval."""
+    """Map places from 0 to 1, 1 excluded, to values of a parameter; each of a set of values gets an equal share."""
     if isinstance(parameter, Values):
         return np.array(parameter.values)[(unit * len(parameter.values)).astype(np.int64)]
     if parameter.scale == "log":
@@ -104,7 +100,7 @@ def spread(parameter: Parameter, unit: NDArray[np.float64]) -> NDArray[np.float6
 
 
 def places(parameter: Parameter, values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The inverse of `spread`: places from 0 to 1 of values; a value of a set is in the middle of its share."""
+    """Map values to places from 0 to 1, the inverse of `spread`; a value of a set is in the middle of its share."""
     if isinstance(parameter, Values):
         nearest = np.argmin(np.abs(np.subtract.outer(values, parameter.values)), axis=1)
         return np.asarray((nearest + 0.5) / len(parameter.values))
@@ -118,7 +114,7 @@ def places(parameter: Parameter, values: NDArray[np.float64]) -> NDArray[np.floa
 
 
 def _grid(parameters: dict[str, Parameter], trials: int | None) -> Points:
-    size = math.prod(len(each.values) if isinstance(each, Values) else _count(each) for each in parameters.values())
+    size = math.prod(len(key.values) if isinstance(key, Values) else _count(key) for key in parameters.values())
     if trials is None and size > _MOST_TRIALS:
         raise PlanError(
             [Problem(f"the grid has {size} points", key="sweep.parameters")], expected=f"at most {_MOST_TRIALS}"

@@ -1,4 +1,4 @@
-"""Slices of a plan: whole shards of it, so that others can collect them, to the byte as they would be here."""
+"""Slices of a plan: whole shards of it, so that each can be collected anywhere with the same bytes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from throwcollect.wording import format_count
 
 @dataclass(frozen=True)
 class Slice:
-    """One of a number of slices, which together are the plan, in order; written as ``INDEX/COUNT``.
+    """One of several slices, which together are the plan, in order; written as ``INDEX/COUNT``.
 
     Attributes:
         index: From 0.
@@ -26,7 +26,7 @@ class Slice:
 
     @classmethod
     def parse(cls, text: str) -> Slice:
-        """Read a slice as it is written.
+        """Read the text of a slice.
 
         Raises:
             ConfigError: If it is no such text, or the index is not below the count.
@@ -42,17 +42,11 @@ class Slice:
 
     @classmethod
     def all_of(cls, count: int) -> tuple[Slice, ...]:
-        """All slices of a number of them."""
+        """List the slices of a plan that is cut into `count` slices."""
         return tuple(cls(index, count) for index in range(count))
 
     def trials_of(self, trials: int, *, trials_per_shard: int) -> range:
-        """Numbers of its trials.
-
-        The shards are handed out as evenly as they can be: two slices differ by at most one shard.
-
-        Args:
-            trials: Number of trials of the plan.
-            trials_per_shard: Trials in one MCAP file.
+        """List the numbers of its trials in a plan of `trials`; two slices of a plan differ by at most one shard.
 
         Raises:
             ConfigError: If there are fewer shards than slices.

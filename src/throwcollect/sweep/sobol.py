@@ -1,7 +1,7 @@
 """Scrambled Sobol sequences: points that fill the unit cube more evenly than random ones.
 
-They are those of `scipy.stats.qmc.Sobol`, bit for bit, which a test compares. A plan made here depends on no version of
-SciPy, whose statistics take longer to import than all else that a command needs.
+They are the points of `scipy.stats.qmc.Sobol`, bit for bit, which a test compares. With this code a plan depends on no
+version of SciPy, whose statistics take longer to import than everything else that a command needs.
 """
 
 from __future__ import annotations
@@ -13,20 +13,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 MOST_DIMENSIONS = 1024
-"""As many as the table of direction numbers has."""
+"""Size of the table of direction numbers."""
 BITS = 30
-"""Bits of a coordinate; there are as many points as numbers of so many bits."""
+"""Bits of a coordinate; a sequence has ``2**BITS`` points."""
 
 _TABLE = Path(__file__).with_name("joe_kuo_d6.txt")
 
 
 def draw_sobol(count: int, dimensions: int, randomness: np.random.Generator) -> NDArray[np.float64]:
-    """The first points of a sequence that is scrambled by a random matrix and a random shift (Matousek 1998).
+    """Draw the first points of a sequence that is scrambled by a random matrix and a random shift (Matousek 1998).
 
     Args:
-        count: Number of points, from 1 to 2 to the power of `BITS`.
+        count: Number of points, from 1 to ``2**BITS``.
         dimensions: Number of coordinates, from 1 to `MOST_DIMENSIONS`.
-        randomness: Where the scrambling comes from.
+        randomness: Source of the scrambling.
 
     Returns:
         Coordinates from 0 to 1, 1 excluded, shape ``(count, dimensions)``.
@@ -36,7 +36,7 @@ def draw_sobol(count: int, dimensions: int, randomness: np.random.Generator) -> 
     below = np.tril(randomness.integers(2, size=(dimensions, BITS, BITS), dtype=np.uint32), -1)
     matrices = _pack(below + np.eye(BITS, dtype=np.uint32), places[::-1])
     numbers = _multiply(matrices, _direction_numbers(dimensions))
-    # In Gray code, neighbours differ in one bit: the lowest one that is set in the number of the second of them.
+    # In Gray code, neighbours differ in one bit: the lowest one that is set in the index of the second one.
     index = np.arange(1, count)
     flipped = np.frexp(index & -index)[1] - 1
     points = np.empty((count, dimensions))
@@ -49,7 +49,7 @@ def draw_sobol(count: int, dimensions: int, randomness: np.random.Generator) -> 
 
 
 def _pack(bits: NDArray[np.uint32], places: NDArray[np.uint32]) -> NDArray[np.uint32]:
-    """Numbers of which each bit of the last axis is the one at its place."""
+    """Pack the bits of the last axis into numbers, each at its place."""
     packed: NDArray[np.uint32] = (bits << places).sum(axis=-1, dtype=np.uint32)
     return packed
 
@@ -68,13 +68,13 @@ def _multiply(matrices: NDArray[np.uint32], numbers: NDArray[np.uint32]) -> NDAr
 
 
 def _direction_numbers(dimensions: int) -> NDArray[np.uint32]:
-    """Direction numbers, shape ``(dimensions, BITS)``, by the recurrence of Bratley and Fox (1988)."""
+    """Compute direction numbers, shape ``(dimensions, BITS)``, by the recurrence of Bratley and Fox (1988)."""
     numbers = np.ones((dimensions, BITS), dtype=np.int64)
     with open(_TABLE, encoding="ascii") as lines:
         entries = (line.split() for line in lines if not line.startswith("#"))
         for row, (_, degree, coefficients, *first) in zip(numbers[1:], islice(entries, dimensions - 1), strict=True):
             s, a = int(degree), int(coefficients)
-            row[:s] = [int(each) for each in first]
+            row[:s] = [int(word) for word in first]
             for j in range(s, BITS):
                 number = row[j - s] ^ (row[j - s] << s)
                 for k in range(1, s):

@@ -1,4 +1,4 @@
-"""The sampler of `sweep.target`: spreads throws that land over the cells of landing targets."""
+"""The sampler of `sweep.target`, which spreads landing throws over the cells of landing targets."""
 
 from __future__ import annotations
 
@@ -17,21 +17,16 @@ from throwcollect.tasks.result import Result
 from throwcollect.tasks.throw.outcome import ThrowOutcome, ThrowResult
 
 _RANDOMNESS = 0
-"""First number of the spawn keys of rounds; those of trials have one number alone."""
+"""First number of the spawn keys of rounds, which have two numbers; those of trials have one."""
 _GOALS = 3
-"""Number of places that are tried in a cell; the throw aims at the one that it is predicted to come nearest to."""
+"""Number of random places in a cell for each throw; it aims at the one to which it is predicted to come nearest."""
 
 
 class TargetSampler:
-    """Draws round after round, each from the results of those two or more before it.
+    """Draws round after round, each from the results of rounds up to two before it.
 
-    It is a pure function of the configuration and these results: asked again from the first round on, with the same
-    results, it draws the same points.
-
-    Args:
-        config: Configuration with the sweep.
-        target: Its landing targets.
-        first: Number of the first round that is drawn from results.
+    The points are a pure function of the configuration and these results: a new sampler that gets the same results from
+    the first round on draws the same points. `first` is the number of the first round that it draws.
     """
 
     def __init__(self, config: Config, target: TargetConfig, *, first: int) -> None:
@@ -42,12 +37,12 @@ class TargetSampler:
         self._cells = Cells(target)
         self._model = InverseModel(len(self._parameters), self.dimensions)
         self._aims = np.full(first * ROUND_TRIALS, NOWHERE)
-        """Cells of the throws that `draw` was not told the end of."""
+        """Cells of the throws whose results `draw` does not know yet."""
         self._known = 0
-        """Number of trials that it was told the end of."""
+        """Number of trials whose results it knows."""
         self._landed = np.zeros(self._cells.count, dtype=np.int64)
         self._missed = np.zeros(self._cells.count, dtype=np.int64)
-        """Of each cell, throws at it that landed elsewhere or not at all, since the last landing in it."""
+        """For each cell, throws at it that landed elsewhere or not at all since the last landing in it."""
 
     @property
     def dimensions(self) -> int:
@@ -55,12 +50,7 @@ class TargetSampler:
         return len(self._cells.shape)
 
     def place(self, values: Mapping[str, float], result: Result) -> NDArray[np.float64]:
-        """What `draw` wants to know of a trial, shape ``(n_targets,)``: where it landed in bins; NaN if it did not.
-
-        Args:
-            values: Value of each swept key of the trial.
-            result: What came of it.
-        """
+        """Find the landing place of a trial for `draw`, in bins, shape ``(n_targets,)``; NaN if it did not land."""
         if not isinstance(result, ThrowResult) or result.outcome is not ThrowOutcome.LANDED:
             return np.full(self.dimensions, np.nan)
         return self._cells.place(values, result)
@@ -68,14 +58,14 @@ class TargetSampler:
     def draw(
         self, otherwise: NDArray[np.float64], tried: NDArray[np.float64], ended: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """The points of the next round.
+        """Draw the points of the next round.
 
         Args:
-            otherwise: Points to take while too few throws have landed, shape ``(n_trials, n_parameters)``: of a whole
-                round or, if it is the last one, of as many trials as it has.
-            tried: Values of the trials of all rounds but the one before, shape ``(n_tried, n_parameters)``; they begin
-                with those of the time before.
-            ended: What `place` says of each of them, shape ``(n_tried, n_targets)``.
+            otherwise: Points to return while too few throws have landed, shape ``(n_trials, n_parameters)``: a whole
+                round or, if it is the last one, as many trials as it has.
+            tried: Values of the trials of all rounds but the latest, shape ``(n_tried, n_parameters)``; they begin with
+                those of the previous call.
+            ended: The result of `place` for each of them, shape ``(n_tried, n_targets)``.
 
         Returns:
             Values in the units of the parameters, shape ``(n_trials, n_parameters)``.
@@ -101,11 +91,11 @@ class TargetSampler:
             unit = np.append(unit, proposed[~given_back], axis=0)
         self._aims = np.append(self._aims, aims)
         columns = [spread(parameter, unit[:, i]) for i, parameter in enumerate(self._parameters.values())]
-        # A round that is cut short begins as a whole one does, so that it can be made whole later.
+        # A short round has the first points of a whole one, so that later calls can complete it.
         return np.column_stack(columns)[: len(otherwise)]
 
     def _learn(self, tried: NDArray[np.float64], ended: NDArray[np.float64]) -> None:
-        """Take in what came of further trials, whose parameters are places in the unit cube."""
+        """Take in the results of further trials, whose parameters are places in the unit cube."""
         aimed, self._aims = self._aims[: len(ended)], self._aims[len(ended) :]
         self._known += len(ended)
         landed = np.isfinite(ended[:, 0])
@@ -118,11 +108,7 @@ class TargetSampler:
                 self._missed[cell] = 0
 
     def _thinness(self, randomness: np.random.Generator) -> Thinness:
-        """How thin the cells are.
-
-        Args:
-            randomness: Decides between equals.
-        """
+        """Make the current scores of the cells; `randomness` decides between equal ones."""
         cells = self._cells.count
         return Thinness(
             landed=self._landed,

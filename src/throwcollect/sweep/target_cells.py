@@ -1,4 +1,4 @@
-"""Landing targets as a grid of cells, and which of them should be thrown at next."""
+"""Landing targets as a grid of cells, and the choice of the next cells to throw at."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from throwcollect.config.sweep import LANDING_HEIGHT, TargetConfig
 from throwcollect.tasks.throw.outcome import ThrowResult
 
 NOWHERE = -1
-"""Stands in the place of a cell for none of them."""
+"""Number of no cell."""
 
 _TIE = 1e-6
-"""Cells whose scores differ by less are equally thin."""
+"""Cells whose scores differ by less count as equal."""
 _MOST_DOUBLINGS = 60
 _DOUBT = 4
-"""Number of misses that a doubt counts for."""
+"""A doubt counts as so many misses."""
 
 
 class Cells:
@@ -27,26 +27,18 @@ class Cells:
     Attributes:
         shape: Number of bins of each target, ``(n_targets,)``.
         count: Number of cells.
-
-    Args:
-        target: The targets and their bins.
     """
 
     def __init__(self, target: TargetConfig) -> None:
         self._names = tuple(target.dimensions)
-        bins = target.dimensions.values()
-        self._low = np.array([each.min for each in bins])
-        self._width = np.array([(each.max - each.min) / each.bins for each in bins])
-        self.shape = tuple(each.bins for each in bins)
+        dimensions = target.dimensions.values()
+        self._low = np.array([dimension.min for dimension in dimensions])
+        self._width = np.array([(dimension.max - dimension.min) / dimension.bins for dimension in dimensions])
+        self.shape = tuple(dimension.bins for dimension in dimensions)
         self.count = math.prod(self.shape)
 
     def place(self, values: Mapping[str, float], result: ThrowResult) -> NDArray[np.float64]:
-        """Where a throw landed, in bins, shape ``(n_targets,)``; NaN if it has no landing.
-
-        Args:
-            values: Value of each swept key of its trial.
-            result: What came of it.
-        """
+        """Find the landing place of a throw in bins, shape ``(n_targets,)``; NaN if it has no landing."""
         measured = dict.fromkeys(self._names, math.nan)
         if result.landing is not None and result.hit_angle_rad is not None:
             measured = {
@@ -58,37 +50,37 @@ class Cells:
         return place
 
     def cells_of(self, places: NDArray[np.float64]) -> NDArray[np.int64]:
-        """Cell of each place, shape ``(n_places,)``, -1 where it is in none.
+        """Find the cell of each place, shape ``(n_places,)``; `NOWHERE` for places outside of all cells.
 
         Args:
             places: In bins, shape ``(n_places, n_targets)``; the upper end of the last bin is in it, NaN is in none.
         """
         shape = np.array(self.shape)
         inside = ((places >= 0) & (places <= shape)).all(axis=1)
-        found = np.full(len(places), NOWHERE, dtype=np.int64)
+        cells = np.full(len(places), NOWHERE, dtype=np.int64)
         bins = np.minimum(places[inside].astype(np.int64), shape - 1)
-        found[inside] = np.ravel_multi_index(tuple(bins.T), self.shape)
-        return found
+        cells[inside] = np.ravel_multi_index(tuple(bins.T), self.shape)
+        return cells
 
     def corners(self, cells: NDArray[np.int64]) -> NDArray[np.float64]:
-        """Lower corner of each cell in bins, shape ``(n_cells, n_targets)``."""
+        """Find the lower corner of each cell in bins, shape ``(n_cells, n_targets)``."""
         return np.column_stack(np.unravel_index(cells, self.shape)).astype(np.float64)
 
 
 class Thinness:
-    """Which cells should be thrown at next: each time the one with the lowest score.
+    """Chooses cells to throw at: each time the one with the lowest score.
 
-    The score of a cell is the number of throws that have landed in it or are asked for, and for cells that seem out of
-    reach a penalty on top: ``2^(missed - 1) - 1``, so that each further miss doubles the wait for the next try, and the
-    square of how much farther than one bin the nearest landing is, so that the edge of what is reached moves outwards
-    before what lies beyond it is tried.
+    The score of a cell is the number of throws that have landed in it or are planned, plus penalties for cells that
+    seem out of reach: ``2^(missed - 1) - 1``, so that each further miss doubles the wait for the next try, and the
+    square of the distance of the nearest landing beyond one bin, so that throws reach the cells at the edge of the
+    region that they cover before those behind it.
 
     Args:
         landed: Throws that landed in each cell, shape ``(n_cells,)``.
-        asked: Throws that are asked for but whose results are not known yet.
+        asked: Planned throws at each cell whose results are not known yet.
         missed: Throws at each cell that landed elsewhere or not at all, since the last landing in it.
         away: Distance of each cell's centre from the nearest landing [bins].
-        randomness: Decides between cells that are equally thin.
+        randomness: Decides between cells with equal scores.
     """
 
     def __init__(
@@ -106,7 +98,7 @@ class Thinness:
         self._score += _TIE * randomness.permutation(len(missed)) / len(missed)
 
     def take(self, count: int) -> NDArray[np.int64]:
-        """So many cells, one after the other; each counts as asked for at once."""
+        """Choose `count` cells, one after the other; each counts as planned at once."""
         taken = np.empty(count, dtype=np.int64)
         for index in range(count):
             taken[index] = np.argmin(self._score)
@@ -114,13 +106,10 @@ class Thinness:
         return taken
 
     def doubt(self, cells: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Give back cells for which no promising throw was found; from now on they count as missed four times more.
-
-        Args:
-            cells: Some that were taken, shape ``(n_cells,)``.
+        """Give back chosen cells without a promising throw; from now on each counts as missed `_DOUBT` times more.
 
         Returns:
-            Which of them are given back: not those that had been doubted before, and were taken all the same.
+            True for cells that are given back: `take` may choose a cell again after a doubt, which then keeps it.
         """
         fresh = ~self._doubted[cells]
         np.subtract.at(self._score, cells[fresh], 1)

@@ -1,4 +1,4 @@
-"""Trials as a plan holds them: in columns, some 80 bytes each, of which a trial is made when it is asked for."""
+"""Trials as a plan holds them: in columns of some 80 bytes per trial, from which single trials are made on demand."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Trial:
         seed: Seed for anything random in the trial, from the root seed and the number; fits uint64.
         digest: SHA-256 in hex over everything that determines the trial's samples.
         refused: Why the trial is not run, or None.
-        target: Where it should end, by column; empty if nobody says so. Nothing that the trial does depends on it.
+        target: Place where it should end, by column; empty if it has none. The simulation does not depend on it.
     """
 
     number: int
@@ -39,40 +39,36 @@ class Trial:
 
 
 class Trials(Sequence[Trial]):
-    """Trials in order and without gaps; a slice of them stays as it is when others are appended to these.
+    """Trials in order and without gaps; appending trials does not change slices that were cut before.
 
     Attributes:
         keys: Swept dotted keys.
         first: Number of the first trial.
-        target_names: Columns of targets; none if nobody says where trials should end.
+        target_names: Columns of targets; empty if no trial has one.
 
     Args:
-        keys: Swept dotted keys, ``(n_keys,)``.
-        values: Their values in the units of the keys, shape ``(n_trials, n_keys)``.
+        points: Values and targets of the trials.
         seeds: Seed of each trial, shape ``(n_trials,)``.
         digests: Digest of each trial, shape ``(n_trials, DIGEST_BYTES)``.
         first: Number of the first trial.
-        refused: Why trials are not run, by their numbers; of those that are not run alone.
-        targets: Where the trials should end; None if nobody says so.
+        refused: Reasons of the trials that are not run, by their numbers.
     """
 
     def __init__(
         self,
-        keys: Sequence[str],
-        values: NDArray[np.float64],
+        points: Points,
         seeds: NDArray[np.uint64],
         digests: NDArray[np.uint8],
         *,
         first: int = 0,
         refused: Mapping[int, str] = MappingProxyType({}),
-        targets: Targets | None = None,
     ) -> None:
-        self.keys = tuple(keys)
+        self.keys, targets = points.keys, points.targets
         self.first = first
-        self._values, self._seeds, self._digests = Rows(values), Rows(seeds), Rows(digests)
+        self._values, self._seeds, self._digests = Rows(points.values), Rows(seeds), Rows(digests)
         self._refused = dict(refused)
         self.target_names = () if targets is None else targets.names
-        self._targets = Rows(np.empty((len(values), 0)) if targets is None else targets.values)
+        self._targets = Rows(np.empty((len(points.values), 0)) if targets is None else targets.values)
 
     @property
     def values(self) -> NDArray[np.float64]:
@@ -96,12 +92,12 @@ class Trials(Sequence[Trial]):
 
     @property
     def targets(self) -> Targets | None:
-        """Where the trials should end; None if nobody says so."""
+        """Places where the trials should end; None if no trial has one."""
         return Targets(self.target_names, self._targets.all) if self.target_names else None
 
     @property
     def refused(self) -> Mapping[int, str]:
-        """Why trials are not run, by their numbers and in their order; of those that are not run alone."""
+        """Reasons of the trials that are not run, by their numbers and in their order."""
         return self._refused
 
     @property
@@ -122,7 +118,7 @@ class Trials(Sequence[Trial]):
     @overload
     def __getitem__(self, which: slice) -> Trials: ...
     def __getitem__(self, which: int | slice) -> Trial | Trials:
-        """A trial by its position, or those of a slice without gaps.
+        """Return the trial at a position, or those of a slice without gaps.
 
         Raises:
             IndexError: If there are not so many.
@@ -135,9 +131,7 @@ class Trials(Sequence[Trial]):
             raise ValueError(f"trials have no gaps: {which}")
         rows = slice(chosen.start - self.first, chosen.stop - self.first)
         refused = {number: self._refused[number] for number in chosen if number in self._refused}
-        columns = self.values[rows], self.seeds[rows], self.digests[rows]
-        targets = None if self.targets is None else self.targets[rows]
-        return Trials(self.keys, *columns, first=chosen.start, refused=refused, targets=targets)
+        return Trials(self.points[rows], self.seeds[rows], self.digests[rows], first=chosen.start, refused=refused)
 
     def __iter__(self) -> Iterator[Trial]:
         return map(self._trial, self.numbers)
@@ -159,10 +153,10 @@ class Trials(Sequence[Trial]):
         return f"Trials({len(self)} from {self.first}, {len(self._refused)} refused; swept: {', '.join(self.keys)})"
 
     def extend(self, others: Trials) -> None:
-        """Append trials, which go on where these end, vary the same keys and have the same columns of targets.
+        """Append trials.
 
         Raises:
-            ValueError: If they do not.
+            ValueError: If they do not begin where these end, vary other keys, or have other columns of targets.
         """
         names = (others.keys, others.target_names)
         if others.first != self.numbers.stop or names != (self.keys, self.target_names):
@@ -174,15 +168,10 @@ class Trials(Sequence[Trial]):
         self._refused |= others.refused
 
     def refuse(self, reasons: Sequence[str | None]) -> Trials:
-        """These trials, refused as told and not otherwise.
-
-        Args:
-            reasons: Why each trial is not run, in order; None for those that are.
-        """
+        """Make the same trials with other reasons for refusal, one for each trial in order; None if it is run."""
         pairs = zip(self.numbers, reasons, strict=True)
         refused = {number: reason for number, reason in pairs if reason is not None}
-        columns = self.values, self.seeds, self.digests
-        return Trials(self.keys, *columns, first=self.first, refused=refused, targets=self.targets)
+        return Trials(self.points, self.seeds, self.digests, first=self.first, refused=refused)
 
     def _trial(self, number: int) -> Trial:
         row = number - self.first

@@ -1,6 +1,6 @@
-"""How the fields of a result stand in the table of throws: declared once, on the field, for writing and for reading.
+"""Columns of the table of throws: each field of a result declares its own once, for writing and for reading.
 
-A field of a result says which columns it has by what it is made with::
+A field of a result declares its columns by the function that makes it::
 
     release: BallState | None = measured(BallColumns("when it left the {tool}"))
     flight_time_s: float | None = measured(Number("From release to landing [s]."))
@@ -13,7 +13,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import Field, dataclass, field
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from throwcollect.tasks.measures import BallState, Peak, Vector
 
@@ -26,9 +26,9 @@ class Column:
 
     Attributes:
         name: Its name.
-        kind: What it holds: numbers, whole numbers, or text; null where there is nothing.
+        kind: Kind of its values: numbers, whole numbers, or text; null where there is nothing.
         description: One sentence, with units.
-        later: Whether datasets of earlier versions lack it.
+        later: Datasets of earlier versions lack this column.
     """
 
     name: str
@@ -38,24 +38,19 @@ class Column:
 
 
 class Columns(ABC):
-    """The columns of one field of a result; the values of all of them are null where the field is None."""
+    """The columns of one field of a result, by default a single one; all are null where the field is None."""
 
     @abstractmethod
     def declare(self, name: str, joints: Sequence[str]) -> list[Column]:
-        """List the columns.
+        """List the columns of the field `name`, for the joints that the task moves."""
 
-        Args:
-            name: Name of the field.
-            joints: Joints that the task moves.
-        """
-
-    @abstractmethod
     def split(self, value: Any, joints: Sequence[str]) -> Sequence[object]:
         """Split a value of the field, which is not None, into one value for each column."""
+        return (value,)
 
-    @abstractmethod
     def join(self, values: Sequence[Any], joints: Sequence[str]) -> Any:
         """Make the field's value of the columns' values, none of which is null."""
+        return values[0]
 
 
 @dataclass(frozen=True)
@@ -63,33 +58,23 @@ class Number(Columns):
     """A number, in a column that has the field's name.
 
     Attributes:
-        description: What it is, with its unit.
-        later: Whether datasets of earlier versions lack it.
+        description: One sentence, with the unit.
+        later: Datasets of earlier versions lack this column.
     """
 
+    kind: ClassVar[Literal["number", "count"]] = "number"
     description: str
     later: bool = False
 
     def declare(self, name: str, joints: Sequence[str]) -> list[Column]:
         """List the column; see `Columns`."""
-        return [Column(name, "number", self.description, self.later)]
-
-    def split(self, value: float, joints: Sequence[str]) -> Sequence[object]:
-        """Return the number alone; see `Columns`."""
-        return (value,)
-
-    def join(self, values: Sequence[Any], joints: Sequence[str]) -> Any:
-        """Return the number; see `Columns`."""
-        return values[0]
+        return [Column(name, self.kind, self.description, self.later)]
 
 
-@dataclass(frozen=True)
 class Count(Number):
     """A whole number, in a column that has the field's name."""
 
-    def declare(self, name: str, joints: Sequence[str]) -> list[Column]:
-        """List the column; see `Columns`."""
-        return [Column(name, "count", self.description, self.later)]
+    kind = "count"
 
 
 @dataclass(frozen=True)
@@ -97,7 +82,7 @@ class BallColumns(Columns):
     """A `BallState`: ``<field>_time_s``, ``<field>_x_m`` and so on.
 
     Attributes:
-        when: At which instant, as the end of a sentence.
+        when: The instant, as the end of a sentence.
     """
 
     when: str
@@ -136,7 +121,7 @@ class SpinColumns(Columns):
     """An angular velocity of the ball: ``<field>_x_radps`` and so on. Datasets of earlier versions lack it.
 
     Attributes:
-        when: At which instant, as the end of a sentence.
+        when: The instant, as the end of a sentence.
     """
 
     when: str
@@ -167,7 +152,7 @@ class PeakColumns(Columns):
     """A `Peak`: ``<field>_share`` and ``<field>_joint``.
 
     Attributes:
-        of: What the share is, as the beginning of a sentence.
+        of: Description of the share, as the beginning of a sentence.
     """
 
     of: str
@@ -194,7 +179,7 @@ class JointColumns(Columns):
     """A number for each joint that the task moves, by joint: ``<joint>_<field>``.
 
     Attributes:
-        description: What it is, with its unit; ``{joint}`` stands for the joint.
+        description: One sentence, with the unit; ``{joint}`` stands for the joint.
     """
 
     description: str
@@ -213,11 +198,11 @@ class JointColumns(Columns):
 
 
 def measured(columns: Columns) -> Any:
-    """Make a field of a result that is None where there is nothing to measure, and stands in these columns."""
+    """Make a field of a result that stands in these columns, and is None where there is nothing to measure."""
     return field(default=None, metadata={_DECLARED: columns})
 
 
 def columns_of(declared: Field[Any]) -> Columns | None:
-    """Return the columns that a field of a result was declared with; None if it is no measure."""
+    """Return the columns of a field of a result; None if it was not made by `measured`."""
     columns: Columns | None = declared.metadata.get(_DECLARED)
     return columns

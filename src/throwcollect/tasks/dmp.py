@@ -41,7 +41,7 @@ def dmp_trajectory(
     family: DynamicMovementPrimitive,
     points_hz: float,
 ) -> JointTrajectory:
-    """Points on the motion of a DMP, brought to rest at its goal.
+    """Compute points on the motion of a DMP, which ends at rest at its goal.
 
     A DMP only approaches its goal. Points follow it until every joint stays within 1 mrad and 5 mrad/s of rest at
     the goal; one more point at rest, exactly at the goal and at least 0.2 s later, ends the trajectory. The last
@@ -53,9 +53,6 @@ def dmp_trajectory(
         duration_s: Time constant tau [s]. The motion lasts longer than that until it has settled.
         family: Weights and constants of the DMP.
         points_hz: Points per second.
-
-    Returns:
-        The trajectory; its last point is at rest, exactly at `end`.
 
     Raises:
         ConfigError: If the motion has not settled after 5 tau.
@@ -98,7 +95,7 @@ def roll_out(
     family: DynamicMovementPrimitive,
     refinement: int = 1,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Motion of a DMP that starts at rest, by the classical Runge-Kutta method with exact phase.
+    """Compute the motion of a DMP that starts at rest, by the classical Runge-Kutta method with exact phase.
 
     The step resolves the fastest time scale of both the transformation system and the basis functions, which keeps
     positions within 1e-7 rad per rad of motion.
@@ -109,8 +106,8 @@ def roll_out(
         goal: Goals [rad], shape ``(n_joints,)``.
         weights: [rad], shape ``(n_joints, n_basis_functions)``.
         tau: Time constant [s].
-        family: Constants of the DMP; its weights are not looked at.
-        refinement: Factor on the number of integration steps, to measure the error.
+        family: Constants of the DMP; its weights are ignored.
+        refinement: Factor on the number of integration steps; tests measure the error of the integration by it.
 
     Returns:
         Positions [rad], velocities [rad/s] and accelerations [rad/s²], each of shape ``(n, n_joints)``.
@@ -137,40 +134,29 @@ def roll_out(
         y, z = state
         return yy * y + yz * z + push[0], zy * y + zz * z + push[1]
 
-    # Joint by joint, as two numbers are not worth an array.
-    pushes = zip(drive.transpose(2, 0, 1).tolist(), (start - goal).tolist(), strict=True)
-    states = np.array([list(accumulate(each, following, initial=(offset, 0.0))) for each, offset in pushes])
+    # One joint after the other in plain numbers: for two numbers each, arrays are slower.
+    drives = zip(drive.transpose(2, 0, 1).tolist(), (start - goal).tolist(), strict=True)
+    states = np.array([list(accumulate(pushes, following, initial=(offset, 0.0))) for pushes, offset in drives])
     offsets, speeds = np.moveaxis(states[:, ::substeps], (0, 1, 2), (2, 1, 0))
     push = forcing[:: 2 * substeps] - family.alpha_z * (family.alpha_z / 4 * offsets + speeds)
     return goal + offsets, speeds / tau, push / tau**2
 
 
 def basis(phase: NDArray[np.float64], *, count: int, alpha_x: float) -> NDArray[np.float64]:
-    """Normalised basis functions times the phase: the forcing term is their product with the weights.
+    """Compute the normalised basis functions times the phase x, shapes ``(n, count)`` and ``(n,)``.
 
-    Args:
-        phase: x, shape ``(n,)``.
-        count: Number of basis functions, at least 2.
-        alpha_x: Decay constant of the phase.
-
-    Returns:
-        Shape ``(n, count)``.
+    The forcing term is their product with the weights.
     """
     centres, variances = kernels(count=count, alpha_x=alpha_x)
     exponents = (phase[:, None] - centres) ** 2 / (-2 * variances)
-    # Far from all centres every psi underflows; their ratios do not.
+    # Far from all centres every psi underflows, but their ratios do not: this makes the largest one 1.
     psi = exp(exponents - exponents.max(axis=1, keepdims=True))
     weighted: NDArray[np.float64] = psi * (phase / psi.sum(axis=1))[:, None]
     return weighted
 
 
 def kernels(*, count: int, alpha_x: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Centres ``c_i`` and squared widths ``sigma2_i`` of the basis functions over the phase, each ``(count,)``.
-
-    Args:
-        count: Number of basis functions, at least 2.
-        alpha_x: Decay constant of the phase.
-    """
+    """Compute centres ``c_i`` and squared widths ``sigma2_i`` of the basis functions, each of shape ``(count,)``."""
     centres = exp(-alpha_x * np.linspace(0, 1, count))
     widths = (0.75 * np.diff(centres)) ** 2
     return centres, np.append(widths, widths[-1])
@@ -181,58 +167,27 @@ def fit_dmp(
     times: NDArray[np.float64],
     positions: NDArray[np.float64],
     *,
-    velocities: NDArray[np.float64] | None = None,
-    accelerations: NDArray[np.float64] | None = None,
-    basis_functions: int = 20,
-    alpha_z: float = 48.0,
-    alpha_x: float = 2.0,
+    velocities: NDArray[np.float64],
+    accelerations: NDArray[np.float64],
+    basis_functions: int,
 ) -> DynamicMovementPrimitive:
-    """Weights with which a DMP repeats a demonstrated motion, by linear least squares over all basis functions.
+    """Find the weights with which a DMP repeats a demonstrated motion, by least squares over all basis functions.
 
     The DMP starts at the first position; its goal is the last one and its tau the duration of the demonstration,
-    which should start and end at rest.
+    which should start and end at rest. Its other constants have their defaults.
 
     Args:
         joints: Names of the joints, ``(n_joints,)``.
-        times: [s], strictly increasing, shape ``(n,)``; need not be evenly spaced.
+        times: [s], from 0, strictly increasing, shape ``(n,)`` with at least as many as there are basis functions.
         positions: [rad], shape ``(n, n_joints)``.
-        velocities: [rad/s], shape ``(n, n_joints)``; finite differences of the positions when None.
-        accelerations: [rad/s²], shape ``(n, n_joints)``; finite differences of the velocities when None.
+        velocities: [rad/s], shape ``(n, n_joints)``.
+        accelerations: [rad/s²], shape ``(n, n_joints)``.
         basis_functions: Number of basis functions of each joint.
-        alpha_z: Stiffness constant of the transformation system.
-        alpha_x: Decay constant of the phase.
-
-    Returns:
-        Trajectory family with these weights, as `task.trajectory` takes it.
-
-    Raises:
-        ValueError: If the shapes do not fit.
-        ConfigError: If times do not increase, or there are fewer samples than basis functions.
     """
-    shape = (len(times), len(joints))
-    for name, array in (("positions", positions), ("velocities", velocities), ("accelerations", accelerations)):
-        if array is not None and array.shape != shape:
-            raise ValueError(f"{name} of shape {array.shape} for {shape[0]} times and {shape[1]} joints")
-    if len(times) < max(basis_functions, 3):
-        raise ConfigError(
-            f"a demonstration of {len(times)} samples for {basis_functions} basis functions",
-            expected=f"at least {max(basis_functions, 3)} samples",
-        )
-    if not (np.diff(times) > 0).all():
-        raise ConfigError("the times of the demonstration do not increase strictly")
-    since = times - times[0]
-    tau = since[-1]
-    if velocities is None:
-        velocities = np.gradient(positions, since, axis=0, edge_order=2)
-    if accelerations is None:
-        accelerations = np.gradient(velocities, since, axis=0, edge_order=2)
+    family = DynamicMovementPrimitive(family="dmp", basis_functions=basis_functions)
+    alpha_z, tau = family.alpha_z, times[-1]
     target = tau**2 * accelerations - alpha_z * (alpha_z / 4 * (positions[-1] - positions) - tau * velocities)
-    features = basis(exp(-alpha_x / tau * since), count=basis_functions, alpha_x=alpha_x)
+    features = basis(exp(-family.alpha_x / tau * times), count=basis_functions, alpha_x=family.alpha_x)
     weights = np.linalg.lstsq(features, target, rcond=None)[0]
-    return DynamicMovementPrimitive(
-        family="dmp",
-        basis_functions=basis_functions,
-        weights={joint: column.tolist() for joint, column in zip(joints, weights.T, strict=True)},
-        alpha_z=alpha_z,
-        alpha_x=alpha_x,
-    )
+    learned = {joint: column.tolist() for joint, column in zip(joints, weights.T, strict=True)}
+    return family.model_copy(update={"weights": learned})

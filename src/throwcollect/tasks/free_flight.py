@@ -13,7 +13,7 @@ from throwcollect.config.schema import Config
 def ballistic_positions(
     position: NDArray[np.float64], velocity: NDArray[np.float64], *, steps: int, config: Config
 ) -> NDArray[np.float64]:
-    """Ball in free flight, step by step as the physics computes it.
+    """Compute the way of one ball in free flight.
 
     Args:
         position: Ball centre at the start [m], shape ``(3,)``.
@@ -24,13 +24,11 @@ def ballistic_positions(
     Returns:
         Ball centre [m] at the start and after each step, shape ``(steps + 1, 3)``.
     """
-    dt = 1 / config.sim.physics_hz
-    ball, scene = config.ball, config.scene
-    area = math.pi * ball.radius_m**2
-    drag_per_m = 0.5 * scene.air_density_kgpm3 * ball.drag_coefficient * area / ball.mass_kg
+    dt, gravity_mps2 = 1 / config.sim.physics_hz, config.scene.gravity_mps2
+    drag_per_m = _drag_per_m(config)
     if drag_per_m == 0:
-        # Sums from the first row to the last, as below, so the bits are the same.
-        velocities = np.full((steps + 1, 3), [0.0, 0.0, -scene.gravity_mps2 * dt])
+        # These sums run from the first row to the last, as those of the loop below, so the bits are the same.
+        velocities = np.full((steps + 1, 3), [0.0, 0.0, -gravity_mps2 * dt])
         velocities[0] = velocity
         moves = np.add.accumulate(velocities) * dt
         moves[0] = position
@@ -42,7 +40,7 @@ def ballistic_positions(
         braking = drag_per_m * math.sqrt(vx * vx + vy * vy + vz * vz)
         vx -= braking * vx * dt
         vy -= braking * vy * dt
-        vz -= (scene.gravity_mps2 + braking * vz) * dt
+        vz -= (gravity_mps2 + braking * vz) * dt
         x += vx * dt
         y += vy * dt
         z += vz * dt
@@ -53,24 +51,21 @@ def ballistic_positions(
 def ballistic_steps(
     position: NDArray[np.float64], velocity: NDArray[np.float64], *, steps: int, config: Config
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Many balls after some physics steps of free flight each, by the arithmetic of `ballistic_positions`.
+    """Compute positions and velocities of many balls, each of shape ``(n, 3)``, after some steps of free flight.
 
-    Args:
-        position: Ball centres at the start [m], shape ``(n, 3)``.
-        velocity: At the start [m/s], shape ``(n, 3)``.
-        steps: Number of physics steps.
-        config: Gravity, air, ball and physics rate.
-
-    Returns:
-        Positions [m] and velocities [m/s] after the last step, each of shape ``(n, 3)``.
+    The arithmetic and the arguments are those of `ballistic_positions`.
     """
-    dt = 1 / config.sim.physics_hz
-    ball, scene = config.ball, config.scene
-    area = math.pi * ball.radius_m**2
-    drag_per_m = 0.5 * scene.air_density_kgpm3 * ball.drag_coefficient * area / ball.mass_kg
-    gravity = np.array([0.0, 0.0, -scene.gravity_mps2])
+    dt, drag_per_m = 1 / config.sim.physics_hz, _drag_per_m(config)
+    gravity = np.array([0.0, 0.0, -config.scene.gravity_mps2])
     for _ in range(steps):
         braking = drag_per_m * np.linalg.norm(velocity, axis=1, keepdims=True)
         velocity = velocity + (gravity - braking * velocity) * dt
         position = position + velocity * dt
     return position, velocity
+
+
+def _drag_per_m(config: Config) -> float:
+    """Compute the ball's deceleration by the air over the square of its speed [1/m]."""
+    ball = config.ball
+    area = math.pi * ball.radius_m**2
+    return 0.5 * config.scene.air_density_kgpm3 * ball.drag_coefficient * area / ball.mass_kg

@@ -1,10 +1,9 @@
-"""What every task measures of the joints in an episode, and what of it fails a trial."""
+"""Measures of the joints in an episode that every task has, and the reasons in them for which a trial fails."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +15,7 @@ from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.quintic_curve import sample_positions
 from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.tasks.measures import Peak
-from throwcollect.tasks.result import Result
+from throwcollect.tasks.result import AnyResult, Result
 from throwcollect.units import NS_PER_S
 
 _SLACK = 1e-3
@@ -24,30 +23,13 @@ _AT_LIMIT = 1 - _SLACK
 _FAILED_GOALS = {5: "canceled", 6: "aborted"}
 
 
-@dataclass(frozen=True)
-class JointMeasures:
-    """What is measured of the joints; the attributes are those of `Result`."""
-
-    position_peak: Peak
-    velocity_peak: Peak
-    effort_peak: Peak
-    effort_saturated_share: float
-    tracking_error_rad: Mapping[str, float]
-
-
 def measure_joints(
-    samples: Samples, start_ns: int, *, config: Config, trajectory: JointTrajectory
-) -> JointMeasures | None:
+    result: AnyResult, samples: Samples, start_ns: int, *, config: Config, trajectory: JointTrajectory
+) -> AnyResult | None:
     """Measure how close the joints came to their limits, and how well they followed their trajectory.
 
-    Args:
-        samples: The recorded trial, at least two samples.
-        start_ns: Its start, at which the trajectory starts [ns].
-        config: Configuration of the trial.
-        trajectory: What the controllers were sent, followed as quintic curve and then held at its end.
-
     Returns:
-        The measures; None if the samples of the joints are not finite.
+        The result with these measures; None if the samples of the joints are not finite.
     """
     robot = robot_of(config)
     limits = joint_limits(robot)
@@ -58,7 +40,7 @@ def measure_joints(
         return None
     moving = [robot.joints.index(joint) for joint in trajectory.joints]
     middle = (limits.lower[moving] + limits.upper[moving]) / 2
-    # A row a joint, so that arithmetic runs along memory.
+    # One row per joint, so that arithmetic runs along memory.
     measured = samples.position.T[moving]
     positions = np.abs(measured - middle[:, np.newaxis]).max(axis=1) / (limits.upper[moving] - middle)
     desired = sample_positions(trajectory, (samples.stamps_ns - start_ns) / NS_PER_S).T
@@ -66,7 +48,8 @@ def measure_joints(
     saturated = 0.0
     if effort_peak.share >= _AT_LIMIT:
         saturated = float((np.abs(samples.effort) / effort_limits >= _AT_LIMIT).any(axis=1).mean())
-    return JointMeasures(
+    return replace(
+        result,
         position_peak=_peak(positions, trajectory.joints),
         velocity_peak=velocity_peak,
         effort_peak=effort_peak,

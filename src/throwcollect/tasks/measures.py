@@ -1,4 +1,4 @@
-"""What results are made of besides numbers: the ball at one instant, and how close a joint came to its limit."""
+"""Parts of results that are more than a number: the ball at one instant, and the joint closest to its limit."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ from throwcollect.robots.trajectory import JointTrajectory
 def minimum_jerk_trajectory(
     start: Mapping[str, float], end: Mapping[str, float], *, duration_s: float, family: MinimumJerk, points_hz: float
 ) -> JointTrajectory:
-    """Points on ``q(t) = q0 + (q1 - q0) s((t/T)^gamma)``, ``s(x) = 10x³ - 15x⁴ + 6x⁵``, with exact derivatives.
+    """Compute points on ``q(t) = q0 + (q1 - q0) s((t/T)^gamma)``, ``s(x) = 10x³ - 15x⁴ + 6x⁵``, and their derivatives.
 
     Near the start the motion grows as ``t^(3 gamma)``, so its acceleration as ``t^(3 gamma - 2)``: it rises from zero
     when gamma is above 2/3, and would be unbounded below, which the configuration does not allow.
@@ -25,10 +25,7 @@ def minimum_jerk_trajectory(
         end: Angle [rad] of each moving joint; its order is that of the trajectory's joints.
         duration_s: T, the time from rest to rest [s].
         family: The time warp.
-        points_hz: Points per second; the end is always a point.
-
-    Returns:
-        The trajectory; its last point is at rest, exactly at `end`.
+        points_hz: Points per second; the last point is at rest, exactly at `end`.
     """
     exponent = 3 * family.gamma - 2
     times = point_times(duration_s, points_hz=points_hz)
@@ -53,12 +50,10 @@ def minimum_jerk_trajectory(
 
 
 def point_times(duration_s: float, *, points_hz: float) -> NDArray[np.float64]:
-    """Times of evenly spaced points and of the end.
+    """List the times of evenly spaced points and of the end.
 
-    Args:
-        duration_s: Time of the last point [s].
-        points_hz: Points per second; a point that would come less than a tenth of the spacing before the end is left
-            out, as nearly coincident points make the curve between them ill-conditioned.
+    A point that would come less than a tenth of the spacing before the end is left out, as nearly coincident points
+    make the curve between them ill-conditioned.
 
     Returns:
         Times [s] from 0 to exactly `duration_s`, strictly increasing, shape ``(n_points,)`` with at least two.

@@ -1,4 +1,4 @@
-"""What came of a trial of any task: a word, a reason, and what all tasks measure of the joints."""
+"""The result of a trial of any task: its outcome, the reason, and the measures of the joints that all tasks have."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from throwcollect.tasks.columns import Columns, JointColumns, Number, PeakColumn
 from throwcollect.tasks.measures import Peak
 
 LIMIT_VIOLATED, TRACKING_FAILED, LOST = "limit_violated", "tracking_failed", "lost"
-"""Outcomes that every task has: it succeeded, but a joint violated a limit; a controller did not carry out its
+"""Outcomes that every task has: the trial succeeded, but a joint violated a limit; a controller did not carry out its
 trajectory, or the simulation diverged; no simulation returned an episode."""
 
 
@@ -23,9 +23,9 @@ class Outcome(str, Enum):
 
 @dataclass(frozen=True)
 class Result:
-    """Outcome and key numbers of a trial; None where there is nothing to measure.
+    """Outcome and measures of a trial; a measure is None where there is nothing to measure.
 
-    Tasks derive results of their own from it, whose fields are declared with their columns (see `tasks.columns`).
+    Tasks derive their own results from it and declare the fields that they add with their columns, see `tasks.columns`.
 
     Attributes:
         outcome: How the trial ended.
@@ -56,22 +56,17 @@ AnyResult = TypeVar("AnyResult", bound=Result)
 
 
 class ResultColumns(Generic[AnyResult]):
-    """The columns of the results of a task, by which these are written into a table and read from it.
+    """Writes the results of a task into the columns of a table, and reads them from there.
 
     Attributes:
-        columns: What the task measures, then what all tasks measure.
-
-    Args:
-        results: Class of the results.
-        joints: Joints that the task moves.
-        tool: Name of the tool.
+        columns: First those of the measures that the task adds, then those that all tasks have.
     """
 
     def __init__(self, results: type[AnyResult], joints: Sequence[str], *, tool: str) -> None:
         self._results = results
         self._joints = tuple(joints)
         self._fields = [
-            (each.name, columns, columns.declare(each.name, joints)) for each, columns in _list_declared(results)
+            (field.name, columns, columns.declare(field.name, joints)) for field, columns in _list_declared(results)
         ]
         self.columns = tuple(
             replace(column, description=column.description.replace("{tool}", tool))
@@ -80,7 +75,7 @@ class ResultColumns(Generic[AnyResult]):
         )
 
     def write(self, result: AnyResult) -> dict[str, object]:
-        """Values of all columns, by name; None where there is nothing."""
+        """Make the values of all columns, by name; None where there is nothing."""
         values: dict[str, object] = {}
         for name, columns, declared in self._fields:
             value = getattr(result, name)
@@ -89,15 +84,11 @@ class ResultColumns(Generic[AnyResult]):
         return values
 
     def to_json(self, result: AnyResult) -> str:
-        """A result in JSON: its outcome, its reason, and the values of all columns."""
+        """Write a result in JSON: its outcome, its reason, and the values of all columns."""
         return json.dumps({**self.write(result), "outcome": result.outcome.value, "reason": result.reason})
 
     def from_json(self, outcomes: type[Outcome], text: str) -> AnyResult:
-        """Read what `to_json` writes.
-
-        Args:
-            outcomes: All outcomes that there are.
-            text: The JSON.
+        """Read the text that `to_json` writes.
 
         Raises:
             DatasetError: If the text is anything else.
@@ -109,13 +100,7 @@ class ResultColumns(Generic[AnyResult]):
             raise DatasetError(f"result of a trial: {error}") from error
 
     def read(self, outcome: Outcome, reason: str | None, row: Mapping[str, Any]) -> AnyResult:
-        """The result whose values stand in a row of the table.
-
-        Args:
-            outcome: Its outcome.
-            reason: Its reason.
-            row: Values by column.
-        """
+        """Make the result whose values stand in a row of the table, by column."""
         measures = {}
         for name, columns, declared in self._fields:
             # Rows of an earlier version have fewer columns.
@@ -125,7 +110,7 @@ class ResultColumns(Generic[AnyResult]):
 
 
 def _list_declared(results: type[Result]) -> list[tuple[Field[Any], Columns]]:
-    """The fields of a result that have columns: first those that the task adds."""
-    common = {each.name for each in fields(Result)}
-    found = [(each, columns) for each in fields(results) if (columns := columns_of(each)) is not None]
-    return sorted(found, key=lambda pair: pair[0].name in common)
+    """List the fields of a result that have columns: first those that the task adds."""
+    common = {field.name for field in fields(Result)}
+    pairs = [(field, columns) for field in fields(results) if (columns := columns_of(field)) is not None]
+    return sorted(pairs, key=lambda pair: pair[0].name in common)

@@ -1,4 +1,4 @@
-"""What a task is: how the robot moves in a trial, and what comes of it."""
+"""The kind of part `Task`: it plans the motion of a trial, and judges its episode."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from throwcollect.tasks.result import LIMIT_VIOLATED, LOST, TRACKING_FAILED, Any
 
 @dataclass(frozen=True)
 class Failure:
-    """Why a trial is not the success that it would otherwise be.
+    """The reason for which a trial is no success.
 
     Attributes:
-        outcome: How it ended instead.
-        reason: Why, in one sentence.
+        outcome: The outcome that it has instead.
+        reason: The reason in one sentence.
     """
 
     outcome: Outcome
@@ -41,12 +41,9 @@ class Task(ABC, Generic[AnyResult]):
     Attributes:
         outcomes: All its outcomes.
         results: Class of its results, whose fields are declared with their columns of the table.
-        reasons: What the column of reasons holds, in a sentence.
-        report: What its trials add to a report, ``module:function``: a function that takes a `Dataset` and its
-            `Outcomes` and returns a `TaskReport`. It is imported when a report is made; empty if they add nothing.
-
-    Args:
-        config: The configuration.
+        reasons: Description of the column of reasons, one sentence.
+        report: ``module:function``, imported when a report is made: a function that takes a `Dataset` and its
+            `Outcomes` and returns a `TaskReport` with sections to add; empty if there are none.
     """
 
     outcomes: ClassVar[type[Outcome]]
@@ -82,26 +79,26 @@ class Task(ABC, Generic[AnyResult]):
         return dmp_trajectory(task.start, end, duration_s=task.duration_s, family=family, points_hz=task.points_hz)
 
     def judge(self, samples: Samples, header: EpisodeHeader, trajectory: JointTrajectory) -> AnyResult:
-        """Find the outcome and the numbers of one trial.
+        """Find the outcome and the measures of one trial.
 
-        The first of these that holds is the outcome; whatever can be measured is measured all the same:
+        The first of these that holds is the outcome; everything that can be measured is measured in any case:
 
         1. ``tracking_failed``: a sample is not finite (then nothing is measured), or a goal was canceled or aborted.
-        2. What the task itself finds wrong (see `assess`).
+        2. The failure that the task itself finds (see `assess`).
         3. ``limit_violated``: a joint violated a limit (see `explain_violation`).
         4. The success of the task.
 
         Args:
             samples: The recorded trial, at least two samples.
             header: Contacts, goals and start of the trial; the trajectory starts at its `start_ns`.
-            trajectory: What the controllers were sent, followed as quintic curve and then held at its end.
+            trajectory: The trajectory that the controllers followed as a quintic curve and then held at its end.
         """
-        joints = measure_joints(samples, header.start_ns, config=self.config, trajectory=trajectory)
-        if not (joints and math.isfinite(samples.ball_position.sum() + samples.ball_linear_velocity.sum())):
+        success = self.results(self.outcomes(self.config.task.success))
+        measured = measure_joints(success, samples, header.start_ns, config=self.config, trajectory=trajectory)
+        if not (measured and math.isfinite(samples.ball_position.sum() + samples.ball_linear_velocity.sum())):
             reason = "the samples hold numbers that are not finite"
             return self.results(self.outcomes(TRACKING_FAILED), reason=reason)
-        success = self.outcomes(self.config.task.success)
-        result, failure = self.assess(self.results(success, **vars(joints)), samples, header)
+        result, failure = self.assess(measured, samples, header)
         if refusal := explain_failed_goal(header):
             failure = Failure(self.outcomes(TRACKING_FAILED), refusal)
         elif failure is None and (violation := explain_violation(result)):
@@ -110,7 +107,7 @@ class Task(ABC, Generic[AnyResult]):
 
     @abstractmethod
     def assess(self, result: AnyResult, samples: Samples, header: EpisodeHeader) -> tuple[AnyResult, Failure | None]:
-        """Measure what only this task does, and say what kept a trial from success.
+        """Add the measures that only this task has, and say what kept a trial from success.
 
         Args:
             result: A success, with the measures of the joints.
@@ -118,7 +115,7 @@ class Task(ABC, Generic[AnyResult]):
             header: Contacts, goals and start of the trial.
 
         Returns:
-            The result with the measures of this task, and the failure that this task sees in it, if there is one.
+            The result with the measures of this task, and the failure that this task finds, if there is one.
         """
 
     def lose(self, reason: str) -> AnyResult:
@@ -127,10 +124,6 @@ class Task(ABC, Generic[AnyResult]):
 
 
 def task_of(config: Config) -> Task[Any]:
-    """Make the task that a configuration describes.
-
-    Args:
-        config: Configuration of one trial, or of a whole collection.
-    """
+    """Make the task that a configuration describes."""
     task: Task[Any] = load_object(config.task.implementation)(config)
     return task

@@ -1,1 +1,1 @@
-"""What the hand of a robot holds, and the ball lies in."""
+"""Tools: the hand of a robot holds one, and the ball lies in it."""

@@ -1,4 +1,4 @@
-"""What a tool is: a body in the robot's hand with a cup from which a ball is thrown."""
+"""The kind of part `Tool`: a body in the robot's hand with a cup from which a ball is thrown."""
 
 from __future__ import annotations
 

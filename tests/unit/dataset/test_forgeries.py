@@ -181,7 +181,7 @@ def replanned(plan: Plan, points: Points, *, seed: int | None = None) -> Plan:
     """A plan of other points, or of the seeds of another configuration, in which digests and hashes fit."""
     seeds = plan.config if seed is None else plan.config.model_copy(update={"seed": seed})
     drawn = make_trials(seeds, points).seeds
-    return replace(plan, trials=Trials(points.keys, points.values, drawn, trial_digests(plan.config, points, drawn)))
+    return replace(plan, trials=Trials(points, drawn, trial_digests(plan.config, points, drawn)))
 
 
 def test_a_plan_that_the_configuration_does_not_draw_is_found(collection: Collection, tmp_path: Path) -> None:

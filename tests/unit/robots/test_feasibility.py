@@ -11,6 +11,7 @@ from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError
 from throwcollect.robots.clearance import MARGIN_M, Clearance
 from throwcollect.robots.description import joint_model
+from throwcollect.robots.dynamics import Dynamics
 from throwcollect.robots.feasibility import Feasibility
 from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.quintic_curve import sample_quintic
@@ -47,7 +48,11 @@ def reason(feasibility):
     return lambda config: feasibility.check(config, task_of(config).trajectory())
 
 
-def shares(feasibility, config):
+def efforts_of(config, motion):
+    return Dynamics(TALOS, joint_model(TALOS), {}).efforts(config, tool_of(config.tool), motion)
+
+
+def shares(config):
     """Largest effort over limit, and speed over limit, of the moving joints."""
     times = np.linspace(0, config.task.duration_s, 501)
     trajectory = task_of(config).trajectory()
@@ -56,20 +61,20 @@ def shares(feasibility, config):
     motion = tuple(np.tile(rest, (501, 1)) for rest in (posture, 0 * posture, 0 * posture))
     for array, sampled in zip(motion, sample_quintic(trajectory, times), strict=True):
         array[:, columns] = sampled
-    efforts = np.abs(feasibility.efforts(config, motion)) / joint_limits(TALOS).effort
+    efforts = np.abs(efforts_of(config, motion)) / joint_limits(TALOS).effort
     return efforts[:, columns].max(), (np.abs(motion[1]) / joint_limits(TALOS).velocity).max()
 
 
-def test_default_throw_needs_the_effort_and_speed_that_the_physics_showed(feasibility, reason):
+def test_default_throw_needs_the_effort_and_speed_that_the_physics_showed(reason):
     assert reason(Config()) is None
     # Measured in the physics: 0.86 and 0.69.
-    assert shares(feasibility, Config()) == pytest.approx((0.86, 0.69), abs=0.01)
+    assert shares(Config()) == pytest.approx((0.86, 0.69), abs=0.01)
 
 
-def test_long_throw_is_refused_for_the_effort_that_saturated_in_the_physics(feasibility, reason):
+def test_long_throw_is_refused_for_the_effort_that_saturated_in_the_physics(reason):
     assert reason(LONG).startswith("arm_right_2_joint needs 23.9")
     assert reason(LONG).endswith("its limit is 22.32 Nm")
-    assert shares(feasibility, LONG)[1] == pytest.approx(0.79, abs=0.01)
+    assert shares(LONG)[1] == pytest.approx(0.79, abs=0.01)
 
 
 def test_recommended_sweep_box_is_feasible(reason):
@@ -125,12 +130,12 @@ def test_effort_of_held_joints_is_limited_only_where_they_are_simulated(reason):
     assert reason(Config(task=task, tool={"mass_kg": 2.0}, robot={"locked": "none"})).startswith("arm_right_")
 
 
-def test_static_torque_is_the_weight_times_its_lever(feasibility):
+def test_static_torque_is_the_weight_times_its_lever():
     """Lifting one more kilogram in the cup by a joint's small turn takes the work that the torque gives."""
     heavy = Config(ball={"mass_kg": 1.045})
     posture = np.array([{**TALOS.rest_posture, **TASK.start}[joint] for joint in JOINTS])[None]
     still = np.zeros_like(posture)
-    extra = [feasibility.efforts(config, (posture, still, still))[0] for config in (heavy, Config())]
+    extra = [efforts_of(config, (posture, still, still))[0] for config in (heavy, Config())]
     column = JOINTS.index("arm_right_4_joint")
     model = pinocchio.buildModelFromUrdf(str(TALOS.urdf_path))
     data = model.createData()
@@ -149,16 +154,16 @@ def test_static_torque_is_the_weight_times_its_lever(feasibility):
     assert (extra[0] - extra[1])[column] == pytest.approx(9.81 * lever, abs=1e-6)
 
 
-def test_damping_and_inertia_show_in_the_torque(feasibility):
+def test_damping_and_inertia_show_in_the_torque():
     posture = np.array([{**TALOS.rest_posture, **TASK.start}[joint] for joint in JOINTS])[None]
     still, turning = np.zeros_like(posture), np.zeros_like(posture)
     column = JOINTS.index("torso_1_joint")
     turning[0, column] = 2.0
-    rest = feasibility.efforts(Config(), (posture, still, still))[0, column]
+    rest = efforts_of(Config(), (posture, still, still))[0, column]
     # Turning steadily about the vertical torso axis takes friction alone.
-    steady = feasibility.efforts(Config(), (posture, turning, still))[0, column]
+    steady = efforts_of(Config(), (posture, turning, still))[0, column]
     assert steady - rest == pytest.approx(2.0 * joint_limits(TALOS).damping[column], abs=1e-9)
-    faster = feasibility.efforts(Config(), (posture, still, turning))[0, column]
+    faster = efforts_of(Config(), (posture, still, turning))[0, column]
     assert faster - rest > 1.0
 
 

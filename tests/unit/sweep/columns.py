@@ -6,14 +6,14 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from throwcollect.sweep.points import Points
 from throwcollect.sweep.trials import DIGEST_BYTES, Trial, Trials
 
 
 def in_columns(trials: Iterable[Trial]) -> Trials:
     trials = list(trials)
     return Trials(
-        tuple(trials[0].values),
-        np.array([list(trial.values.values()) for trial in trials], np.float64),
+        Points(tuple(trials[0].values), np.array([list(trial.values.values()) for trial in trials], np.float64)),
         np.array([trial.seed for trial in trials], np.uint64),
         np.frombuffer(bytes.fromhex("".join(trial.digest for trial in trials)), np.uint8).reshape(-1, DIGEST_BYTES),
         first=trials[0].number,

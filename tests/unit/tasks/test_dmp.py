@@ -91,15 +91,6 @@ def test_fitted_weights_repeat_the_demonstrated_motion(count, gamma, bound):
     assert family.basis_functions == count
 
 
-def test_positions_alone_are_enough_to_fit():
-    joints, times, positions, *_ = demonstration()
-    uneven = np.sort(np.random.default_rng(0).permutation(401)[:300])
-    uneven[0], uneven[-1] = 0, 400
-    family = fit_dmp(joints, times[uneven], positions[uneven])
-    curve, _, _ = sample_quintic(task_of(Config(task={"trajectory": family.model_dump()})).trajectory(), times)
-    assert np.abs(curve - positions).max() < 2e-3
-
-
 def test_trajectory_ends_at_rest_at_the_goal_after_a_short_approach():
     points = dmp_trajectory({ELBOW: -1.9}, {ELBOW: -0.5}, duration_s=1.0, family=PLAIN, points_hz=50)
     assert points.positions[-1].tolist() == [-0.5]
@@ -130,13 +121,3 @@ def test_motion_that_does_not_settle_is_refused():
         ConfigError, match=r"the DMP of arm_right_4_joint has not settled after 5\.\d+ s: it is 0\.11 rad from its goal"
     ):
         dmp_trajectory({ELBOW: 0.0}, {ELBOW: 1.0}, duration_s=1.0, family=family, points_hz=50)
-
-
-def test_demonstrations_that_cannot_be_fitted_are_refused():
-    joints, times, positions, velocities, _ = demonstration()
-    with pytest.raises(ConfigError, match="a demonstration of 19 samples for 20 basis functions"):
-        fit_dmp(joints, times[:19], positions[:19])
-    with pytest.raises(ConfigError, match="do not increase strictly"):
-        fit_dmp(joints, np.zeros_like(times), positions)
-    with pytest.raises(ValueError, match=r"velocities of shape \(400, 5\) for 401 times and 5 joints"):
-        fit_dmp(joints, times, positions, velocities=velocities[1:])

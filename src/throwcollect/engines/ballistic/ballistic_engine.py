@@ -28,19 +28,19 @@ _FREE: frozenset[str] = frozenset()
 _ON_GROUND = frozenset({GROUND})
 
 _Moment = tuple[Vector, Vector, frozenset[str]]
-"""Position and velocity of the ball after a step, and what touches it."""
+"""Position and velocity of the ball after a step, and the names of the bodies that touch it."""
 
 
 class BallisticEngine(Engine):
-    """A world of kinematics: quick and simple, and not what a robot does.
+    """A world of kinematics: fast and simple, and not realistic.
 
-    - The arm is where it is told to be at the end of each step, at the velocity that led there. Motors have no torques,
-      and no limits.
-    - The ball goes with its seat in the tool as long as the tool pushes it. In the first step in which the tool would
-      have to pull the ball back along its opening, the ball is free, and goes on with the velocity that it had.
-    - A free ball takes on its acceleration by gravity and drag in each step, then moves on at its new velocity, as in
-      Bullet. It touches nothing but solid ground, where it stays.
-    - The ball never spins. There are no other bodies, and nobody touches the robot.
+    - At the end of each step, the arm is at the commanded positions, at the velocity that led there. Motors have no
+      torques and no limits.
+    - The ball moves with its seat in the tool as long as the tool pushes it. From the first step on in which the tool
+      would have to pull the ball back along its opening, the ball is free and keeps the velocity that it had.
+    - In each step, gravity and drag accelerate a free ball, which then moves at its new velocity, as in Bullet. It
+      touches nothing but solid ground, where it stays.
+    - The ball never spins. There are no other bodies, and nothing touches the robot.
     """
 
     _scene: Scene
@@ -56,11 +56,11 @@ class BallisticEngine(Engine):
         self._seat = np.zeros((3, 1))
 
     def close(self) -> None:
-        """There is nothing to free."""
+        """Do nothing: this world holds no resources."""
 
     @property
     def is_as_loaded(self) -> bool:
-        """Nothing can be added."""
+        """Return True, as no bodies can be added."""
         return True
 
     def load(self, scene: Scene) -> None:
@@ -75,11 +75,11 @@ class BallisticEngine(Engine):
         self._scene = scene
 
     def configure(self, physics: Physics) -> None:
-        """Set the numbers of the physics; of these, rate, gravity and the ball's mass matter."""
+        """Set the numbers of the physics; this engine uses rate, gravity and the ball's mass."""
         self._physics = physics
 
     def rest(self, joints: Sequence[float], seat: Vector) -> None:
-        """Put the joints somewhere and the ball into the tool, all at rest."""
+        """Put the joints into positions and the ball into the tool, all at rest."""
         place, turn = self._tool_path.along(np.array([joints]))
         centre = (place + matmul(turn, np.array(seat).reshape(3, 1))).ravel().tolist()
         still = (0.0,) * len(joints)
@@ -87,7 +87,7 @@ class BallisticEngine(Engine):
         self.reset(State((*joints, *still, *still, *ball), self._carried_by))
 
     def reset(self, state: State) -> None:
-        """Put robot and ball into a state; a ball that touches the tool has its seat where it is."""
+        """Put robot and ball into a state; the place of a ball that touches the tool becomes its seat."""
         count = len(self._scene.moving)
         self._joints, self._velocities = np.array(state.sample[: 2 * count]).reshape(2, count)
         self.place_ball(ball_of(state.sample))
@@ -107,7 +107,7 @@ class BallisticEngine(Engine):
         for number, (position, velocity, touching) in enumerate(self._path(steps), start=1):
             self._joints, self._velocities = steps.targets[number], steps.velocities[number - 1]
             self._position, self._velocity, self._touching = position, velocity, touching
-            # An observer hears of changes only, as from engines with contacts.
+            # Observers hear of changes only, also from engines with contacts.
             if touching != self._told:
                 self._told = touching
                 observer.on_touch(number, touching)
@@ -118,18 +118,18 @@ class BallisticEngine(Engine):
         return number
 
     def place_ball(self, ball: BodyState) -> None:
-        """Put the ball somewhere, where it is free; it does not spin."""
+        """Set pose and velocity of the ball, which is free then; it does not spin."""
         self._position, self._velocity = ball.position, ball.linear_velocity
         self._orientation = ball.orientation_xyzw
         self._touching = _FREE
 
     def ball_boxes(self) -> list[Box]:
-        """A box along the axes of the world around the ball."""
+        """Find the box around the ball, along the axes of the world."""
         radius, (x, y, z) = self._scene.ball_radius_m, self._position
         return [((x - radius, y - radius, z - radius), (x + radius, y + radius, z + radius))]
 
     def robot_boxes(self) -> list[Box]:
-        """None, as no shapes are known."""
+        """Return no boxes: this engine knows no shapes."""
         return []
 
     def _sample(self) -> Sample:
@@ -138,27 +138,27 @@ class BallisticEngine(Engine):
         return (*self._joints.tolist(), *self._velocities.tolist(), *torques, *ball)
 
     def _path(self, steps: Steps) -> Iterator[_Moment]:
-        """The ball after each step."""
+        """Compute the ball after each step."""
         moment = self._position, self._velocity, self._touching
-        left = len(steps.velocities)
+        steps_left = len(steps.velocities)
         if self._touching == self._carried_by:
             for moment in self._carry(steps):
-                left -= 1
+                steps_left -= 1
                 yield moment
-        for _ in range(left):
+        for _ in range(steps_left):
             if moment[2] != _ON_GROUND:
                 moment = self._fly(moment[0], moment[1], steps.drag_kgpm / self._physics.ball_mass_kg)
             yield moment
 
     def _carry(self, steps: Steps) -> Iterator[_Moment]:
-        """The ball in its seat, up to the step in which the tool would have to pull it."""
+        """Compute the ball in its seat, up to the step in which the tool would have to pull it."""
         place, turn = self._tool_path.along(steps.targets[1:])
         hz = self._physics.hz
-        # Joints go where they are told without delay, so the way of the seat is known for all steps at once.
+        # Joints follow their commands without delay, so the path of the seat is known for all steps at once.
         path = np.vstack((self._position, (place + matmul(turn, self._seat))[:, :, 0]))
         velocities = np.vstack((self._velocity, np.diff(path, axis=0) * hz))
         push = np.diff(velocities, axis=0) * hz
-        # What the tool has to do for the ball: the acceleration of its way, less that of gravity.
+        # The tool has to give the ball the acceleration of its path, less that of gravity.
         push[:, 2] += self._physics.gravity_mps2
         x, y, z = (push * matmul(turn, self._opening)[:, :, 0]).T
         pulled = np.flatnonzero(x + y + z <= 0)
@@ -167,7 +167,7 @@ class BallisticEngine(Engine):
             yield tuple(position), tuple(velocity), self._carried_by
 
     def _fly(self, position: Vector, velocity: Vector, drag_per_m: float) -> _Moment:
-        """The ball one step of free flight later, or on the ground if that stops it."""
+        """Compute the ball one step of free flight later, or on the ground if that stops it."""
         dt = 1 / self._physics.hz
         (x, y, z), (vx, vy, vz) = position, velocity
         braking = drag_per_m * math.sqrt(vx * vx + vy * vy + vz * vz)

@@ -1,4 +1,4 @@
-"""Where a tool goes when the joints of its robot move, by the robot's description alone."""
+"""Forward kinematics of a tool, from the robot's description alone."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class _Joint:
         turn: Orientation of its frame in that of the link before, shape ``(3, 3)``.
         place: Origin of its frame there [m], shape ``(3, 1)``.
         axis: Unit vector that it turns about, in its frame.
-        column: Column of commands that it follows; None if it is fixed.
+        column: Column of the commands that it follows; None if it is fixed.
     """
 
     turn: Array
@@ -35,17 +35,14 @@ class _Joint:
 
 
 class ToolPath:
-    """The way from a robot's base to its tool.
-
-    Args:
-        scene: Of it, all that concerns the robot matters.
+    """The chain of joints from a robot's base to its tool.
 
     Raises:
-        ConfigError: If a joint on the way is of a kind that is not known here.
+        ConfigError: If a joint of the chain neither turns about an axis nor is fixed.
     """
 
     def __init__(self, scene: Scene) -> None:
-        # The scene's description can be trusted.
+        # `Scene` says that its description can be trusted.
         joints = ElementTree.fromstring(scene.urdf.encode()).findall("joint")  # noqa: S314
         above = {_link(joint, "child"): joint for joint in joints}
         chain = []
@@ -57,7 +54,7 @@ class ToolPath:
         self._base = np.array([[0.0], [0.0], [scene.base_height_m]])
 
     def along(self, positions: Array) -> tuple[Array, Array]:
-        """Frames of the tool's link in world.
+        """Compute the frames of the tool's link in world.
 
         Args:
             positions: Positions of the moving joints [rad], shape ``(n, n_moving)``.
@@ -102,7 +99,7 @@ def _numbers(joint: ElementTree.Element, tag: str, key: str, default: Vector) ->
 
 
 def _rotations(axis: Sequence[float], angles: Array) -> Array:
-    """Rotations about a unit vector, by Rodrigues' formula, shape ``(n, 3, 3)``."""
+    """Make rotations about a unit vector, by Rodrigues' formula, shape ``(n, 3, 3)``."""
     x, y, z = axis
     across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     sines, cosines = (values[:, np.newaxis, np.newaxis] for values in (sin(angles), cos(angles)))

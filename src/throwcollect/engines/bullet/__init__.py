@@ -1,3 +1,3 @@
-"""Bullet, by pybullet: rigid bodies with contacts, the engine that collections are simulated with by default."""
+"""Bullet, by pybullet: rigid bodies with contacts, the default engine."""
 
-import throwcollect.engines.bullet.silence  # noqa: F401 - before any other module of this room imports Bullet
+import throwcollect.engines.bullet.silence  # noqa: F401 - first, before another module of this room imports Bullet

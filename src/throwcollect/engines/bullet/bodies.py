@@ -6,7 +6,6 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
 import pybullet
 
 from throwcollect.engines.bullet.scenery import BASE, Surface, boxes, collide_with_everything, connect, links
@@ -15,8 +14,6 @@ from throwcollect.errors import RequestError
 
 _JOINT_TYPE, _LARGEST_EFFORT, _LINK_NAME = 2, 10, 12
 _INERTIAL_POSITION, _INERTIAL_ORIENTATION = 3, 4
-_STL = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-_STL_TITLE = bytes(80)
 
 
 class BulletBodies(Bodies):
@@ -24,7 +21,7 @@ class BulletBodies(Bodies):
 
     Args:
         client: Physics client.
-        names: Name of each surface that can press on the ball; those of the bodies are kept in it.
+        names: Name of each surface that can press on the ball; this object adds and removes those of its bodies.
     """
 
     def __init__(self, client: int, names: dict[Surface, str]) -> None:
@@ -34,7 +31,7 @@ class BulletBodies(Bodies):
         self.friction = 0.0
         """Friction of bodies that are added from now on."""
         self.leave_traces = False
-        """Whether a body has been in the world since it was loaded; Bullet cannot forget that."""
+        """A body has been in the world since it was loaded; removing it does not remove all its effects on Bullet."""
 
     def __contains__(self, name: object) -> bool:
         return name in self._bodies
@@ -54,7 +51,7 @@ class BulletBodies(Bodies):
         root = pybullet.getBodyInfo(body, physicsClientId=client)[0].decode()
         self._names[body, BASE] = f"{name}/{root}"
         for link in links(client, body):
-            # The ball alone decides how it bounces off what stands still; what moves does not bounce.
+            # The ball's restitution alone counts where it hits a body at rest; off a moving body it does not bounce.
             pybullet.changeDynamics(
                 body,
                 link,
@@ -80,7 +77,7 @@ class BulletBodies(Bodies):
             del self._names[surface]
 
     def state(self, name: str) -> BodyState:
-        """Where the root link of a body is and how it moves."""
+        """Find pose and velocity of the root link of a body."""
         body, _ = self._bodies[name]
         centre, turn = pybullet.getBasePositionAndOrientation(body, self._client)
         linear, angular = pybullet.getBaseVelocity(body, self._client)
@@ -89,7 +86,7 @@ class BulletBodies(Bodies):
         return BodyState(position, orientation, _velocity_at(linear, angular, centre, position), angular)
 
     def place(self, name: str, state: BodyState) -> None:
-        """Put the root link of a body somewhere; its joints stay as they are."""
+        """Set pose and velocity of the root link of a body; its joints stay as they are."""
         body, _ = self._bodies[name]
         centre, turn = pybullet.multiplyTransforms(state.position, state.orientation_xyzw, *self._inertial_frame(body))
         linear = _velocity_at(state.linear_velocity, state.angular_velocity, state.position, centre)
@@ -97,16 +94,16 @@ class BulletBodies(Bodies):
         pybullet.resetBaseVelocity(body, linear, state.angular_velocity, physicsClientId=self._client)
 
     def boxes(self, name: str) -> list[Box]:
-        """Boxes along the axes of the world around the links of a body."""
+        """Find the boxes around the links of a body, along the axes of the world."""
         return boxes(self._client, self._bodies[name][0])
 
     def bounds(self, name: str) -> list[Box]:
-        """Boxes along the axes of the root link around the links of a body."""
+        """Find the boxes around the links of a body, along the axes of its root link."""
         body, model = self._bodies[name]
         angles = [pybullet.getJointState(body, joint, self._client)[0] for joint in links(self._client, body)[1:]]
         aside = connect()
         try:
-            # Without the given inertia the engine's own axes, along which it measures, are those of the link.
+            # Bullet measures along its own axes of a link; those are the link's axes unless an inertia is given.
             copy = _load(aside, model, BodyState((0.0, 0.0, 0.0)), flags=0)
             for joint, angle in enumerate(angles):
                 pybullet.resetJointState(copy, joint, angle, physicsClientId=aside)
@@ -115,7 +112,7 @@ class BulletBodies(Bodies):
             pybullet.disconnect(aside)
 
     def _inertial_frame(self, body: int) -> tuple[Vector, Quaternion]:
-        """Centre of mass and principal axes in the root link, by which the engine locates a body."""
+        """Find centre of mass and principal axes in the root link; by these the engine locates a body."""
         info: Sequence[tuple[float, ...]] = pybullet.getDynamicsInfo(body, BASE, physicsClientId=self._client)
         position: Vector = tuple(info[_INERTIAL_POSITION])  # type: ignore[assignment]
         orientation: Quaternion = tuple(info[_INERTIAL_ORIENTATION])  # type: ignore[assignment]
@@ -126,11 +123,8 @@ def _load(client: int, model: BodyModel, start: BodyState, *, flags: int = pybul
     with tempfile.TemporaryDirectory(prefix="throwcollect-") as directory:
         path = Path(directory, "entity.urdf")
         path.write_text(model.urdf, encoding="utf-8")
-        for number, triangles in enumerate(model.meshes):
-            records = np.zeros(len(triangles), _STL)
-            records["corners"] = triangles
-            count = len(triangles).to_bytes(4, "little")
-            path.with_name(f"{number}.stl").write_bytes(_STL_TITLE + count + records.tobytes())
+        for name, content in model.encode_meshes().items():
+            path.with_name(name).write_bytes(content)
         try:
             return int(
                 pybullet.loadURDF(

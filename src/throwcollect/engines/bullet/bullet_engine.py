@@ -57,7 +57,7 @@ class BulletEngine(Engine):
         self.bodies: BulletBodies = BulletBodies(self._client, self._names)
         self._scene: Scene | None = None
         self._touching: frozenset[str] = frozenset()
-        # What pressed on the ball in the last step; None if there was none since the last reset.
+        # The surfaces that pressed on the ball in the last step; None if there was no step since the last reset.
         self._pressing: set[Surface] | None = None
 
     def close(self) -> None:
@@ -66,11 +66,11 @@ class BulletEngine(Engine):
 
     @property
     def is_as_loaded(self) -> bool:
-        """Whether nothing was added since the world was loaded."""
+        """Say whether no body was added since the world was loaded."""
         return not self.bodies.leave_traces
 
     def load(self, scene: Scene) -> None:
-        """Make the world of a scene; if nothing but the ball differs, the ball alone is made anew."""
+        """Make the world of a scene; if nothing but the ball's radius differs, only the ball changes."""
         kept, self._scene = self._scene, None
         if (
             kept is None
@@ -96,7 +96,7 @@ class BulletEngine(Engine):
         self._velocity_gains = [physics.velocity_gain] * len(physics.efforts)
 
     def rest(self, joints: Sequence[float], seat: Vector) -> None:
-        """Put the joints somewhere and the ball into the tool, all at rest."""
+        """Put the joints into positions and the ball into the tool, all at rest."""
         client, scenery = self._client, self._scenery
         for joint, angle in zip(scenery.joints, joints, strict=True):
             pybullet.resetJointState(scenery.robot, joint, angle, physicsClientId=client)
@@ -106,7 +106,7 @@ class BulletEngine(Engine):
         self.reset(State((*joints, *still, *still, *centre, *_UPRIGHT, *(0.0,) * 6), frozenset()))
 
     def reset(self, state: State) -> None:
-        """Put robot and ball into a state, leaving nothing behind of what went on before.
+        """Put robot and ball into a state, and leave no trace of earlier ones in the world.
 
         Bullet's own snapshots do not achieve that: they keep pairs of shapes that once came close, and with them the
         order in which contacts are solved. `renew_pairs` forgets those.
@@ -125,11 +125,12 @@ class BulletEngine(Engine):
         if self._pressing is None:
             return State(self._sample(), self._touching)
         # Bodies that were removed since the last step have no names any more.
-        return State(self._sample(), frozenset(self._names[each] for each in self._pressing if each in self._names))
+        pressing = self._pressing & self._names.keys()
+        return State(self._sample(), frozenset(self._names[surface] for surface in pressing))
 
     def run(self, steps: Steps, observer: Observer) -> int:
         """Take steps until the observer stops them."""
-        # Local names, arguments by position and one loop: what stands here is paid for in every step.
+        # Local names, arguments by position and a single loop, because every operation here costs time in every step.
         client, ball, robot, joints = self._client, self._ball, self._scenery.robot, self._scenery.joints
         forces, position_gains, velocity_gains = self._forces, self._position_gains, self._velocity_gains
         aim, mode = pybullet.setJointMotorControlArray, pybullet.POSITION_CONTROL
@@ -137,16 +138,16 @@ class BulletEngine(Engine):
         drag, due, stride = steps.drag_kgpm, steps.first_sample, steps.stride
         last_pressing = self._pressing
         number = 0
-        # Lists, as Bullet reads them twice as fast as arrays.
+        # Bullet reads lists twice as fast as arrays.
         for position, velocity in zip(steps.targets[:-1].tolist(), steps.velocities.tolist(), strict=True):
-            # A motor is told to be where it should be at the beginning of the step and to have the speed that leads
-            # from there to the target, so that it follows without lag.
+            # A motor gets the position of the beginning of the step and the velocity that leads from there to the
+            # target, so that it follows without lag.
             aim(robot, joints, mode, position, velocity, forces, position_gains, velocity_gains, client)
             if drag:
                 self._apply_drag(drag)
             take_step(client)
             number += 1
-            # Bullet also lists points that are merely close; those have no normal force (field 9).
+            # Bullet also lists points that are close without touching; those have no normal force (field 9).
             points = points_on(ball, _ANY_BODY, _ANY_LINK, _ANY_LINK, client)
             pressing = {(point[2], point[4]) for point in points if point[9] > 0}
             if pressing != last_pressing:
@@ -159,7 +160,7 @@ class BulletEngine(Engine):
         return number
 
     def place_ball(self, ball: BodyState) -> None:
-        """Put the ball somewhere."""
+        """Set pose and velocity of the ball."""
         pybullet.resetBasePositionAndOrientation(
             self._ball, ball.position, ball.orientation_xyzw, physicsClientId=self._client
         )
@@ -168,15 +169,15 @@ class BulletEngine(Engine):
         )
 
     def ball_boxes(self) -> list[Box]:
-        """A box along the axes of the world around the ball."""
+        """Find the box around the ball, along the axes of the world."""
         return boxes(self._client, self._ball)
 
     def robot_boxes(self) -> list[Box]:
-        """Boxes along the axes of the world around the links of the robot."""
+        """Find the boxes around the links of the robot, along the axes of the world."""
         return boxes(self._client, self._scenery.robot)
 
     def _tell_touch(self, step: int, observer: Observer) -> None:
-        """Tell of what presses now, unless those are only other surfaces of the same names."""
+        """Tell the observer which bodies press on the ball now, unless these are other surfaces of the same names."""
         touching = frozenset(self._names[surface] for surface in self._pressing or ())
         if touching != self._touching:
             self._touching = touching

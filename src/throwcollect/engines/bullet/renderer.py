@@ -15,12 +15,12 @@ from throwcollect.engines.bullet.scenery import BASE, connect, links
 from throwcollect.engines.engine import Vector
 from throwcollect.errors import ConfigError
 
-_NOTHING_THERE = -1
+_BACKGROUND = -1
 _UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 
 
 class Renderer:
-    """A robot and a ball that are put where they are to be seen; a context manager.
+    """A robot and a ball in poses that a camera sees; a context manager.
 
     Args:
         urdf: URDF text of the robot; paths of meshes are absolute.
@@ -68,18 +68,13 @@ class Renderer:
                 raise ConfigError(f"Bullet cannot load the robot's description: {error}") from error
 
     def place(self, joints: Mapping[str, float], ball: Vector) -> None:
-        """Put robot and ball somewhere.
-
-        Args:
-            joints: Angle of each joint that is not at 0 [rad].
-            ball: Centre of the ball in world [m].
-        """
+        """Put joints at angles [rad], and the centre of the ball at a place in world [m]; other joints stay at 0."""
         for name, angle in joints.items():
             pybullet.resetJointState(self._robot, self._joints[name], angle, physicsClientId=self._client)
         pybullet.resetBasePositionAndOrientation(self._ball, ball, _UPRIGHT, physicsClientId=self._client)
 
     def find_frames(self) -> list[Vector]:
-        """Origins of the frames of the robot's links in world [m]."""
+        """Find the origins of the frames of the robot's links in world [m]."""
         states = pybullet.getLinkStates(
             self._robot, list(self._joints.values()), computeForwardKinematics=True, physicsClientId=self._client
         )
@@ -88,19 +83,19 @@ class Renderer:
     def draw(
         self, width: int, height: int, *, view: Sequence[float], projection: Sequence[float], light: Vector
     ) -> NDArray[np.uint8]:
-        """Draw what a camera sees.
+        """Draw the picture of a camera.
 
         Args:
             width: Width of the picture in pixels.
             height: Its height.
             view: World to camera as OpenGL has it: 16 numbers, column by column.
-            projection: Camera to clip space, alike.
-            light: Where the light comes from.
+            projection: Camera to clip space, in the same form.
+            light: Direction from which the light comes.
 
         Returns:
-            Red, green, blue and 255 where there is something, else 0; shape ``(height, width, 4)``.
+            Red, green, blue, and 255 for the robot and the ball, 0 for the background; shape ``(height, width, 4)``.
         """
-        _, _, colors, _, what = pybullet.getCameraImage(
+        _, _, colors, _, objects = pybullet.getCameraImage(
             width,
             height,
             view,
@@ -111,12 +106,12 @@ class Renderer:
             physicsClientId=self._client,
         )
         picture = np.array(colors, np.uint8).reshape(height, width, 4)
-        picture[..., 3] = np.where(np.array(what).reshape(height, width) == _NOTHING_THERE, 0, 255)
+        picture[..., 3] = np.where(np.array(objects).reshape(height, width) == _BACKGROUND, 0, 255)
         return picture
 
 
 def _with_masses(urdf: str) -> str:
-    """A description in which every link has a mass, as Bullet complains on standard output of those that have none."""
+    """Give every link of a description a mass: Bullet prints a warning to standard output for each link without one."""
     robot = ElementTree.fromstring(urdf)  # noqa: S314 - the dataset's own description
     for link in robot.iter("link"):
         if link.find("inertial") is None:

@@ -1,7 +1,7 @@
-"""What is in a Bullet world, and how it is set up: ground, robot with its tool, ball.
+"""Sets up a Bullet world: ground, robot with its tool, ball.
 
-Only the ball collides, with everything, as long as nothing is added. Shapes of a robot may overlap each other at rest,
-and with fewer pairs the order in which Bullet solves contacts cannot come to depend on what happened before.
+As long as no body is added, nothing but the ball collides with other things. Shapes of a robot may overlap each other
+at rest, and with these few pairs the order in which Bullet solves contacts does not depend on earlier trials.
 """
 
 from __future__ import annotations
@@ -21,12 +21,13 @@ BASE = -1
 """Link number of the first link of a body."""
 
 _GROUND_GROUP, _ROBOT_GROUP, _BALL_GROUP, _ADDED_GROUP, _FLOOR_GROUP = 1, 2, 4, 8, 16
-"""Bullet lets a pair collide if either side wants to: added bodies collide with all, the floor with them alone."""
+"""Bullet lets a pair collide if the mask of either one has the group of the other: added bodies collide with all, and
+the floor with them alone."""
 
 
 @dataclass(frozen=True)
 class Scenery:
-    """What stays the same from trial to trial: ground and robot.
+    """The parts of a world that stay the same from trial to trial: ground and robot.
 
     Attributes:
         robot: Body number of the robot.
@@ -42,10 +43,7 @@ class Scenery:
 
 
 def connect() -> int:
-    """Start an empty world in this process.
-
-    Returns:
-        Number of the physics client.
+    """Start an empty world in this process, and return the number of its physics client.
 
     Raises:
         WorkerError: If Bullet refuses, as it does when one process has very many worlds.
@@ -58,10 +56,6 @@ def connect() -> int:
 
 def load_scenery(client: int, scene: Scene) -> Scenery:
     """Empty the world and load ground and robot into it.
-
-    Args:
-        client: Physics client.
-        scene: What the world is made of.
 
     Raises:
         ConfigError: If Bullet cannot load the description.
@@ -106,14 +100,9 @@ def _load_robot(client: int, scene: Scene) -> int:
 
 
 def load_ball(client: int, radius: float) -> int:
-    """Put a ball into the world, out of the way.
+    """Put a ball into the world, far above everything else, and return its body number.
 
-    Args:
-        client: Physics client.
-        radius: Its radius [m]; it cannot be changed later.
-
-    Returns:
-        Its body number.
+    Its radius [m] cannot be changed later.
     """
     sphere = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=radius, physicsClientId=client)
     ball = int(pybullet.createMultiBody(1, sphere, basePosition=[0, 0, 100], physicsClientId=client))
@@ -122,34 +111,24 @@ def load_ball(client: int, radius: float) -> int:
 
 
 def renew_pairs(client: int, ball: int) -> None:
-    """Let the ball collide with everything, and forget all contacts that it had.
-
-    Args:
-        client: Physics client.
-        ball: Body number of the ball.
-    """
+    """Let the ball collide with everything; setting its filter makes Bullet forget all contacts that it had."""
     pybullet.setCollisionFilterGroupMask(ball, BASE, _BALL_GROUP, _GROUND_GROUP | _ROBOT_GROUP, physicsClientId=client)
 
 
 def collide_with_everything(client: int, body: int) -> None:
-    """Let an added body collide with ground, robot, ball and other added bodies.
-
-    Args:
-        client: Physics client.
-        body: Its body number.
-    """
+    """Let an added body collide with ground, robot, ball and other added bodies."""
     mask = _GROUND_GROUP | _ROBOT_GROUP | _BALL_GROUP | _ADDED_GROUP | _FLOOR_GROUP
     for link in links(client, body):
         pybullet.setCollisionFilterGroupMask(body, link, _ADDED_GROUP, mask, physicsClientId=client)
 
 
 def links(client: int, body: int) -> range:
-    """Link numbers of a body, that of its base included."""
+    """List the link numbers of a body, that of its base included."""
     return range(BASE, pybullet.getNumJoints(body, physicsClientId=client))
 
 
 def boxes(client: int, body: int) -> list[Box]:
-    """Boxes along the axes of the world that enclose the links of a body which have a shape."""
+    """Find the boxes around those links of a body that have a shape, along the axes of the world."""
     return [
         pybullet.getAABB(body, link, physicsClientId=client)
         for link in links(client, body)
@@ -158,14 +137,7 @@ def boxes(client: int, body: int) -> list[Box]:
 
 
 def set_physics(client: int, scenery: Scenery, ball: int, physics: Physics) -> None:
-    """Set time step, solver, gravity, masses and surfaces; all of them, so that nothing of the trial before remains.
-
-    Args:
-        client: Physics client.
-        scenery: Ground and robot.
-        ball: Body number of the ball.
-        physics: The numbers.
-    """
+    """Set time step, solver, gravity, masses and surfaces; all of them, so that none of the trial before remains."""
     pybullet.setPhysicsEngineParameter(
         fixedTimeStep=1 / physics.hz,
         numSolverIterations=physics.solver_iterations,
@@ -174,7 +146,7 @@ def set_physics(client: int, scenery: Scenery, ball: int, physics: Physics) -> N
         physicsClientId=client,
     )
     pybullet.setGravity(0, 0, -physics.gravity_mps2, physicsClientId=client)
-    # Bullet's default damping of 0.04/s is no physics and would shorten a throw by 6 cm.
+    # Bullet's default damping of 0.04/s has no physical cause and would shorten a throw by 6 cm.
     undamped = {"linearDamping": 0, "angularDamping": 0}
     pybullet.changeDynamics(
         ball,
@@ -186,7 +158,7 @@ def set_physics(client: int, scenery: Scenery, ball: int, physics: Physics) -> N
         **undamped,
     )
     for body, link in scenery.names:
-        # Bullet multiplies restitutions, so the ball's alone decides.
+        # Bullet multiplies restitutions: with 1 here, that of the ball alone counts.
         pybullet.changeDynamics(
             body,
             link,

@@ -1,17 +1,17 @@
-"""Imports Bullet without the line by which it tells on standard error when it was built."""
+"""Imports Bullet without the line with its build time that it prints to standard error."""
 
 import os
 
 
 def _import_bullet() -> None:
-    kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, 2)
+    stderr, devnull = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(devnull, 2)
     try:
-        import pybullet  # noqa: F401 - whoever imports it later gets this one
+        import pybullet  # noqa: F401 - later imports of it return this module
     finally:
-        os.dup2(kept, 2)
-        os.close(kept)
-        os.close(nowhere)
+        os.dup2(stderr, 2)
+        os.close(stderr)
+        os.close(devnull)
 
 
 _import_bullet()

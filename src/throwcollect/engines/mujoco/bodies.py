@@ -7,27 +7,23 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import mujoco
-import numpy as np
-from numpy.typing import NDArray
 
 from throwcollect.engines.engine import Bodies, BodyModel, BodyState, Box
 from throwcollect.engines.mujoco.frames import rotation, turn, turn_back
 from throwcollect.engines.mujoco.scenery import Surface, boxes, collide_with_everything, read_urdf, watch
 from throwcollect.errors import RequestError
 
-_STL = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-_STL_TITLE = bytes(80)
 _FREE_JOINT = "free"
 
 
 @dataclass
 class _Added:
-    """A body.
+    """A body in the world.
 
     Attributes:
-        model: What it is.
+        model: Its model.
         links: Names of its links; that of the root comes first.
-        state: Where it was put last.
+        state: The state that it was last put into.
     """
 
     model: BodyModel
@@ -38,12 +34,12 @@ class _Added:
 class MujocoBodies(Bodies):
     """The bodies of one world. Their joints are braked, with the efforts of their limits.
 
-    MuJoCo compiles a world as a whole, so whatever comes or goes has it compiled anew.
+    MuJoCo compiles a world as a whole, so adding or removing a body compiles it again.
 
     Args:
-        compile_world: Compiles the world with all bodies that are here, and keeps the motion of what stays; or else
-            raises a `ValueError`, and leaves the world as it is.
-        world: Gives the compiled world.
+        compile_world: Compiles the world with all bodies that are here, and keeps the motion of those that were there
+            before. If MuJoCo refuses a body, it raises a `ValueError` and leaves the world as it is.
+        world: Returns the compiled world.
     """
 
     def __init__(
@@ -54,7 +50,7 @@ class MujocoBodies(Bodies):
         self._compile_world, self._world = compile_world, world
         self._bodies: dict[str, _Added] = {}
         self.leave_traces = False
-        """Whether a body has been in the world since it was loaded."""
+        """A body has been in the world since it was loaded."""
 
     def __contains__(self, name: object) -> bool:
         return name in self._bodies
@@ -91,17 +87,17 @@ class MujocoBodies(Bodies):
         self._compile_world()
 
     def attach(self, spec: mujoco.MjSpec) -> Iterator[Surface]:
-        """Put all bodies into a world that is to be compiled.
+        """Put all bodies into a world before it is compiled.
 
         Yields:
-            What can press on the ball.
+            The surfaces of these bodies, which can press on the ball.
 
         Raises:
             ValueError: If MuJoCo cannot read a description.
         """
         for name, body in self._bodies.items():
             text, body.links = _rename_links(body.model.urdf)
-            child = read_urdf(text, {f"{number}.stl": _stl(mesh) for number, mesh in enumerate(body.model.meshes)})
+            child = read_urdf(text, body.model.encode_meshes())
             for joint in child.joints:
                 joint.frictionloss = max(joint.actfrcrange[1], 0.0)
                 joint.actfrclimited = mujoco.mjtLimited.mjLIMITED_FALSE
@@ -115,13 +111,13 @@ class MujocoBodies(Bodies):
                 yield surface
 
     def place_fixed(self) -> None:
-        """Put the bodies that are attached to the world where they were put last; a compiled world has forgotten it."""
+        """Put bodies that are attached to the world where they were last put: compiling the world has reset them."""
         for name, body in self._bodies.items():
             if body.model.is_fixed:
                 self.place(name, body.state)
 
     def state(self, name: str) -> BodyState:
-        """Where the root link of a body is and how it moves."""
+        """Find pose and velocity of the root link of a body."""
         body = self._bodies[name]
         if body.model.is_fixed:
             return body.state
@@ -131,7 +127,7 @@ class MujocoBodies(Bodies):
         return BodyState((x, y, z), (i, j, k, w), (vx, vy, vz), turn((i, j, k, w), spin))
 
     def place(self, name: str, state: BodyState) -> None:
-        """Put the root link of a body somewhere; its joints stay as they are."""
+        """Set pose and velocity of the root link of a body; its joints stay as they are."""
         body = self._bodies[name]
         model, data = self._world()
         x, y, z, w = state.orientation_xyzw
@@ -145,13 +141,13 @@ class MujocoBodies(Bodies):
         joint.qvel = (*state.linear_velocity, *turn_back(state.orientation_xyzw, state.angular_velocity))
 
     def boxes(self, name: str) -> list[Box]:
-        """Boxes along the axes of the world around the links of a body."""
+        """Find the boxes around the links of a body, along the axes of the world."""
         model, data = self._world()
         mujoco.mj_kinematics(model, data)
         return boxes(model, data, self._numbers(name))
 
     def bounds(self, name: str) -> list[Box]:
-        """Boxes along the axes of a body's root link around its links."""
+        """Find the boxes around the links of a body, along the axes of its root link."""
         model, data = self._world()
         mujoco.mj_kinematics(model, data)
         root = model.body(f"{name}/0").id
@@ -159,15 +155,14 @@ class MujocoBodies(Bodies):
         return boxes(model, data, self._numbers(name), frame)
 
     def _numbers(self, name: str) -> list[int]:
-        """Numbers of the bodies of a body's links."""
+        """List MuJoCo's body number of each link of a body."""
         model, _ = self._world()
         return [model.body(f"{name}/{number}").id for number in range(len(self._bodies[name].links))]
 
 
 def _rename_links(urdf: str) -> tuple[str, list[str]]:
-    """Number the links of a description, the root's being 0: MuJoCo has an opinion on names such as ``world``."""
-    # It was checked and written anew.
-    robot = ElementTree.fromstring(urdf.encode())  # noqa: S314
+    """Name the links of a description by numbers, the root 0: MuJoCo gives names such as ``world`` a meaning."""
+    robot = ElementTree.fromstring(urdf.encode())  # noqa: S314 - `BodyModel` has a checked and rewritten description
     ends = [(joint.find("parent"), joint.find("child")) for joint in robot.findall("joint")]
     children = {child.get("link") for _, child in ends if child is not None}
     links = sorted((link.get("name", "") for link in robot.findall("link")), key=lambda name: name in children)
@@ -177,9 +172,3 @@ def _rename_links(urdf: str) -> tuple[str, list[str]]:
     for end in (end for both in ends for end in both if end is not None):
         end.set("link", numbers[end.get("link", "")])
     return ElementTree.tostring(robot, encoding="unicode"), links
-
-
-def _stl(triangles: NDArray[np.float32]) -> bytes:
-    records = np.zeros(len(triangles), _STL)
-    records["corners"] = triangles
-    return _STL_TITLE + len(triangles).to_bytes(4, "little") + records.tobytes()

@@ -1,8 +1,8 @@
-"""What contacts ask for, in the way of Bullet.
+"""Target velocities of contacts, as Bullet has them.
 
-MuJoCo has contacts ask for accelerations, by the velocities at the begin of a step, and does not see that surfaces
-turn. A tool that swings turns so fast that a ball, which is held in it by less and less force, would begin to hop long
-before it leaves. So each contact is told in each step what velocity there should be after it.
+MuJoCo computes the acceleration that a contact asks for from the velocities at the begin of a step, and ignores that
+the surfaces turn. A tool that swings turns so fast that a ball, which it holds with less and less force, would begin to
+hop long before it leaves. So this module gives each contact in each step the velocity that it should have after it.
 """
 
 from __future__ import annotations
@@ -12,32 +12,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 _ROWS = 3
-"""Rows of a contact with friction, but without friction of rolling and turning on the spot."""
+"""Rows of a contact with sliding friction alone, without rolling and torsional friction."""
 
 HARDNESS = 0.9
-"""Share of the acceleration that a contact asks for which it gets; the harder, the longer it is solved."""
+"""Share of its target acceleration that a contact reaches; the higher it is, the longer the solver takes."""
 
 _CORRECTED = 0.2
-"""Share of a penetration that one step removes; Bullet's share."""
+"""Share of a penetration that one step removes, as in Bullet."""
 
 _LEAST_BOUNCE_MPS = 0.2
-"""What comes more slowly does not bounce; as in Bullet."""
+"""Contacts with a lower approach speed do not bounce, as in Bullet."""
 
 
 def aim_contacts(data: mujoco.MjData, hz: float, restitutions: NDArray[np.float64] | None) -> None:
-    """Have all contacts ask for what is right after a step: between ``mj_step1`` and ``mj_step2``.
+    """Set the targets of all contacts, between ``mj_step1`` and ``mj_step2``.
 
-    - Surfaces that are apart may come as near as they are apart, but not nearer.
-    - Those that are in one another part slowly.
-    - Those that would meet in this step and bounce part at once.
+    - Surfaces with a gap may close it in this step, but not penetrate each other.
+    - Surfaces that penetrate each other separate slowly.
+    - Surfaces that would meet in this step and bounce separate at once.
 
     Args:
-        data: The world; it has a contact.
+        data: The world, with at least one contact.
         hz: Steps per second.
-        restitutions: Of each shape of the model; of a contact, it is the product of both. None if nothing bounces.
+        restitutions: One factor for each shape of the model; the restitution of a contact is the product of two. None
+            if nothing bounces.
     """
-    # Rows of contacts are the last ones, and each has three: along its normal, and two of friction. Contacts of shapes
-    # that merely touch have none.
+    # The last rows are those of contacts, three for each: one along its normal, and two of friction. Contacts of shapes
+    # that merely touch have no rows.
     first = data.ne + data.nf + data.nl
     away, speeds = data.efc_pos[first::_ROWS] * hz, data.efc_vel[first::_ROWS]
     wanted = np.maximum(away, _CORRECTED * away)

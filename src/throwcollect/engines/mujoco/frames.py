@@ -1,4 +1,4 @@
-"""Vectors in the frame of a body, where MuJoCo has angular velocities, and in world."""
+"""Turns vectors between the frame of a body, in which MuJoCo has angular velocities, and world."""
 
 from __future__ import annotations
 
@@ -12,12 +12,7 @@ from throwcollect.engines.engine import Quaternion, Vector
 
 
 def turn(orientation_xyzw: Sequence[float], vector: Sequence[float]) -> Vector:
-    """Turn a vector from the frame of a body into world.
-
-    Args:
-        orientation_xyzw: Unit quaternion, body to world.
-        vector: In the frame of the body.
-    """
+    """Turn a vector from the frame of a body into world."""
     x, y, z, w = orientation_xyzw
     a, b, c = vector
     p, q, r = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
@@ -31,7 +26,7 @@ def turn_back(orientation_xyzw: Quaternion, vector: Vector) -> Vector:
 
 
 def rotation(orientation_wxyz: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The matrix of a unit quaternion as MuJoCo has it, shape ``(3, 3)``."""
+    """Make the matrix of a unit quaternion, shape ``(3, 3)``."""
     matrix = np.zeros(9)
     mujoco.mju_quat2Mat(matrix, orientation_wxyz)
     return matrix.reshape(3, 3)

@@ -42,10 +42,10 @@ from throwcollect.errors import ConfigError
 from throwcollect.reproducible_math import matmul
 
 _ORIENTATION, _SPIN = slice(-10, -6), -3
-"""Places in a sample."""
+"""Places of the ball's orientation and angular velocity in a sample."""
 
 _PRESS = 3
-"""Numbers of a sensor, of which the first is the normal force."""
+"""Each contact sensor has three numbers, of which the first is the normal force."""
 
 
 class MujocoEngine(Engine):
@@ -70,11 +70,11 @@ class MujocoEngine(Engine):
 
     @property
     def is_as_loaded(self) -> bool:
-        """Whether nothing was added since the world was loaded."""
+        """Say whether no body was added since the world was loaded."""
         return not self.bodies.leave_traces
 
     def load(self, scene: Scene) -> None:
-        """Make the world of a scene; if nothing but the ball differs, the ball alone is made anew.
+        """Make the world of a scene; if nothing but the ball's radius differs, only the ball changes.
 
         Raises:
             ConfigError: If MuJoCo does not take the robot's description.
@@ -90,7 +90,7 @@ class MujocoEngine(Engine):
             self._compile()
         except ValueError as error:
             raise ConfigError(f"MuJoCo cannot load the robot's description: {error}") from error
-        # Joints of the robot come first in the model, but in an order of its own.
+        # Joints of the robot come first in the model, but not in the order of the scene.
         names = [self._model.joint(number).name for number in range(len(scene.moving))]
         self._columns = np.array([scene.moving.index(name) for name in names])
         self._places = [names.index(name) for name in scene.moving]
@@ -109,7 +109,7 @@ class MujocoEngine(Engine):
         self._surfaces = surfaces
 
     def _compile_anew(self) -> None:
-        """Compile the world with other bodies; what stays goes on as it was.
+        """Compile the world with other bodies; robot, ball and bodies that stay keep their motion.
 
         Raises:
             ValueError: If MuJoCo does not take the description of a body.
@@ -128,7 +128,7 @@ class MujocoEngine(Engine):
         self._pick = _find_sample(self._model, self._places)
 
     def rest(self, joints: Sequence[float], seat: Vector) -> None:
-        """Put the joints somewhere and the ball into the tool, all at rest."""
+        """Put the joints into positions and the ball into the tool, all at rest."""
         model, data = self._model, self._data
         data.qpos[: len(joints)] = np.array(joints)[self._columns]
         mujoco.mj_kinematics(model, data)
@@ -138,7 +138,7 @@ class MujocoEngine(Engine):
         self.reset(State((*joints, *still, *still, *centre, 0.0, 0.0, 0.0, 1.0, *(0.0,) * 6), frozenset()))
 
     def reset(self, state: State) -> None:
-        """Put robot and ball into a state, leaving nothing behind of what went on before."""
+        """Put robot and ball into a state, and leave no trace of earlier ones in the world."""
         count, data = len(self._columns), self._data
         # Bodies that were added stay where they are.
         added = data.qpos[count + 7 :].copy(), data.qvel[count + 6 :].copy()
@@ -153,18 +153,18 @@ class MujocoEngine(Engine):
     @property
     def state(self) -> State:
         """Robot and ball now; right after `reset` without torques, as there are none before a step."""
-        # Bodies that were removed since the last step have no names any more.
+        # `_touching` may name bodies that were removed since the last step.
         names = {surface.name for surface in self._surfaces}
         return State(self._sample(), self._touching & names)
 
     def run(self, steps: Steps, observer: Observer) -> int:
         """Take steps until the observer stops them.
 
-        A motor gives its joint the velocity in one step that Bullet's would give it, by the torque that this takes: by
-        inverse dynamics of the present state, with what pressed on the robot in the step before, and within the
-        efforts. So contacts are solved for the motion that the tool really has.
+        In one step, a motor gives its joint the velocity that Bullet's motor would give it. Inverse dynamics of the
+        present state give the torque for that, with the contact forces of the step before and within the efforts. So
+        the solver finds contacts for the motion that the tool really has.
         """
-        # Local names, numbers in place and one loop: what stands here is paid for in every step.
+        # Local names, arithmetic in place and a single loop, because every operation here costs time in every step.
         model, data, physics = self._model, self._data, self._physics
         count, hz = len(self._columns), float(physics.hz)
         pull = np.full(count, hz * physics.position_gain_per_s)
@@ -188,7 +188,7 @@ class MujocoEngine(Engine):
             subtract(want, multiply(position, pull, work), work)
             subtract(work, multiply(velocity, brake, other), acceleration)
             inverse(model, data, 1, needed)
-            # The joints are damped by what they move at after the step.
+            # Joint damping acts on the velocity after the step.
             subtract(multiply(acceleration, lag, work), passive, work)
             subtract(work, pushed, work)
             add(work, load, work)
@@ -211,7 +211,7 @@ class MujocoEngine(Engine):
         return number
 
     def place_ball(self, ball: BodyState) -> None:
-        """Put the ball somewhere."""
+        """Set pose and velocity of the ball."""
         first = len(self._columns)
         x, y, z, w = ball.orientation_xyzw
         self._data.qpos[first : first + 7] = (*ball.position, w, x, y, z)
@@ -219,15 +219,15 @@ class MujocoEngine(Engine):
         self._data.qvel[first : first + 6] = (*ball.linear_velocity, *spin)
 
     def ball_boxes(self) -> list[Box]:
-        """A box along the axes of the world around the ball."""
+        """Find the box around the ball, along the axes of the world."""
         return self._boxes([self._model.body(BALL).id])
 
     def robot_boxes(self) -> list[Box]:
-        """Boxes along the axes of the world around the links of the robot."""
+        """Find the boxes around the links of the robot, along the axes of the world."""
         return self._boxes(range(1, self._model.body(BALL).id))
 
     def _bear(self) -> None:
-        """Have motors know what presses on the robot, as if they had held it up before."""
+        """Compute the contact forces on the robot that motors need in the first step, as if they had held it before."""
         model, data, count = self._model, self._data, len(self._columns)
         mujoco.mj_step1(model, data)
         data.qfrc_applied[:count] = data.qfrc_bias[:count]
@@ -241,7 +241,7 @@ class MujocoEngine(Engine):
         return boxes(self._model, self._data, bodies)
 
     def _tell_touch(self, step: int, presses: NDArray[np.bool_], observer: Observer) -> None:
-        """Tell of what presses now, if it is not what did before."""
+        """Tell the observer which bodies press on the ball now, if others did before."""
         touching = frozenset(surface.name for surface in compress(self._surfaces, presses))
         if touching != self._touching:
             self._touching = touching
@@ -260,11 +260,10 @@ class MujocoEngine(Engine):
 
 
 def _find_sample(model: mujoco.MjModel, order: Sequence[int]) -> Callable[[list[float]], Sample]:
-    """What takes a sample out of positions, velocities and forces, but with the ball's spin in the frame of the ball.
+    """Make a function that picks a sample from all positions, velocities and forces.
 
-    Args:
-        model: The world.
-        order: Place of each moving joint among those of the model.
+    The ball's angular velocity is still in the frame of the ball then. `order` is the place of each moving joint among
+    those of the model.
     """
     ball = len(order)
     x, y, z, w, i, j, k = range(ball, ball + 7)

@@ -1,6 +1,6 @@
-"""What is in a MuJoCo world, and how it is set up: ground, robot with its tool, ball.
+"""Sets up a MuJoCo world: ground, robot with its tool, ball.
 
-As in Bullet, only the ball collides, with everything, as long as nothing is added.
+As in Bullet, nothing but the ball collides with other things as long as no body is added.
 """
 
 from __future__ import annotations
@@ -21,14 +21,15 @@ BALL = "ball"
 """Name of the ball's body and shape; those of added bodies begin with the name of the body and a slash."""
 
 _GROUND_BIT, _ROBOT_BIT, _FLOOR_BIT, _ADDED_BIT = 1, 2, 4, 8
-"""A pair collides if what one of both is (``contype``) is among what the other collides with (``conaffinity``)."""
+"""Bits of ``contype`` and ``conaffinity``: a pair collides if the one's type is among those that the other collides
+with."""
 
 _EVERYTHING = _GROUND_BIT | _ROBOT_BIT | _FLOOR_BIT | _ADDED_BIT
 _REACH_M = 0.02
-"""Distance from which on a contact is looked at, so that a ball does not come to be inside of what it flies against."""
+"""MuJoCo makes a contact of shapes at this distance, so that a fast ball does not get inside of a shape in one step."""
 
 _BALL_PRIORITY = 1
-"""The ball's friction and restitution are those of its contacts, whatever it touches."""
+"""The highest priority: friction and restitution of a contact are those of the ball, whatever it touches."""
 
 _COMPILER = '<mujoco><compiler strippath="false" discardvisual="true" fusestatic="false"/></mujoco>'
 _ROOT_TAG_END = ">"
@@ -36,11 +37,11 @@ _ROOT_TAG_END = ">"
 
 @dataclass(frozen=True)
 class Surface:
-    """What can press on the ball.
+    """A body that can press on the ball.
 
     Attributes:
-        body: Name of its body in the model; all shapes of it are meant.
-        name: Its name among what touches the ball.
+        body: Name of the body in the model; all its shapes count.
+        name: Its name in contacts of the ball.
     """
 
     body: str
@@ -48,11 +49,7 @@ class Surface:
 
 
 def read_urdf(text: str, meshes: dict[str, bytes] | None = None) -> mujoco.MjSpec:
-    """Read a description, whose links all become bodies.
-
-    Args:
-        text: The description.
-        meshes: Files that it speaks of; None for those on disk.
+    """Read a description, whose links all become bodies; `meshes` are its mesh files unless these are on disk.
 
     Raises:
         ValueError: If MuJoCo cannot read it.
@@ -61,7 +58,7 @@ def read_urdf(text: str, meshes: dict[str, bytes] | None = None) -> mujoco.MjSpe
     at = text.index(_ROOT_TAG_END, begin) + 1
     spec = mujoco.MjSpec.from_string(text[:at] + _COMPILER + text[at:], assets=meshes)
     for joint in spec.joints:
-        # A motor overcomes friction, as in Bullet, where it is part of what the motor does.
+        # A motor overcomes the friction of its joint, as in Bullet.
         joint.frictionloss = 0.0
     return spec
 
@@ -69,11 +66,8 @@ def read_urdf(text: str, meshes: dict[str, bytes] | None = None) -> mujoco.MjSpe
 def make_spec(scene: Scene) -> tuple[mujoco.MjSpec, list[Surface]]:
     """Put ground, robot and ball together.
 
-    Args:
-        scene: What the world is made of.
-
     Returns:
-        The world, and what of it can press on the ball.
+        The world, and its surfaces that can press on the ball.
 
     Raises:
         ConfigError: If MuJoCo cannot read the robot's description.
@@ -101,13 +95,13 @@ def make_spec(scene: Scene) -> tuple[mujoco.MjSpec, list[Surface]]:
     option = spec.option
     option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
-    # A world that diverges is told of by its numbers; MuJoCo would begin it anew, from nobody's state.
+    # MuJoCo would reset a world that diverges. Without that, its numbers are not finite, and the trial is refused.
     option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     return spec, surfaces
 
 
 def _add_ball(spec: mujoco.MjSpec, radius: float) -> None:
-    """Put a ball into the world; its mass and its surface are set later."""
+    """Put a ball into the world; `set_physics` sets its mass and its surface."""
     ball = spec.worldbody.add_body(name=BALL)
     ball.add_freejoint(name=BALL)
     ball.add_geom(
@@ -122,7 +116,7 @@ def _add_ball(spec: mujoco.MjSpec, radius: float) -> None:
 
 
 def watch(spec: mujoco.MjSpec, surface: Surface) -> None:
-    """Have the force measured with which something presses on the ball; its first number is the normal force."""
+    """Add a sensor of the force with which a surface presses on the ball; its first number is the normal force."""
     force, strongest, one = 1 << int(mujoco.mjtConDataField.mjCONDATA_FORCE), 2, 1
     spec.add_sensor(
         type=mujoco.mjtSensor.mjSENS_CONTACT,
@@ -135,7 +129,7 @@ def watch(spec: mujoco.MjSpec, surface: Surface) -> None:
 
 
 def collide_with_everything(spec: mujoco.MjSpec) -> None:
-    """Let all links of an added body collide with everything but each other."""
+    """Let the links of an added body collide with everything but each other."""
     bodies = spec.bodies[1:]
     for body in bodies:
         for geom in body.geoms:
@@ -156,39 +150,29 @@ def resize_ball(model: mujoco.MjModel, radius: float) -> None:
 
 
 def set_physics(model: mujoco.MjModel, physics: Physics) -> None:
-    """Set time step, solver, gravity, masses and surfaces; all of them, so that nothing of the trial before remains.
-
-    Args:
-        model: The world.
-        physics: The numbers.
-    """
+    """Set time step, solver, gravity, masses and surfaces; all of them, so that none of the trial before remains."""
     model.opt.timestep = 1 / physics.hz
     model.opt.iterations = physics.solver_iterations
     model.opt.gravity[:] = (0.0, 0.0, -physics.gravity_mps2)
     ball, sphere = model.body(BALL).id, model.geom(BALL).id
     model.body_mass[ball] = physics.ball_mass_kg
     model.body_inertia[ball] = 0.4 * physics.ball_mass_kg * model.geom_size[sphere, 0] ** 2
-    # Frictions are multiplied, as in Bullet. Rolling and turning on the spot are not braked.
+    # Frictions are multiplied, as in Bullet. There is no rolling and no torsional friction.
     model.geom_friction[:] = (physics.surface_friction**2, 0.0, 0.0)
     model.geom_friction[sphere, 0] = physics.ball_friction * physics.surface_friction
     model.geom_margin[sphere] = _REACH_M
-    # Friction stops what slides in one step if it can. What contacts ask for along their normals, the engine says.
+    # Friction stops sliding within one step if it can. `aim_contacts` replaces the targets along the normals.
     model.geom_solref[:] = (2 / physics.hz, 1.0)
     model.geom_solimp[:, :2] = HARDNESS
-    # Numbers that the solver derives from masses, such as those by which it scales contacts.
+    # Recompute the numbers that the solver derives from masses, such as those by which it scales contacts.
     mujoco.mj_setConst(model, mujoco.MjData(model))
 
 
 def restitutions_of(model: mujoco.MjModel, physics: Physics) -> NDArray[np.float64] | None:
-    """Factor of each shape by which the ball bounces off it; None if it does not bounce.
-
-    Args:
-        model: The world.
-        physics: Of it, the restitution of the ball matters.
-    """
+    """Find the factor of each shape in the restitution of its contacts with the ball; None if nothing bounces."""
     if physics.ball_restitution == 0:
         return None
-    # What moves on its own does not bounce, as in Bullet; the robot does.
+    # The ball does not bounce off added bodies that can move, as in Bullet; it does bounce off the robot.
     added = model.geom_contype == _ADDED_BIT
     moves = model.body_weldid[model.geom_bodyid] != 0
     factors = np.where(added & moves, 0.0, 1.0)
@@ -197,12 +181,12 @@ def restitutions_of(model: mujoco.MjModel, physics: Physics) -> NDArray[np.float
 
 
 def keep_motion(model: mujoco.MjModel, data: mujoco.MjData, other_model: mujoco.MjModel, other: mujoco.MjData) -> None:
-    """Have all joints that another world has too go on there as in this one."""
-    there = {other_model.joint(number).name for number in range(other_model.njnt)}
+    """Copy the motion of all joints that two worlds have in common from the first to the second."""
+    common = {other_model.joint(number).name for number in range(other_model.njnt)}
     for name in (model.joint(number).name for number in range(model.njnt)):
-        if name in there:
-            for what in ("qpos", "qvel", "qacc_warmstart", "qfrc_applied", "qfrc_constraint"):
-                setattr(other.joint(name), what, getattr(data.joint(name), what))
+        if name in common:
+            for field in ("qpos", "qvel", "qacc_warmstart", "qfrc_applied", "qfrc_constraint"):
+                setattr(other.joint(name), field, getattr(data.joint(name), field))
 
 
 Frame = tuple[NDArray[np.float64], NDArray[np.float64]]
@@ -212,22 +196,22 @@ WORLD: Frame = (np.zeros(3), np.eye(3))
 
 
 def boxes(model: mujoco.MjModel, data: mujoco.MjData, bodies: Iterable[int], frame: Frame = WORLD) -> list[Box]:
-    """Boxes along the axes of a frame that enclose the bodies which have a shape."""
-    found = []
+    """Find the boxes around those of some bodies that have a shape, along the axes of a frame."""
+    enclosing = []
     for body in bodies:
         first, count = int(model.body_geomadr[body]), int(model.body_geomnum[body])
         if count:
             corners = [_reach(model, data, geom, frame) for geom in range(first, first + count)]
             lowest = np.min([low for low, _ in corners], axis=0)
             highest = np.max([high for _, high in corners], axis=0)
-            found.append((tuple(lowest.tolist()), tuple(highest.tolist())))
-    return found
+            enclosing.append((tuple(lowest.tolist()), tuple(highest.tolist())))
+    return enclosing
 
 
 def _reach(
     model: mujoco.MjModel, data: mujoco.MjData, geom: int, frame: Frame
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Lowest and highest corner of the box around a shape's own box."""
+    """Find the lowest and highest corner of the box around a shape's own box."""
     origin, axes = frame
     turned = matmul(axes.T, data.geom_xmat[geom].reshape(3, 3))
     box = model.geom_aabb[geom].reshape(2, 3, 1)

@@ -1,10 +1,10 @@
-"""Keeps MuJoCo from telling of a world that diverges in a file ``MUJOCO_LOG.TXT``, wherever a process happens to be."""
+"""Keeps MuJoCo from writing a file ``MUJOCO_LOG.TXT`` into the current directory when a world diverges."""
 
 import mujoco
 
 
 def _keep_silent(message: str) -> None:
-    """Samples that are not finite tell it, and are refused."""
+    """Ignore the message: a world that diverges has samples that are not finite, and these are refused."""
 
 
 if mujoco.get_mju_user_warning() is None:

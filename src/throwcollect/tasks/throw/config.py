@@ -75,7 +75,7 @@ class ThrowConfig(TaskConfig):
 
 
 def throw_section(task: TaskConfig) -> ThrowConfig:
-    """Return the section of a task that is a throw.
+    """Return the section of a task, which has to be a throw.
 
     Raises:
         ConfigError: If it is another task's.

@@ -1,4 +1,4 @@
-"""Whether the tool threw the ball, or the ball left it by its own weight."""
+"""Tells a ball that the tool threw from one that left the tool by its own weight."""
 
 from __future__ import annotations
 
@@ -18,26 +18,21 @@ from throwcollect.units import NS_PER_S
 _LEAST_SHARE = 0.25
 """Least speed of a throwing spoon, over the speed of a fall through the depth of its cup [-]: 0.20 m/s by default.
 
-The weight of a ball alone lets it leave a still spoon with 0.41 m/s at least (0.52 of that fall); so below this
-threshold it owes more of its speed to its weight than to the spoon. Of 143 balls that landed after simulated motions
-from random postures that hold the ball, 43 had left at a share below 0.03, most of them after the arm had come to rest;
-above, shares spread evenly. Sampled throws of the configurations that come with the product are above 0.9.
+A ball leaves a still spoon by its weight alone with 0.41 m/s at least (0.52 of that fall); so below this threshold it
+owes more of its speed to its weight than to the spoon. Of 143 balls that landed after simulated motions from random
+postures that hold the ball, 43 had left at a share below 0.03, most of them after the arm had come to rest; above,
+shares spread evenly. Sampled throws of the configurations that come with the product are above 0.9.
 
-The energy that the ball gains does not tell: it was up to 4.3 J/kg when a still spoon lost the ball after lifting it,
+The energy that the ball gains is no criterion: it was up to 4.3 J/kg when a still spoon lost the ball after lifting it,
 and down to -2.1 J/kg when the ball was thrown with 1.8 m/s in a downward swing.
 """
 
 
 def find_early_loss(samples: Samples, header: EpisodeHeader, *, config: Config) -> str | None:
-    """Reason why a trial began without a ball in the tool, if it did.
+    """Explain why a trial began without a ball in the tool; None if the ball was in the tool.
 
-    A ball that is not pressed on the tool at the start may be on a small bounce: it counts as in the tool if it is
-    there no farther than the rim's radius from where it rests, and touches the tool later.
-
-    Args:
-        samples: The whole trial.
-        header: Its contacts and its start.
-        config: Configuration of the trial.
+    A ball that does not press on the tool at the start may be on a small bounce: it counts as in the tool if it is no
+    farther than the rim's radius from the place where it rests, and touches the tool later.
     """
     held = [contact.start_ns for contact in header.contacts if contact.body == config.tool.name]
     if held and min(held) > header.start_ns:
@@ -52,18 +47,12 @@ def find_early_loss(samples: Samples, header: EpisodeHeader, *, config: Config) 
     )
 
 
-def drop(samples: Samples, header: EpisodeHeader, release: BallState, *, config: Config) -> str | None:
-    """Reason why a ball that left the tool was not thrown by it, if it was not.
+def explain_drop(samples: Samples, header: EpisodeHeader, release: BallState, *, config: Config) -> str | None:
+    """Explain why a ball that left the tool was not thrown by it; None if it was thrown.
 
-    The tool threw the ball if it moved the way that the ball then took, at a quarter or more of the speed of a fall
-    through the depth of the cup. A tool that brakes lets the ball roll on over its rim; so its highest speed counts
-    of the time that the ball, at its speed, needs for the radius of the rim.
-
-    Args:
-        samples: The whole trial.
-        header: Its start.
-        release: The ball when it left the tool.
-        config: Configuration of the trial.
+    The tool threw the ball if it moved in the direction that the ball then took, at a quarter or more of the speed of a
+    fall through the depth of the cup. When the tool brakes, the ball still has to roll over its rim; so the highest
+    speed of the tool counts during the time that the ball, at its own speed, needs for the radius of the rim.
     """
     speed = math.hypot(*release.velocity)
     direction = [part / (speed or 1.0) for part in release.velocity]

@@ -1,4 +1,4 @@
-"""The ball between release and landing: its states at instants between samples, and how ballistic they are."""
+"""The ball between release and landing: its states between samples, and its distance from a ballistic flight."""
 
 from __future__ import annotations
 
@@ -37,17 +37,12 @@ class Flight:
     velocities: NDArray[np.float64]
 
     def state_at(self, time_s: float, *, knot: int) -> BallState:
-        """Ball between two knots.
-
-        Args:
-            time_s: Since the start of the trial [s].
-            knot: The knot before that time; there is one after it.
-        """
+        """Interpolate the ball at a time between a knot, which is not the last one, and the next."""
         before, after = self.times[knot : knot + 2].tolist()
         span = after - before
         u = (time_s - before) / span
         smooth, bump = u * u * (3 - 2 * u), span * u * (1 - u)
-        # Three numbers are not worth an array.
+        # For three numbers, plain Python is faster than an array.
         axes = list(
             zip(*self.positions[knot : knot + 2].tolist(), *self.velocities[knot : knot + 2].tolist(), strict=True)
         )
@@ -61,10 +56,7 @@ class Flight:
         return BallState(float(self.times[knot]), (x, y, z), (vx, vy, vz))
 
     def landing(self, height: float) -> tuple[int, BallState] | None:
-        """First downward crossing of a height by the ball's centre.
-
-        Args:
-            height: [m].
+        """Find the first downward crossing of a height [m] by the ball's centre.
 
         Returns:
             The knot before it and the ball at that instant; None without a crossing.
@@ -81,11 +73,7 @@ class Flight:
         return knot, self.state_at(float(self.times[knot]) + u * span, knot=knot)
 
     def apex(self, knots: int) -> BallState:
-        """Highest point.
-
-        Args:
-            knots: Number of knots to look at, from the first; at least one.
-        """
+        """Find the highest point of the first `knots` knots, at least one, and between them."""
         top = int(np.argmax(self.positions[:knots, 2]))
         speeds = self.velocities[:, 2]
         for knot in (top - 1, top):
@@ -97,13 +85,7 @@ class Flight:
 
 
 def flight_after(samples: Samples, *, start_ns: int, release_ns: int) -> Flight:
-    """The ball from its release to the last sample.
-
-    Args:
-        samples: The whole trial, at least two samples.
-        start_ns: Start of the trial [ns].
-        release_ns: Instant of the release [ns], not after the last sample.
-    """
+    """Cut the flight out of a trial: from its release [ns], which is not after the last sample, to the last sample."""
     after = int(np.searchsorted(samples.stamps_ns, release_ns, side="right"))
     before = max(after - 1, 0)
     times = (samples.stamps_ns[before:] - start_ns) / NS_PER_S
@@ -116,16 +98,11 @@ def flight_after(samples: Samples, *, start_ns: int, release_ns: int) -> Flight:
 
 
 def without_impact(flight: Flight, impact_s: float, *, config: Config) -> Flight:
-    """The flight up to its impact on the ground, as if the ground were not there.
-
-    Args:
-        flight: The ball from its release on.
-        impact_s: Time since the start of the trial of the first step in which the ground pressed on the ball [s].
-        config: Configuration of the trial.
+    """Cut a flight off at its impact, the first step in which the ground pressed on the ball, and continue it freely.
 
     Returns:
-        The knots before the impact, and in place of the first one from it on where free flight would have led; the
-        flight itself if it has no such pair of knots.
+        The knots before the impact, and at the time of the next knot the state to which free flight leads; the flight
+        itself if the impact is not between two knots.
     """
     # Subtract half a step, so that rounding cannot pick the next knot.
     knot = int(np.searchsorted(flight.times, impact_s - 0.5 / config.sim.physics_hz))
@@ -142,12 +119,7 @@ def without_impact(flight: Flight, impact_s: float, *, config: Config) -> Flight
 
 
 def release_of(contacts: tuple[Contact, ...], *, tool: str, gap_s: float) -> int | None:
-    """Instant at which the ball left the tool [ns].
-
-    Args:
-        contacts: All contacts of the ball.
-        tool: Name of the tool.
-        gap_s: Time out of the tool that makes a release [s].
+    """Find the instant at which the ball left the tool [ns].
 
     Returns:
         End of the first contact with the tool that no other one follows within `gap_s`; None if the ball never was
@@ -163,22 +135,14 @@ def release_of(contacts: tuple[Contact, ...], *, tool: str, gap_s: float) -> int
 
 
 def spin_after(samples: Samples, release_ns: int) -> Vector:
-    """Angular velocity of the ball in the first sample from its release on, which nothing changes in flight.
-
-    Args:
-        samples: The whole trial.
-        release_ns: Instant of the release [ns], not after the last sample.
-
-    Returns:
-        In world [rad/s].
-    """
+    """Read the angular velocity of the ball in world [rad/s] after its release [ns]; nothing changes it in flight."""
     first = int(np.searchsorted(samples.stamps_ns, release_ns))
     x, y, z = samples.ball_angular_velocity[first].tolist()
     return x, y, z
 
 
 def flight_residual(samples: Samples, header: EpisodeHeader, *, config: Config) -> float | None:
-    """How far the recorded flight departs from the discrete ballistic motion of the physics.
+    """Measure how far the recorded flight departs from the discrete ballistic motion of the physics.
 
     The motion takes, per physics step dt, ``v += (g + drag(v)) dt``, then ``x += v dt``, as the physics does. It starts
     at the first sample `task.recatch_gap_s` after the release, because the contact solver may leave friction impulses
@@ -186,14 +150,9 @@ def flight_residual(samples: Samples, header: EpisodeHeader, *, config: Config) 
     moved the landing by 1 mm. It ends with the first contact after the release, or with the record.
 
     Both sides then do the same arithmetic in double precision, so they differ by its rounding alone: at most about
-    half an ulp of the position per step, less than 1e-12 m after 1000 steps within 4 m. What contradicts the recorded
-    release or physics is larger by far: one impulse that changes the speed by 1e-6 m/s, 10 ms before the landing,
-    moves the ball by 1e-8 m.
-
-    Args:
-        samples: The whole trial.
-        header: Its contacts and its start.
-        config: Configuration of the trial.
+    half an ulp of the position per step, less than 1e-12 m after 1000 steps within 4 m. A flight under other physics
+    than the recorded ones differs by far more: one impulse that changes the speed by 1e-6 m/s, 10 ms before the
+    landing, moves the ball by 1e-8 m.
 
     Returns:
         The largest distance [m]; None without a release, or with fewer than two such samples.
@@ -205,7 +164,7 @@ def flight_residual(samples: Samples, header: EpisodeHeader, *, config: Config) 
     later = [contact.start_ns for contact in header.contacts if contact.start_ns >= release_ns]
     free_ns = release_ns + round(gap_s * NS_PER_S)
     first = int(np.searchsorted(samples.stamps_ns, free_ns))
-    # A contact acts in the physics step that ends at its start, so what comes before that instant is untouched.
+    # A contact acts in the physics step that ends at its start, so samples before that instant are untouched.
     stop = int(np.searchsorted(samples.stamps_ns, min(later))) if later else len(samples.stamps_ns)
     if stop - first < 2:
         return None
@@ -217,12 +176,12 @@ def flight_residual(samples: Samples, header: EpisodeHeader, *, config: Config) 
         config=config,
     )
     x, y, z = (samples.ball_position[first:stop] - predicted[::stride]).T
-    # `norm` adds in an order that depends on the processor.
+    # `numpy.linalg.norm` adds in an order that depends on the processor.
     return float(np.sqrt(x * x + y * y + z * z).max())
 
 
 def _root(cubic: tuple[float, float, float, float]) -> float:
-    """Root in (0, 1] of a cubic in u, highest power first, that is at least 0 at u = 0 and negative at u = 1."""
+    """Find the root in (0, 1] of a cubic in u, highest power first, that is at least 0 at 0 and negative at 1."""
     a, b, c, d = cubic
     low, high = 0.0, 1.0
     u = 0.5

@@ -1,4 +1,4 @@
-"""What a throw amounted to, as numbers and a word."""
+"""The result of a throw: its outcome and its measures."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class ThrowOutcome(Outcome):
 
 @dataclass(frozen=True)
 class ThrowResult(Result):
-    """Outcome and key numbers of a throw; None where there is nothing to measure.
+    """Outcome and measures of a throw; a measure is None where there is nothing to measure.
 
     Attributes:
         release: The ball when it left the tool.
@@ -46,7 +46,7 @@ class ThrowResult(Result):
         hit_angle_rad: Direction of flight at landing below the horizontal [rad].
         recontacts: Number of contacts with tool or robot between release and landing.
         release_spin: Angular velocity of the ball in world when it left the tool [rad/s].
-        ballistic_residual_m: How far the recorded flight is from the one that gravity and drag alone give [m]; see
+        ballistic_residual_m: Largest distance of the recorded flight from one under gravity and drag alone [m]; see
             `flight.flight_residual`.
     """
 

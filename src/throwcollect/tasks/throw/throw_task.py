@@ -9,7 +9,7 @@ from throwcollect.episode.record import Contact, EpisodeHeader, Samples
 from throwcollect.tasks.measures import BallState
 from throwcollect.tasks.task import Failure, Task
 from throwcollect.tasks.throw.config import throw_section
-from throwcollect.tasks.throw.drop import drop, find_early_loss
+from throwcollect.tasks.throw.drop import explain_drop, find_early_loss
 from throwcollect.tasks.throw.flight import (
     Flight,
     flight_after,
@@ -25,20 +25,21 @@ from throwcollect.units import NS_PER_S
 class ThrowTask(Task[ThrowResult]):
     """The arm swings from start to end, and the ball leaves the tool when the tool brakes.
 
-    Of these, which come between ``tracking_failed`` and ``limit_violated`` (see `Task.judge`), the first one that holds
-    is the outcome. Whatever can be measured is measured all the same, so that a throw that landed keeps its landing
+    Between ``tracking_failed`` and ``limit_violated`` (see `Task.judge`) come these outcomes; the first one that
+    holds counts. Everything that can be measured is measured in any case, so a throw that landed keeps its landing
     under any outcome:
 
     1. ``dropped``: the ball was not in the tool at the start.
     2. ``not_released``: no contact with the tool ended for at least `task.recatch_gap_s` or to the end of the record.
-    3. ``dropped``: the tool hardly moved, or not the way of the ball, when the ball left it (see `drop`).
+    3. ``dropped``: the tool hardly moved, or not in the direction of the ball, when the ball left it (see
+       `explain_drop`).
     4. ``self_hit`` or ``recaught``: between release and landing the ball touched a link of the robot, or the tool
-       again; what it touched first decides.
+       again; the first touch decides.
     5. ``timeout``: the ball's lowest point did not cross the landing plane downwards after the release.
 
     Release, apex and landing lie between samples: positions on the cubic through the positions and velocities of both
-    neighbours, velocities linear between them. If the ground has pressed on the ball by the sample after the landing,
-    as it can below a low landing plane, free flight takes that sample's place.
+    neighbours, velocities linear between them. Below a low landing plane, the ground may press on the ball before the
+    sample after the landing; then a computed state of free flight replaces that sample.
     """
 
     outcomes = ThrowOutcome
@@ -75,7 +76,7 @@ class ThrowTask(Task[ThrowResult]):
             return Failure(ThrowOutcome.DROPPED, reason)
         if result.release is None:
             return Failure(ThrowOutcome.NOT_RELEASED, f"the ball stayed in the {tool}")
-        if reason := drop(samples, header, result.release, config=self.config):
+        if reason := explain_drop(samples, header, result.release, config=self.config):
             return Failure(ThrowOutcome.DROPPED, reason)
         if touched:
             first = touched[0]
@@ -89,7 +90,7 @@ class ThrowTask(Task[ThrowResult]):
         return None
 
     def _touches(self, header: EpisodeHeader, release_ns: int, end_s: float) -> list[Contact]:
-        """Contacts with tool or robot that began, or with the robot also lasted, between release and landing."""
+        """List the contacts between release and landing: those with the tool that began then, all with the robot."""
 
         def counts(contact: Contact) -> bool:
             if contact.body == "ground" or (contact.start_ns - header.start_ns) / NS_PER_S >= end_s:
@@ -102,8 +103,8 @@ class ThrowTask(Task[ThrowResult]):
 
     def _measure_flight(self, result: ThrowResult, flight: Flight) -> ThrowResult:
         release = flight.knot_state(0)
-        found = flight.landing(self.config.scene.landing_height_m + self.config.ball.radius_m)
-        last, landing = found or (len(flight.times) - 1, None)
+        crossing = flight.landing(self.config.scene.landing_height_m + self.config.ball.radius_m)
+        last, landing = crossing or (len(flight.times) - 1, None)
         speed, elevation = _direction(release)
         return replace(
             result,
@@ -118,7 +119,7 @@ class ThrowTask(Task[ThrowResult]):
 
 
 def _direction(ball: BallState) -> tuple[float, float]:
-    """Speed [m/s] and elevation of the direction of flight above the horizontal [rad]."""
+    """Compute the speed [m/s] and the elevation of the direction of flight above the horizontal [rad]."""
     vx, vy, vz = ball.velocity
     level = math.hypot(vx, vy)
     return math.hypot(level, vz), math.atan2(vz, level)
