@@ -7,16 +7,21 @@ run of records: its chunks, each with its message indexes, and a Metadata record
 from __future__ import annotations
 
 import itertools
+import struct
+import zlib
+from collections import Counter
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 import zstandard
 from isal.isal_zlib import crc32
 from mcap import records
+from mcap.opcode import Opcode
 
 from throwcollect.dataset.bag import FileSummary, bag_information, to_yaml
-from throwcollect.dataset.mcap_contents import FileContents, Run, declarations
-from throwcollect.episode.channels import Channel, Channels
+from throwcollect.dataset.mcap_records import Run, declarations
+from throwcollect.episode.channels import Channels
 from throwcollect.episode.chunk import Chunk, encode_message_index, encode_records
 from throwcollect.episode.message import Episode
 
@@ -72,16 +77,24 @@ class McapFile:
         self.size = 0
         self._crc = 0
         self._channels = channels
-        self._contents = FileContents(*declarations(channels.all))
-        opening = encode_records(records.Header(PROFILE, LIBRARY), *self._contents.schemas, *self._contents.channels)
-        self._put(MAGIC + opening)
-        latched = encode_latched_run(channels, start_ns)
-        self._contents.add_run(latched, self.size)
-        self._put(latched.data)
+        self._declarations = declarations(channels.all)
+        self._chunk_indexes: list[records.ChunkIndex] = []
+        self._metadata_indexes: list[records.MetadataIndex] = []
+        self._counts: Counter[int] = Counter()
+        schemas, declared = self._declarations
+        self._put(MAGIC + encode_records(records.Header(PROFILE, LIBRARY), *schemas, *declared))
+        self.append(encode_latched_run(channels, start_ns))
 
     def append(self, run: Run) -> None:
-        """Write an episode's run of records."""
-        self._contents.add_run(run, self.size, EPISODE)
+        """Write a run of records, such as that of an episode."""
+        for index in run.chunk_indexes:
+            offsets = {channel: self.size + offset for channel, offset in index.message_index_offsets.items()}
+            start = self.size + index.chunk_start_offset
+            self._chunk_indexes.append(replace(index, chunk_start_offset=start, message_index_offsets=offsets))
+        self._counts.update(run.counts)
+        if run.metadata_length:
+            start = self.size + run.length - run.metadata_length
+            self._metadata_indexes.append(records.MetadataIndex(start, run.metadata_length, EPISODE))
         self._put(run.data)
 
     def finish(self, name: str) -> FileSummary:
@@ -93,23 +106,55 @@ class McapFile:
         Returns:
             What the bag's metadata say of the file.
         """
-        summary = self._contents.summary(name)
-        bag = encode_records(bag_record(summary, self._channels.all))
-        self._contents.add_metadata(BAG, self.size, len(bag))
+        start_ns = min(index.message_start_time for index in self._chunk_indexes)
+        end_ns = max(index.message_end_time for index in self._chunk_indexes)
+        summary = FileSummary(name, start_ns, end_ns, dict(sorted(self._counts.items())))
+        # rosbag2 reads its metadata from each file, too, as if that were the whole bag.
+        metadata = {"serialized_metadata": to_yaml(bag_information([summary], self._channels.all, {}))}
+        bag = encode_records(records.Metadata(BAG, metadata))
+        self._metadata_indexes.append(records.MetadataIndex(self.size, len(bag), BAG))
         self._put(bag)
         self._put(encode_records(records.DataEnd(self._crc)))
-        self._put(self._contents.section(self.size) + MAGIC)
+        self._put(self._encode_summary_section(summary) + MAGIC)
         return summary
+
+    def _encode_summary_section(self, summary: FileSummary) -> bytes:
+        """Everything between the end of the data and the closing magic (MCAP specification, Summary Section)."""
+        schemas, channels = self._declarations
+        statistics = records.Statistics(
+            attachment_count=0,
+            channel_count=len(channels),
+            channel_message_counts=dict(summary.counts),
+            chunk_count=len(self._chunk_indexes),
+            message_count=summary.messages,
+            message_end_time=summary.end_ns,
+            message_start_time=summary.start_ns,
+            metadata_count=len(self._metadata_indexes),
+            schema_count=len(schemas),
+        )
+        groups: dict[Opcode, Sequence[records.McapRecord]] = {
+            Opcode.SCHEMA: schemas,
+            Opcode.CHANNEL: channels,
+            Opcode.STATISTICS: [statistics],
+            Opcode.CHUNK_INDEX: self._chunk_indexes,
+            Opcode.METADATA_INDEX: self._metadata_indexes,
+        }
+        offset = self.size
+        parts, offsets = [], []
+        for opcode, group in groups.items():
+            part = encode_records(*group)
+            offsets.append(records.SummaryOffset(opcode, offset, len(part)))
+            offset += len(part)
+            parts.append(part)
+        contents = b"".join((*parts, encode_records(*offsets)))
+        footer = struct.pack("<BQQQ", Opcode.FOOTER, 8 + 8 + 4, self.size, offset)
+        crc = zlib.crc32(footer, zlib.crc32(contents))
+        return contents + encode_records(records.Footer(self.size, offset, crc))
 
     def _put(self, data: bytes) -> None:
         self._write(data)
         self._crc = crc32(data, self._crc)
         self.size += len(data)
-
-
-def bag_record(summary: FileSummary, channels: Sequence[Channel]) -> records.Metadata:
-    """The bag's metadata as rosbag2 keeps them in each file, as if the file were the whole bag."""
-    return records.Metadata(BAG, {"serialized_metadata": to_yaml(bag_information([summary], channels, {}))})
 
 
 def encode_latched_run(channels: Channels, stamp_ns: int) -> Run:

@@ -18,8 +18,8 @@ from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
 
-from throwcollect.dataset.mcap_contents import Run
 from throwcollect.dataset.mcap_file import EPISODE, MAGIC, SENSORS_SHA256, episode_run
+from throwcollect.dataset.mcap_records import Run
 from throwcollect.episode.chunk import CHUNK_HEADER_BYTES, CHUNK_MARK, CHUNK_MARK_OFFSET, Chunk
 from throwcollect.episode.message import Episode, make_episode
 from throwcollect.errors import DatasetError

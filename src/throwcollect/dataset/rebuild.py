@@ -22,10 +22,11 @@ from throwcollect.dataset.manifest import entry_of_file
 from throwcollect.dataset.mcap_reader import StoredEpisode
 from throwcollect.dataset.provenance import Provenance, read_provenance, write_provenance
 from throwcollect.dataset.recovery import remove_unfinished
+from throwcollect.dataset.shard import list_shards, shard_of
 from throwcollect.dataset.throws_table import Row, ThrowsTable, read_throws_table
 from throwcollect.dataset.verify_episode import EpisodeCheck
 from throwcollect.dataset.verify_shard import check_shard
-from throwcollect.dataset.verify_tables import find_wrong_trials, shard_of
+from throwcollect.dataset.verify_tables import find_wrong_trials
 from throwcollect.episode.channels import Channels
 from throwcollect.errors import DatasetError
 from throwcollect.files import read_text, write_file
@@ -112,7 +113,7 @@ def _rebuild(directory: Path) -> Rebuilt:
         )
     earlier = read_earlier_rows(directory, plan)
     recordings = _Recordings(plan)
-    for name in dict.fromkeys(shard_of(plan, number) for number in plan.trials.numbers):
+    for name in list_shards(plan):
         if (directory / name).exists():
             if findings := recordings.read(directory / name):
                 raise DatasetError(str(findings[0]), path=directory, hint=repair)

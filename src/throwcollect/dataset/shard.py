@@ -16,13 +16,15 @@ from operator import itemgetter
 from pathlib import Path
 
 from throwcollect.dataset.bag import FileSummary
+from throwcollect.dataset.directory import shard_name
 from throwcollect.dataset.manifest import FileEntry, RunningHash
-from throwcollect.dataset.mcap_contents import Run
 from throwcollect.dataset.mcap_file import McapFile, episode_run
+from throwcollect.dataset.mcap_records import Run
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.message import Episode
 from throwcollect.errors import DatasetError
 from throwcollect.files import open_regular, replacing, unwritable, write_all
+from throwcollect.sweep.plan import Plan
 
 
 @dataclass(frozen=True)
@@ -73,6 +75,16 @@ def write_in_order(
     return FinishedShard(summary, offsets, FileEntry(name, file.size, sha256.hexdigest()))
 
 
+def shard_of(plan: Plan, trial: int) -> str:
+    """Name of the file that holds the episode of a trial, if it has one."""
+    return shard_name(plan.config.name, trial // plan.config.record.trials_per_shard)
+
+
+def list_shards(plan: Plan) -> list[str]:
+    """Names of the files that a plan's trials may have, in order."""
+    return list(dict.fromkeys(shard_of(plan, trial) for trial in plan.trials.numbers))
+
+
 def path_of_part(path: Path) -> Path:
     """Path of a shard while it is filled; `path` is its final one."""
     return path.with_name(f"{path.name}.part")
@@ -105,23 +117,23 @@ class OpenShard:
         """Wait for the episodes or losses of more trials."""
         self.missing.update(trials)
 
-    def adopt(self, runs: Iterable[tuple[int, int, Run]], *, size: int) -> None:
-        """Go on with the unfinished file of a shard.
+    def adopt(self, runs: Mapping[int, tuple[int, Run]]) -> None:
+        """Go on with the unfinished file of a shard; what follows its last whole episode is cut off.
 
         Args:
-            runs: Trial, offset [bytes] and records of each episode that lies in the file already.
-            size: Where its last whole episode ends [bytes]; what follows is cut off.
+            runs: By trial, where the run of an episode begins in the file [bytes], and its records.
 
         Raises:
             DatasetError: If the file cannot be written.
         """
+        size = max(offset + run.length for offset, run in runs.values())
         try:
             self._descriptor = open_regular(self.part, os.O_RDWR)
             self._cut(self._descriptor, size)
         except OSError as error:
             raise unwritable(self.part, error) from error
         self._size = size
-        for trial, offset, run in runs:
+        for trial, (offset, run) in runs.items():
             self._remember(trial, offset, run)
 
     def append(self, episode: Episode) -> None:

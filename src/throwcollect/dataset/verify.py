@@ -17,11 +17,12 @@ from throwcollect.dataset.bag import FileSummary, bag_information, read_bag_meta
 from throwcollect.dataset.digest import combine_digests
 from throwcollect.dataset.directory import CARD, FORMAT, METADATA, SHARD_SUFFIX, THROWS, TRIALS
 from throwcollect.dataset.findings import Finding
+from throwcollect.dataset.shard import shard_of
 from throwcollect.dataset.verify_episode import EpisodeCheck
 from throwcollect.dataset.verify_manifest import find_manifest_problems
 from throwcollect.dataset.verify_plan import CheckOf, can_draw, find_drawing_problems, find_refusal_problems
 from throwcollect.dataset.verify_shard import ShardReport, check_shard
-from throwcollect.dataset.verify_tables import Tables, check_tables, shard_of
+from throwcollect.dataset.verify_tables import Tables, check_tables
 from throwcollect.errors import DatasetError
 from throwcollect.robots.description import is_available as robot_is_available
 from throwcollect.side_by_side import working_side_by_side

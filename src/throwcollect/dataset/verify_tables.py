@@ -10,8 +10,9 @@ import numpy as np
 
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
-from throwcollect.dataset.directory import CONFIG, PLAN, THROWS, TRIALS, config_path, shard_name
+from throwcollect.dataset.directory import CONFIG, PLAN, THROWS, TRIALS, config_path
 from throwcollect.dataset.findings import Finding
+from throwcollect.dataset.shard import shard_of
 from throwcollect.dataset.throws_table import REFUSED, Row, read_throws_table
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError
 from throwcollect.sweep.digest import trial_digests
@@ -148,8 +149,3 @@ def _plan_findings(plan: Plan, rows: Mapping[int, Row], doubtful: Collection[int
         expected = None if row["outcome"] in WITHOUT_EPISODE else shard_of(plan, trial.number)
         if row["shard"] != expected:
             yield Finding(THROWS, place, f"is {row['outcome']} with shard {row['shard']}, not {expected}")
-
-
-def shard_of(plan: Plan, trial: int) -> str:
-    """Name of the file that holds the episode of a trial, if it has one."""
-    return shard_name(plan.config.name, trial // plan.config.record.trials_per_shard)

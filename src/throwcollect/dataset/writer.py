@@ -38,12 +38,12 @@ from throwcollect.dataset.manifest import FileEntry
 from throwcollect.dataset.provenance import Provenance, write_provenance
 from throwcollect.dataset.recovery import Part, find_left, recover_shard, remove_unfinished
 from throwcollect.dataset.row_store import Digests, RowStore
-from throwcollect.dataset.shard import FinishedShard, OpenShard
+from throwcollect.dataset.shard import FinishedShard, OpenShard, path_of_part
 from throwcollect.dataset.throws_table import Place, Row, ThrowsTable
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.message import Episode
 from throwcollect.errors import DatasetError
-from throwcollect.files import remove, write_file
+from throwcollect.files import is_there, remove, write_file
 from throwcollect.robots.description import full_description
 from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.points import Points
@@ -157,27 +157,28 @@ class DatasetWriter:
         remove_unfinished(self._directory)
         for name in (METADATA, MANIFEST, THROWS):
             remove(self._directory / name)
-        found = 0
-        numbers = sorted(self._unfinished)
-        all_left = find_left([*map(self._part, numbers)], self._channels, processes=processes)
-        for number, left in zip(numbers, all_left, strict=True):
+        count = 0
+        # Every process gets the trials of the shards that it looks through, and not a whole plan.
+        parts = {number: self._part(number) for number in sorted(self._unfinished) if self._has_file(number)}
+        all_left = find_left([*parts.values()], self._channels, processes=processes)
+        for number, left in zip(parts, all_left, strict=True):
             shard = self._shard(number)
-            recovered = recover_shard(shard, left)
-            for each in recovered.episodes:
-                place = Place(shard.path.name, -1, each.samples, each.digest)
+            episodes = recover_shard(shard, left)
+            for each in episodes:
+                place = replace(each.place, shard=shard.path.name)
                 self._rows[number][each.trial] = self._row(each.trial, each.result, place)
                 if tell is not None:
                     tell(each.trial, each.result)
-            found += len(recovered.episodes)
-            if recovered.finished is not None:
-                self._close_shard(number, recovered.finished)
-            elif recovered.episodes or not shard.missing:
+            count += len(episodes)
+            if left.finished is not None:
+                self._close_shard(number, left.finished)
+            elif episodes or not shard.missing:
                 self._finish_shard_if_complete(number)
             else:
                 del self._shards[number], self._rows[number]
-        if found:
-            self.note("recovered", episodes=found)
-        return found
+        if count:
+            self.note("recovered", episodes=count)
+        return count
 
     def extend(self, trials: Trials) -> None:
         """Add trials to the plan, and to the one on disk before this returns.
@@ -348,6 +349,11 @@ class DatasetWriter:
         members, first = self._members(number), self.plan.trials.first
         trials = self.plan.trials[members.start - first : members.stop - first]
         return Part(self._path(number), Plan(self._config, trials), self._settled(number))
+
+    def _has_file(self, number: int) -> bool:
+        """Whether an earlier writer has begun a shard."""
+        path = self._path(number)
+        return is_there(path) or is_there(path_of_part(path))
 
     def _path(self, number: int) -> Path:
         return self._directory / shard_name(self._config.name, number)
