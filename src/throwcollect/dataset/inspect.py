@@ -1,4 +1,4 @@
-"""What a dataset holds, in numbers."""
+"""Summaries and digests of datasets."""
 
 from __future__ import annotations
 
@@ -18,10 +18,7 @@ from throwcollect.errors import DatasetError
 
 
 def info(directory: Path) -> Info:
-    """Summary of a dataset, from its tables; `verify` says whether they are right.
-
-    Args:
-        directory: Its directory.
+    """Summarise a dataset from its tables; `verify` says whether they are right.
 
     Raises:
         DatasetError: If the directory holds no finished dataset, or its tables are damaged.
@@ -31,7 +28,7 @@ def info(directory: Path) -> Info:
 
 
 def summary(dataset: Dataset) -> Info:
-    """Summary of an open dataset.
+    """Summarise an open dataset.
 
     Raises:
         DatasetError: If its metadata lack a field, or its directory cannot be read.
@@ -73,10 +70,7 @@ def _landing(throws: pa.Table) -> Mapping[str, tuple[float, float]] | None:
 
 
 def digest(directory: Path) -> str:
-    """Hash over all episodes in order of trials, recomputed from their bytes, and over targets if trials have some.
-
-    Args:
-        directory: Directory of the dataset.
+    """Compute the digest of a dataset again from the bytes of its episodes, and from the targets if trials have some.
 
     Raises:
         DatasetError: If an episode is damaged, or the digest of one or of all is not what the dataset says.

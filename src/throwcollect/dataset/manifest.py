@@ -26,7 +26,7 @@ _PROFILE = "data-package"
 _HASH = "sha256:"
 _PROMISED = frozenset({CONFIG, METADATA, PLAN, SOURCES, THROWS, TRIALS})
 _NAME = re.compile(r"[a-z0-9][a-z0-9_.-]*")
-"""A name alone: nothing outside the directory is ever meant."""
+"""A file name without directories, so that no manifest can name a file outside of the dataset."""
 _MOST_BYTES = 100_000_000
 _BLOCK = 1 << 20
 
@@ -47,15 +47,15 @@ class FileEntry:
 
 
 def entry_of(path: str, data: bytes) -> FileEntry:
-    """Entry of a file with these contents."""
+    """Make the entry of a file with these contents."""
     return FileEntry(path, len(data), hashlib.sha256(data).hexdigest())
 
 
 def entry_of_file(path: Path) -> FileEntry:
-    """Entry of a file as it lies on disk.
+    """Make the entry of a file on disk.
 
     Raises:
-        DatasetError: If it cannot be read, or is no plain file.
+        DatasetError: If it cannot be read, or is no regular file.
     """
     digest, size = hashlib.sha256(), 0
     try:
@@ -69,10 +69,10 @@ def entry_of_file(path: Path) -> FileEntry:
 
 
 def size_of_file(path: Path) -> int:
-    """Size of a file as it lies on disk [bytes].
+    """Size of a file on disk [bytes].
 
     Raises:
-        DatasetError: If it cannot be opened, or is no plain file.
+        DatasetError: If it cannot be opened, or is no regular file.
     """
     try:
         with open(open_regular(path), "rb") as file:
@@ -82,7 +82,7 @@ def size_of_file(path: Path) -> int:
 
 
 class RunningHash:
-    """SHA-256 of a file while it is written, computed in a thread of its own, so that writing need not wait for it."""
+    """SHA-256 of a file while it is written, computed in a thread of its own, so that the writer need not wait."""
 
     def __init__(self) -> None:
         self._hash = hashlib.sha256()
@@ -95,7 +95,7 @@ class RunningHash:
         """Take in the next bytes of the file."""
         self._held.append(data)
         self._held_bytes += len(data)
-        # Handing over to a thread takes some 20 µs, so it is done for many episodes at once.
+        # Handing over to a thread takes some 20 µs, so it is done with the bytes of many episodes at once.
         if self._held_bytes >= _BLOCK:
             self._hand_over()
 
@@ -123,20 +123,15 @@ class RunningHash:
 
 
 def list_promised_names(directory: Path) -> list[str]:
-    """Names of the files in a directory that a manifest has to cover, in order; nothing is opened.
+    """Names of the files in a directory that a manifest has to cover, in order.
 
-    The data card and the logs are not among them, as they say how, where and when a dataset was collected.
+    The data card and the logs are not among them, as they tell how, where and when the dataset was collected.
     """
     return sorted(name for name in os.listdir(directory) if name in _PROMISED or name.endswith(SHARD_SUFFIX))
 
 
 def manifest_text(name: str, entries: Iterable[FileEntry]) -> str:
-    """Text of a manifest.
-
-    Args:
-        name: Name of the collection.
-        entries: The files, in any order.
-    """
+    """Text of the manifest of a collection of this name; the entries may come in any order."""
     resources = [
         {"name": entry.path, "path": entry.path, "bytes": entry.bytes, "hash": _HASH + entry.sha256}
         for entry in sorted(entries, key=lambda entry: entry.path)
@@ -145,10 +140,7 @@ def manifest_text(name: str, entries: Iterable[FileEntry]) -> str:
 
 
 def read_manifest(directory: Path) -> tuple[FileEntry, ...]:
-    """Entries of the manifest of a dataset, in order of their paths.
-
-    Args:
-        directory: Directory of the dataset.
+    """Read the entries of the manifest of a dataset, in order of their paths.
 
     Raises:
         DatasetError: If the manifest is missing, or its text is not one that `manifest_text` makes.
@@ -157,10 +149,10 @@ def read_manifest(directory: Path) -> tuple[FileEntry, ...]:
 
 
 def read_named_manifest(directory: Path) -> tuple[str, tuple[FileEntry, ...]]:
-    """Name of the collection that a manifest has, and its entries; see `read_manifest`.
+    """Read the name of the collection that a manifest has, and its entries; see `read_manifest`.
 
     Raises:
-        DatasetError: If the manifest is missing, or is not written as one is.
+        DatasetError: If the manifest is missing, or its text is not one that `manifest_text` makes.
     """
     path = directory / MANIFEST
     if not os.path.lexists(path):

@@ -39,7 +39,7 @@ _LATCHED_LEVEL = 9
 
 
 def episode_run(episode: Episode) -> Run:
-    """Records of an episode.
+    """Encode the records of an episode.
 
     Raises:
         DatasetError: If a chunk of the episode is damaged.
@@ -158,7 +158,7 @@ class McapFile:
 
 
 def encode_latched_run(channels: Channels, stamp_ns: int) -> Run:
-    """Records with the latched messages: a chunk and its message indexes."""
+    """Encode the latched messages: a chunk and its message indexes."""
     messages = [
         encode_records(records.Message(channel.id, stamp_ns, data, stamp_ns, 0))
         for channel, data in channels.encode_latched_messages(stamp_ns).items()

@@ -33,13 +33,13 @@ def declarations(channels: Sequence[Channel]) -> tuple[list[records.Schema], lis
 
 @dataclass(frozen=True)
 class Run:
-    """Records that follow each other without a gap, wherever they lie: chunks with their indexes, and what ends them.
+    """Records that follow each other without a gap: chunks, each with its message indexes, and maybe a Metadata record.
 
     Attributes:
         data: The bytes.
         chunk_indexes: Index of each chunk, as if the run began at offset 0.
         counts: Number of messages on each channel, by its number.
-        metadata_length: Size of the Metadata record at its end [bytes]; 0 if there is none.
+        metadata_length: Size of the Metadata record at the end [bytes]; 0 if there is none.
     """
 
     data: bytes
@@ -59,7 +59,7 @@ class Run:
 
     @classmethod
     def of(cls, chunks: Iterable[tuple[Chunk, Mapping[int, bytes]]], metadata: bytes = b"") -> Run:
-        """The run of some chunks.
+        """Make the run of some chunks.
 
         Args:
             chunks: Each chunk with the Message Index records that follow it, by channel.

@@ -1,4 +1,4 @@
-"""By how much trials miss their targets: columns of the table of throws that there are where targets are."""
+"""The distances by which trials miss their targets: columns of the table of throws, where trials have targets."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from throwcollect.units import unit_of_name
 
 
 def read_targets(throws: pa.Table) -> Targets | None:
-    """The targets of all trials of a table of throws, in order; None if it has no columns of targets."""
+    """Read the targets of all trials of a table of throws, in order; None if it has no columns of targets."""
     names = tuple(name for name in throws.column_names if is_target(name))
     if not names:
         return None
@@ -28,7 +28,7 @@ def read_targets(throws: pa.Table) -> Targets | None:
 
 
 def summarise_misses(config: Config, throws: pa.Table) -> dict[str, MissSummary]:
-    """By how much trials missed their targets, by column of misses; empty if they have no targets.
+    """Summarise by how much trials missed their targets, by column of misses; empty if they have no targets.
 
     Args:
         config: Configuration of the dataset.
@@ -73,7 +73,7 @@ class Misses:
         return f"Distance of where the trial ended from its target, in {words} [{unit_of_name(miss)}]."
 
     def measure(self, target: Mapping[str, float], row: Mapping[str, Any]) -> dict[str, float | None]:
-        """The columns of misses of a trial; None where it has no such target, or nothing to compare with it.
+        """Compute the columns of misses of a trial; None where it has no such target, or nothing to compare with it.
 
         Args:
             target: Its target by column.

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True)
 class Moments:
-    """What is known of the rows of a table when they have passed by once.
+    """The moments of the rows of a table, which are read only once and need not fit into memory.
 
     Attributes:
         count: Number of rows.
@@ -28,7 +28,7 @@ class Moments:
 
     @classmethod
     def of(cls, rows: NDArray[np.float64]) -> Moments:
-        """Those of some rows, shape ``(n_rows, n_columns)``, at least one."""
+        """Compute those of some rows, shape ``(n_rows, n_columns)``, at least one."""
         mean = rows.mean(axis=0)
         return cls(len(rows), rows.min(axis=0), rows.max(axis=0), mean, ((rows - mean) ** 2).sum(axis=0))
 
@@ -39,7 +39,7 @@ class Moments:
         return deviations
 
     def with_more(self, more: Moments) -> Moments:
-        """Those of both."""
+        """Compute those of these rows and `more` together."""
         count = self.count + more.count
         step = more.mean - self.mean
         return Moments(

@@ -32,14 +32,13 @@ class FinishedShard:
     """A shard in trial order under its final name.
 
     Attributes:
-        summary: What the bag's metadata say of it; None when no trial of it has an episode, and so no file.
+        recording: What bag's metadata and manifest say of its file; None if no trial of it has an episode, and so there
+            is no file.
         offsets: Where the chunk of each trial's episode begins [bytes].
-        entry: What the manifest says of it; None when there is no file.
     """
 
-    summary: FileSummary | None
+    recording: tuple[FileSummary, FileEntry] | None
     offsets: dict[int, int]
-    entry: FileEntry | None
 
 
 def write_in_order(
@@ -56,7 +55,7 @@ def write_in_order(
         write: Called with the bytes of the file, in order.
         channels: What is recorded.
         runs: By trial, where the run of an episode begins in another file [bytes], and its records without their bytes.
-        read: Gives the bytes of that other file from an offset on, so many.
+        read: Reads that other file: given an offset and a length, returns the bytes.
         name: Name of the file.
     """
     sha256 = RunningHash()
@@ -72,7 +71,7 @@ def write_in_order(
         offsets[trial] = file.size
         file.append(replace(run, data=read(offset, run.length)))
     summary = file.finish(name)
-    return FinishedShard(summary, offsets, FileEntry(name, file.size, sha256.hexdigest()))
+    return FinishedShard((summary, FileEntry(name, file.size, sha256.hexdigest())), offsets)
 
 
 def shard_of(plan: Plan, trial: int) -> str:
@@ -114,7 +113,7 @@ class OpenShard:
         self._runs: dict[int, tuple[int, Run]] = {}
 
     def expect(self, trials: Iterable[int]) -> None:
-        """Wait for the episodes or losses of more trials."""
+        """Wait for the episodes, or losses, of more trials."""
         self.missing.update(trials)
 
     def adopt(self, runs: Mapping[int, tuple[int, Run]]) -> None:
@@ -166,7 +165,7 @@ class OpenShard:
             DatasetError: If the shard cannot be written.
         """
         if self._descriptor is None or not self._runs:
-            return FinishedShard(None, {}, None)
+            return FinishedShard(None, {})
         with replacing(self.path) as descriptor:
             write = partial(write_all, descriptor)
             finished = write_in_order(write, self._channels, self._runs, self._read, name=self.path.name)
@@ -178,7 +177,7 @@ class OpenShard:
         return finished
 
     def sync(self) -> None:
-        """Have what was appended survive a power cut.
+        """Make the appended episodes survive a power cut.
 
         Raises:
             DatasetError: If the disk fails.
@@ -192,13 +191,13 @@ class OpenShard:
         self._synced = True
 
     def close(self) -> None:
-        """Close the file; it stays where it is."""
+        """Close the file, which stays on disk."""
         if self._descriptor is not None:
             os.close(self._descriptor)
             self._descriptor = None
 
     def _remember(self, trial: int, offset: int, run: Run) -> None:
-        # The bytes are in the file; keeping them in memory too would hold whole shards there.
+        # The file has the bytes; with them, whole shards would be in memory.
         self._runs[trial] = (offset, replace(run, data=b""))
         self.missing.discard(trial)
 

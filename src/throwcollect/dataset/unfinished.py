@@ -1,4 +1,4 @@
-"""Opens a dataset for people: a finished one as it is, one that is still collected with what it holds so far."""
+"""Opens a dataset to read it: a finished one as it is, an unfinished one with the trials that have ended."""
 
 from __future__ import annotations
 
@@ -28,9 +28,6 @@ def load(directory: StrPath) -> Dataset:
     is not finished, the recordings are read through, and its rows are the trials that have ended so far: row i is not
     trial i, and `Dataset.digest` is an error.
 
-    Args:
-        directory: Its directory.
-
     Raises:
         DatasetError: If the directory holds no dataset, or its tables or plan are damaged.
         ConfigError: If its ``config.yaml`` is wrong.
@@ -53,7 +50,7 @@ def load(directory: StrPath) -> Dataset:
 
 
 def _list_rows(directory: Path, plan: Plan) -> Iterator[Row]:
-    """Rows of the trials that were refused, and of those whose episodes are there: those that `resume` would keep."""
+    """Make the rows of the refused trials, and of those whose episodes are on disk as `resume` would keep them."""
     table = ThrowsTable.of(plan)
     yield from (table.make_refused_row(plan.trial(number)) for number in plan.trials.refused)
     for name in list_shards(plan):

@@ -34,7 +34,7 @@ _MANY_EPISODES = 1000
 _TELL_EVERY_S = 2.0
 _UNFINISHED = (".part", ".new")
 _short = reprlib.Repr()
-"""Values from a file may be as large and as deep as they like."""
+"""Shortens values from files, which somebody may have made as large and as deep as possible."""
 _short.maxstring = _short.maxother = 120
 _short.maxlevel = _short.maxdict = _short.maxlist = 3
 
@@ -52,14 +52,14 @@ def verify(
     plan is drawn again; the bag's metadata against the files; of each file every record, index, count and CRC, the
     latched topics and the order of trials; of each episode its digest, layout and stamps, and that the simulation can
     have recorded it; the table of throws against the episodes, which are judged again, and against the plan; and the
-    dataset's digest. What takes packages that are not installed is left out, and `find_unchecked` names it.
+    dataset's digest. Checks that need packages that are not installed are left out; `find_unchecked` names them.
 
     Args:
         directory: Its directory.
         check_of: Makes the check that says which trials the plan refuses; None leaves refusals as they are.
         processes: How many processes may check the recordings of a large dataset; more than one import the program that
             calls this, as those of `multiprocessing` do.
-        say: Is told how far the check of a large dataset has come.
+        say: Receives the progress of the check of a large dataset.
 
     Returns:
         What is wrong, file by file; empty when nothing is.
@@ -84,7 +84,7 @@ def verify(
     findings += [finding for check in checks.values() for finding in check.findings]
     if bag is not None:
         findings += _find_bag_problems(bag, checks)
-        # Targets are part of the digest, and without a plan those of a list are not known.
+        # Targets are part of the digest, and only the plan has those of a list.
         if tables.plan is not None or not (directory / TRIALS).exists():
             findings += _find_digest_problems(bag, tables, checks)
     findings += _find_stray_files(directory, checks)
@@ -115,7 +115,7 @@ def _plan_findings(directory: Path, tables: Tables, check_of: CheckOf | None) ->
 def _checking_shards(
     directory: Path, tables: Tables, processes: int, say: Callable[[str], object]
 ) -> Iterator[Iterator[tuple[str, ShardReport]]]:
-    """Have the files checked that rows name; all that are there if there are no rows."""
+    """Start to check the files that rows name, or all that are there if there are no rows."""
     expected = _trials_by_file(directory, tables)
     names = sorted(_list_shards(directory) if expected is None else expected)
     many = expected is not None and sum(map(len, expected.values())) >= _MANY_EPISODES
@@ -124,7 +124,7 @@ def _checking_shards(
     with working_side_by_side(
         names,
         _file_check,
-        (directory, tables),
+        (directory, tables, expected),
         processes=processes if many else 1,
         doing="checks recordings",
         fork=True,
@@ -135,7 +135,7 @@ def _checking_shards(
 def _tell(
     reports: Iterator[tuple[str, ShardReport]], count: int, say: Callable[[str], object]
 ) -> Iterator[tuple[str, ShardReport]]:
-    """The same, with word of how far it has come."""
+    """Pass the reports on, and say how many there are every few seconds."""
     told = time.monotonic()
     for number, report in enumerate(reports, start=1):
         yield report
@@ -144,9 +144,10 @@ def _tell(
             say(f"{number} of {format_count(count, 'recording')} checked")
 
 
-def _file_check(directory: Path, tables: Tables) -> Callable[[str], ShardReport]:
-    """What checks the files of a dataset, by their names."""
-    expected = _trials_by_file(directory, tables)
+def _file_check(
+    directory: Path, tables: Tables, expected: Mapping[str, list[int]] | None
+) -> Callable[[str], ShardReport]:
+    """Make the function that checks a file of a dataset, by its name."""
     robot = tables.config is not None and robot_is_available(tables.config)
     check = EpisodeCheck(tables.plan, tables.rows or {}, doubtful=tables.doubtful, robot=robot)
 
@@ -158,14 +159,14 @@ def _file_check(directory: Path, tables: Tables) -> Callable[[str], ShardReport]
 
 
 def _trials_by_file(directory: Path, tables: Tables) -> dict[str, list[int]] | None:
-    """Trials whose episodes each file should hold, in order; None if that is not known."""
+    """List the trials whose episodes each file should hold, in order; None if that is not known."""
     if tables.plan is None or tables.rows is None:
         return None
     names, expected = _list_shards(directory), dict[str, list[int]]()
     refused = tables.plan.trials.refused
     for trial in sorted({*range(len(tables.plan.trials)), *tables.rows}):
         name, row = shard_of(tables.plan, trial), tables.rows.get(trial)
-        # A trial whose row is missing most likely has an episode.
+        # If the row of a trial is missing, its episode is most likely in its file all the same.
         if (trial not in refused and name in names) if row is None else row["shard"] == name:
             expected.setdefault(name, []).append(trial)
     return expected
@@ -188,7 +189,7 @@ def _find_bag_problems(bag: Mapping[str, Any], checks: Mapping[str, ShardReport]
     if not channels:
         del expected["topics_with_message_count"]
     if not whole:
-        # Some files cannot be read, which is reported above, so totals over all files cannot be checked.
+        # Other findings report the unreadable files; without them, the totals over all files are not known.
         yield from _find_file_problems(bag, summaries)
         return
     for key, value in expected.items():
@@ -220,7 +221,7 @@ def _find_digest_problems(
     if damaged:
         if tables.rows is None:
             return
-        # The table stands in for episodes that cannot be read.
+        # For episodes that cannot be read, the digests are taken from the table.
         digests = {trial: row["digest"] for trial, row in tables.rows.items() if is_digest(row["digest"])} | digests
     targets = None if tables.plan is None else tables.plan.trials.targets
     written = said.get("throwcollect.digest")

@@ -21,7 +21,7 @@ from throwcollect.wording import command
 
 
 def find_manifest_problems(directory: Path, name: str | None) -> Iterator[Finding]:
-    """What the manifest of a dataset and its files do not agree in; every byte of the promised files is read.
+    """Find where the manifest of a dataset and its files differ; every byte of the promised files is read.
 
     Args:
         directory: Directory of the dataset.
@@ -46,12 +46,12 @@ def find_manifest_problems(directory: Path, name: str | None) -> Iterator[Findin
 
 
 def find_changed_files(directory: Path, entries: Iterable[FileEntry], *, in_full: bool) -> Iterator[Finding]:
-    """Files that are not what a manifest says.
+    """Find the files that are not as a manifest says.
 
     Args:
         directory: Directory of the dataset.
         entries: Those of the manifest.
-        in_full: Whether the bytes of all files are hashed; else their sizes are enough.
+        in_full: Whether the bytes of all files are hashed; else only their sizes are compared.
     """
     for said in entries:
         path = directory / said.path
