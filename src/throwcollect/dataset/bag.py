@@ -17,7 +17,7 @@ from ruamel.yaml.error import YAMLError
 from ruamel.yaml.events import AliasEvent
 
 from rclzenoh.interfaces import type_hash
-from throwcollect.dataset.directory import FORMAT, METADATA, PLAN
+from throwcollect.dataset.directory import METADATA, PLAN
 from throwcollect.episode.channels import Channel
 from throwcollect.errors import DatasetError
 from throwcollect.files import read_text
@@ -96,12 +96,6 @@ def bag_information(
         "custom_data": dict(custom_data),
         "ros_distro": _ROS_DISTRO,
     }
-
-
-def dataset_metadata(files: Sequence[FileSummary], channels: Sequence[Channel], digest: str) -> str:
-    """Text of the ``metadata.yaml`` of a dataset with these files, in this order."""
-    custom = {"throwcollect.format": FORMAT, "throwcollect.digest": digest}
-    return to_yaml({"rosbag2_bagfile_information": bag_information(files, channels, custom)})
 
 
 class _PlainComposer(Composer):

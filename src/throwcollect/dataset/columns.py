@@ -88,16 +88,7 @@ class Recorded(Protocol):
 
 @dataclass(frozen=True)
 class StoredThrow:
-    """The place of a throw's episode in a file.
-
-    Attributes:
-        trial: Number of the trial.
-        start_ns: Simulated time at which the trial starts [ns].
-        path: The MCAP file.
-        offset: Where its chunk begins in the file [bytes].
-        samples: Number of samples.
-        joints: Joints that are recorded, in the order of their columns.
-    """
+    """The episode of a throw in an MCAP file, whose chunk begins at `offset` [bytes]; see `Recorded` for the others."""
 
     trial: int
     start_ns: int
@@ -153,12 +144,9 @@ def name_components(column: str, joints: Sequence[str]) -> tuple[str, ...]:
 
 
 def empty_columns(columns: Iterable[str], samples: int, joints: int) -> dict[str, Column]:
-    """Make arrays to be filled, by name; shape ``(samples,)`` or ``(samples, n)``.
+    """Make arrays for some of `COLUMNS`, by name; shape ``(samples,)`` or ``(samples, n)``.
 
-    Args:
-        columns: Which of `COLUMNS`.
-        samples: Number of samples.
-        joints: Number of joints that the columns of joints have.
+    `joints` is the number of joints that the columns of joints have.
     """
     shapes = {TIMES: (samples,), **column_shapes(samples, joints)}
     return {name: _empty(shapes[name], np.int64 if name == STAMPS else np.float64) for name in columns}

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pyarrow as pa
 
-from throwcollect.dataset.bag import FileSummary, dataset_metadata
+from throwcollect.dataset.bag import FileSummary, bag_information, to_yaml
 from throwcollect.dataset.digest import combine_digests
-from throwcollect.dataset.directory import CONFIG, MANIFEST, METADATA, PLAN, SOURCES, THROWS, TRIALS
+from throwcollect.dataset.directory import CONFIG, FORMAT, MANIFEST, METADATA, PLAN, SOURCES, THROWS, TRIALS
 from throwcollect.dataset.manifest import FileEntry, entry_of, entry_of_file, manifest_text
 from throwcollect.dataset.misses import read_targets
 from throwcollect.episode.channels import Channels
@@ -45,7 +45,9 @@ def write_description(
         DatasetError: If a file cannot be read or written.
     """
     digest = combine_digests(_digests(throws, on_piece), read_targets(throws))
-    metadata = dataset_metadata([summary for summary, _ in recordings], channels.all, digest).encode()
+    custom = {"throwcollect.format": FORMAT, "throwcollect.digest": digest}
+    bag = bag_information([summary for summary, _ in recordings], channels.all, custom)
+    metadata = to_yaml({"rosbag2_bagfile_information": bag}).encode()
     with replacing(directory / THROWS) as descriptor:
         waiting = bytearray()
 

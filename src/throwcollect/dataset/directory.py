@@ -44,10 +44,9 @@ def is_attempt(directory: Path) -> bool:
 
 
 def find_known_directory(directory: Path) -> Path | None:
-    """The directory of a dataset as its user knows it; None if the user cannot reach it, as in a volume.
+    """The directory of a dataset as its user knows it, which may have another path in this process, as in a container.
 
-    Args:
-        directory: The same directory as this process sees it, which in a container may have another path.
+    It is None if the user cannot reach it, as in a volume.
     """
     known = os.environ.get(DIRECTORY_VARIABLE, str(directory))
     return Path(known) if known else None

@@ -8,11 +8,10 @@ comparisons and arithmetic, and a null condition is not fulfilled.
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import reduce
-from types import MappingProxyType
 from typing import Any, Literal
 
 import pyarrow as pa
@@ -25,16 +24,14 @@ _SHOWN = 100
 
 _Kind = Literal["a number", "text", "a condition", "None"]
 
-_COMPARISONS = MappingProxyType[type[ast.cmpop], Callable[..., Any]](
-    {
-        ast.Eq: pc.equal,
-        ast.NotEq: pc.not_equal,
-        ast.Lt: pc.less,
-        ast.LtE: pc.less_equal,
-        ast.Gt: pc.greater,
-        ast.GtE: pc.greater_equal,
-    }
-)
+_COMPARISONS: Mapping[type[ast.cmpop], Callable[..., Any]] = {
+    ast.Eq: pc.equal,
+    ast.NotEq: pc.not_equal,
+    ast.Lt: pc.less,
+    ast.LtE: pc.less_equal,
+    ast.Gt: pc.greater,
+    ast.GtE: pc.greater_equal,
+}
 
 
 def _floor_divide(left: Any, right: Any) -> Any:
@@ -45,26 +42,26 @@ def _remainder(left: Any, right: Any) -> Any:
     return pc.subtract(left, pc.multiply(right, _floor_divide(left, right)))
 
 
-_ARITHMETIC = MappingProxyType[type[ast.operator], Callable[..., Any]](
-    {
-        ast.Add: pc.add,
-        ast.Sub: pc.subtract,
-        ast.Mult: pc.multiply,
-        ast.Div: pc.divide,
-        ast.FloorDiv: _floor_divide,
-        ast.Mod: _remainder,
-        ast.Pow: pc.power,
-    }
-)
+_ARITHMETIC: Mapping[type[ast.operator], Callable[..., Any]] = {
+    ast.Add: pc.add,
+    ast.Sub: pc.subtract,
+    ast.Mult: pc.multiply,
+    ast.Div: pc.divide,
+    ast.FloorDiv: _floor_divide,
+    ast.Mod: _remainder,
+    ast.Pow: pc.power,
+}
 
 
 def _hypot(x: Any, y: Any) -> Any:
     return pc.sqrt(pc.add(pc.multiply(x, x), pc.multiply(y, y)))
 
 
-_FUNCTIONS = MappingProxyType[str, tuple[int, Callable[..., Any]]](
-    {"abs": (1, pc.abs), "sqrt": (1, pc.sqrt), "hypot": (2, _hypot)}
-)
+_FUNCTIONS: Mapping[str, tuple[int, Callable[..., Any]]] = {
+    "abs": (1, pc.abs),
+    "sqrt": (1, pc.sqrt),
+    "hypot": (2, _hypot),
+}
 """Number of arguments, and the function."""
 
 
@@ -134,12 +131,7 @@ class Expression:
 
 
 class _Evaluation:
-    """Evaluates parts of an expression on a table.
-
-    Args:
-        table: The table.
-        error: Makes an error that points to a part.
-    """
+    """Evaluates parts of an expression on a table; `error` makes an error that points to a part."""
 
     def __init__(self, table: pa.Table, error: Callable[[ast.expr, str], ConfigError]) -> None:
         self._table = table

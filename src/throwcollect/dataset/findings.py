@@ -13,7 +13,7 @@ class Finding:
 
     Attributes:
         file: Name of the file in the dataset's directory.
-        place: Where in it: a trial, a byte, a field; empty when it is the file as a whole.
+        place: The place in it: a trial, a byte, a field; empty if it is the file as a whole.
         problem: What is wrong.
     """
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-import pyarrow as pa
-import pyarrow.compute as pc
+import numpy as np
 
 from throwcollect.dataset.data_card import count_outcomes
 from throwcollect.dataset.digest import combine_digests
@@ -47,7 +46,7 @@ def summary(dataset: Dataset) -> Info:
         episodes=episodes,
         outcomes=count_outcomes(dataset.throws),
         wanted=dataset.config.until.wanted if dataset.config.until else None,
-        landing=_landing(dataset.throws) if dataset.config.task.throws else None,
+        landing=_find_landing_area(dataset) if dataset.config.task.throws else None,
         samples=samples,
         duration_s=(samples - episodes) / dataset.config.record.rate_hz,
         shards=len(shards),
@@ -62,11 +61,11 @@ def summary(dataset: Dataset) -> Info:
     )
 
 
-def _landing(throws: pa.Table) -> Mapping[str, tuple[float, float]] | None:
-    limits = {axis: pc.min_max(throws[f"landing_{axis}"]).as_py() for axis in ("x_m", "y_m")}
-    if limits["x_m"]["min"] is None:
+def _find_landing_area(dataset: Dataset) -> Mapping[str, tuple[float, float]] | None:
+    bounds = dataset.landings.bounds
+    if np.isnan(bounds).any():
         return None
-    return {axis: (each["min"], each["max"]) for axis, each in limits.items()}
+    return {axis: (low, high) for axis, (low, high) in zip(("x_m", "y_m"), bounds[:2].tolist(), strict=True)}
 
 
 def digest(directory: Path) -> str:

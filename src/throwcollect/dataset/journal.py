@@ -13,7 +13,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Literal, get_args
 
 from throwcollect.dataset.directory import JOURNAL
@@ -62,14 +61,6 @@ class Journal:
             self._append(b"\n")
         self.note("opened", pid=os.getpid())
 
-    def __enter__(self) -> Journal:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
     def measure_collected_s(self) -> float:
         """Real time for which this process and earlier ones have collected [s], to the millisecond."""
         # The clock may have been set back meanwhile.
@@ -96,14 +87,7 @@ class Journal:
 
 @dataclass(frozen=True)
 class Entry:
-    """One line of a journal.
-
-    Attributes:
-        event: The event.
-        time_s: Its Unix time [s].
-        wall_s: Real time that collecting took in all [s], if the line has it.
-        outcome: Outcome of the trial whose episode was written, if the line has it.
-    """
+    """One line of a journal; `wall_s` (real time that collecting took in all) and `outcome` are None if it has none."""
 
     event: Event
     time_s: float
@@ -118,16 +102,8 @@ def read_journal(path: Path) -> Iterator[Entry]:
     except OSError:
         return
     with open(descriptor, "rb") as file:
-        for line in file:
-            try:
-                entry = json.loads(line)
-            except ValueError:
-                continue
-            if (
-                isinstance(entry, dict)
-                and entry.get("event") in get_args(Event)
-                and isinstance(entry.get("time"), int | float)
-            ):
+        for entry in map(_parse, file):
+            if entry.get("event") in get_args(Event) and isinstance(entry.get("time"), int | float):
                 wall_s, outcome = entry.get("wall_s"), entry.get("outcome")
                 yield Entry(
                     entry["event"],
@@ -165,15 +141,22 @@ def read_commits(
         raise unreadable(path, error) from error
     # Another process may be writing the last line now.
     whole = data[: data.rfind(b"\n") + 1]
-    found = []
-    for line in whole.splitlines():
-        if b'"commit"' not in line:
-            continue
-        with suppress(ValueError):
-            entry = json.loads(line)
-            if isinstance(entry, dict) and all(isinstance(entry.get(name), int | float | str) for name in columns):
-                found.append([entry[name] for name in columns])
+    entries = [_parse(line) for line in whole.splitlines() if b'"commit"' in line]
+    found = [
+        [entry[name] for name in columns]
+        for entry in entries
+        if all(isinstance(entry.get(name), int | float | str) for name in columns)
+    ]
     return found, first + len(whole), bool(rest)
+
+
+def _parse(line: bytes) -> dict[str, Any]:
+    """The fields of a line; none if it was cut off or damaged."""
+    with suppress(ValueError):
+        entry = json.loads(line)
+        if isinstance(entry, dict):
+            return entry
+    return {}
 
 
 def was_open(directory: Path) -> bool:

@@ -60,13 +60,7 @@ def hold_lock(directory: Path, *, alone: bool = True, needed: bool = True) -> It
 
 
 def lock(descriptor: int, directory: Path, *, alone: bool = True, needed: bool = True) -> None:
-    """Lock an open file or directory of a dataset until it is closed; see `hold_lock`.
-
-    Args:
-        descriptor: Its descriptor.
-        directory: Directory of the dataset, for messages.
-        alone: Whether no other process may hold the lock.
-        needed: Whether it has to be locked; an attempt at a slice never needs it.
+    """Lock an open file or directory of a dataset, as `hold_lock` does, until it is closed; an attempt never needs it.
 
     Raises:
         DatasetError: If another process holds it, or it cannot be locked.

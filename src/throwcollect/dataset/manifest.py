@@ -10,15 +10,16 @@ import hashlib
 import json
 import os
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from throwcollect.dataset.directory import CONFIG, MANIFEST, METADATA, PLAN, SHARD_SUFFIX, SOURCES, THROWS, TRIALS
+from throwcollect.dataset.findings import Finding
 from throwcollect.errors import DatasetError
-from throwcollect.files import open_regular, read_text, unreadable
+from throwcollect.files import is_there, open_regular, read_text, unreadable
 from throwcollect.sweep.digest import is_digest
 from throwcollect.wording import command
 
@@ -33,13 +34,7 @@ _BLOCK = 1 << 20
 
 @dataclass(frozen=True)
 class FileEntry:
-    """One file of a dataset.
-
-    Attributes:
-        path: Its name in the dataset's directory.
-        bytes: Its size [bytes].
-        sha256: SHA-256 of its contents, in hexadecimal.
-    """
+    """One file of a dataset: its name there, its size [bytes], and its SHA-256 in hexadecimal."""
 
     path: str
     bytes: int
@@ -155,7 +150,7 @@ def read_named_manifest(directory: Path) -> tuple[str, tuple[FileEntry, ...]]:
         DatasetError: If the manifest is missing, or its text is not one that `manifest_text` makes.
     """
     path = directory / MANIFEST
-    if not os.path.lexists(path):
+    if not is_there(path):
         raise DatasetError("is missing", path=path, hint=command("dataset", "rebuild", directory))
     text = read_text(path, most_bytes=_MOST_BYTES)
     try:
@@ -166,6 +161,60 @@ def read_named_manifest(directory: Path) -> tuple[str, tuple[FileEntry, ...]]:
     if text != manifest_text(name, entries) or len({entry.path for entry in entries}) < len(entries):
         raise DatasetError("is not written as the manifest of a dataset is", path=path)
     return name, entries
+
+
+def is_as_written(directory: Path, name: str) -> bool:
+    """Whether there is a manifest, and it says of a file of a dataset that it is as it was written."""
+    try:
+        return entry_of_file(directory / name) in read_manifest(directory)
+    except DatasetError:
+        return False
+
+
+def find_manifest_problems(directory: Path, name: str | None) -> Iterator[Finding]:
+    """Find where the manifest of a dataset and its files differ; every byte of the promised files is read.
+
+    The name of the collection is compared, too, unless it is None because nobody knows it.
+    """
+    if not (directory / MANIFEST).exists():
+        rebuild = command("dataset", "rebuild", directory)
+        yield Finding(MANIFEST, "", f"is missing, so changed bytes may go unnoticed; {rebuild} writes it")
+        return
+    try:
+        name_there, entries = read_named_manifest(directory)
+    except DatasetError as error:
+        yield Finding(MANIFEST, "", error.problem)
+        return
+    if name is not None and name_there != name:
+        yield Finding(MANIFEST, "name", f"is {name_there!r}, in the configuration {name!r}")
+    covered = {entry.path for entry in entries}
+    yield from find_changed_files(directory, entries, in_full=True)
+    yield from (
+        Finding(path, "", f"is not in {MANIFEST}") for path in list_promised_names(directory) if path not in covered
+    )
+
+
+def find_changed_files(directory: Path, entries: Iterable[FileEntry], *, in_full: bool) -> Iterator[Finding]:
+    """Find the files of a dataset that are not as entries of a manifest say.
+
+    They are compared byte by byte in full, or else only by their sizes.
+    """
+    for entry in entries:
+        path = directory / entry.path
+        if not is_there(path):
+            yield Finding(entry.path, "", f"is missing, {MANIFEST} has it")
+            continue
+        try:
+            actual = entry_of_file(path) if in_full else replace(entry, bytes=size_of_file(path))
+        except DatasetError as error:
+            yield Finding(entry.path, "", error.problem)
+            continue
+        if actual.bytes != entry.bytes:
+            yield Finding(entry.path, "", f"has {actual.bytes} bytes, in {MANIFEST} {entry.bytes}")
+        elif actual != entry:
+            yield Finding(
+                entry.path, "", f"has SHA-256 {actual.sha256}, in {MANIFEST} {entry.sha256}: its bytes were changed"
+            )
 
 
 def _entry(resource: Any) -> FileEntry:

@@ -10,8 +10,8 @@ import itertools
 import struct
 import zlib
 from collections import Counter
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import zstandard
@@ -19,10 +19,10 @@ from isal.isal_zlib import crc32
 from mcap import records
 from mcap.opcode import Opcode
 
+from rclzenoh.interfaces import message_definition, type_hash
 from throwcollect.dataset.bag import FileSummary, bag_information, to_yaml
-from throwcollect.dataset.mcap_records import Run, declarations
-from throwcollect.episode.channels import Channels
-from throwcollect.episode.chunk import Chunk, encode_message_index, encode_records
+from throwcollect.episode.channels import Channel, Channels
+from throwcollect.episode.chunk import Chunk, count_indexed, encode_message_index, encode_records
 from throwcollect.episode.message import Episode
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -36,6 +36,89 @@ PROFILE = "ros2"
 LIBRARY = "throwcollect"
 
 _LATCHED_LEVEL = 9
+
+
+def declarations(channels: Sequence[Channel]) -> tuple[list[records.Schema], list[records.Channel]]:
+    """Schema and Channel records, as rosbag2 writes them."""
+    types = list(dict.fromkeys(channel.type_name for channel in channels))
+    schemas = [
+        records.Schema(id=number, data=message_definition(name).encode(), encoding="ros2msg", name=name)
+        for number, name in enumerate(types, start=1)
+    ]
+    return schemas, [
+        records.Channel(
+            id=channel.id,
+            topic=channel.topic,
+            message_encoding="cdr",
+            metadata={"offered_qos_profiles": channel.qos.text, "topic_type_hash": type_hash(channel.type_name)},
+            schema_id=types.index(channel.type_name) + 1,
+        )
+        for channel in channels
+    ]
+
+
+@dataclass(frozen=True)
+class Run:
+    """Records that follow each other without a gap: chunks, each with its message indexes, and maybe a Metadata record.
+
+    Attributes:
+        data: The bytes.
+        chunk_indexes: Index of each chunk, as if the run began at offset 0.
+        counts: Number of messages on each channel, by its number.
+        metadata_length: Size of the Metadata record at the end [bytes]; 0 if there is none.
+    """
+
+    data: bytes
+    chunk_indexes: tuple[records.ChunkIndex, ...]
+    counts: Mapping[int, int]
+    metadata_length: int
+
+    @property
+    def length(self) -> int:
+        """Size of the records [bytes]."""
+        return _end_of(self.chunk_indexes[-1]) + self.metadata_length
+
+    @property
+    def start_ns(self) -> int:
+        """Time of the first message of its first chunk [ns]."""
+        return int(self.chunk_indexes[0].message_start_time)
+
+    @classmethod
+    def of(cls, chunks: Iterable[tuple[Chunk, Mapping[int, bytes]]], metadata: bytes = b"") -> Run:
+        """Make the run of chunks, each with its Message Index records by channel, and of a Metadata record."""
+        parts: list[bytes | memoryview] = []
+        places: list[records.ChunkIndex] = []
+        counts: dict[int, int] = {}
+        for chunk, indexes in chunks:
+            parts += (chunk.record_header(), chunk.data, *indexes.values())
+            places.append(_index_chunk(chunk, indexes, _end_of(places[-1]) if places else 0))
+            counts |= {channel: count_indexed(index) for channel, index in indexes.items()}
+        return cls(b"".join((*parts, metadata)), tuple(places), counts, len(metadata))
+
+
+def _index_chunk(chunk: Chunk, indexes: Mapping[int, bytes], start: int) -> records.ChunkIndex:
+    """Index of a chunk that begins at `start` [bytes] and is followed by its message indexes."""
+    end = start + chunk.record_size
+    offsets, offset = {}, end
+    for channel, index in indexes.items():
+        offsets[channel] = offset
+        offset += len(index)
+    return records.ChunkIndex(
+        chunk_length=chunk.record_size,
+        chunk_start_offset=start,
+        compression="zstd",
+        compressed_size=len(chunk.data),
+        message_end_time=chunk.end_ns,
+        message_index_length=offset - end,
+        message_index_offsets=offsets,
+        message_start_time=chunk.start_ns,
+        uncompressed_size=chunk.uncompressed_size,
+    )
+
+
+def _end_of(index: records.ChunkIndex) -> int:
+    """Where the message indexes of a chunk end [bytes]."""
+    return int(index.chunk_start_offset + index.chunk_length + index.message_index_length)
 
 
 def episode_run(episode: Episode) -> Run:
@@ -98,13 +181,9 @@ class McapFile:
         self._put(run.data)
 
     def finish(self, name: str) -> FileSummary:
-        """Write everything that follows the last episode.
+        """Write everything that follows the last episode; returns what the bag's metadata say of the file of this name.
 
-        Args:
-            name: Name of the file, for the copy of the bag's metadata that rosbag2 looks for in each file.
-
-        Returns:
-            What the bag's metadata say of the file.
+        The name also stands in the copy of the bag's metadata that rosbag2 looks for in each file.
         """
         start_ns = min(index.message_start_time for index in self._chunk_indexes)
         end_ns = max(index.message_end_time for index in self._chunk_indexes)

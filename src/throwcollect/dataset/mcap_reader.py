@@ -19,8 +19,7 @@ from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
 
 from rclzenoh.interfaces import deserialize, get_message
-from throwcollect.dataset.mcap_file import EPISODE, MAGIC, SENSORS_SHA256, episode_run
-from throwcollect.dataset.mcap_records import Run
+from throwcollect.dataset.mcap_file import EPISODE, MAGIC, SENSORS_SHA256, Run, episode_run
 from throwcollect.episode.channels import ROBOT_DESCRIPTION_ID
 from throwcollect.episode.chunk import CHUNK_HEADER_BYTES, CHUNK_MARK, CHUNK_MARK_OFFSET, Chunk
 from throwcollect.episode.message import Episode, make_episode
@@ -80,12 +79,7 @@ class Record(NamedTuple):
 
 @dataclass(frozen=True)
 class StoredChunk:
-    """A chunk of an episode as it lies in a file.
-
-    Attributes:
-        record: Its record.
-        indexes: Records of its message indexes, by channel.
-    """
+    """A chunk of an episode as it lies in a file: its record, and those of its message indexes by channel."""
 
     record: Record
     indexes: Mapping[int, Record]

@@ -12,12 +12,7 @@ from numpy.typing import NDArray
 class Moments:
     """The moments of the rows of a table, which are read only once and need not fit into memory.
 
-    Attributes:
-        count: Number of rows.
-        minimum: Of each column, shape ``(n_columns,)``, as all that follow.
-        maximum: Of each column.
-        mean: Of each column.
-        squares: Sum of squared distances from the mean, of each column.
+    All but the number of rows have one value a column; `squares` are sums of squared distances from the mean.
     """
 
     count: int

@@ -64,13 +64,7 @@ class NamedArray:
 
     @classmethod
     def of(cls, table: pa.Table, names: Sequence[str], bounds: Sequence[Bounds]) -> NamedArray:
-        """Take columns of a table.
-
-        Args:
-            table: One row a throw.
-            names: Names of the columns, which are numbers.
-            bounds: Smallest and largest value of each; None if there is none.
-        """
+        """Take columns of a table, one row a throw, with smallest and largest value of each; None if there is none."""
         columns = [read_column(table[name]).astype(np.float64) for name in names]
         values = np.column_stack(columns) if columns else np.empty((len(table), 0))
         return cls(tuple(names), values, np.array(bounds, np.float64).reshape(-1, 2))

@@ -43,6 +43,7 @@ _LIBRARIES = (
 )
 _MOST_BYTES = 1_000_000
 _GIT_S = 5.0
+_OPEN = "anybody who reached the router could join, read and disturb the collection"
 
 
 @dataclass(frozen=True)
@@ -100,21 +101,18 @@ class Provenance:
         """Its facts in words, by name; unknown ones are left out."""
         facts = {
             "finished": self.finished.isoformat(timespec="seconds"),
-            **({"host": self.host} if self.host else {}),
+            "host": self.host,
             "platform": self.platform,
             "Python": self.python,
             **self.libraries,
-            **({"revision": self.revision} if self.revision else {}),
-            **({"image": self.image} if self.image else {}),
-            **({"robot description": f"SHA-256 {self.robot_sha256}"} if self.robot_sha256 else {}),
+            "revision": self.revision,
+            "image": self.image,
+            "robot description": self.robot_sha256 and f"SHA-256 {self.robot_sha256}",
+            "simulations": None if self.simulations is None else str(self.simulations),
+            "wall time": None if self.wall_s is None else f"{self.wall_s:.1f} s",
+            "open": _OPEN if self.was_open else None,
         }
-        if self.simulations is not None:
-            facts["simulations"] = str(self.simulations)
-        if self.wall_s is not None:
-            facts["wall time"] = f"{self.wall_s:.1f} s"
-        if self.was_open:
-            facts["open"] = "anybody who reached the router could join, read and disturb the collection"
-        return facts
+        return {name: fact for name, fact in facts.items() if fact}
 
 
 def write_provenance(directory: Path, provenance: Provenance) -> None:
@@ -149,12 +147,12 @@ def _read_revision() -> str | None:
 
 
 def _versions() -> dict[str, str]:
-    found = {}
+    versions = {}
     for name in _LIBRARIES:
         # A machine that only coordinates has no engines.
         with suppress(PackageNotFoundError):
-            found[name] = version(name)
-    return found
+            versions[name] = version(name)
+    return versions
 
 
 _JSON = TypeAdapter(Provenance)

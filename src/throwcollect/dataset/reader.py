@@ -315,11 +315,11 @@ class Dataset(Sequence[Throw]):
             DatasetError: If an episode is not where the table says, or it is damaged; CRCs are compared.
         """
         trials, known = self.throws["trial"].to_pylist(), self.joints
-        wanted = known if joints is None else tuple(joints)
-        for joint in wanted:
+        chosen = known if joints is None else tuple(joints)
+        for joint in chosen:
             if joint not in known:
                 raise ConfigError(f"{robot_of(self.config).title} has no joint {joint!r}", expected=", ".join(known))
-        return read_trajectories(trials, self._stored, tuple(columns), wanted, threads=threads)
+        return read_trajectories(trials, self._stored, tuple(columns), chosen, threads=threads)
 
     @property
     def joints(self) -> tuple[str, ...]:

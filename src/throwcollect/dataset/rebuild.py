@@ -44,13 +44,7 @@ _MOST_CARD_BYTES = 10_000_000
 
 @dataclass(frozen=True)
 class Rejudged:
-    """A trial that is judged otherwise than the earlier table of throws says.
-
-    Attributes:
-        trial: Its number.
-        before: Outcome in the earlier table.
-        after: Outcome now.
-    """
+    """A trial that is judged otherwise than the earlier table of throws says: its outcomes `before` and `after`."""
 
     trial: int
     before: str

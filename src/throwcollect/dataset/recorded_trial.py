@@ -25,15 +25,10 @@ shorten = _short.repr
 
 @dataclass(frozen=True, eq=False)
 class RecordedTrial:
-    """The samples of a trial with its header, and what it was simulated with.
+    """The samples of a trial with its header, its configuration, and the trajectory that its controllers were sent.
 
-    Its time is counted in physics steps: the first sample is at step 0.
-
-    Attributes:
-        samples: The samples; finite, with the stamps that belong to the trial.
-        header: Its contacts, its goals, and the reason for its end.
-        config: Configuration of the trial.
-        trajectory: The joint trajectory that its controllers were sent.
+    The samples are finite and have the stamps that belong to the trial. Its time is counted in physics steps: the first
+    sample is at step 0.
     """
 
     samples: Samples

@@ -14,8 +14,8 @@ from pathlib import Path
 
 from throwcollect.dataset.directory import CARD, CONFIG, MANIFEST, METADATA, PLAN, PROVENANCE, SOURCES, THROWS, TRIALS
 from throwcollect.dataset.judging import judge_episode
+from throwcollect.dataset.mcap_file import Run
 from throwcollect.dataset.mcap_reader import map_file
-from throwcollect.dataset.mcap_records import Run
 from throwcollect.dataset.scan import scan_whole
 from throwcollect.dataset.shard import FinishedShard, OpenShard, path_of_part, write_in_order
 from throwcollect.dataset.throws_table import Place
@@ -65,12 +65,9 @@ class LeftOfShard:
 
 @dataclass(frozen=True)
 class Part:
-    """A shard of which something may be left.
+    """A shard of which something may be left: its final path, and its trials.
 
-    Attributes:
-        path: Its final path.
-        plan: Its trials; it should have an episode of each that is not refused.
-        settled: Whether no trial will be added to it, so that its final file may stay if it has an episode of each.
+    It is settled if no trial will be added, so that its final file may stay if it has an episode of each.
     """
 
     path: Path
@@ -126,14 +123,10 @@ def _look_with(channels: Channels) -> Callable[[Part], LeftOfShard]:
 
 
 def recover_shard(shard: OpenShard, left: LeftOfShard) -> list[RecoveredEpisode]:
-    """Take in what is left of a shard.
-
-    Args:
-        shard: Waits for all its trials; those whose episodes are left are not missing any more when this returns.
-        left: What is left of it.
+    """Take in what is left of a shard, which no longer waits for these episodes when this returns.
 
     Returns:
-        Its episodes, in order of trials.
+        The episodes, in order of trials.
 
     Raises:
         DatasetError: If files cannot be read or written.
@@ -142,7 +135,7 @@ def recover_shard(shard: OpenShard, left: LeftOfShard) -> list[RecoveredEpisode]
     final, begun = left.final, left.begun
     if left.finished is not None:
         remove(shard.part)
-        return _sort(final)
+        return [final[trial] for trial in sorted(final)]
     if final and not begun:
         try:
             os.replace(shard.path, shard.part)
@@ -159,7 +152,8 @@ def recover_shard(shard: OpenShard, left: LeftOfShard) -> list[RecoveredEpisode]
             for found in only_final.values():
                 shard.append(contents.episode(found.place.chunk_offset).episode)
     remove(shard.path)
-    return _sort({**begun, **only_final})
+    episodes = {**begun, **only_final}
+    return [episodes[trial] for trial in sorted(episodes)]
 
 
 def find_episodes(path: Path, plan: Plan, channels: Channels | None = None) -> dict[int, RecoveredEpisode]:
@@ -210,7 +204,3 @@ def _check_finished(path: Path, channels: Channels, episodes: Mapping[int, Recov
         runs = {trial: (each.place.chunk_offset, each.run) for trial, each in episodes.items()}
         finished = write_in_order(compare, channels, runs, read, name=path.name)
         return finished if same and written == len(contents) else None
-
-
-def _sort(episodes: Mapping[int, RecoveredEpisode]) -> list[RecoveredEpisode]:
-    return [episodes[trial] for trial in sorted(episodes)]

@@ -35,12 +35,7 @@ Remake = Callable[[Config], Plan]
 
 @dataclass(frozen=True)
 class LostTrial:
-    """A trial whose episode is lost.
-
-    Attributes:
-        trial: Its number.
-        reason: Why.
-    """
+    """A trial whose episode is lost, and the reason."""
 
     trial: int
     reason: str
@@ -196,7 +191,7 @@ def _plan_of_table(path: Path, config: Config) -> Plan:
 
 
 def _find_list(directory: Path, plan: Plan, remarks: list[str]) -> Points | None:
-    """The list of points that the configuration reads, or else those of the plan; None if it reads none."""
+    """Read the list of points that the configuration names, or make it from the plan; None if it names none."""
     if plan.config.sweep.file is None:
         return None
     try:
@@ -263,23 +258,19 @@ class _Sorting:
             self._write(name, episode)
 
     def settle(self, directory: Path) -> None:
-        """Write the first waiting episode of each trial whose right one was not found, and remark on all that waited.
-
-        Args:
-            directory: Directory of their files.
-        """
-        for trial, found in sorted(self.waiting.items()):
-            for each in found:
-                other = f"an episode with digest {each.digest}, not {each.expected} as in {THROWS}"
-                told = f"{each.file}: trial {trial}: {other}"
+        """Write the first waiting episode of each trial whose right one was not found, and remark on all of them."""
+        for trial, candidates in sorted(self.waiting.items()):
+            for episode in candidates:
+                difference = f"an episode with digest {episode.digest}, not {episode.expected} as in {THROWS}"
+                remark = f"{episode.file}: trial {trial}: {difference}"
                 if trial in self.taken:
-                    where, digest = self.taken[trial]
-                    kind = "right" if digest == each.expected else "first"
-                    self.remarks.append(f"{told}; the {kind} one was taken from {where}")
+                    file, digest = self.taken[trial]
+                    kind = "right" if digest == episode.expected else "first"
+                    self.remarks.append(f"{remark}; the {kind} one was taken from {file}")
                 else:
-                    self._write(each.file, _find_again(directory / each.file, each))
-                    self.differing.append(each)
-                    self.remarks.append(f"{told}; kept, as nothing else speaks against it")
+                    self._write(episode.file, _find_again(directory / episode.file, episode))
+                    self.differing.append(episode)
+                    self.remarks.append(f"{remark}; kept, as nothing else speaks against it")
 
     def _write(self, name: str, episode: Episode) -> None:
         self.writer.append(episode, self._check.judge(episode))

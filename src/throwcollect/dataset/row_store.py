@@ -28,11 +28,7 @@ _Place = tuple[int, int]
 
 
 class _NamelessFile:
-    """A file without a name, which the system removes however this process ends.
-
-    Args:
-        directory: Directory of the dataset, whose disk it is on.
-    """
+    """A file without a name, which the system removes however this process ends; it is on the disk of `directory`."""
 
     def __init__(self, directory: Path) -> None:
         self._path = directory / THROWS
@@ -83,12 +79,7 @@ class _NamelessFile:
 
 
 class RowStore:
-    """Rows of shards, which come in any order and are read in order of trials.
-
-    Args:
-        directory: Directory of the dataset.
-        schema: Columns of the table of throws.
-    """
+    """Rows of the shards of a dataset, which come in any order and are read in order of trials."""
 
     def __init__(self, directory: Path, schema: pa.Schema) -> None:
         self._schema = schema
@@ -163,11 +154,7 @@ class RowStore:
 
 
 class Digests(Mapping[int, str]):
-    """The digest of each episode by trial, in order of trials, read one at a time.
-
-    Args:
-        throws: The table of throws, in order of trials.
-    """
+    """The digest of each episode by trial, in order of trials, read from the table of throws one at a time."""
 
     def __init__(self, throws: pa.Table) -> None:
         self._rows = np.flatnonzero(np.concatenate([read_validity(chunk) for chunk in throws["digest"].chunks]))

@@ -86,10 +86,7 @@ def scan_whole(path: Path) -> Iterator[Found]:
 def _find(contents: McapContents, first: Record, facts: int) -> Found | None:
     """Read the episode whose first chunk a record is; None if it is none.
 
-    Args:
-        contents: The contents of the file.
-        first: The record.
-        facts: Where the next metadata of an episode begin [bytes]; negative if there are none.
+    `facts` is where the next metadata of an episode begin [bytes]; negative if there are none.
     """
     try:
         stored, readable = contents.episode(first.offset), True

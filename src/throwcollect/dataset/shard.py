@@ -18,8 +18,7 @@ from pathlib import Path
 from throwcollect.dataset.bag import FileSummary
 from throwcollect.dataset.directory import shard_name
 from throwcollect.dataset.manifest import FileEntry, RunningHash
-from throwcollect.dataset.mcap_file import McapFile, episode_run
-from throwcollect.dataset.mcap_records import Run
+from throwcollect.dataset.mcap_file import McapFile, Run, episode_run
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.message import Episode
 from throwcollect.errors import DatasetError
@@ -32,8 +31,8 @@ class FinishedShard:
     """A shard in trial order under its final name.
 
     Attributes:
-        recording: What bag's metadata and manifest say of its file; None if no trial of it has an episode, and so there
-            is no file.
+        recording: What bag's metadata and manifest say of its file; None if no trial has an episode, and so there is
+            none.
         offsets: Where the chunk of each trial's episode begins [bytes].
     """
 
@@ -93,13 +92,9 @@ class OpenShard:
     """A shard that still waits for episodes.
 
     Attributes:
-        missing: Trials that have neither an episode nor are known to be lost.
+        missing: Trials that neither have an episode nor are known to be lost.
         path: Final path of the shard.
         part: Path of the shard while it is filled.
-
-    Args:
-        path: Final path of the shard.
-        channels: What is recorded.
     """
 
     def __init__(self, path: Path, channels: Channels) -> None:

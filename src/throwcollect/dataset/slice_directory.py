@@ -19,7 +19,7 @@ import re
 import secrets
 import shutil
 import socket
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
@@ -61,12 +61,7 @@ def find_attempts(directory: Path, slice: Slice) -> list[Path]:
 
 
 def make_attempt(directory: Path, slice: Slice, *, scratch: Path | None = None) -> Path:
-    """Make a directory for an attempt at a slice, empty and unlike any other.
-
-    Args:
-        directory: Directory of the dataset.
-        slice: Which one.
-        scratch: Where it is made; None for the place beside all slices.
+    """Make an empty directory for an attempt at a slice, in `scratch` or else beside all slices, unlike any other.
 
     Raises:
         DatasetError: If it cannot be made.
@@ -119,9 +114,9 @@ def mark_stopped(attempt: Path) -> None:
 
 def remove_stopped(attempts: Sequence[Path]) -> None:
     """Remove those of some attempts that were stopped in order, once another one has their recordings."""
-    for each in attempts:
-        if (each / _STOPPED).exists():
-            shutil.rmtree(each, ignore_errors=True)
+    for attempt in attempts:
+        if (attempt / _STOPPED).exists():
+            shutil.rmtree(attempt, ignore_errors=True)
 
 
 def publish(attempt: Path, directory: Path, slice: Slice) -> bool:
@@ -143,7 +138,8 @@ def publish(attempt: Path, directory: Path, slice: Slice) -> bool:
     packed = directory / SLICES / f"{attempt.name}-packed"
     try:
         packed.mkdir(parents=True, exist_ok=True)
-        for name in _names_to_publish(attempt):
+        shards = [name for name in _list(attempt) if name.endswith(SHARD_SUFFIX)]
+        for name in (*shards, THROWS, MANIFEST):
             _move(attempt / name, packed / name)
         try:
             packed.rename(place)
@@ -157,11 +153,6 @@ def publish(attempt: Path, directory: Path, slice: Slice) -> bool:
         raise unwritable(packed, error) from error
     shutil.rmtree(attempt, ignore_errors=True)
     return first
-
-
-def _names_to_publish(attempt: Path) -> Iterator[str]:
-    yield from (name for name in _list(attempt) if name.endswith(SHARD_SUFFIX))
-    yield from (THROWS, MANIFEST)
 
 
 def _move(source: Path, target: Path) -> None:

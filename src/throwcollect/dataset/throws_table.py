@@ -36,13 +36,9 @@ _KINDS = {"number": pa.float64(), "count": pa.int64(), "text": pa.string()}
 
 @dataclass(frozen=True)
 class Place:
-    """The place of an episode in a dataset.
+    """The place of an episode in a dataset: its MCAP file and the offset of its first chunk there [bytes].
 
-    Attributes:
-        shard: Name of the MCAP file.
-        chunk_offset: Where its chunk begins in that file [bytes].
-        samples: Number of samples.
-        digest: Digest of the episode.
+    Number of samples and digest say which episode it is.
     """
 
     shard: str
@@ -69,11 +65,9 @@ def name_alias(key: str) -> str:
 
 
 def ball_state(row: Row, name: str) -> BallState | None:
-    """Read the state of the ball from a row; None if the trial came to no such event, or its task knows none.
+    """Read the state of the ball at ``release``, ``apex`` or ``landing`` from a row of the table of throws.
 
-    Args:
-        row: A row of the table of throws.
-        name: ``release``, ``apex`` or ``landing``.
+    It is None if the trial came to no such event, or its task knows none.
     """
     values: list[Any] = [row.get(column) for column in ball_columns(name)]
     return None if None in values else join_ball(values)
@@ -89,7 +83,7 @@ class ThrowsTable:
     Args:
         parameters: Swept dotted configuration keys, in the order of their columns.
         config: Configuration of the collection.
-        targets: Columns of targets.
+        targets: Names of the columns of targets.
     """
 
     def __init__(self, parameters: Sequence[str], config: Config, targets: Sequence[str] = ()) -> None:
@@ -157,9 +151,9 @@ def read_throws_table(path: Path, plan: Plan) -> pa.Table:
         DatasetError: If the table is missing or damaged, or has other columns.
     """
     table = read_parquet(path)
-    wanted = ThrowsTable.of(plan)
-    lacking = wanted.later - set(table.schema.names)
-    schema = pa.schema([field for field in wanted.schema if field.name not in lacking])
+    expected = ThrowsTable.of(plan)
+    lacking = expected.later - set(table.schema.names)
+    schema = pa.schema([field for field in expected.schema if field.name not in lacking])
     if not table.schema.equals(schema):
         wrong = sorted(set(table.schema.names) ^ set(schema.names)) or "types of columns"
         raise DatasetError(f"not the table of this plan: differs in {wrong}", path=path)

@@ -15,18 +15,23 @@ from typing import Any
 from throwcollect.config.schema import Config
 from throwcollect.dataset.bag import FileSummary, bag_information, read_bag_metadata
 from throwcollect.dataset.digest import combine_digests
-from throwcollect.dataset.directory import CARD, FORMAT, METADATA, SHARD_SUFFIX, THROWS, TRIALS
+from throwcollect.dataset.directory import CARD, CONFIG, FORMAT, MANIFEST, METADATA, PLAN, SHARD_SUFFIX, THROWS, TRIALS
 from throwcollect.dataset.findings import Finding
+from throwcollect.dataset.manifest import find_changed_files, find_manifest_problems, read_manifest
+from throwcollect.dataset.mcap_file import MAGIC
+from throwcollect.dataset.mcap_reader import open_mcap
 from throwcollect.dataset.shard import shard_of
+from throwcollect.dataset.throws_table import read_throws_table
 from throwcollect.dataset.verify_episode import EpisodeCheck
-from throwcollect.dataset.verify_manifest import find_manifest_problems
 from throwcollect.dataset.verify_plan import CheckOf, can_draw, find_drawing_problems, find_refusal_problems
 from throwcollect.dataset.verify_shard import ShardReport, check_shard
 from throwcollect.dataset.verify_tables import Tables, check_tables
 from throwcollect.errors import DatasetError
+from throwcollect.files import is_there
 from throwcollect.robots.description import is_available as robot_is_available
 from throwcollect.side_by_side import working_side_by_side
 from throwcollect.sweep.digest import is_digest
+from throwcollect.sweep.plan import Plan
 from throwcollect.wording import format_count
 
 _MANY_EPISODES = 1000
@@ -103,6 +108,29 @@ def find_unchecked(config: Config) -> tuple[str, ...]:
     return left_out
 
 
+def find_damage(directory: Path, plan: Plan | None, *, in_full: bool) -> list[Finding]:
+    """Find the files of a finished dataset that are not as they were written.
+
+    Files are compared with the manifest. Earlier versions wrote none: then the recordings that the table of throws
+    names
+    have to begin and end as MCAP files do, or, in full, the dataset is verified.
+
+    Args:
+        directory: Directory of a dataset that has its ``metadata.yaml``.
+        plan: Its trials; None if they cannot be read.
+        in_full: Whether all bytes are compared, and not only the sizes.
+    """
+    if not is_there(directory / MANIFEST):
+        if plan is None:
+            return [Finding(PLAN, "", "is missing or damaged")]
+        return list(_find_damage_without_manifest(directory, plan, in_full=in_full))
+    try:
+        entries = read_manifest(directory)
+    except DatasetError as error:
+        return [Finding.of(MANIFEST, error)]
+    return list(find_changed_files(directory, entries, in_full=in_full))
+
+
 def _plan_findings(directory: Path, tables: Tables, check_of: CheckOf | None) -> Iterator[Finding]:
     if tables.plan is None:
         return
@@ -136,11 +164,11 @@ def _tell(
     reports: Iterator[tuple[str, ShardReport]], count: int, say: Callable[[str], object]
 ) -> Iterator[tuple[str, ShardReport]]:
     """Pass the reports on, and say how many there are every few seconds."""
-    told = time.monotonic()
+    last_told = time.monotonic()
     for number, report in enumerate(reports, start=1):
         yield report
-        if number < count and time.monotonic() >= told + _TELL_EVERY_S:
-            told = time.monotonic()
+        if number < count and time.monotonic() >= last_told + _TELL_EVERY_S:
+            last_told = time.monotonic()
             say(f"{number} of {format_count(count, 'recording')} checked")
 
 
@@ -199,11 +227,13 @@ def _find_bag_problems(bag: Mapping[str, Any], checks: Mapping[str, ShardReport]
 
 def _find_file_problems(bag: Mapping[str, Any], summaries: list[FileSummary]) -> Iterator[Finding]:
     entries = bag.get("files")
-    said = {each.get("path"): each for each in entries if isinstance(each, dict)} if isinstance(entries, list) else {}
+    entries_by_path = (
+        {each.get("path"): each for each in entries if isinstance(each, dict)} if isinstance(entries, list) else {}
+    )
     for summary in summaries:
         (expected,) = bag_information([summary], (), {})["files"]
-        if said.get(summary.path) != expected:
-            found = _shorten(said.get(summary.path))
+        if entries_by_path.get(summary.path) != expected:
+            found = _shorten(entries_by_path.get(summary.path))
             yield Finding(METADATA, f"files: {summary.path}", f"is {found}, the file gives {_shorten(expected)}")
 
 
@@ -211,10 +241,12 @@ def _find_digest_problems(
     bag: Mapping[str, Any], tables: Tables, checks: Mapping[str, ShardReport]
 ) -> Iterator[Finding]:
     custom = bag.get("custom_data")
-    said = custom if isinstance(custom, dict) else {}
-    if said.get("throwcollect.format") != FORMAT:
-        yield Finding(METADATA, "custom_data: throwcollect.format", f"is {_shorten(said.get('throwcollect.format'))}")
-    if unknown := sorted(map(str, set(said) - {"throwcollect.format", "throwcollect.digest"})):
+    entries = custom if isinstance(custom, dict) else {}
+    if entries.get("throwcollect.format") != FORMAT:
+        yield Finding(
+            METADATA, "custom_data: throwcollect.format", f"is {_shorten(entries.get('throwcollect.format'))}"
+        )
+    if unknown := sorted(map(str, set(entries) - {"throwcollect.format", "throwcollect.digest"})):
         yield Finding(METADATA, "custom_data", f"has unknown keys: {_shorten(unknown)}")
     digests = {trial: digest for check in checks.values() for trial, digest in check.digests.items()}
     damaged = any(check.summary is None for check in checks.values())
@@ -224,7 +256,7 @@ def _find_digest_problems(
         # For episodes that cannot be read, the digests are taken from the table.
         digests = {trial: row["digest"] for trial, row in tables.rows.items() if is_digest(row["digest"])} | digests
     targets = None if tables.plan is None else tables.plan.trials.targets
-    written = said.get("throwcollect.digest")
+    written = entries.get("throwcollect.digest")
     digest = combine_digests((digests[trial] for trial in sorted(digests)), targets)
     if written != digest:
         giver = THROWS if damaged else "the episodes"
@@ -247,3 +279,24 @@ def _find_stray_files(directory: Path, checks: Mapping[str, ShardReport]) -> Ite
 
 def _shorten(value: object) -> str:
     return _short.repr(value)
+
+
+def _find_damage_without_manifest(directory: Path, plan: Plan, *, in_full: bool) -> Iterator[Finding]:
+    try:
+        shards = set(read_throws_table(directory / THROWS, plan)["shard"].drop_null().to_pylist())
+    except DatasetError as error:
+        yield Finding.of(THROWS, error)
+        return
+    if in_full:
+        # The manifest and the data card follow from these, and a dataset without them counts as whole.
+        promised = {CONFIG, PLAN, THROWS, METADATA, *shards}
+        yield from (finding for finding in verify(directory) if finding.file in promised)
+        return
+    for name in sorted(shards):
+        try:
+            with open_mcap(directory / Path(name).name) as contents:
+                # An MCAP file begins and ends with the same bytes, and the end is written last.
+                if contents.slice(len(contents) - len(MAGIC), len(contents)) != MAGIC:
+                    yield Finding(name, "", "is cut off")
+        except DatasetError as error:
+            yield Finding.of(name, error)

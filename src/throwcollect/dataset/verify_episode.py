@@ -34,15 +34,7 @@ _MOST_NAMED = 3
 
 
 class _TrialsOf:
-    """The trials of a plan with what they are simulated with, worked out once for all checks of an episode.
-
-    Attributes:
-        plan: The plan.
-        table: Makes rows of its table of throws.
-        trial: Gives a trial, by its number.
-        config: Gives the configuration of a trial.
-        trajectory: Gives the joint trajectory that its controllers are sent.
-    """
+    """Trials of a plan, with what they are simulated with, worked out once for all checks of an episode."""
 
     def __init__(self, plan: Plan) -> None:
         self.plan = plan
@@ -74,15 +66,9 @@ class EpisodeCheck:
         self._bodies = touchable_bodies(plan.config) if plan and robot else None
 
     def find_problems(self, stored: StoredEpisode, shard: str, channels: Channels | None) -> Iterator[str]:
-        """Find everything that is wrong with an episode.
+        """Find everything that is wrong with an episode in the file `shard`, a sentence each.
 
-        Args:
-            stored: The episode as it lies in its file.
-            shard: Name of that file.
-            channels: What the dataset records; None if that is not known.
-
-        Yields:
-            What is wrong, a sentence each.
+        `channels` are what the dataset records; None if that is not known.
         """
         episode = stored.episode
         try:
@@ -149,8 +135,8 @@ class EpisodeCheck:
         except ConfigError as error:
             yield f"the plan has values that cannot be: {error}"
             return
-        yield from find_stamp_problems(episode, samples, config)
-        yield from find_sensor_problems(episode)
+        yield from _find_stamp_problems(episode, samples, config)
+        yield from _find_sensor_problems(episode)
 
     def _find_physics_problems(self, episode: Episode) -> Iterator[str]:
         """Find what the simulation cannot have recorded."""
@@ -189,7 +175,7 @@ def _find_row_problems(expected: Mapping[str, Any], row: Mapping[str, Any]) -> I
 
 def _find_message_problems(episode: Episode, channels: Channels) -> Iterator[str]:
     expected = {channel.id: topic for channel, topic in channels.recorded.items()}
-    if problems := list(find_channel_problems(episode, channels)):
+    if problems := list(_find_channel_problems(episode, channels)):
         yield from problems
         return
     for channel, topic in expected.items():
@@ -217,7 +203,7 @@ def _find_record_problems(stored: StoredEpisode) -> Iterator[str]:
         yield f"the metadata at byte {stored.facts.offset} do not fit the chunk (digest, trial or header)"
 
 
-def find_sensor_problems(episode: Episode) -> Iterator[str]:
+def _find_sensor_problems(episode: Episode) -> Iterator[str]:
     """Find what chunks of sensors cannot have recorded, a sentence each."""
     last_ns = episode.chunk.end_ns
     for number, sensor in enumerate(episode.sensors, start=1):
@@ -236,7 +222,7 @@ def find_sensor_problems(episode: Episode) -> Iterator[str]:
                 yield f"chunk {number}: the messages of channel {channel} are not numbered from 0"
 
 
-def find_stamp_problems(episode: Episode, samples: Samples, config: Config) -> Iterator[str]:
+def _find_stamp_problems(episode: Episode, samples: Samples, config: Config) -> Iterator[str]:
     """Find everything that is wrong with the times of an episode and its samples, a sentence each."""
     stamps, header = samples.stamps_ns, episode.header
     if not episode.table.are_timed_by(stamps):
@@ -251,7 +237,7 @@ def find_stamp_problems(episode: Episode, samples: Samples, config: Config) -> I
         yield f"stamps are not spaced by 1/{config.record.rate_hz} s: {steps.min()} to {steps.max()} ns"
 
 
-def find_channel_problems(episode: Episode, channels: Channels) -> Iterator[str]:
+def _find_channel_problems(episode: Episode, channels: Channels) -> Iterator[str]:
     """Compare the channels of the chunks of an episode with those that are recorded; a sentence if they differ."""
     if not channels.fit(episode.channels()):
         yield f"has the channels {_list(episode.channels())} instead of {_list(channels.numbers)}"

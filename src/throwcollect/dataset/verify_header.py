@@ -21,14 +21,9 @@ _ROUNDING = 1e-9
 
 
 def find_header_problems(trial: RecordedTrial, bodies: Collection[str] | None) -> Iterator[str]:
-    """Find what a header says that cannot be, or that its samples contradict.
+    """Find what a header says that cannot be, or that its samples contradict, a sentence each.
 
-    Args:
-        trial: The trial.
-        bodies: Names of all bodies that can touch the ball; None if they are not known.
-
-    Yields:
-        What is wrong, a sentence each.
+    `bodies` has the names of all bodies that can touch the ball; None if they are not known.
     """
     yield from _find_contact_problems(trial, bodies)
     yield from _find_goal_problems(trial)

@@ -92,11 +92,9 @@ def find_refusal_problems(plan: Plan, doubtful: Collection[int], check_of: Check
 
 
 class _Drawing(NamedTuple):
-    """The trials that a configuration draws, as far as they are known.
+    """The trials that a configuration draws, as far as they are known: values of shape ``(n_trials, n_keys)``.
 
-    Attributes:
-        values: Their values, shape ``(n_trials, n_keys)``.
-        problem: Why they are not as many as the plan has; None if they are, or if that is not known.
+    The problem says why they are not as many as the plan has; None if they are, or if that is not known.
     """
 
     values: NDArray[np.float64]

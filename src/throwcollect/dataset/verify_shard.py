@@ -105,8 +105,8 @@ class _ShardCheck:
         """Report that records cannot be read.
 
         Args:
-            error: Says why.
-            start: Where the run of records begins that is damaged, if it is not where the error says [bytes].
+            error: The reason.
+            start: Where the damaged run of records begins [bytes], if it is not where the error says.
             resumed: Where the next one begins [bytes]; -1 if there is none.
         """
         self._damaged = True
@@ -194,8 +194,8 @@ class _ShardCheck:
         elif wanted.opcode == Opcode.CHUNK:
             self._report_latched(actual, wanted)
         else:
-            told = f"summary: the {actual.kind} does not fit the file"
-            self._report(place, _PROBLEMS.get(Opcode(wanted.opcode), told))
+            other = f"summary: the {actual.kind} does not fit the file"
+            self._report(place, _PROBLEMS.get(Opcode(wanted.opcode), other))
 
     def _report_latched(self, actual: Record, wanted: Record) -> None:
         """Report how the chunk of the latched topics differs from the one that should be there."""
@@ -264,8 +264,8 @@ class _ShardCheck:
         except DatasetError as error:
             self._report_damage(error, start=start, resumed=resumed)
         else:
-            told = DatasetError("so much is damaged that the rest is not looked at", place=f"byte {start}")
-            self._report_damage(told)
+            given_up = DatasetError("so much is damaged that the rest is not looked at", place=f"byte {start}")
+            self._report_damage(given_up)
 
     def _check_place(self, stored: StoredEpisode, places: dict[int, int]) -> None:
         """Check an episode, and that it should come now; `places` has the offsets of earlier ones [bytes]."""

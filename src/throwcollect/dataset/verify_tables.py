@@ -143,8 +143,8 @@ def _plan_findings(plan: Plan, rows: Mapping[int, Row], doubtful: Collection[int
             if row[key] != value and trial.number not in doubtful:
                 yield Finding(THROWS, place, f"has {key} = {row[key]!r}, the plan {value!r}")
         for name in plan.trials.target_names:
-            if row[name] != (wanted := trial.target.get(name)):
-                yield Finding(THROWS, place, f"has {name} = {row[name]!r}, the plan {wanted!r}")
+            if row[name] != (planned := trial.target.get(name)):
+                yield Finding(THROWS, place, f"has {name} = {row[name]!r}, the plan {planned!r}")
         if (row["outcome"] == REFUSED) != (trial.refused is not None):
             yield Finding(THROWS, place, f"is {row['outcome']}, the plan says {trial.refused or 'nothing against it'}")
         elif trial.refused is not None and row["reason"] != trial.refused:

@@ -9,7 +9,7 @@ stopped, the next writer takes in the files that it left (see `recovery`) and go
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -124,7 +124,7 @@ class DatasetWriter:
                 raise DatasetError(f"holds no {name}", path=directory, expected="a dataset that was created")
         with ExitStack() as held:
             held.enter_context(hold_lock(directory, alone=False))
-            journal = held.enter_context(Journal(directory))
+            journal = held.enter_context(closing(Journal(directory)))
             plan = Plan.read(directory / PLAN, load(config_path(directory)))
             plan.take_in_rounds(directory / PLAN)
             writer = cls(directory, plan, journal=journal, growing=plan.config.grows)
