@@ -31,9 +31,8 @@ from tests.e2e.collection import Running, collect, fingerprints, launched, start
 from tests.unit.dataset.conftest import Collection
 from tests.unit.dataset.test_forgeries import FORGED, FORGERIES, problems
 from throwcollect.config.loader import load
-from throwcollect.dataset.manifest import list_promised_names
+from throwcollect.dataset.manifest import find_manifest_problems, list_promised_names
 from throwcollect.dataset.verify import verify
-from throwcollect.dataset.verify_manifest import find_manifest_problems
 
 MANIFEST = "datapackage.json"
 _TOO_ALIKE = "swapped trials"

@@ -2,8 +2,8 @@
 
 A dataset may come from anybody, so a name in its directory may be a symbolic link to any file of the user, a pipe that
 blocks the process that opens it, or a second name of a file elsewhere. Nothing here follows such a name: a file is
-read, written or cut only if it is a regular file in the very directory that it is looked for in. That directory itself
-is the user's choice, and may be reached through links.
+read, written or cut only if it is a regular file in the very directory that it is looked for in. The user chooses that
+directory, so the way to it may go through links.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from throwcollect.errors import ConfigError, DatasetError
 
 _DIRECTORY_PERMISSIONS = 0o755
 StrPath = str | os.PathLike[str]
-"""What functions that other programs call take as a path."""
+"""A path, as functions take it that other programs call."""
 
 _MOVE_HERE = "put the file itself, or a copy of it, in that place; or remove it"
 _HINTS = {
@@ -39,36 +39,33 @@ _REASONS = {
     errno.ENXIO: "not a file",
     errno.EMLINK: "it has another name (hard link), under which it would change, too",
 }
-"""What these numbers mean here; the system's texts are about other cases."""
+"""The meaning of these numbers here; the system's own texts are about other cases."""
 
 
 def unwritable(path: Path, error: OSError) -> DatasetError:
-    """The error that says that a path cannot be written, and why."""
+    """Make the error that says why a path cannot be written."""
     return DatasetError(f"cannot be written: {_reason(error)}", path=path, hint=_HINTS.get(error.errno or 0))
 
 
 def unreadable(path: Path, error: OSError) -> DatasetError:
-    """The error that says that a path cannot be read, and why."""
+    """Make the error that says why a path cannot be read."""
     hint = _MOVE_HERE if error.errno in _REASONS else None
     return DatasetError(f"cannot be read: {_reason(error)}", path=path, hint=hint)
 
 
 def _reason(error: OSError) -> str:
-    # Some libraries fill the text of an error with their own; the number is the system's.
+    # Some libraries put a text of their own into the error, but leave the number of the system.
     number = error.errno or 0
     return _REASONS.get(number) or (os.strerror(number) if number else str(error))
 
 
 def open_regular(path: Path, flags: int = os.O_RDONLY, *, folder: int | None = None) -> int:
-    """Open a regular file; a link is not followed and a pipe not waited for.
+    """Open a regular file and return its descriptor; a link is not followed, and a pipe does not block.
 
     Args:
         path: The file; its name alone if `folder` is given.
         flags: As for `os.open`. A file that is opened for writing must have no other name.
         folder: Descriptor of the directory that it is in; None if `path` says that.
-
-    Returns:
-        Its descriptor.
 
     Raises:
         OSError: If it cannot be opened; see `unwritable` and `unreadable`.
@@ -85,11 +82,10 @@ def open_regular(path: Path, flags: int = os.O_RDONLY, *, folder: int | None = N
 
 
 def open_log(path: Path, flags: int = os.O_WRONLY | os.O_CREAT | os.O_APPEND) -> int:
-    """Open a file in a folder of its own, such as ``logs``, which is made if it is missing and must not be a link.
+    """Open a file in a folder of its own, such as ``logs``, which must not be a link.
 
-    Args:
-        path: The file.
-        flags: As for `open_regular`; without ``os.O_CREAT`` nothing is made.
+    With ``os.O_CREAT`` among the flags, which are those of `open_regular`, file and folder are made if they are
+    missing.
 
     Raises:
         OSError: If it cannot be opened, or the folder cannot be made.
@@ -106,15 +102,15 @@ def open_log(path: Path, flags: int = os.O_WRONLY | os.O_CREAT | os.O_APPEND) ->
 
 
 def is_there(path: Path) -> bool:
-    """Whether something has this name, be it only a link that leads nowhere."""
+    """Whether a file, or a link that may lead nowhere, has this name."""
     return os.path.lexists(path)
 
 
 def check_regular(path: Path) -> None:
-    """Make sure that a name under which others will open a file does not lead elsewhere; all else is theirs to report.
+    """Refuse a link, a pipe or a directory where another library will open a file, which reports all other errors.
 
     Raises:
-        DatasetError: If it is that of something else than a regular file, such as a link.
+        DatasetError: If the name is that of something else than a regular file.
     """
     try:
         os.close(open_regular(path))
@@ -125,14 +121,14 @@ def check_regular(path: Path) -> None:
 
 @contextmanager
 def beside(path: Path, *, mode: int = 0o666) -> Iterator[int]:
-    """A new file that takes the place of `path` when the block ends well, and vanishes when it does not.
+    """Open a new file that takes the place of `path` when the block ends well, and vanishes when it does not.
 
-    While it is written, it is called ``<name>.new``. What already has that name was left by a process that was killed,
-    or put there by another one, and is removed.
+    While it is written, it is called ``<name>.new``. A file that already has that name was left by a process that was
+    killed, or put there by another program, and is removed.
 
     Args:
         path: The file.
-        mode: Who may do what with it, before the process's mask.
+        mode: Its permissions, before the process's mask.
 
     Yields:
         File descriptor to write to.
@@ -157,10 +153,7 @@ def beside(path: Path, *, mode: int = 0o666) -> Iterator[int]:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[int]:
-    """A new file as `beside` makes it, which survives a power cut from the end of the block on.
-
-    Args:
-        path: The file.
+    """Open a new file as `beside` does, which survives a power cut once the block has ended.
 
     Yields:
         File descriptor to write to.
@@ -179,16 +172,16 @@ def replacing(path: Path) -> Iterator[int]:
 
 @contextmanager
 def new_directory(path: Path) -> Iterator[Path]:
-    """A directory that gets its name when the block ends well, and vanishes when it does not.
+    """Make a directory that gets its name when the block ends well, and vanishes when it does not.
 
     Args:
         path: The directory; must not exist, or be empty.
 
     Yields:
-        Where to write meanwhile: a hidden directory beside it.
+        A hidden directory beside it, to write into meanwhile.
 
     Raises:
-        ConfigError: If there is already something.
+        ConfigError: If something is in its place already.
         DatasetError: If the directory cannot be written.
     """
     try:
@@ -210,7 +203,7 @@ def new_directory(path: Path) -> Iterator[Path]:
 
 
 def remove(path: Path) -> None:
-    """Remove a file, if it is there.
+    """Remove a file, if it exists.
 
     Raises:
         DatasetError: If it cannot be removed.
@@ -222,7 +215,7 @@ def remove(path: Path) -> None:
 
 
 def sync_directory(directory: Path) -> None:
-    """Make names in a directory survive a power cut.
+    """Make the names in a directory survive a power cut.
 
     Raises:
         OSError: If the directory cannot be opened or synchronised.
@@ -235,7 +228,7 @@ def sync_directory(directory: Path) -> None:
 
 
 def write_all(descriptor: int, data: bytes | bytearray) -> None:
-    """Write all bytes, however many calls it takes.
+    """Write all bytes; `os.write` may write only some of them at a time.
 
     Raises:
         OSError: If the system writes no more of them.
@@ -246,10 +239,10 @@ def write_all(descriptor: int, data: bytes | bytearray) -> None:
 
 
 def read_text(path: Path, *, most_bytes: int) -> str:
-    """UTF-8 text of a regular file.
+    """Read a regular file as UTF-8 text.
 
     Raises:
-        DatasetError: If it is missing, no such file, no such text, or larger than `most_bytes`.
+        DatasetError: If it is missing, no regular file, no such text, or larger than `most_bytes`.
     """
     try:
         with open(open_regular(path), "rb") as file:

@@ -13,11 +13,12 @@ from throwcollect.config.problems import quote
 from throwcollect.config.schema import Config
 from throwcollect.config.values import differences
 from throwcollect.coordinator.prepare import draw_plan, make_self_contained, prepare, read_listed_points
-from throwcollect.dataset.completeness import find_damage, is_as_written
 from throwcollect.dataset.directory import CONFIG, METADATA, PLAN, SHARD_SUFFIX, SOURCES, TRIALS, config_path
-from throwcollect.dataset.lock import hold_alone
+from throwcollect.dataset.lock import hold_lock
+from throwcollect.dataset.manifest import is_as_written
 from throwcollect.dataset.recovery import remove_unfinished
 from throwcollect.dataset.throws_table import read_throws
+from throwcollect.dataset.verify import find_damage
 from throwcollect.dataset.verify_tables import find_wrong_trials
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError, Problem
 from throwcollect.files import check_regular, is_there, remove, write_file
@@ -57,7 +58,7 @@ def resume(
         DatasetError: If another process changes the dataset, files cannot be written, or something is damaged that
             cannot be made again.
     """
-    with hold_alone(directory):
+    with hold_lock(directory):
         stored = _read_stored_config(directory)
         if stored is not None:
             refuse_changes(directory, stored, make_self_contained(config))

@@ -17,7 +17,7 @@ from ruamel.yaml.error import YAMLError
 from ruamel.yaml.events import AliasEvent
 
 from rclzenoh.interfaces import type_hash
-from throwcollect.dataset.directory import FORMAT, METADATA, PLAN
+from throwcollect.dataset.directory import METADATA, PLAN
 from throwcollect.episode.channels import Channel
 from throwcollect.errors import DatasetError
 from throwcollect.files import read_text
@@ -58,7 +58,7 @@ def bag_information(
     Args:
         files: The files of the bag, in order.
         channels: All channels.
-        custom_data: Facts of our own.
+        custom_data: Further entries, which rosbag2 does not read.
     """
     start = min((file.start_ns for file in files), default=0)
     end = max((file.end_ns for file in files), default=0)
@@ -98,20 +98,8 @@ def bag_information(
     }
 
 
-def dataset_metadata(files: Sequence[FileSummary], channels: Sequence[Channel], digest: str) -> str:
-    """Text of a dataset's ``metadata.yaml``.
-
-    Args:
-        files: Its MCAP files, in order.
-        channels: All channels.
-        digest: Hash over all episodes.
-    """
-    custom = {"throwcollect.format": FORMAT, "throwcollect.digest": digest}
-    return to_yaml({"rosbag2_bagfile_information": bag_information(files, channels, custom)})
-
-
 class _PlainComposer(Composer):
-    """Refuses what makes a short text as large as it likes, or what is no plain value."""
+    """Refuses aliases, with which a short text can expand without limit, and tags, whose values are not plain."""
 
     def compose_node(self, parent: Any, index: Any) -> Any:
         event = self.parser.peek_event()
@@ -121,7 +109,7 @@ class _PlainComposer(Composer):
 
 
 def from_yaml(path: Path) -> Mapping[str, Any]:
-    """Keys and values of a YAML file such as `to_yaml` makes them: without anchors and tags.
+    """Read a YAML file such as `to_yaml` makes: one mapping, without anchors and tags.
 
     Raises:
         DatasetError: If the file cannot be read, is no such YAML, or is larger than any bag's metadata.
@@ -139,7 +127,7 @@ def from_yaml(path: Path) -> Mapping[str, Any]:
 
 
 def read_bag_metadata(directory: Path) -> Mapping[str, Any]:
-    """Fields of the rosbag2 metadata of a finished dataset.
+    """Read the fields of the rosbag2 metadata of a finished dataset.
 
     Raises:
         DatasetError: If the directory holds no dataset or an unfinished one, or ``metadata.yaml`` is damaged.
@@ -156,7 +144,7 @@ def read_bag_metadata(directory: Path) -> Mapping[str, Any]:
 
 
 def to_yaml(data: Mapping[str, Any]) -> str:
-    """YAML text in block style, keys in their order."""
+    """Encode a mapping as YAML in block style, with the keys in their order."""
     yaml = YAML()
     yaml.width = 4096
     yaml.representer.ignore_aliases = lambda *_: True

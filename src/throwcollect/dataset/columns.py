@@ -1,4 +1,4 @@
-"""Columns of trajectories: which there are, where the throws of a dataset lie, and how arrays are filled from there."""
+"""Columns of trajectories: their names, the places of their throws in files, and arrays filled from there."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ _LARGE_BYTES = 4 << 20
 
 
 class Recorded(Protocol):
-    """The episode of a throw, wherever it is."""
+    """The episode of a throw, in a file or in memory."""
 
     @property
     def start_ns(self) -> int:
@@ -72,14 +72,14 @@ class Recorded(Protocol):
         """Joints that are recorded, in the order of their columns."""
 
     def read(self) -> Episode:
-        """The episode.
+        """Read the episode.
 
         Raises:
             DatasetError: If it is not where it should be, or its records are damaged; the samples are not looked at.
         """
 
     def read_rows(self) -> NDArray[np.void]:
-        """The rows of its samples; see `trajectory_rows`.
+        """Read the rows of its samples; see `trajectory_rows`.
 
         Raises:
             DatasetError: If the episode is not where it should be, or its chunk is damaged.
@@ -88,16 +88,7 @@ class Recorded(Protocol):
 
 @dataclass(frozen=True)
 class StoredThrow:
-    """Where the episode of a throw lies in a file.
-
-    Attributes:
-        trial: Number of the trial.
-        start_ns: Simulated time at which the trial starts [ns].
-        path: The MCAP file.
-        offset: Where its chunk begins in the file [bytes].
-        samples: Number of samples.
-        joints: Joints that are recorded, in the order of their columns.
-    """
+    """The episode of a throw in an MCAP file, whose chunk begins at `offset` [bytes]; see `Recorded` for the others."""
 
     trial: int
     start_ns: int
@@ -107,7 +98,7 @@ class StoredThrow:
     joints: tuple[str, ...]
 
     def read(self) -> Episode:
-        """The episode, from its file; see `Recorded`.
+        """Read the episode from its file.
 
         Raises:
             DatasetError: If the file is damaged there, or has another trial.
@@ -123,36 +114,16 @@ class StoredThrow:
         return episode
 
     def read_rows(self) -> NDArray[np.void]:
-        """The rows of its samples, from its file; see `Recorded`."""
+        """Read the rows of its samples from its file; see `Recorded`."""
         (rows,) = read_stored_rows([self])
         return rows
 
-    def rows_in(self, contents: McapContents) -> NDArray[np.void]:
-        """The rows of the episode; see `trajectory_rows`.
-
-        Args:
-            contents: Those of the file.
-
-        Raises:
-            DatasetError: If the episode is not there, or its chunk is damaged.
-        """
-        try:
-            size = Chunk.read_announced_size(contents.slice(self.offset, self.offset + CHUNK_HEADER_BYTES))
-            chunk = Chunk.parse(contents.slice(self.offset, self.offset + size))
-            if chunk.start_ns != self.start_ns:
-                raise DatasetError(
-                    f"starts at {chunk.start_ns} ns", expected=f"trial {self.trial} at {self.start_ns} ns"
-                )
-            return trajectory_rows(chunk.decompress(), self.samples, self.joints)
-        except DatasetError as error:
-            raise error.locate(self.path, f"byte {self.offset}") from error
-
 
 def check_columns(columns: Sequence[str]) -> None:
-    """Check names.
+    """Refuse names that are none of `COLUMNS`.
 
     Raises:
-        ConfigError: If a column is none of `COLUMNS`.
+        ConfigError: If there is such a name.
     """
     for column in columns:
         if column not in COLUMNS:
@@ -160,10 +131,10 @@ def check_columns(columns: Sequence[str]) -> None:
 
 
 def name_components(column: str, joints: Sequence[str]) -> tuple[str, ...]:
-    """Names of the components of a column, with units, as they are called wherever each has a column of its own.
+    """Names, with units, of the components of a column of joints or of the ball, where each has a column of its own.
 
     Args:
-        column: One of `COLUMNS` of joints or of the ball.
+        column: One of `COLUMNS`, but neither times nor stamps.
         joints: Joints that columns of joints have.
     """
     series, _, quantity = column.partition(".")
@@ -173,12 +144,9 @@ def name_components(column: str, joints: Sequence[str]) -> tuple[str, ...]:
 
 
 def empty_columns(columns: Iterable[str], samples: int, joints: int) -> dict[str, Column]:
-    """Arrays to be filled, by name; shape ``(samples,)`` or ``(samples, n)``.
+    """Make arrays for some of `COLUMNS`, by name; shape ``(samples,)`` or ``(samples, n)``.
 
-    Args:
-        columns: Which of `COLUMNS`.
-        samples: Number of samples.
-        joints: Number of joints that the columns of joints have.
+    `joints` is the number of joints that the columns of joints have.
     """
     shapes = {TIMES: (samples,), **column_shapes(samples, joints)}
     return {name: _empty(shapes[name], np.int64 if name == STAMPS else np.float64) for name in columns}
@@ -188,14 +156,14 @@ def _empty(shape: tuple[int, ...], dtype: type[np.generic]) -> Column:
     size = math.prod(shape) * np.dtype(dtype).itemsize
     if size < _LARGE_BYTES:
         return np.empty(shape, dtype)
-    # numpy asks for huge pages. Where the host of a virtual machine takes back what is free, it hands them out piece by
-    # piece, which can take several times as long as everything else here.
+    # NumPy asks the kernel for huge pages. A virtual machine whose host takes back free memory gets these piece by
+    # piece, which can take several times as long as everything else here, so the memory is mapped without them.
     memory = mmap.mmap(-1, size, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
     return np.frombuffer(memory, dtype).reshape(shape)
 
 
 def read_stored_rows(throws: Iterable[StoredThrow]) -> Iterator[NDArray[np.void]]:
-    """The rows of episodes, one after the other; each file is open while its throws follow each other.
+    """Read the rows of episodes, one after the other; each file is open while its throws follow each other.
 
     Raises:
         DatasetError: If an episode is not where it should be, or its chunk is damaged; its CRC is compared.
@@ -203,7 +171,19 @@ def read_stored_rows(throws: Iterable[StoredThrow]) -> Iterator[NDArray[np.void]
     for path, group in groupby(throws, attrgetter("path")):
         with open_mcap(path) as contents:
             for place in group:
-                yield place.rows_in(contents)
+                yield _read_rows(place, contents)
+
+
+def _read_rows(place: StoredThrow, contents: McapContents) -> NDArray[np.void]:
+    offset = place.offset
+    try:
+        size = Chunk.read_announced_size(contents.slice(offset, offset + CHUNK_HEADER_BYTES))
+        chunk = Chunk.parse(contents.slice(offset, offset + size))
+        if chunk.start_ns != place.start_ns:
+            raise DatasetError(f"starts at {chunk.start_ns} ns", expected=f"trial {place.trial} at {place.start_ns} ns")
+        return trajectory_rows(chunk.decompress(), place.samples, place.joints)
+    except DatasetError as error:
+        raise error.locate(place.path, f"byte {offset}") from error
 
 
 def fill(
@@ -248,7 +228,7 @@ def fill(
 def _derive(
     columns: Mapping[str, Column], recorded: Mapping[str, Column], velocities: Sequence[str], starts: NDArray[np.int64]
 ) -> None:
-    """Make columns of what is recorded."""
+    """Turn stamps into nanoseconds, and compute times and the velocities in world from the recorded columns."""
     if STAMPS in recorded:
         to_nanoseconds(recorded[STAMPS])
     if TIMES in columns:

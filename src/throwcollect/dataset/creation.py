@@ -1,4 +1,4 @@
-"""Creates the directory of a dataset: its configuration and its plan, of which no trial has run yet."""
+"""Creates the directory of a dataset, with its configuration and its plan, before a trial runs."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 
 from throwcollect.config.loader import dump_yaml
 from throwcollect.dataset.directory import CONFIG, PLAN, TRIALS
-from throwcollect.dataset.lock import hold_alone
+from throwcollect.dataset.lock import hold_lock
 from throwcollect.errors import ConfigError
 from throwcollect.files import write_file
 from throwcollect.sweep.plan import Plan
@@ -22,7 +22,7 @@ def create(directory: Path, plan: Plan, *, listed: Points | None = None) -> None
     Args:
         directory: Must not exist, or be empty.
         plan: The trials and their configuration.
-        listed: Points that the sampler of the configuration is to find in ``trials.parquet``; None if it does not.
+        listed: Points for ``trials.parquet``, where the sampler of the configuration finds them; None if it needs none.
 
     Raises:
         ConfigError: If the directory holds files already, or cannot be made.
@@ -33,7 +33,7 @@ def create(directory: Path, plan: Plan, *, listed: Points | None = None) -> None
         directory.mkdir(parents=True, exist_ok=True)
     except (OSError, RecursionError) as error:
         raise _unusable(directory, error) from error
-    with hold_alone(directory, needed=False):
+    with hold_lock(directory, needed=False):
         _fill(directory, plan, listed, made=made)
 
 

@@ -1,4 +1,4 @@
-"""The data card of a dataset: what it holds and where it came from, for people who find it."""
+"""The data card of a dataset: contents and origin of the dataset, for people who find it."""
 
 from __future__ import annotations
 
@@ -18,25 +18,19 @@ _MORE = "1M<n<10M"
 
 
 def count_outcomes(throws: pa.Table) -> dict[str, int]:
-    """Number of trials of each outcome, most frequent first."""
+    """Count the trials of each outcome, most frequent first."""
     counts = {entry["values"]: entry["counts"] for entry in pc.value_counts(throws["outcome"]).to_pylist()}
     return dict(sorted(counts.items(), key=lambda item: (-item[1], item[0])))
 
 
 def outcome_lines(throws: pa.Table) -> list[str]:
-    """The table of outcomes of a data card, in Markdown."""
+    """Write the table of outcomes of a data card, in Markdown."""
     counts = count_outcomes(throws).items()
     return ["| outcome | trials |", "|---|---|", *(f"| {outcome} | {count} |" for outcome, count in counts)]
 
 
 def data_card(config: Config, throws: pa.Table, provenance: Provenance) -> str:
-    """README.md of a dataset, with the YAML header that dataset hubs read.
-
-    Args:
-        config: The configuration.
-        throws: One row a trial.
-        provenance: How the collection was run.
-    """
+    """Write the README.md of a dataset, with the YAML header that dataset hubs read."""
     episodes = len(throws) - throws["digest"].null_count
     size = next((label for limit, label in _SIZES if episodes < limit), _MORE)
     measures = "release, apex, landing" if config.task.throws else "measures"
@@ -77,7 +71,7 @@ def data_card(config: Config, throws: pa.Table, provenance: Provenance) -> str:
         "",
         "| | |",
         "|---|---|",
-        # A card is published; the name of a machine concerns nobody there, and stands in provenance.json.
+        # People publish the card, and the name of a machine is private; provenance.json has it.
         *(f"| {name} | {value} |" for name, value in provenance.facts().items() if name != "host"),
         "",
     ]
@@ -85,11 +79,11 @@ def data_card(config: Config, throws: pa.Table, provenance: Provenance) -> str:
 
 
 _RIGID_BODIES = {"bullet": "Bullet", "mujoco": "MuJoCo"}
-"""Engines that leave out the same."""
+"""Engines with the same limits."""
 
 
 def _limits(engine: str) -> str:
-    """What a physics engine leaves out; of those of other packages nothing is known."""
+    """Say what a physics engine leaves out; nothing is known of engines of other packages."""
     if engine in _RIGID_BODIES:
         return (
             f"Simulated with {_RIGID_BODIES[engine]}: rigid bodies, the base of the robot fixed, ideal motors within "
@@ -121,7 +115,7 @@ def _ranges(config: Config, throws: pa.Table) -> list[str]:
 
 
 def _list_targets(config: Config, throws: pa.Table) -> list[str]:
-    """How trials missed their targets; nothing if they have none."""
+    """Tell how trials missed their targets; no lines if they have none."""
     found = summarise_misses(config, throws)
     if not found:
         return []
@@ -144,7 +138,7 @@ def _list_targets(config: Config, throws: pa.Table) -> list[str]:
 
 
 def _tell_drawing(config: Config) -> list[str]:
-    """How the values came about, one sentence a line."""
+    """Tell how the values were drawn, one sentence a line."""
     lines = [f"Drawn by the sampler `{config.sweep.sampler}` with seed {config.seed}."]
     if config.sweep.target is not None:
         bins = [

@@ -1,4 +1,4 @@
-"""Writes what describes a finished dataset as a whole: table of throws, manifest, and bag metadata as its mark."""
+"""Writes the files that describe a finished dataset as a whole: table of throws, manifest, and the bag's metadata."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pyarrow as pa
 
-from throwcollect.dataset.bag import FileSummary, dataset_metadata
+from throwcollect.dataset.bag import FileSummary, bag_information, to_yaml
 from throwcollect.dataset.digest import combine_digests
-from throwcollect.dataset.directory import CONFIG, MANIFEST, METADATA, PLAN, SOURCES, THROWS, TRIALS
+from throwcollect.dataset.directory import CONFIG, FORMAT, MANIFEST, METADATA, PLAN, SOURCES, THROWS, TRIALS
 from throwcollect.dataset.manifest import FileEntry, entry_of, entry_of_file, manifest_text
 from throwcollect.dataset.misses import read_targets
 from throwcollect.episode.channels import Channels
@@ -39,13 +39,15 @@ def write_description(
         throws: The table of throws, one row a trial and in order of trials.
         channels: What is recorded.
         recordings: What bag's metadata and manifest say of each MCAP file, in order of files.
-        on_piece: Called when a piece of the table has been looked at, which happens column by column.
+        on_piece: Called after each piece of the table, which is read column by column, so that its memory can be freed.
 
     Raises:
         DatasetError: If a file cannot be read or written.
     """
     digest = combine_digests(_digests(throws, on_piece), read_targets(throws))
-    metadata = dataset_metadata([summary for summary, _ in recordings], channels.all, digest).encode()
+    custom = {"throwcollect.format": FORMAT, "throwcollect.digest": digest}
+    bag = bag_information([summary for summary, _ in recordings], channels.all, custom)
+    metadata = to_yaml({"rosbag2_bagfile_information": bag}).encode()
     with replacing(directory / THROWS) as descriptor:
         waiting = bytearray()
 
@@ -69,7 +71,7 @@ def write_description(
 
 
 def _digests(throws: pa.Table, on_piece: Callable[[], object]) -> Iterator[str]:
-    """Digests of the episodes, in order; as texts of Python, those of a million would fill 100 MB."""
+    """Digests of the episodes, in order, some at a time: as Python texts, those of a million would fill 100 MB."""
     for first in range(0, len(throws), _ROWS_AT_ONCE):
         yield from throws["digest"].slice(first, _ROWS_AT_ONCE).drop_null().to_pylist()
         on_piece()

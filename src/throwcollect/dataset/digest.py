@@ -1,4 +1,4 @@
-"""One hash for a whole dataset."""
+"""The digest of a whole dataset."""
 
 from __future__ import annotations
 
@@ -11,14 +11,10 @@ from throwcollect.sweep.points import Targets
 
 
 def combine_digests(digests: Iterable[str], targets: Targets | None) -> str:
-    """SHA-256 over the digests of all episodes in order of trials, each as 32 bytes, in hexadecimal.
+    """Compute SHA-256 over the digests of all episodes in order of trials, each as 32 bytes; digests are hexadecimal.
 
-    If trials have targets, which no episode knows of, these follow: of each column its name, a zero byte, and the
-    number of each trial as a little-endian double, the NaN 0x7ff8000000000000 where it has none.
-
-    Args:
-        digests: Digests of the episodes, in hexadecimal.
-        targets: Those of all trials, in order; None if they have none.
+    The targets of all trials follow, if trials have some, as no episode contains them: of each column its name, a zero
+    byte, and the number of each trial as a little-endian double, the NaN 0x7ff8000000000000 where it has none.
     """
     combined = hashlib.sha256()
     for digest in digests:

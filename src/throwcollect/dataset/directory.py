@@ -27,32 +27,26 @@ MANIFEST = "datapackage.json"
 SHARD_SUFFIX = ".mcap"
 JOURNAL = "logs/journal.jsonl"
 ATTEMPT = ".attempt-"
-"""Stands in the names of directories of attempts at a slice, and of no dataset."""
+"""Part of the name of the directory of each attempt at a slice, and of no dataset."""
 
 FORMAT = "1"
 """Version of the layout that ``docs/dataset.md`` describes."""
 
 
 def shard_name(collection: str, number: int) -> str:
-    """File name of a shard.
-
-    Args:
-        collection: Name of the collection.
-        number: Number of the shard, counted from 0.
-    """
+    """File name of the shard of a collection that has this number, counted from 0."""
     return f"{collection}_{number:05d}{SHARD_SUFFIX}"
 
 
 def is_attempt(directory: Path) -> bool:
-    """Whether a directory is that of an attempt at a slice, which one process alone knows (see `slice_directory`)."""
+    """Whether a directory is that of an attempt at a slice, which no other process knows (see `slice_directory`)."""
     return ATTEMPT in directory.name
 
 
 def find_known_directory(directory: Path) -> Path | None:
-    """The directory of a dataset as its user knows it; None if it has none, such as in a volume.
+    """The directory of a dataset as its user knows it, which may have another path in this process, as in a container.
 
-    Args:
-        directory: The same as this process sees it.
+    It is None if the user cannot reach it, as in a volume.
     """
     known = os.environ.get(DIRECTORY_VARIABLE, str(directory))
     return Path(known) if known else None

@@ -1,17 +1,17 @@
-"""Conditions on the columns of a table, written as Python writes them: which rows fulfil one, and numbers of each row.
+"""Conditions and numbers computed from the columns of a table, written as Python writes them.
 
-Text is parsed by Python and evaluated here by Arrow, so nothing of it is ever run. Names with dots are names of
-columns, ``weights.arm_right_4_joint[0]`` is the column ``weights.arm_right_4_joint.0``. What is null in a row stays
-null in comparisons and arithmetic, and a null condition is not fulfilled.
+Python parses the text, and Arrow evaluates it here, so nothing of it ever runs. Names with dots are names of
+columns, ``weights.arm_right_4_joint[0]`` is the column ``weights.arm_right_4_joint.0``. A null stays null in
+comparisons and arithmetic, and a null condition is not fulfilled.
 """
 
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
-from types import MappingProxyType
+from functools import reduce
 from typing import Any, Literal
 
 import pyarrow as pa
@@ -24,16 +24,14 @@ _SHOWN = 100
 
 _Kind = Literal["a number", "text", "a condition", "None"]
 
-_COMPARISONS = MappingProxyType[type[ast.cmpop], Callable[..., Any]](
-    {
-        ast.Eq: pc.equal,
-        ast.NotEq: pc.not_equal,
-        ast.Lt: pc.less,
-        ast.LtE: pc.less_equal,
-        ast.Gt: pc.greater,
-        ast.GtE: pc.greater_equal,
-    }
-)
+_COMPARISONS: Mapping[type[ast.cmpop], Callable[..., Any]] = {
+    ast.Eq: pc.equal,
+    ast.NotEq: pc.not_equal,
+    ast.Lt: pc.less,
+    ast.LtE: pc.less_equal,
+    ast.Gt: pc.greater,
+    ast.GtE: pc.greater_equal,
+}
 
 
 def _floor_divide(left: Any, right: Any) -> Any:
@@ -44,32 +42,32 @@ def _remainder(left: Any, right: Any) -> Any:
     return pc.subtract(left, pc.multiply(right, _floor_divide(left, right)))
 
 
-_ARITHMETIC = MappingProxyType[type[ast.operator], Callable[..., Any]](
-    {
-        ast.Add: pc.add,
-        ast.Sub: pc.subtract,
-        ast.Mult: pc.multiply,
-        ast.Div: pc.divide,
-        ast.FloorDiv: _floor_divide,
-        ast.Mod: _remainder,
-        ast.Pow: pc.power,
-    }
-)
+_ARITHMETIC: Mapping[type[ast.operator], Callable[..., Any]] = {
+    ast.Add: pc.add,
+    ast.Sub: pc.subtract,
+    ast.Mult: pc.multiply,
+    ast.Div: pc.divide,
+    ast.FloorDiv: _floor_divide,
+    ast.Mod: _remainder,
+    ast.Pow: pc.power,
+}
 
 
 def _hypot(x: Any, y: Any) -> Any:
     return pc.sqrt(pc.add(pc.multiply(x, x), pc.multiply(y, y)))
 
 
-_FUNCTIONS = MappingProxyType[str, tuple[int, Callable[..., Any]]](
-    {"abs": (1, pc.abs), "sqrt": (1, pc.sqrt), "hypot": (2, _hypot)}
-)
+_FUNCTIONS: Mapping[str, tuple[int, Callable[..., Any]]] = {
+    "abs": (1, pc.abs),
+    "sqrt": (1, pc.sqrt),
+    "hypot": (2, _hypot),
+}
 """Number of arguments, and the function."""
 
 
 @dataclass(frozen=True)
 class _Value:
-    """What a part of an expression yields: an Arrow array with one value a row, or a scalar for all of them."""
+    """The value of a part of an expression: an Arrow array with one value a row, or a scalar for all of them."""
 
     kind: _Kind
     data: Any
@@ -87,7 +85,7 @@ class Expression:
     """
 
     def __init__(self, text: str, *, place: str) -> None:
-        # Line breaks mean nothing here, but would end a statement of Python.
+        # Python would take a line break for the end of the expression.
         self._text = " ".join(text.splitlines()).strip()
         self._place = place
         try:
@@ -133,12 +131,7 @@ class Expression:
 
 
 class _Evaluation:
-    """Evaluates parts of an expression on a table.
-
-    Args:
-        table: The table.
-        error: Makes an error that points to a part.
-    """
+    """Evaluates parts of an expression on a table; `error` makes an error that points to a part."""
 
     def __init__(self, table: pa.Table, error: Callable[[ast.expr, str], ConfigError]) -> None:
         self._table = table
@@ -157,7 +150,7 @@ class _Evaluation:
                 return self._column(node)
             case ast.BoolOp():
                 combine = pc.and_kleene if isinstance(node.op, ast.And) else pc.or_kleene
-                return self._combine(combine, [self._of(part, "a condition") for part in node.values])
+                return _Value("a condition", reduce(combine, [self._of(part, "a condition") for part in node.values]))
             case ast.UnaryOp(op=ast.Not()):
                 return _Value("a condition", pc.invert(self._of(node.operand, "a condition")))
             case ast.UnaryOp(op=ast.USub()):
@@ -182,12 +175,6 @@ class _Evaluation:
         if value.kind != kind:
             raise self._error(node, f"should be {kind}, is {value.kind}")
         return value.data
-
-    def _combine(self, combine: Callable[..., Any], parts: Sequence[Any]) -> _Value:
-        whole = parts[0]
-        for part in parts[1:]:
-            whole = combine(whole, part)
-        return _Value("a condition", whole)
 
     def _constant(self, node: ast.Constant) -> _Value:
         match node.value:
@@ -234,7 +221,7 @@ class _Evaluation:
                 parts.append(pc.invert(found) if isinstance(operator, ast.NotIn) else found)
             else:
                 parts.append(self._compare(left, operator, right))
-        return self._combine(pc.and_kleene, parts)
+        return _Value("a condition", reduce(pc.and_kleene, parts))
 
     def _compare(self, left: ast.expr, operator: ast.cmpop, right: ast.expr) -> Any:
         a, b = self.value(left), self.value(right)
@@ -254,4 +241,4 @@ class _Evaluation:
         if not isinstance(right, ast.List | ast.Tuple | ast.Set) or not right.elts:
             raise self._error(right, "should be a list, such as ['landed', 'recaught']")
         equal = [self._compare(left, ast.Eq(), element) for element in right.elts]
-        return self._combine(pc.or_kleene, equal).data
+        return reduce(pc.or_kleene, equal)

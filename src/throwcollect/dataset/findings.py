@@ -1,4 +1,4 @@
-"""What is wrong with a dataset, one thing at a time."""
+"""Findings: single things that are wrong with a dataset."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ class Finding:
 
     Attributes:
         file: Name of the file in the dataset's directory.
-        place: Where in it: a trial, a byte, a field; empty when it is the file as a whole.
+        place: The place in it: a trial, a byte, a field; empty if it is the file as a whole.
         problem: What is wrong.
     """
 
@@ -23,17 +23,12 @@ class Finding:
 
     @classmethod
     def of(cls, file: str, error: DatasetError) -> Finding:
-        """What an error says of a file.
-
-        Args:
-            file: Name of the file in the dataset's directory.
-            error: The error.
-        """
+        """Make a finding of an error in the file of this name in the dataset's directory."""
         return cls(file, error.place, error.details)
 
     def __str__(self) -> str:
         return ": ".join(part for part in (self.file, self.place, self.problem) if part)
 
     def as_dict(self) -> dict[str, str]:
-        """The same for JSON."""
+        """The fields by name, for JSON."""
         return asdict(self)

@@ -1,4 +1,4 @@
-"""Says what somebody looks for who takes an attribute that is not there."""
+"""Names the attribute that a program most likely means when it takes one that does not exist."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ DATASET: Mapping[str, str] = {
     "trials": "throws",
     "where": "select(...)",
 }
-"""What people try on a dataset, and what they look for."""
+"""Attributes of a dataset that people try, and the ones that they look for."""
 
 THROW: Mapping[str, str] = {
     "apex": "events.apex",
@@ -45,16 +45,16 @@ THROW: Mapping[str, str] = {
     "trajectory": "ball, joints or to_pandas()",
     "velocity": "ball.velocity or joints.velocity",
 }
-"""What people try on a throw, and what they look for."""
+"""Attributes of a throw that people try, and the ones that they look for."""
 
 
 def refuse_attribute(owner: object, name: str, guesses: Mapping[str, str]) -> AttributeError:
-    """Make the error for an attribute that is not there, which names the one that is meant, if that can be guessed.
+    """Make the error for a missing attribute, which names the one that is meant if it can be guessed.
 
     Args:
-        owner: What has no such attribute.
-        name: Its name.
-        guesses: What people try, and what they look for.
+        owner: The object without such an attribute.
+        name: Name of the attribute.
+        guesses: Attributes that people try, and the ones that they look for.
     """
     kind = type(owner).__name__
     meant = guesses.get(name) or next(iter(get_close_matches(name, _list_public(type(owner)), 1)), None)

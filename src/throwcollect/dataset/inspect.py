@@ -1,12 +1,11 @@
-"""What a dataset holds, in numbers."""
+"""Summaries and digests of datasets."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
 
-import pyarrow as pa
-import pyarrow.compute as pc
+import numpy as np
 
 from throwcollect.dataset.data_card import count_outcomes
 from throwcollect.dataset.digest import combine_digests
@@ -18,10 +17,7 @@ from throwcollect.errors import DatasetError
 
 
 def info(directory: Path) -> Info:
-    """Summary of a dataset, from its tables; `verify` says whether they are right.
-
-    Args:
-        directory: Its directory.
+    """Summarise a dataset from its tables; `verify` says whether they are right.
 
     Raises:
         DatasetError: If the directory holds no finished dataset, or its tables are damaged.
@@ -31,7 +27,7 @@ def info(directory: Path) -> Info:
 
 
 def summary(dataset: Dataset) -> Info:
-    """Summary of an open dataset.
+    """Summarise an open dataset.
 
     Raises:
         DatasetError: If its metadata lack a field, or its directory cannot be read.
@@ -50,7 +46,7 @@ def summary(dataset: Dataset) -> Info:
         episodes=episodes,
         outcomes=count_outcomes(dataset.throws),
         wanted=dataset.config.until.wanted if dataset.config.until else None,
-        landing=_landing(dataset.throws) if dataset.config.task.throws else None,
+        landing=_find_landing_area(dataset) if dataset.config.task.throws else None,
         samples=samples,
         duration_s=(samples - episodes) / dataset.config.record.rate_hz,
         shards=len(shards),
@@ -65,18 +61,15 @@ def summary(dataset: Dataset) -> Info:
     )
 
 
-def _landing(throws: pa.Table) -> Mapping[str, tuple[float, float]] | None:
-    limits = {axis: pc.min_max(throws[f"landing_{axis}"]).as_py() for axis in ("x_m", "y_m")}
-    if limits["x_m"]["min"] is None:
+def _find_landing_area(dataset: Dataset) -> Mapping[str, tuple[float, float]] | None:
+    bounds = dataset.landings.bounds
+    if np.isnan(bounds).any():
         return None
-    return {axis: (each["min"], each["max"]) for axis, each in limits.items()}
+    return {axis: (low, high) for axis, (low, high) in zip(("x_m", "y_m"), bounds[:2].tolist(), strict=True)}
 
 
 def digest(directory: Path) -> str:
-    """Hash over all episodes in order of trials, recomputed from their bytes, and over targets if trials have some.
-
-    Args:
-        directory: Directory of the dataset.
+    """Compute the digest of a dataset again from the bytes of its episodes, and from the targets if trials have some.
 
     Raises:
         DatasetError: If an episode is damaged, or the digest of one or of all is not what the dataset says.

@@ -1,7 +1,7 @@
 """Joins the slices of a dataset: moves their recordings beside each other, and writes the tables of the whole.
 
-No recording is opened but to read the statistics at its end. Whatever ends this, it can be done again and comes out the
-same: the mark of a finished dataset is written last, and the slices are removed after that.
+Of a recording, only the statistics at its end are read. If joining is interrupted, it can be done again and gives the
+same dataset: ``metadata.yaml``, which marks a finished dataset, is written last, and the slices are removed after that.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from mcap.reader import make_reader
 from throwcollect.config.loader import load
 from throwcollect.dataset.bag import FileSummary
 from throwcollect.dataset.directory import METADATA, PLAN, config_path, shard_name
-from throwcollect.dataset.lock import hold_alone
+from throwcollect.dataset.lock import hold_lock
 from throwcollect.dataset.manifest import FileEntry, entry_of, read_manifest
 from throwcollect.dataset.slice_directory import SLICES, find_finished, slice_directory
 from throwcollect.dataset.throws_table import read_throws
@@ -35,25 +35,18 @@ _MOST_NAMED = 8
 def join(directory: Path) -> None:
     """Make a finished dataset of its slices; one that is finished already stays as it is.
 
-    Args:
-        directory: Directory of the dataset, with its configuration and its plan.
-
     Raises:
         ConfigError: If the directory holds no slices, or some of another number of slices.
         DatasetError: If a slice is missing, damaged or not of this plan, or the dataset cannot be written.
     """
-    with hold_alone(directory, needed=False):
+    with hold_lock(directory, needed=False):
         if not (directory / METADATA).exists():
             _join(directory)
         shutil.rmtree(directory / SLICES, ignore_errors=True)
 
 
-def count_slices(directory: Path, finished: Collection[Slice]) -> int:
-    """Of how many slices a dataset is.
-
-    Args:
-        directory: Its directory.
-        finished: Its finished slices.
+def _count_slices(directory: Path, finished: Collection[Slice]) -> int:
+    """The number of slices that a dataset was cut into.
 
     Raises:
         ConfigError: If none is finished, or they are of different numbers of slices.
@@ -74,7 +67,7 @@ def count_slices(directory: Path, finished: Collection[Slice]) -> int:
 def _join(directory: Path) -> None:
     plan = Plan.read(directory / PLAN, load(config_path(directory)))
     finished = find_finished(directory)
-    slices = Slice.all_of(count_slices(directory, finished))
+    slices = Slice.all_of(_count_slices(directory, finished))
     if missing := [each for each in slices if each not in finished]:
         named = ", ".join(map(str, missing[:_MOST_NAMED])) + (" and more" if missing[_MOST_NAMED:] else "")
         raise DatasetError(
@@ -89,7 +82,7 @@ def _join(directory: Path) -> None:
 
 
 def _take(directory: Path, part: Plan, slice: Slice, writer: DatasetWriter) -> None:
-    """Move the recordings of a slice, and have the writer know them.
+    """Move the recordings of a slice to the dataset, and hand them to its writer.
 
     Raises:
         DatasetError: If the slice is not one of this plan, or damaged.
@@ -106,12 +99,12 @@ def _take(directory: Path, part: Plan, slice: Slice, writer: DatasetWriter) -> N
         number = first // per_shard
         name = shard_name(part.config.name, number)
         entry = entries.get(name)
-        summary = None if entry is None else _move(place / name, directory / name, entry)
-        writer.take_shard(number, summary, entry, throws.slice(first - part.trials.first, per_shard))
+        recording = None if entry is None else (_move(place / name, directory / name, entry), entry)
+        writer.take_shard(number, recording, throws.slice(first - part.trials.first, per_shard))
 
 
 def _move(source: Path, target: Path, entry: FileEntry) -> FileSummary:
-    """Move a recording, unless that is done, and read what is in it.
+    """Move a recording, unless an earlier join has moved it, and read its statistics.
 
     Raises:
         DatasetError: If it is not there, or not as the manifest says.

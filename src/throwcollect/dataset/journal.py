@@ -1,7 +1,7 @@
-"""What happened while a dataset was collected, in the order in which it did: ``logs/journal.jsonl``.
+"""The journal of a dataset, ``logs/journal.jsonl``: what happened while it was collected, in that order.
 
-One JSON object a line, only ever appended to, through all interruptions: `event`, `time` (Unix [s]) and what belongs to
-the event. Nothing is read back from it to make the dataset; it is there for people, and for the data card.
+Each line is a JSON object with `event`, `time` (Unix [s]) and the facts of that event. Lines are only ever appended,
+also after an interruption. The dataset never depends on the journal, which is for people and for the data card.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Literal, get_args
 
 from throwcollect.dataset.directory import JOURNAL
@@ -39,9 +38,6 @@ Event = Literal["opened", "exposed", "recovered", "planned", "lease", "commit", 
 class Journal:
     """The journal of a dataset that is being collected, which one process at a time may hold.
 
-    Args:
-        directory: Directory of the dataset.
-
     Raises:
         DatasetError: If another process holds it, or it cannot be written.
     """
@@ -61,25 +57,17 @@ class Journal:
         self._opened = time.time()
         size = os.fstat(self._descriptor).st_size
         if size and os.pread(self._descriptor, 1, size - 1) != b"\n":
-            # The process that wrote last was killed within a line.
+            # The process that wrote last was killed while it wrote a line.
             self._append(b"\n")
         self.note("opened", pid=os.getpid())
 
-    def __enter__(self) -> Journal:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
     def measure_collected_s(self) -> float:
-        """Real time that this process and earlier ones have collected for [s], to the millisecond."""
-        # Clocks are set back now and then.
+        """Real time for which this process and earlier ones have collected [s], to the millisecond."""
+        # The clock may have been set back meanwhile.
         return round(self._earlier_s + max(time.time() - self._opened, 0.0), 3)
 
     def note(self, event: Event, **details: Any) -> None:
-        """Write down an event.
+        """Append an event.
 
         Raises:
             DatasetError: If it cannot be written.
@@ -87,7 +75,7 @@ class Journal:
         self._append(json.dumps({"event": event, "time": round(time.time(), 3), **details}).encode() + b"\n")
 
     def close(self) -> None:
-        """Let other processes have it."""
+        """Close the file, so that another process can hold it."""
         os.close(self._descriptor)
 
     def _append(self, data: bytes) -> None:
@@ -99,14 +87,7 @@ class Journal:
 
 @dataclass(frozen=True)
 class Entry:
-    """One line of a journal.
-
-    Attributes:
-        event: What happened.
-        time_s: When, Unix time [s].
-        wall_s: Real time that collecting took in all [s], if the line tells it.
-        outcome: What came of a trial whose episode was written, if the line tells it.
-    """
+    """One line of a journal; `wall_s` (real time that collecting took in all) and `outcome` are None if it has none."""
 
     event: Event
     time_s: float
@@ -115,26 +96,14 @@ class Entry:
 
 
 def read_journal(path: Path) -> Iterator[Entry]:
-    """Events of a journal, in order; lines that were cut off or damaged are left out.
-
-    Args:
-        path: The file; if it is missing, nothing happened.
-    """
+    """Read the events of a journal, in order; a missing file has none, and damaged lines are left out."""
     try:
         descriptor = open_log(path, os.O_RDONLY)
     except OSError:
         return
     with open(descriptor, "rb") as file:
-        for line in file:
-            try:
-                entry = json.loads(line)
-            except ValueError:
-                continue
-            if (
-                isinstance(entry, dict)
-                and entry.get("event") in get_args(Event)
-                and isinstance(entry.get("time"), int | float)
-            ):
+        for entry in map(_parse, file):
+            if entry.get("event") in get_args(Event) and isinstance(entry.get("time"), int | float):
                 wall_s, outcome = entry.get("wall_s"), entry.get("outcome")
                 yield Entry(
                     entry["event"],
@@ -147,11 +116,11 @@ def read_journal(path: Path) -> Iterator[Entry]:
 def read_commits(
     path: Path, columns: Sequence[str], *, first: int, most_bytes: int
 ) -> tuple[list[list[Any]], int, bool]:
-    """Trials whose episodes were written, as a part of a journal tells them; more than once if they were lost again.
+    """Read a part of a journal for the trials whose episodes were written; a trial whose episode got lost occurs again.
 
     Args:
-        path: The file; if it is missing, nothing happened.
-        columns: What is told of each: `trial`, `outcome`, and numbers. Trials without one of them are left out.
+        path: The file; if it is missing, it has no trials.
+        columns: Values to read of each: `trial`, `outcome`, and numbers. Trials without one of them are left out.
         first: Where the part begins [bytes]: 0, or where an earlier one has ended.
         most_bytes: How long the part is at most, which is more than a line.
 
@@ -170,17 +139,24 @@ def read_commits(
         return [], first, False
     except OSError as error:
         raise unreadable(path, error) from error
-    # The last line may be one that is being written.
+    # Another process may be writing the last line now.
     whole = data[: data.rfind(b"\n") + 1]
-    found = []
-    for line in whole.splitlines():
-        if b'"commit"' not in line:
-            continue
-        with suppress(ValueError):
-            entry = json.loads(line)
-            if isinstance(entry, dict) and all(isinstance(entry.get(name), int | float | str) for name in columns):
-                found.append([entry[name] for name in columns])
+    entries = [_parse(line) for line in whole.splitlines() if b'"commit"' in line]
+    found = [
+        [entry[name] for name in columns]
+        for entry in entries
+        if all(isinstance(entry.get(name), int | float | str) for name in columns)
+    ]
     return found, first + len(whole), bool(rest)
+
+
+def _parse(line: bytes) -> dict[str, Any]:
+    """The fields of a line; none if it was cut off or damaged."""
+    with suppress(ValueError):
+        entry = json.loads(line)
+        if isinstance(entry, dict):
+            return entry
+    return {}
 
 
 def was_open(directory: Path) -> bool:
@@ -191,7 +167,8 @@ def was_open(directory: Path) -> bool:
 def measure_collected_s(directory: Path) -> float | None:
     """Real time for which processes have collected into a dataset [s]; None if no journal says so.
 
-    What the last one has written when it finished the dataset; before that, from first to last event of each.
+    The process that finishes a dataset writes this time down. Processes that came after it count from their first to
+    their last event, and so do all if none has finished the dataset.
     """
     total: float | None = None
     began = last = 0.0

@@ -1,4 +1,4 @@
-"""Judges episodes that are stored, or were simulated in this process, as the coordinator does."""
+"""Judges episodes that are stored, or were simulated in this process, with the rules of the coordinator."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from throwcollect.tasks.task import task_of
 
 
 def judge_episode(config: Config, episode: Episode, trajectory: JointTrajectory | None = None) -> Result:
-    """What came of a trial.
+    """Say how a trial ended, from its episode.
 
     Args:
         config: Configuration of the trial.
         episode: Its episode.
-        trajectory: What its controllers were sent; None if it has yet to be worked out.
+        trajectory: The joint trajectory that its controllers were sent; None to compute it here.
 
     Raises:
         DatasetError: If the episode is damaged, or another robot's.

@@ -10,15 +10,16 @@ import hashlib
 import json
 import os
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from throwcollect.dataset.directory import CONFIG, MANIFEST, METADATA, PLAN, SHARD_SUFFIX, SOURCES, THROWS, TRIALS
+from throwcollect.dataset.findings import Finding
 from throwcollect.errors import DatasetError
-from throwcollect.files import open_regular, read_text, unreadable
+from throwcollect.files import is_there, open_regular, read_text, unreadable
 from throwcollect.sweep.digest import is_digest
 from throwcollect.wording import command
 
@@ -26,20 +27,14 @@ _PROFILE = "data-package"
 _HASH = "sha256:"
 _PROMISED = frozenset({CONFIG, METADATA, PLAN, SOURCES, THROWS, TRIALS})
 _NAME = re.compile(r"[a-z0-9][a-z0-9_.-]*")
-"""A name alone: nothing outside the directory is ever meant."""
+"""A file name without directories, so that no manifest can name a file outside of the dataset."""
 _MOST_BYTES = 100_000_000
 _BLOCK = 1 << 20
 
 
 @dataclass(frozen=True)
 class FileEntry:
-    """One file of a dataset.
-
-    Attributes:
-        path: Its name in the dataset's directory.
-        bytes: Its size [bytes].
-        sha256: SHA-256 of its contents, in hexadecimal.
-    """
+    """One file of a dataset: its name there, its size [bytes], and its SHA-256 in hexadecimal."""
 
     path: str
     bytes: int
@@ -47,15 +42,15 @@ class FileEntry:
 
 
 def entry_of(path: str, data: bytes) -> FileEntry:
-    """Entry of a file with these contents."""
+    """Make the entry of a file with these contents."""
     return FileEntry(path, len(data), hashlib.sha256(data).hexdigest())
 
 
 def entry_of_file(path: Path) -> FileEntry:
-    """Entry of a file as it lies on disk.
+    """Make the entry of a file on disk.
 
     Raises:
-        DatasetError: If it cannot be read, or is no plain file.
+        DatasetError: If it cannot be read, or is no regular file.
     """
     digest, size = hashlib.sha256(), 0
     try:
@@ -69,10 +64,10 @@ def entry_of_file(path: Path) -> FileEntry:
 
 
 def size_of_file(path: Path) -> int:
-    """Size of a file as it lies on disk [bytes].
+    """Size of a file on disk [bytes].
 
     Raises:
-        DatasetError: If it cannot be opened, or is no plain file.
+        DatasetError: If it cannot be opened, or is no regular file.
     """
     try:
         with open(open_regular(path), "rb") as file:
@@ -82,7 +77,7 @@ def size_of_file(path: Path) -> int:
 
 
 class RunningHash:
-    """SHA-256 of a file while it is written, computed in a thread of its own, so that writing need not wait for it."""
+    """SHA-256 of a file while it is written, computed in a thread of its own, so that the writer need not wait."""
 
     def __init__(self) -> None:
         self._hash = hashlib.sha256()
@@ -95,7 +90,7 @@ class RunningHash:
         """Take in the next bytes of the file."""
         self._held.append(data)
         self._held_bytes += len(data)
-        # Handing over to a thread takes some 20 µs, so it is done for many episodes at once.
+        # Handing over to a thread takes some 20 µs, so it is done with the bytes of many episodes at once.
         if self._held_bytes >= _BLOCK:
             self._hand_over()
 
@@ -123,20 +118,15 @@ class RunningHash:
 
 
 def list_promised_names(directory: Path) -> list[str]:
-    """Names of the files in a directory that a manifest has to cover, in order; nothing is opened.
+    """Names of the files in a directory that a manifest has to cover, in order.
 
-    The data card and the logs are not among them, as they say how, where and when a dataset was collected.
+    The data card and the logs are not among them, as they tell how, where and when the dataset was collected.
     """
     return sorted(name for name in os.listdir(directory) if name in _PROMISED or name.endswith(SHARD_SUFFIX))
 
 
 def manifest_text(name: str, entries: Iterable[FileEntry]) -> str:
-    """Text of a manifest.
-
-    Args:
-        name: Name of the collection.
-        entries: The files, in any order.
-    """
+    """Text of the manifest of a collection of this name; the entries may come in any order."""
     resources = [
         {"name": entry.path, "path": entry.path, "bytes": entry.bytes, "hash": _HASH + entry.sha256}
         for entry in sorted(entries, key=lambda entry: entry.path)
@@ -145,10 +135,7 @@ def manifest_text(name: str, entries: Iterable[FileEntry]) -> str:
 
 
 def read_manifest(directory: Path) -> tuple[FileEntry, ...]:
-    """Entries of the manifest of a dataset, in order of their paths.
-
-    Args:
-        directory: Directory of the dataset.
+    """Read the entries of the manifest of a dataset, in order of their paths.
 
     Raises:
         DatasetError: If the manifest is missing, or its text is not one that `manifest_text` makes.
@@ -157,13 +144,13 @@ def read_manifest(directory: Path) -> tuple[FileEntry, ...]:
 
 
 def read_named_manifest(directory: Path) -> tuple[str, tuple[FileEntry, ...]]:
-    """Name of the collection that a manifest has, and its entries; see `read_manifest`.
+    """Read the name of the collection that a manifest has, and its entries; see `read_manifest`.
 
     Raises:
-        DatasetError: If the manifest is missing, or is not written as one is.
+        DatasetError: If the manifest is missing, or its text is not one that `manifest_text` makes.
     """
     path = directory / MANIFEST
-    if not os.path.lexists(path):
+    if not is_there(path):
         raise DatasetError("is missing", path=path, hint=command("dataset", "rebuild", directory))
     text = read_text(path, most_bytes=_MOST_BYTES)
     try:
@@ -174,6 +161,60 @@ def read_named_manifest(directory: Path) -> tuple[str, tuple[FileEntry, ...]]:
     if text != manifest_text(name, entries) or len({entry.path for entry in entries}) < len(entries):
         raise DatasetError("is not written as the manifest of a dataset is", path=path)
     return name, entries
+
+
+def is_as_written(directory: Path, name: str) -> bool:
+    """Whether there is a manifest, and it says of a file of a dataset that it is as it was written."""
+    try:
+        return entry_of_file(directory / name) in read_manifest(directory)
+    except DatasetError:
+        return False
+
+
+def find_manifest_problems(directory: Path, name: str | None) -> Iterator[Finding]:
+    """Find where the manifest of a dataset and its files differ; every byte of the promised files is read.
+
+    The name of the collection is compared, too, unless it is None because nobody knows it.
+    """
+    if not (directory / MANIFEST).exists():
+        rebuild = command("dataset", "rebuild", directory)
+        yield Finding(MANIFEST, "", f"is missing, so changed bytes may go unnoticed; {rebuild} writes it")
+        return
+    try:
+        name_there, entries = read_named_manifest(directory)
+    except DatasetError as error:
+        yield Finding(MANIFEST, "", error.problem)
+        return
+    if name is not None and name_there != name:
+        yield Finding(MANIFEST, "name", f"is {name_there!r}, in the configuration {name!r}")
+    covered = {entry.path for entry in entries}
+    yield from find_changed_files(directory, entries, in_full=True)
+    yield from (
+        Finding(path, "", f"is not in {MANIFEST}") for path in list_promised_names(directory) if path not in covered
+    )
+
+
+def find_changed_files(directory: Path, entries: Iterable[FileEntry], *, in_full: bool) -> Iterator[Finding]:
+    """Find the files of a dataset that are not as entries of a manifest say.
+
+    They are compared byte by byte in full, or else only by their sizes.
+    """
+    for entry in entries:
+        path = directory / entry.path
+        if not is_there(path):
+            yield Finding(entry.path, "", f"is missing, {MANIFEST} has it")
+            continue
+        try:
+            actual = entry_of_file(path) if in_full else replace(entry, bytes=size_of_file(path))
+        except DatasetError as error:
+            yield Finding(entry.path, "", error.problem)
+            continue
+        if actual.bytes != entry.bytes:
+            yield Finding(entry.path, "", f"has {actual.bytes} bytes, in {MANIFEST} {entry.bytes}")
+        elif actual != entry:
+            yield Finding(
+                entry.path, "", f"has SHA-256 {actual.sha256}, in {MANIFEST} {entry.sha256}: its bytes were changed"
+            )
 
 
 def _entry(resource: Any) -> FileEntry:

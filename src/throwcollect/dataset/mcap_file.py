@@ -7,17 +7,22 @@ run of records: its chunks, each with its message indexes, and a Metadata record
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Sequence
+import struct
+import zlib
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import zstandard
 from isal.isal_zlib import crc32
 from mcap import records
+from mcap.opcode import Opcode
 
+from rclzenoh.interfaces import message_definition, type_hash
 from throwcollect.dataset.bag import FileSummary, bag_information, to_yaml
-from throwcollect.dataset.mcap_contents import FileContents, Run, declarations
 from throwcollect.episode.channels import Channel, Channels
-from throwcollect.episode.chunk import Chunk, encode_message_index, encode_records
+from throwcollect.episode.chunk import Chunk, count_indexed, encode_message_index, encode_records
 from throwcollect.episode.message import Episode
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -33,8 +38,91 @@ LIBRARY = "throwcollect"
 _LATCHED_LEVEL = 9
 
 
+def declarations(channels: Sequence[Channel]) -> tuple[list[records.Schema], list[records.Channel]]:
+    """Schema and Channel records, as rosbag2 writes them."""
+    types = list(dict.fromkeys(channel.type_name for channel in channels))
+    schemas = [
+        records.Schema(id=number, data=message_definition(name).encode(), encoding="ros2msg", name=name)
+        for number, name in enumerate(types, start=1)
+    ]
+    return schemas, [
+        records.Channel(
+            id=channel.id,
+            topic=channel.topic,
+            message_encoding="cdr",
+            metadata={"offered_qos_profiles": channel.qos.text, "topic_type_hash": type_hash(channel.type_name)},
+            schema_id=types.index(channel.type_name) + 1,
+        )
+        for channel in channels
+    ]
+
+
+@dataclass(frozen=True)
+class Run:
+    """Records that follow each other without a gap: chunks, each with its message indexes, and maybe a Metadata record.
+
+    Attributes:
+        data: The bytes.
+        chunk_indexes: Index of each chunk, as if the run began at offset 0.
+        counts: Number of messages on each channel, by its number.
+        metadata_length: Size of the Metadata record at the end [bytes]; 0 if there is none.
+    """
+
+    data: bytes
+    chunk_indexes: tuple[records.ChunkIndex, ...]
+    counts: Mapping[int, int]
+    metadata_length: int
+
+    @property
+    def length(self) -> int:
+        """Size of the records [bytes]."""
+        return _end_of(self.chunk_indexes[-1]) + self.metadata_length
+
+    @property
+    def start_ns(self) -> int:
+        """Time of the first message of its first chunk [ns]."""
+        return int(self.chunk_indexes[0].message_start_time)
+
+    @classmethod
+    def of(cls, chunks: Iterable[tuple[Chunk, Mapping[int, bytes]]], metadata: bytes = b"") -> Run:
+        """Make the run of chunks, each with its Message Index records by channel, and of a Metadata record."""
+        parts: list[bytes | memoryview] = []
+        places: list[records.ChunkIndex] = []
+        counts: dict[int, int] = {}
+        for chunk, indexes in chunks:
+            parts += (chunk.record_header(), chunk.data, *indexes.values())
+            places.append(_index_chunk(chunk, indexes, _end_of(places[-1]) if places else 0))
+            counts |= {channel: count_indexed(index) for channel, index in indexes.items()}
+        return cls(b"".join((*parts, metadata)), tuple(places), counts, len(metadata))
+
+
+def _index_chunk(chunk: Chunk, indexes: Mapping[int, bytes], start: int) -> records.ChunkIndex:
+    """Index of a chunk that begins at `start` [bytes] and is followed by its message indexes."""
+    end = start + chunk.record_size
+    offsets, offset = {}, end
+    for channel, index in indexes.items():
+        offsets[channel] = offset
+        offset += len(index)
+    return records.ChunkIndex(
+        chunk_length=chunk.record_size,
+        chunk_start_offset=start,
+        compression="zstd",
+        compressed_size=len(chunk.data),
+        message_end_time=chunk.end_ns,
+        message_index_length=offset - end,
+        message_index_offsets=offsets,
+        message_start_time=chunk.start_ns,
+        uncompressed_size=chunk.uncompressed_size,
+    )
+
+
+def _end_of(index: records.ChunkIndex) -> int:
+    """Where the message indexes of a chunk end [bytes]."""
+    return int(index.chunk_start_offset + index.chunk_length + index.message_index_length)
+
+
 def episode_run(episode: Episode) -> Run:
-    """Records of an episode.
+    """Encode the records of an episode.
 
     Raises:
         DatasetError: If a chunk of the episode is damaged.
@@ -72,34 +160,75 @@ class McapFile:
         self.size = 0
         self._crc = 0
         self._channels = channels
-        self._contents = FileContents(*declarations(channels.all))
-        opening = encode_records(records.Header(PROFILE, LIBRARY), *self._contents.schemas, *self._contents.channels)
-        self._put(MAGIC + opening)
-        latched = encode_latched_run(channels, start_ns)
-        self._contents.add_run(latched, self.size)
-        self._put(latched.data)
+        self._declarations = declarations(channels.all)
+        self._chunk_indexes: list[records.ChunkIndex] = []
+        self._metadata_indexes: list[records.MetadataIndex] = []
+        self._counts: Counter[int] = Counter()
+        schemas, declared = self._declarations
+        self._put(MAGIC + encode_records(records.Header(PROFILE, LIBRARY), *schemas, *declared))
+        self.append(encode_latched_run(channels, start_ns))
 
     def append(self, run: Run) -> None:
-        """Write an episode's run of records."""
-        self._contents.add_run(run, self.size, EPISODE)
+        """Write a run of records, such as that of an episode."""
+        for index in run.chunk_indexes:
+            offsets = {channel: self.size + offset for channel, offset in index.message_index_offsets.items()}
+            start = self.size + index.chunk_start_offset
+            self._chunk_indexes.append(replace(index, chunk_start_offset=start, message_index_offsets=offsets))
+        self._counts.update(run.counts)
+        if run.metadata_length:
+            start = self.size + run.length - run.metadata_length
+            self._metadata_indexes.append(records.MetadataIndex(start, run.metadata_length, EPISODE))
         self._put(run.data)
 
     def finish(self, name: str) -> FileSummary:
-        """Write everything that follows the last episode.
+        """Write everything that follows the last episode; returns what the bag's metadata say of the file of this name.
 
-        Args:
-            name: Name of the file, for the copy of the bag's metadata that rosbag2 looks for in each file.
-
-        Returns:
-            What the bag's metadata say of the file.
+        The name also stands in the copy of the bag's metadata that rosbag2 looks for in each file.
         """
-        summary = self._contents.summary(name)
-        bag = encode_records(bag_record(summary, self._channels.all))
-        self._contents.add_metadata(BAG, self.size, len(bag))
+        start_ns = min(index.message_start_time for index in self._chunk_indexes)
+        end_ns = max(index.message_end_time for index in self._chunk_indexes)
+        summary = FileSummary(name, start_ns, end_ns, dict(sorted(self._counts.items())))
+        # rosbag2 reads its metadata from each file, too, as if that were the whole bag.
+        metadata = {"serialized_metadata": to_yaml(bag_information([summary], self._channels.all, {}))}
+        bag = encode_records(records.Metadata(BAG, metadata))
+        self._metadata_indexes.append(records.MetadataIndex(self.size, len(bag), BAG))
         self._put(bag)
         self._put(encode_records(records.DataEnd(self._crc)))
-        self._put(self._contents.section(self.size) + MAGIC)
+        self._put(self._encode_summary_section(summary) + MAGIC)
         return summary
+
+    def _encode_summary_section(self, summary: FileSummary) -> bytes:
+        """Everything between the end of the data and the closing magic (MCAP specification, Summary Section)."""
+        schemas, channels = self._declarations
+        statistics = records.Statistics(
+            attachment_count=0,
+            channel_count=len(channels),
+            channel_message_counts=dict(summary.counts),
+            chunk_count=len(self._chunk_indexes),
+            message_count=summary.messages,
+            message_end_time=summary.end_ns,
+            message_start_time=summary.start_ns,
+            metadata_count=len(self._metadata_indexes),
+            schema_count=len(schemas),
+        )
+        groups: dict[Opcode, Sequence[records.McapRecord]] = {
+            Opcode.SCHEMA: schemas,
+            Opcode.CHANNEL: channels,
+            Opcode.STATISTICS: [statistics],
+            Opcode.CHUNK_INDEX: self._chunk_indexes,
+            Opcode.METADATA_INDEX: self._metadata_indexes,
+        }
+        offset = self.size
+        parts, offsets = [], []
+        for opcode, group in groups.items():
+            part = encode_records(*group)
+            offsets.append(records.SummaryOffset(opcode, offset, len(part)))
+            offset += len(part)
+            parts.append(part)
+        contents = b"".join((*parts, encode_records(*offsets)))
+        footer = struct.pack("<BQQQ", Opcode.FOOTER, 8 + 8 + 4, self.size, offset)
+        crc = zlib.crc32(footer, zlib.crc32(contents))
+        return contents + encode_records(records.Footer(self.size, offset, crc))
 
     def _put(self, data: bytes) -> None:
         self._write(data)
@@ -107,13 +236,8 @@ class McapFile:
         self.size += len(data)
 
 
-def bag_record(summary: FileSummary, channels: Sequence[Channel]) -> records.Metadata:
-    """The bag's metadata as rosbag2 keeps them in each file, as if the file were the whole bag."""
-    return records.Metadata(BAG, {"serialized_metadata": to_yaml(bag_information([summary], channels, {}))})
-
-
 def encode_latched_run(channels: Channels, stamp_ns: int) -> Run:
-    """Records with the latched messages: a chunk and its message indexes."""
+    """Encode the latched messages: a chunk and its message indexes."""
     messages = [
         encode_records(records.Message(channel.id, stamp_ns, data, stamp_ns, 0))
         for channel, data in channels.encode_latched_messages(stamp_ns).items()

@@ -1,4 +1,4 @@
-"""Reads the records of one MCAP file of a dataset, trusting nothing in it."""
+"""Reads the records of one MCAP file of a dataset, and believes nothing that the file says without a check."""
 
 from __future__ import annotations
 
@@ -18,16 +18,18 @@ from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
 
-from throwcollect.dataset.mcap_contents import Run
-from throwcollect.dataset.mcap_file import EPISODE, MAGIC, SENSORS_SHA256, episode_run
+from rclzenoh.interfaces import deserialize, get_message
+from throwcollect.dataset.mcap_file import EPISODE, MAGIC, SENSORS_SHA256, Run, episode_run
+from throwcollect.episode.channels import ROBOT_DESCRIPTION_ID
 from throwcollect.episode.chunk import CHUNK_HEADER_BYTES, CHUNK_MARK, CHUNK_MARK_OFFSET, Chunk
 from throwcollect.episode.message import Episode, make_episode
+from throwcollect.episode.message_table import MessageTable
 from throwcollect.errors import DatasetError
 from throwcollect.files import open_regular, unreadable
 
 _RECORD_HEADER = struct.Struct("<BQ")
 MOST_CHUNKS = 64
-"""Chunks of one episode; without an end to them, a file of chunks alone would take forever."""
+"""Most chunks that an episode may have, so that a file of nothing but chunks is not read again and again."""
 _R = TypeVar("_R", covariant=True)
 
 
@@ -61,10 +63,10 @@ class Record(NamedTuple):
         return Opcode(self.opcode).name.lower() if self.opcode in set(Opcode) else f"record 0x{self.opcode:02x}"
 
     def parse(self, kind: _Kind[_R]) -> _R:
-        """Its fields.
+        """Read its fields.
 
         Args:
-            kind: Class of the record, not Message.
+            kind: Class of the record; not Message, which has no length of its own.
 
         Raises:
             DatasetError: If it is not such a record.
@@ -77,12 +79,7 @@ class Record(NamedTuple):
 
 @dataclass(frozen=True)
 class StoredChunk:
-    """A chunk of an episode as it lies in a file.
-
-    Attributes:
-        record: Its record.
-        indexes: Records of its message indexes, by channel.
-    """
+    """A chunk of an episode as it lies in a file: its record, and those of its message indexes by channel."""
 
     record: Record
     indexes: Mapping[int, Record]
@@ -116,12 +113,7 @@ class StoredEpisode:
 
     @classmethod
     def of(cls, chunks: Sequence[StoredChunk], facts: Record, said: Mapping[str, str]) -> StoredEpisode:
-        """The episode of chunks and of the metadata that follow them.
-
-        Args:
-            chunks: The chunks.
-            facts: The record of the metadata.
-            said: What it says.
+        """Make the episode of some chunks and of the Metadata record `facts` behind them, whose contents are `said`.
 
         Raises:
             DatasetError: If the metadata are not those of an episode with so many chunks; the contents of the chunks
@@ -133,7 +125,7 @@ class StoredEpisode:
 
     @cached_property
     def intact_run(self) -> Run:
-        """Its records as they are written for the episode, whether or not they lie there like that.
+        """Its records as the writer makes them for the episode, which may differ from those in the file.
 
         Raises:
             DatasetError: If a chunk is damaged.
@@ -141,7 +133,7 @@ class StoredEpisode:
         return episode_run(self.episode)
 
     def run(self) -> Run:
-        """Its records as they lie there, whether or not they fit each other."""
+        """Its records as they lie in the file, whether or not they fit each other."""
         chunks = zip(self.episode.chunks, self.chunks, strict=True)
         runs = [(each.chunk, {channel: index.data for channel, index in at.indexes.items()}) for each, at in chunks]
         return Run.of(runs, self.facts.data)
@@ -150,7 +142,7 @@ class StoredEpisode:
         """Compare everything that is hashed with its hashes.
 
         Raises:
-            DatasetError: If a chunk is damaged, or what is said of it or of the header is not so.
+            DatasetError: If a chunk or the header is damaged, or does not have its hash.
         """
         self.episode.check_records()
         if self.said_digest != self.episode.digest:
@@ -159,11 +151,7 @@ class StoredEpisode:
 
 
 class McapContents:
-    """The bytes of a file, read record by record.
-
-    Args:
-        data: The whole file.
-    """
+    """The bytes of a whole file, read record by record."""
 
     def __init__(self, data: mmap.mmap | bytes) -> None:
         self._data = data
@@ -176,7 +164,7 @@ class McapContents:
         return self._data[start:end]
 
     def record(self, offset: int) -> Record:
-        """The record that begins at an offset.
+        """Read the record that begins at an offset.
 
         Raises:
             DatasetError: If the file ends before the record does.
@@ -191,11 +179,11 @@ class McapContents:
         return Record(offset, opcode, self._data[offset:end])
 
     def find(self, pattern: bytes, start: int) -> int:
-        """Where some bytes are first found from `start` on; -1 if nowhere."""
+        """Find some bytes from `start` on; -1 if they are nowhere."""
         return self._data.find(pattern, start)
 
     def next_chunk(self, start: int) -> int:
-        """Where the first whole record from `start` on begins that looks like a chunk; -1 if none does.
+        """Find the first whole record from `start` on that looks like a chunk; -1 if none does.
 
         Records need not follow each other: chunks are found by the bytes that all their headers hold.
         """
@@ -210,7 +198,7 @@ class McapContents:
         return -1
 
     def records(self, offset: int = len(MAGIC)) -> Iterator[Record]:
-        """Records from an offset on, to the footer or the end of the file.
+        """Read the records from an offset on, to the footer or the end of the file.
 
         Raises:
             DatasetError: If the file ends within a record.
@@ -222,8 +210,22 @@ class McapContents:
                 return
             offset = record.end
 
+    def read_robot_description(self) -> str:
+        """Read the URDF text of the robot, which is among the latched messages that every file begins with.
+
+        Raises:
+            DatasetError: If it is missing or damaged.
+        """
+        try:
+            table = read_latched_table(self.record(self.next_chunk(0)))
+            message = table.messages(ROBOT_DESCRIPTION_ID)[0].tobytes()
+            text: str = deserialize(message, get_message("std_msgs/msg/String")).data
+        except (DatasetError, KeyError, ValueError) as error:
+            raise DatasetError(f"/robot_description is not readable: {error}") from error
+        return text
+
     def message_indexes(self, offset: int) -> tuple[dict[int, Record], Record]:
-        """The Message Index records from an offset on, by channel, and the record that follows them.
+        """Read the Message Index records from an offset on, by channel, and the record that follows them.
 
         Raises:
             DatasetError: If the file ends before that, or a channel has more than one.
@@ -239,7 +241,7 @@ class McapContents:
         return indexes, record
 
     def episode(self, offset: int) -> StoredEpisode:
-        """The episode whose first chunk begins at an offset.
+        """Read the episode whose first chunk begins at an offset.
 
         Raises:
             DatasetError: If none does, or its records are damaged; the contents of the chunk are not looked at.
@@ -263,9 +265,18 @@ class McapContents:
             raise error.locate(place=f"byte {offset}") from error
 
 
+def read_latched_table(record: Record) -> MessageTable:
+    """Read the messages of the chunk of the latched topics.
+
+    Raises:
+        DatasetError: If the record is no such chunk.
+    """
+    return MessageTable(Chunk.parse(record.data).decompress(), 1)
+
+
 @contextmanager
 def map_file(path: Path) -> Iterator[McapContents]:
-    """The contents of a file, mapped into memory while the block lasts, whatever they are.
+    """Map a file into memory while the block lasts, whatever it contains.
 
     Raises:
         DatasetError: If the file is missing, cannot be read, or is no regular file.
@@ -289,7 +300,7 @@ def map_file(path: Path) -> Iterator[McapContents]:
 
 @contextmanager
 def open_mcap(path: Path) -> Iterator[McapContents]:
-    """The contents of an MCAP file, mapped into memory while the block lasts.
+    """Map an MCAP file into memory while the block lasts.
 
     Raises:
         DatasetError: If the file is missing, cannot be read, or is no MCAP file.

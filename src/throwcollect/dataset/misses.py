@@ -1,4 +1,4 @@
-"""By how much trials miss their targets: columns of the table of throws that there are where targets are."""
+"""The distances by which trials miss their targets: columns of the table of throws, where trials have targets."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from throwcollect.units import unit_of_name
 
 
 def read_targets(throws: pa.Table) -> Targets | None:
-    """The targets of all trials of a table of throws, in order; None if it has no columns of targets."""
+    """Read the targets of all trials of a table of throws, in order; None if it has no columns of targets."""
     names = tuple(name for name in throws.column_names if is_target(name))
     if not names:
         return None
@@ -28,36 +28,27 @@ def read_targets(throws: pa.Table) -> Targets | None:
 
 
 def summarise_misses(config: Config, throws: pa.Table) -> dict[str, MissSummary]:
-    """By how much trials missed their targets, by column of misses; empty if they have no targets.
-
-    Args:
-        config: Configuration of the dataset.
-        throws: The table of throws, or some rows of it.
-    """
+    """Summarise by how much trials missed their targets, by column of misses; empty if they have no targets."""
     targets = read_targets(throws)
     if targets is None:
         return {}
     misses = Misses(config, targets.names)
-    found = {}
+    summaries = {}
     for name in misses.descriptions:
         columns = [number for number, each in enumerate(misses.targets) if each.miss == name]
-        wanted = int((~np.isnan(targets.values[:, columns])).any(axis=1).sum())
+        aimed = int((~np.isnan(targets.values[:, columns])).any(axis=1).sum())
         values = throws[name].drop_null().to_numpy()
         median, share90, largest = np.quantile(values, (0.5, 0.9, 1.0)).tolist() if len(values) else (None,) * 3
-        found[name] = MissSummary(wanted, len(values), median, share90, largest)
-    return found
+        summaries[name] = MissSummary(aimed, len(values), median, share90, largest)
+    return summaries
 
 
 class Misses:
-    """Measures how far from their targets trials end.
+    """Measures how far from their targets trials of a collection end.
 
     Attributes:
         targets: The columns of targets, as the task declares them.
-        descriptions: What each column of misses is, by its name.
-
-    Args:
-        config: Configuration of the collection.
-        targets: Names of its columns of targets.
+        descriptions: Description of each column of misses, by its name.
     """
 
     def __init__(self, config: Config, targets: Sequence[str]) -> None:
@@ -73,20 +64,18 @@ class Misses:
         return f"Distance of where the trial ended from its target, in {words} [{unit_of_name(miss)}]."
 
     def measure(self, target: Mapping[str, float], row: Mapping[str, Any]) -> dict[str, float | None]:
-        """The columns of misses of a trial; None where it has no such target, or nothing to compare with it.
+        """Compute the columns of misses of a trial; None where it has no such target, or nothing to compare with it.
 
-        Args:
-            target: Its target by column.
-            row: Its row, with swept values and what was measured.
+        `target` has its target by column, and `row` its swept values and what was measured.
         """
         return {miss: self._measure(miss, target, row) for miss in self.descriptions}
 
     def _measure(self, miss: str, target: Mapping[str, float], row: Mapping[str, Any]) -> float | None:
         squares = 0.0
-        wanted = [each for each in self.targets if each.miss == miss and each.name in target]
-        for each in wanted:
-            value = row.get(each.of, self._fixed.get(each.of))
+        columns = [column for column in self.targets if column.miss == miss and column.name in target]
+        for column in columns:
+            value = row.get(column.of, self._fixed.get(column.of))
             if value is None:
                 return None
-            squares += (value - target[each.name]) ** 2
-        return math.sqrt(squares) if wanted else None
+            squares += (value - target[column.name]) ** 2
+        return math.sqrt(squares) if columns else None

@@ -10,14 +10,9 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True)
 class Moments:
-    """What is known of the rows of a table when they have passed by once.
+    """The moments of the rows of a table, which are read only once and need not fit into memory.
 
-    Attributes:
-        count: Number of rows.
-        minimum: Of each column, shape ``(n_columns,)``, as all that follow.
-        maximum: Of each column.
-        mean: Of each column.
-        squares: Sum of squared distances from the mean, of each column.
+    All but the number of rows have one value a column; `squares` are sums of squared distances from the mean.
     """
 
     count: int
@@ -28,7 +23,7 @@ class Moments:
 
     @classmethod
     def of(cls, rows: NDArray[np.float64]) -> Moments:
-        """Those of some rows, shape ``(n_rows, n_columns)``, at least one."""
+        """Compute those of some rows, shape ``(n_rows, n_columns)``, at least one."""
         mean = rows.mean(axis=0)
         return cls(len(rows), rows.min(axis=0), rows.max(axis=0), mean, ((rows - mean) ** 2).sum(axis=0))
 
@@ -39,7 +34,7 @@ class Moments:
         return deviations
 
     def with_more(self, more: Moments) -> Moments:
-        """Those of both."""
+        """Compute those of these rows and `more` together."""
         count = self.count + more.count
         step = more.mean - self.mean
         return Moments(

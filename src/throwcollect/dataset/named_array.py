@@ -25,10 +25,10 @@ class UnknownNameError(ConfigError, KeyError):
 
 
 def refuse_name(what: str, name: object, known: Iterable[str]) -> UnknownNameError:
-    """Make the error for a name that is none, which tells those that are like it, or all.
+    """Make the error for an unknown name, which tells the known names that are like it, or all.
 
     Args:
-        what: What has no such name, as the beginning of a sentence.
+        what: What has no such name, as the beginning of a sentence: ``no column``.
         name: The name.
         known: All names that there are.
     """
@@ -38,7 +38,7 @@ def refuse_name(what: str, name: object, known: Iterable[str]) -> UnknownNameErr
 
 
 def read_column(column: pa.ChunkedArray) -> NDArray[Any]:
-    """A column of a table in an array of its own, one value a row; a number that is missing is NaN, a text None."""
+    """Copy a column of a table into an array, one value a row; a number that is missing is NaN, a text None."""
     if pa.types.is_string(column.type):
         return np.array(column.to_pylist(), dtype=object)
     if column.null_count:
@@ -64,18 +64,12 @@ class NamedArray:
 
     @classmethod
     def of(cls, table: pa.Table, names: Sequence[str], bounds: Sequence[Bounds]) -> NamedArray:
-        """Take columns of a table.
-
-        Args:
-            table: One row a throw.
-            names: Names of the columns, which are numbers.
-            bounds: Smallest and largest value of each; None if there is none.
-        """
+        """Take columns of a table, one row a throw, with smallest and largest value of each; None if there is none."""
         columns = [read_column(table[name]).astype(np.float64) for name in names]
         values = np.column_stack(columns) if columns else np.empty((len(table), 0))
         return cls(tuple(names), values, np.array(bounds, np.float64).reshape(-1, 2))
 
-    # Whether rows or names were meant, nobody could tell.
+    # A loop could mean the rows as well as the names, so there is none.
     __iter__ = None
 
     def __len__(self) -> int:

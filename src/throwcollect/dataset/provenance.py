@@ -1,8 +1,7 @@
 """How a dataset was collected: ``provenance.json``.
 
-Where, when and how fast a collection ran is no function of its configuration, so neither digest nor manifest cover this
-file. Together with the data card, which shows it to people, it is what may differ between two collections of the same
-configuration.
+Where, when and how fast a collection ran does not follow from its configuration, so neither digest nor manifest cover
+this file. It and the data card, which shows it to people, may differ between two collections of one configuration.
 """
 
 from __future__ import annotations
@@ -44,6 +43,7 @@ _LIBRARIES = (
 )
 _MOST_BYTES = 1_000_000
 _GIT_S = 5.0
+_OPEN = "anybody who reached the router could join, read and disturb the collection"
 
 
 @dataclass(frozen=True)
@@ -81,10 +81,10 @@ class Provenance:
     def of_this_machine(
         cls, *, simulations: int | None, wall_s: float | None, was_open: bool, robot: str
     ) -> Provenance:
-        """Provenance of a collection that ends now, here; `robot` is the robot's description."""
+        """Make the provenance of a collection that ends now, here; `robot` is the robot's description."""
         return cls(
             finished=datetime.now(timezone.utc),
-            # Of itself, a container knows nothing but a random id.
+            # Inside a container, the host name is only a random id.
             host=os.environ.get(HOST_VARIABLE, socket.gethostname()) or None,
             platform=platform.platform(),
             python=platform.python_version(),
@@ -98,24 +98,21 @@ class Provenance:
         )
 
     def facts(self) -> dict[str, str]:
-        """Its facts in words, by name; what is not known is left out."""
+        """Its facts in words, by name; unknown ones are left out."""
         facts = {
             "finished": self.finished.isoformat(timespec="seconds"),
-            **({"host": self.host} if self.host else {}),
+            "host": self.host,
             "platform": self.platform,
             "Python": self.python,
             **self.libraries,
-            **({"revision": self.revision} if self.revision else {}),
-            **({"image": self.image} if self.image else {}),
-            **({"robot description": f"SHA-256 {self.robot_sha256}"} if self.robot_sha256 else {}),
+            "revision": self.revision,
+            "image": self.image,
+            "robot description": self.robot_sha256 and f"SHA-256 {self.robot_sha256}",
+            "simulations": None if self.simulations is None else str(self.simulations),
+            "wall time": None if self.wall_s is None else f"{self.wall_s:.1f} s",
+            "open": _OPEN if self.was_open else None,
         }
-        if self.simulations is not None:
-            facts["simulations"] = str(self.simulations)
-        if self.wall_s is not None:
-            facts["wall time"] = f"{self.wall_s:.1f} s"
-        if self.was_open:
-            facts["open"] = "anybody who reached the router could join, read and disturb the collection"
-        return facts
+        return {name: fact for name, fact in facts.items() if fact}
 
 
 def write_provenance(directory: Path, provenance: Provenance) -> None:
@@ -128,7 +125,7 @@ def write_provenance(directory: Path, provenance: Provenance) -> None:
 
 
 def read_provenance(directory: Path) -> Provenance | None:
-    """How a dataset was collected; None if it does not say, as those of earlier versions, or says it unreadably."""
+    """Read how a dataset was collected; None if the file is damaged, or missing as in datasets of earlier versions."""
     try:
         return _JSON.validate_json(read_text(directory / PROVENANCE, most_bytes=_MOST_BYTES))
     except (DatasetError, ValidationError):
@@ -140,7 +137,7 @@ def _read_revision() -> str | None:
     root = Path(__file__).parents[3]
     if not (root / ".git").exists():
         return None
-    # Somebody else's clone may name programs that git would run.
+    # The configuration of a foreign clone may name programs that git would run.
     words = ["git", "-C", str(root), "-c", "core.fsmonitor=false", "describe"]
     words += ["--always", "--abbrev=40", "--dirty", "--exclude=*"]
     with suppress(OSError, subprocess.SubprocessError):
@@ -150,12 +147,12 @@ def _read_revision() -> str | None:
 
 
 def _versions() -> dict[str, str]:
-    found = {}
+    versions = {}
     for name in _LIBRARIES:
-        # Not every machine that collects also simulates.
+        # A machine that only coordinates has no engines.
         with suppress(PackageNotFoundError):
-            found[name] = version(name)
-    return found
+            versions[name] = version(name)
+    return versions
 
 
 _JSON = TypeAdapter(Provenance)

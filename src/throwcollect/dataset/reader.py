@@ -1,4 +1,4 @@
-"""The way into a finished dataset: a sequence of throws beside the table of throws, and their episodes."""
+"""Reads a dataset as a sequence of throws, beside its table of throws and the episodes."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from rclzenoh.interfaces import deserialize, get_message
 from throwcollect.config.loader import load as load_config
 from throwcollect.config.schema import Config
 from throwcollect.config.sweep import Range
@@ -28,10 +27,7 @@ from throwcollect.dataset.named_array import Bounds, NamedArray, read_column, re
 from throwcollect.dataset.throw import Throw
 from throwcollect.dataset.throws_table import name_alias, read_throws
 from throwcollect.dataset.trajectories import Trajectories, read_trajectories
-from throwcollect.episode.channels import ROBOT_DESCRIPTION_ID
-from throwcollect.episode.chunk import Chunk
 from throwcollect.episode.message import Episode
-from throwcollect.episode.message_table import MessageTable
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.extras import lazily
 from throwcollect.files import StrPath
@@ -73,9 +69,6 @@ class Dataset(Sequence[Throw]):
         """Open a finished dataset for reading.
 
         Its tables are read and checked against each other; recordings are opened when they are looked at.
-
-        Args:
-            directory: Its directory.
 
         Raises:
             DatasetError: If the directory holds no dataset, an unfinished one, or one whose tables are damaged.
@@ -241,10 +234,7 @@ class Dataset(Sequence[Throw]):
         return self._with(self.throws.filter(pc.is_valid(self.throws["shard"])))
 
     def episode(self, trial: int) -> Episode:
-        """The episode of a trial, with everything that was recorded.
-
-        Args:
-            trial: Its number.
+        """Read the episode of a trial by its number, with everything that was recorded.
 
         Raises:
             DatasetError: If the trial is not among the throws, has no episode, or it is not where the table says.
@@ -255,7 +245,7 @@ class Dataset(Sequence[Throw]):
         return self[position].episode.read()
 
     def robot_description(self) -> str | None:
-        """URDF text of the robot as the first recording has it; None if there is no recording.
+        """Read the URDF text of the robot from the first recording; None if there is no recording.
 
         Raises:
             DatasetError: If that recording is missing or damaged.
@@ -265,16 +255,12 @@ class Dataset(Sequence[Throw]):
             return None
         with open_mcap(first) as contents:
             try:
-                # Messages that every file begins with have a chunk of their own.
-                latched = Chunk.parse(contents.record(contents.next_chunk(0)).data)
-                message = MessageTable(latched.decompress(), 1).messages(ROBOT_DESCRIPTION_ID)[0].tobytes()
-                text: str = deserialize(message, get_message("std_msgs/msg/String")).data
-            except (DatasetError, KeyError, ValueError) as error:
-                raise DatasetError(f"/robot_description is not readable: {error}", path=first) from error
-        return text
+                return contents.read_robot_description()
+            except DatasetError as error:
+                raise error.locate(first) from error
 
     def episodes(self) -> Iterator[Episode]:
-        """The episodes of the throws that have one, in the order of the throws.
+        """Read the episodes of the throws that have one, in the order of the throws.
 
         Raises:
             DatasetError: If an episode is not where the table says.
@@ -329,11 +315,11 @@ class Dataset(Sequence[Throw]):
             DatasetError: If an episode is not where the table says, or it is damaged; CRCs are compared.
         """
         trials, known = self.throws["trial"].to_pylist(), self.joints
-        wanted = known if joints is None else tuple(joints)
-        for joint in wanted:
+        chosen = known if joints is None else tuple(joints)
+        for joint in chosen:
             if joint not in known:
                 raise ConfigError(f"{robot_of(self.config).title} has no joint {joint!r}", expected=", ".join(known))
-        return read_trajectories(trials, self._stored, tuple(columns), wanted, threads=threads)
+        return read_trajectories(trials, self._stored, tuple(columns), chosen, threads=threads)
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -368,7 +354,7 @@ class Dataset(Sequence[Throw]):
 
 
 def _as_array(which: Any) -> pa.Array:
-    """An Arrow array of booleans or integers, whatever holds them.
+    """Make an Arrow array of booleans or integers, from whatever holds them.
 
     Raises:
         ConfigError: If it holds anything else.

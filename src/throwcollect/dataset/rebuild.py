@@ -1,4 +1,4 @@
-"""Writes the files of a dataset anew that follow from others: table of throws, manifest, bag's metadata, data card."""
+"""Writes the files of a dataset anew that follow from the others: table of throws, manifest, metadata and data card."""
 
 from __future__ import annotations
 
@@ -17,15 +17,16 @@ from throwcollect.dataset.description import WRITTEN, write_description
 from throwcollect.dataset.directory import CARD, PLAN, THROWS, config_path
 from throwcollect.dataset.findings import Finding
 from throwcollect.dataset.journal import was_open
-from throwcollect.dataset.lock import hold_alone
+from throwcollect.dataset.lock import hold_lock
 from throwcollect.dataset.manifest import entry_of_file
 from throwcollect.dataset.mcap_reader import StoredEpisode
 from throwcollect.dataset.provenance import Provenance, read_provenance, write_provenance
 from throwcollect.dataset.recovery import remove_unfinished
+from throwcollect.dataset.shard import list_shards, shard_of
 from throwcollect.dataset.throws_table import Row, ThrowsTable, read_throws_table
 from throwcollect.dataset.verify_episode import EpisodeCheck
 from throwcollect.dataset.verify_shard import check_shard
-from throwcollect.dataset.verify_tables import find_wrong_trials, shard_of
+from throwcollect.dataset.verify_tables import find_wrong_trials
 from throwcollect.episode.channels import Channels
 from throwcollect.errors import DatasetError
 from throwcollect.files import read_text, write_file
@@ -37,19 +38,13 @@ from throwcollect.tasks.task import Task, task_of
 from throwcollect.wording import command
 
 NO_EPISODE = "no file holds an episode of it"
-"""Reason of a lost trial of which nothing else is known."""
+"""Reason of a lost trial if no earlier table gives another one."""
 _MOST_CARD_BYTES = 10_000_000
 
 
 @dataclass(frozen=True)
 class Rejudged:
-    """A trial that ends otherwise than the table of throws said.
-
-    Attributes:
-        trial: Its number.
-        before: Outcome in the table that was there.
-        after: Outcome now.
-    """
+    """A trial that is judged otherwise than the earlier table of throws says: its outcomes `before` and `after`."""
 
     trial: int
     before: str
@@ -58,7 +53,7 @@ class Rejudged:
 
 @dataclass(frozen=True)
 class Rebuilt:
-    """What a dataset was found to hold.
+    """The result of a rebuild.
 
     Attributes:
         trials: Number of trials of the plan.
@@ -78,19 +73,17 @@ class Rebuilt:
 def rebuild(directory: Path) -> Rebuilt:
     """Write ``throws.parquet``, the manifest and ``metadata.yaml`` anew, and the data card if it is missing.
 
-    They follow from the configuration, the plan and the recordings, which are checked as `verify` does. The table that
-    is there, if it can be read, says why trials are lost and which recordings there should be. Where the recordings are
-    judged otherwise than it says, the data card that is there gets the new numbers of outcomes.
-
-    Args:
-        directory: Directory of a dataset.
+    They follow from the configuration, the plan and the recordings, which are checked as `verify` does. The earlier
+    table,
+    if it can be read, says why trials are lost and which recordings there should be. Where the recordings are judged
+    otherwise than it says, the data card gets the new numbers of outcomes.
 
     Raises:
         DatasetError: If the plan or a recording is missing or damaged, another process changes the dataset, it is not
             collected to its end, or a file cannot be written.
         ConfigError: If the ``config.yaml`` is wrong.
     """
-    with hold_alone(directory):
+    with hold_lock(directory):
         return _rebuild(directory)
 
 
@@ -105,14 +98,14 @@ def _rebuild(directory: Path) -> Rebuilt:
             path=directory,
             hint=f"{command('resume', directory)}, or {repair}",
         )
-    # The plan says what each recording should be, so it has to be whole before anything is derived from it.
+    # The recordings are checked against the plan, so a changed plan would make sound recordings look damaged.
     if wrong := find_wrong_trials(plan):
         raise DatasetError(
             "was changed since the plan was made", path=directory / PLAN, place=f"trial {min(wrong)}", hint=repair
         )
     earlier = read_earlier_rows(directory, plan)
     recordings = _Recordings(plan)
-    for name in dict.fromkeys(shard_of(plan, number) for number in plan.trials.numbers):
+    for name in list_shards(plan):
         if (directory / name).exists():
             if findings := recordings.read(directory / name):
                 raise DatasetError(str(findings[0]), path=directory, hint=repair)
@@ -129,7 +122,7 @@ def _rebuild(directory: Path) -> Rebuilt:
     written = [*WRITTEN]
     if not (directory / CARD).exists():
         provenance = read_provenance(directory)
-        # Datasets of earlier versions have none, and who collected them is not known any more.
+        # Earlier versions wrote none, so this machine stands in for the unknown one that collected the dataset.
         if provenance is None:
             provenance = Provenance.of_this_machine(
                 simulations=None, wall_s=None, was_open=was_open(directory), robot=channels.robot
@@ -142,7 +135,7 @@ def _rebuild(directory: Path) -> Rebuilt:
         for row in rows
         if (before := earlier.get(trial := row["trial"])) and before["outcome"] != row["outcome"]
     )
-    # A card may have been edited by hand, so only the numbers in it are put right.
+    # People may have edited the card, so only its numbers are corrected.
     if rejudged and CARD not in written:
         _correct_card(directory / CARD, table.table(earlier.values()), throws)
         written.append(CARD)
@@ -153,48 +146,40 @@ def _rebuild(directory: Path) -> Rebuilt:
 
 
 def _correct_card(path: Path, before: pa.Table, after: pa.Table) -> None:
-    """Put the numbers of outcomes into a data card; all else in it stays, as people write there, too."""
+    """Put the numbers of outcomes into a data card; people may have written the rest, so it stays."""
     card = read_text(path, most_bytes=_MOST_CARD_BYTES)
     lines, instead = ("\n".join(outcome_lines(table)) for table in (before, after))
     write_file(path, card.replace(lines, instead, 1).encode())
 
 
 def read_earlier_rows(directory: Path, plan: Plan) -> Mapping[int, Row]:
-    """Rows of the table of throws that is there, by trial; none if it cannot be read.
-
-    Args:
-        directory: Directory of a dataset.
-        plan: Its trials.
-    """
+    """Read the rows of the table of throws that a dataset has, by trial; none if it cannot be read."""
     with suppress(DatasetError):
         return {row["trial"]: row for row in read_throws_table(directory / THROWS, plan).to_pylist()}
     return {}
 
 
 def _row_without_episode(table: ThrowsTable, task: Task[Any], trial: Trial, earlier: Row | None) -> Row:
-    """Row of a trial that has no episode; one that was lost before keeps its reason."""
+    """Make the row of a trial that has no episode; one that was lost before keeps its reason."""
     if trial.refused is not None:
         return table.make_refused_row(trial)
     return table.row(trial, task.lose(reason_lost(earlier) or NO_EPISODE), None)
 
 
 def reason_lost(earlier: Row | None) -> str | None:
-    """Why a trial was lost already when a row was written; None if it was not."""
+    """Why an earlier row says that its trial was lost; None if it says no such thing."""
     if earlier is None or earlier["outcome"] != LOST:
         return None
     return str(earlier["reason"] or NO_EPISODE)
 
 
 class _Recordings:
-    """What the MCAP files of a dataset hold, read one after the other.
+    """The contents of the MCAP files of a dataset, which are read one after the other.
 
     Attributes:
         rows: Rows of the episodes, by trial and in order of files.
         summaries: What the bag's metadata say of each file.
         channels: What is recorded; None if there is no file.
-
-    Args:
-        plan: The trials.
     """
 
     def __init__(self, plan: Plan) -> None:
@@ -205,7 +190,7 @@ class _Recordings:
         self._check = EpisodeCheck(plan, {})
 
     def read(self, path: Path) -> list[Finding]:
-        """Read a file; returns what is wrong with it, and if nothing is, it counts."""
+        """Read a file and return its findings; only a file without findings counts."""
         checked = check_shard(path, self._plan.config, None, self._problems)
         if not checked.findings and checked.summary is not None:
             self.summaries.append(checked.summary)

@@ -1,4 +1,4 @@
-"""A trial as it was recorded, with what it was to be: what the checks of headers and of motion look at."""
+"""A trial as it was recorded, beside what it was simulated with, for the checks of headers and of motion."""
 
 from __future__ import annotations
 
@@ -15,21 +15,20 @@ from throwcollect.episode.record import Contact, EpisodeHeader, Samples
 from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.units import NS_PER_S
 
+EXECUTING, SUCCEEDED, CANCELED, ABORTED = 2, 4, 5, 6
+"""Of action_msgs/msg/GoalStatus."""
 _short = reprlib.Repr()
 _short.maxstring = 60
+shorten = _short.repr
+"""A value in words, however long a forged file makes it."""
 
 
 @dataclass(frozen=True, eq=False)
 class RecordedTrial:
-    """The samples of a trial with its header, and what it was simulated with.
+    """The samples of a trial with its header, its configuration, and the trajectory that its controllers were sent.
 
-    Its time is counted in physics steps: the first sample is at step 0.
-
-    Attributes:
-        samples: The samples; finite, with the stamps that belong to the trial.
-        header: What is known besides.
-        config: Configuration of the trial.
-        trajectory: What its controllers were sent.
+    The samples are finite and have the stamps that belong to the trial. Its time is counted in physics steps: the first
+    sample is at step 0.
     """
 
     samples: Samples
@@ -53,6 +52,11 @@ class RecordedTrial:
         times: NDArray[np.float64] = (self.samples.stamps_ns - self.header.start_ns) / NS_PER_S
         return times
 
+    @cached_property
+    def has_failed_goal(self) -> bool:
+        """Whether a goal was canceled or aborted; then the joints need not have followed their trajectory."""
+        return any(goal.status in (CANCELED, ABORTED) for goal in self.header.goals)
+
     def step_at(self, instant_ns: int) -> int | None:
         """The step that ends at an instant [ns]; None if none of the trial does."""
         hz = self.config.sim.physics_hz
@@ -67,7 +71,7 @@ class RecordedTrial:
         return None if begin is None or end is None or end <= begin else (begin, end)
 
     def find_pressed(self, contacts: Collection[Contact]) -> NDArray[np.bool_]:
-        """At which samples at least one of these contacts lasts, shape ``(n_samples,)``."""
+        """Find the samples at which at least one of these contacts lasts, shape ``(n_samples,)``."""
         steps = np.arange(0, self.last_step + 1, self.stride)
         pressed = np.zeros(len(steps), dtype=bool)
         for interval in map(self.steps_of, contacts):
@@ -77,7 +81,7 @@ class RecordedTrial:
 
     def name_contact(self, contact: Contact) -> str:
         """A contact in words, however long the name of its body is."""
-        return f"the contact with {_short.repr(contact.body)} at {self.tell_time(contact.start_ns)}"
+        return f"the contact with {shorten(contact.body)} at {self.tell_time(contact.start_ns)}"
 
     def tell_time(self, instant_ns: int) -> str:
         """An instant as time since the start of the trial, in words."""

@@ -1,4 +1,4 @@
-"""Makes a sound dataset of a damaged one: every whole episode is kept, and what is lost is said."""
+"""Makes a sound dataset of a damaged one: keeps every whole episode, and reports the lost ones."""
 
 from __future__ import annotations
 
@@ -13,13 +13,12 @@ from throwcollect.config.schema import Config
 from throwcollect.config.target import is_target
 from throwcollect.config.values import reason_not_sweepable
 from throwcollect.dataset.directory import CONFIG, PLAN, SHARD_SUFFIX, THROWS, TRIALS, config_path
-from throwcollect.dataset.judging import judge_episode
 from throwcollect.dataset.misses import read_targets
 from throwcollect.dataset.rebuild import read_earlier_rows, reason_lost
 from throwcollect.dataset.scan import Found, scan_whole
 from throwcollect.dataset.throws_table import REFUSED, Row, ThrowsTable
 from throwcollect.dataset.verify_episode import EpisodeCheck
-from throwcollect.dataset.verify_tables import find_wrong_trials
+from throwcollect.dataset.verify_tables import find_wrong_trials, read_list
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.message import Episode
@@ -28,7 +27,6 @@ from throwcollect.files import new_directory
 from throwcollect.robots.description import full_description
 from throwcollect.sweep.parquet_file import read_parquet
 from throwcollect.sweep.plan import Plan, make_trials
-from throwcollect.sweep.point_file import read_points
 from throwcollect.sweep.points import Points
 
 Remake = Callable[[Config], Plan]
@@ -37,12 +35,7 @@ Remake = Callable[[Config], Plan]
 
 @dataclass(frozen=True)
 class LostTrial:
-    """A trial whose episode is lost.
-
-    Attributes:
-        trial: Its number.
-        reason: Why.
-    """
+    """A trial whose episode is lost, and the reason."""
 
     trial: int
     reason: str
@@ -50,7 +43,7 @@ class LostTrial:
 
 @dataclass(frozen=True)
 class DifferingEpisode:
-    """An episode that was kept although it is not the one that the table of throws has, as that was found nowhere.
+    """An episode that was kept although the table of throws has another one, which no file holds.
 
     Attributes:
         trial: Number of its trial.
@@ -67,14 +60,14 @@ class DifferingEpisode:
 
 @dataclass(frozen=True)
 class Repaired:
-    """What became of a dataset.
+    """The result of a repair.
 
     Attributes:
         trials: Number of trials of the plan.
         episodes: Number of episodes that were kept.
         lost: Trials that have no whole episode, and had one or may have had one.
         differing: Episodes that were kept although the table of throws has others.
-        remarks: What else was not as it should be, a sentence each.
+        remarks: Everything else that was wrong, a sentence each.
     """
 
     trials: int
@@ -84,7 +77,7 @@ class Repaired:
     remarks: tuple[str, ...]
 
     def as_dict(self) -> dict[str, object]:
-        """The same for JSON."""
+        """The fields by name, for JSON."""
         return asdict(self)
 
 
@@ -92,10 +85,11 @@ def repair(directory: Path, output: Path, *, remake: Remake) -> Repaired:
     """Write a sound dataset with all whole and correct episodes of a damaged one.
 
     Episodes are looked for in all MCAP files, finished or not, and judged anew. Where the table of throws can be read,
-    its digest says which episode of a trial is the right one. If that is not found, another one that nothing else
-    speaks against is kept, and that is said: only a replay can tell whether the episode or the table was changed.
-    Whatever else there is to a dataset is made from the configuration and the plan. Trials without an episode are
-    `lost` in it.
+    its digest says which episode of a trial is the right one. If no file has that one, another one that passes all
+    other
+    checks is kept and reported: only a replay can tell whether the episode or the table was changed. All other files
+    are
+    made from the configuration and the plan. Trials without an episode are `lost` in them.
 
     Args:
         directory: Directory of the damaged dataset; it stays as it is.
@@ -104,7 +98,7 @@ def repair(directory: Path, output: Path, *, remake: Remake) -> Repaired:
 
     Raises:
         ConfigError: If `output` holds something already.
-        DatasetError: If neither configuration nor plan can be had, or files cannot be read or written.
+        DatasetError: If there is no way to configuration or plan, or files cannot be read or written.
     """
     config = _configuration(directory)
     remarks: list[str] = []
@@ -170,7 +164,7 @@ def _plan(directory: Path, config: Config, remake: Remake, remarks: list[str]) -
 
 
 def _plan_of_table(path: Path, config: Config) -> Plan:
-    """The plan of the trials that a table of throws has.
+    """Make the plan of the trials that a table of throws has.
 
     Raises:
         DatasetError: If the table is missing or damaged, or not one of this configuration.
@@ -197,30 +191,29 @@ def _plan_of_table(path: Path, config: Config) -> Plan:
 
 
 def _find_list(directory: Path, plan: Plan, remarks: list[str]) -> Points | None:
-    """The list of points that a configuration reads, or else those of the plan; None if it reads none."""
+    """Read the list of points that the configuration names, or make it from the plan; None if it names none."""
     if plan.config.sweep.file is None:
         return None
-    known = plan.trials.points
     try:
-        listed = read_points(directory / TRIALS, plan.config)
-        if listed.first(len(known.values)) == known:
-            return listed
-        reason = f"begins with other points than those of {PLAN}"
-    except ConfigError as error:
-        reason = error.problems[0].message
-    remarks.append(f"{TRIALS}: {reason}; made again from {PLAN}")
-    return known
+        return read_list(directory, plan)
+    except DatasetError as error:
+        remarks.append(f"{TRIALS}: {error.details}; made again from {PLAN}")
+        return plan.trials.points
 
 
 @dataclass
 class _Sorting:
-    """Sorts whole episodes into those that are written and those that are not.
+    """Decides which of the whole episodes are written.
 
     Attributes:
-        digests: Digests of the right episodes, by trial, as far as they are known.
+        plan: The trials.
+        writer: Writes the new dataset.
+        digests: Digests of the right episodes, by trial, as far as the table of throws tells them.
+        remarks: Receives a sentence for everything that is wrong.
         taken: File and digest of the episode of each trial that was written.
         differing: Episodes that were written and have another digest than the right one.
         waiting: Episodes that have another digest than the right one, by trial, in the order in which they were found.
+        rejected: Why the last episode of a trial that a check refused was not written, by trial.
     """
 
     plan: Plan
@@ -237,7 +230,7 @@ class _Sorting:
         self._check = EpisodeCheck(self.plan, {})
 
     def take(self, path: Path) -> None:
-        """Write all right episodes of a file, each trial's first one; those that are not the table's wait."""
+        """Write the right episodes of a file, the first one of each trial; those that differ from the table wait."""
         try:
             for found in scan_whole(path):
                 self._take(path.name, found)
@@ -265,26 +258,22 @@ class _Sorting:
             self._write(name, episode)
 
     def settle(self, directory: Path) -> None:
-        """Write the first of the episodes that wait where no right one was found, and say what became of them.
-
-        Args:
-            directory: Where their files are.
-        """
-        for trial, found in sorted(self.waiting.items()):
-            for each in found:
-                other = f"an episode with digest {each.digest}, not {each.expected} as in {THROWS}"
-                told = f"{each.file}: trial {trial}: {other}"
+        """Write the first waiting episode of each trial whose right one was not found, and remark on all of them."""
+        for trial, candidates in sorted(self.waiting.items()):
+            for episode in candidates:
+                difference = f"an episode with digest {episode.digest}, not {episode.expected} as in {THROWS}"
+                remark = f"{episode.file}: trial {trial}: {difference}"
                 if trial in self.taken:
-                    where, digest = self.taken[trial]
-                    kind = "right" if digest == each.expected else "first"
-                    self.remarks.append(f"{told}; the {kind} one was taken from {where}")
+                    file, digest = self.taken[trial]
+                    kind = "right" if digest == episode.expected else "first"
+                    self.remarks.append(f"{remark}; the {kind} one was taken from {file}")
                 else:
-                    self._write(each.file, _find_again(directory / each.file, each))
-                    self.differing.append(each)
-                    self.remarks.append(f"{told}; kept, as nothing else speaks against it")
+                    self._write(episode.file, _find_again(directory / episode.file, episode))
+                    self.differing.append(episode)
+                    self.remarks.append(f"{remark}; kept, as nothing else speaks against it")
 
     def _write(self, name: str, episode: Episode) -> None:
-        self.writer.append(episode, judge_episode(self.plan.config_of(self.plan.trial(episode.header.trial)), episode))
+        self.writer.append(episode, self._check.judge(episode))
         self.taken[episode.header.trial] = (name, episode.digest)
 
     def give_up(self, earlier: Mapping[int, Row]) -> tuple[LostTrial, ...]:
@@ -302,7 +291,7 @@ class _Sorting:
 
 
 def _find_again(path: Path, wanted: DifferingEpisode) -> Episode:
-    """An episode that was found in a file before; one at a time is in memory.
+    """Read a waiting episode from its file once more, as only one episode at a time is kept in memory.
 
     Raises:
         DatasetError: If it is not there any more.

@@ -1,4 +1,4 @@
-"""Rows of the table of throws until it is written: on disk, as those of a million trials fill half a gigabyte."""
+"""Keeps rows of the table of throws on disk until it is written, as those of a million trials fill half a gigabyte."""
 
 from __future__ import annotations
 
@@ -21,18 +21,14 @@ _ALIGNED_BYTES = 64
 """Buffers of Arrow begin at multiples of this."""
 
 _SHARDS_AT_ONCE = 50
-"""So many are looked at before memory is let go of; the kernel maps what lies around a value along with it."""
+"""So many are read before their memory is freed, as the kernel maps the bytes around a value along with it."""
 
 _Place = tuple[int, int]
 """First byte and number of bytes."""
 
 
 class _NamelessFile:
-    """A file that has no name, so whatever ends this process, nothing of it is left.
-
-    Args:
-        directory: Directory of the dataset, whose disk it is on.
-    """
+    """A file without a name, which the system removes however this process ends; it is on the disk of `directory`."""
 
     def __init__(self, directory: Path) -> None:
         self._path = directory / THROWS
@@ -63,16 +59,16 @@ class _NamelessFile:
         self._size += len(data)
 
     def map(self) -> None:
-        """Map what was appended so far, so that it can be read."""
+        """Map all bytes that were appended so far, so that they can be read."""
         if self._file is not None:
             self._map = mmap.mmap(self._file.fileno(), self._size, prot=mmap.PROT_READ)
 
     def read(self, place: _Place) -> pa.Buffer:
-        """What was appended; it is read from the disk when it is looked at."""
+        """The appended bytes of a place; the system reads them from the disk when they are looked at."""
         return pa.py_buffer(self._map).slice(*place)
 
     def let_go(self) -> None:
-        """Have nothing in memory; what is looked at again is read again."""
+        """Free the memory of what was read; the system reads it again if somebody looks at it again."""
         if self._map is not None:
             self._map.madvise(mmap.MADV_DONTNEED)
 
@@ -83,12 +79,7 @@ class _NamelessFile:
 
 
 class RowStore:
-    """Rows of shards, put down in any order and read in order of trials.
-
-    Args:
-        directory: Directory of the dataset.
-        schema: Columns of the table of throws.
-    """
+    """Rows of the shards of a dataset, which come in any order and are read in order of trials."""
 
     def __init__(self, directory: Path, schema: pa.Schema) -> None:
         self._schema = schema
@@ -97,11 +88,7 @@ class RowStore:
         self._places: dict[int, _Place] = {}
 
     def put(self, number: int, rows: pa.Table) -> None:
-        """Put down the rows of a shard; `table` must not have been asked for yet.
-
-        Args:
-            number: Number of the shard.
-            rows: Its rows, in order of trials.
+        """Store the rows of a shard, in order of trials, under its number; `table` must not have been read yet.
 
         Raises:
             DatasetError: If they cannot be written.
@@ -128,7 +115,7 @@ class RowStore:
         return pa.Table.from_arrays(arrays, schema=self._schema)
 
     def _put_column(self, chunks: list[pa.Array]) -> tuple[_Place | None, ...]:
-        """Put a column down in one piece; returns where the buffers of the array are, as Arrow has them."""
+        """Write a column in one piece; returns the places of the buffers of its array, in the order of Arrow."""
         valid: list[NDArray[np.bool_]] = []
         ends = [np.zeros(1, np.int32)]
 
@@ -137,7 +124,7 @@ class RowStore:
                 some = pa.concat_arrays(chunks[first : first + _SHARDS_AT_ONCE])
                 valid.append(read_validity(some))
                 if some.type == pa.string():
-                    # As numbers of bytes, where texts end; of an array that nothing was cut off from.
+                    # Arrow has the number of bytes up to the end of each text, from 0 on, as the array is no slice.
                     within = np.frombuffer(some.buffers()[1], np.int32, len(some) + 1)
                     ends.append(within[1:] + ends[-1][-1])
                     yield (some.buffers()[2] or pa.py_buffer(b"")).slice(0, int(within[-1]))
@@ -157,21 +144,17 @@ class RowStore:
         return pa.Array.from_buffers(kind, count, buffers)
 
     def let_go(self) -> None:
-        """Have no values of `table` in memory that nobody looks at any more."""
+        """Free the memory of values of `table` that nobody looks at any more."""
         self._by_columns.let_go()
 
     def close(self) -> None:
-        """Let go of the disk, as soon as nobody has the table any more."""
+        """Close the files; their disk space is freed once nobody has the table any more."""
         self._by_shards.close()
         self._by_columns.close()
 
 
 class Digests(Mapping[int, str]):
-    """Digest of each episode by trial, in order of trials, of which one is read when it is asked for.
-
-    Args:
-        throws: The table of throws, in order of trials.
-    """
+    """The digest of each episode by trial, in order of trials, read from the table of throws one at a time."""
 
     def __init__(self, throws: pa.Table) -> None:
         self._rows = np.flatnonzero(np.concatenate([read_validity(chunk) for chunk in throws["digest"].chunks]))

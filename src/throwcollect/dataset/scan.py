@@ -1,10 +1,10 @@
 """Finds the episodes of an MCAP file, however damaged the rest of it is.
 
-Neither the order of records nor their lengths are relied on: chunks are found by the bytes that every header of theirs
-holds, wherever they lie. So what is lost is what was damaged, and never what follows it.
+It relies neither on the order of records nor on their lengths: it finds chunks by the bytes that every header of theirs
+holds, wherever they lie. So damage costs the damaged episodes, and never those behind them.
 
-Everything that looks through a file for episodes does it with `scan`: recovery takes the intact ones, repair takes the
-whole ones, and verify reports what lies between the readable ones.
+All commands find episodes with `scan`: recovery takes the intact ones, repair the whole ones, and verify reports what
+lies between the readable ones.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from throwcollect.errors import DatasetError
 _FACTS_MARK = len(EPISODE).to_bytes(4, "little") + EPISODE.encode()
 """How the contents of the Metadata record of an episode begin."""
 _EFFORT = 64
-"""Bytes that may be looked at in vain for each byte of the file; only a file made to be slow takes more."""
+"""Most bytes that are read in vain for each byte of the file; only a file that was made to be slow needs more."""
 
 
 @dataclass(frozen=True)
@@ -47,13 +47,13 @@ class Found:
 
 
 def scan(contents: McapContents, start: int = 0) -> Iterator[Found]:
-    """All episodes of a file, in the order in which they lie there; one episode at a time is in memory.
+    """Find all episodes of a file, in the order in which they lie there; one episode at a time is in memory.
 
-    Whether an episode is one of the dataset's is not known here. Behind an episode that is not whole, chunks are looked
-    for from within its records on, as their lengths may be what is wrong.
+    They may be of another dataset. Behind an episode that is not whole, the search goes on within its records, as their
+    lengths may be what is wrong.
 
     Args:
-        contents: Those of an MCAP file or the beginning of one, finished or not.
+        contents: The contents of an MCAP file or of its beginning, finished or not.
         start: Where to begin [bytes].
     """
     effort = _EFFORT * len(contents)
@@ -74,10 +74,7 @@ def scan(contents: McapContents, start: int = 0) -> Iterator[Found]:
 
 
 def scan_whole(path: Path) -> Iterator[Found]:
-    """All whole episodes of a file, in the order in which they lie there.
-
-    Args:
-        path: An MCAP file or the beginning of one, finished or not.
+    """Find all whole episodes of an MCAP file or of its beginning, in the order in which they lie there.
 
     Raises:
         DatasetError: If the file is missing or cannot be read.
@@ -87,12 +84,9 @@ def scan_whole(path: Path) -> Iterator[Found]:
 
 
 def _find(contents: McapContents, first: Record, facts: int) -> Found | None:
-    """The episode whose first chunk a record is; None if it is none.
+    """Read the episode whose first chunk a record is; None if it is none.
 
-    Args:
-        contents: Those of the file.
-        first: The record.
-        facts: Where the next metadata of an episode begin [bytes]; negative if there are none.
+    `facts` is where the next metadata of an episode begin [bytes]; negative if there are none.
     """
     try:
         stored, readable = contents.episode(first.offset), True
@@ -112,7 +106,7 @@ def _find(contents: McapContents, first: Record, facts: int) -> Found | None:
 
 
 def _gather(contents: McapContents, first: Record, facts: Record) -> StoredEpisode:
-    """The episode of a chunk and of some metadata, with as many further chunks as the metadata have hashes of.
+    """Make an episode of a chunk and of some metadata, with as many further chunks as the metadata have hashes of.
 
     Raises:
         DatasetError: If they do not belong together.

@@ -16,13 +16,14 @@ from operator import itemgetter
 from pathlib import Path
 
 from throwcollect.dataset.bag import FileSummary
+from throwcollect.dataset.directory import shard_name
 from throwcollect.dataset.manifest import FileEntry, RunningHash
-from throwcollect.dataset.mcap_contents import Run
-from throwcollect.dataset.mcap_file import McapFile, episode_run
+from throwcollect.dataset.mcap_file import McapFile, Run, episode_run
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.message import Episode
 from throwcollect.errors import DatasetError
 from throwcollect.files import open_regular, replacing, unwritable, write_all
+from throwcollect.sweep.plan import Plan
 
 
 @dataclass(frozen=True)
@@ -30,14 +31,13 @@ class FinishedShard:
     """A shard in trial order under its final name.
 
     Attributes:
-        summary: What the bag's metadata say of it; None when no trial of it has an episode, and so no file.
+        recording: What bag's metadata and manifest say of its file; None if no trial has an episode, and so there is
+            none.
         offsets: Where the chunk of each trial's episode begins [bytes].
-        entry: What the manifest says of it; None when there is no file.
     """
 
-    summary: FileSummary | None
+    recording: tuple[FileSummary, FileEntry] | None
     offsets: dict[int, int]
-    entry: FileEntry | None
 
 
 def write_in_order(
@@ -54,7 +54,7 @@ def write_in_order(
         write: Called with the bytes of the file, in order.
         channels: What is recorded.
         runs: By trial, where the run of an episode begins in another file [bytes], and its records without their bytes.
-        read: Gives the bytes of that other file from an offset on, so many.
+        read: Reads that other file: given an offset and a length, returns the bytes.
         name: Name of the file.
     """
     sha256 = RunningHash()
@@ -70,7 +70,17 @@ def write_in_order(
         offsets[trial] = file.size
         file.append(replace(run, data=read(offset, run.length)))
     summary = file.finish(name)
-    return FinishedShard(summary, offsets, FileEntry(name, file.size, sha256.hexdigest()))
+    return FinishedShard((summary, FileEntry(name, file.size, sha256.hexdigest())), offsets)
+
+
+def shard_of(plan: Plan, trial: int) -> str:
+    """Name of the file that holds the episode of a trial, if it has one."""
+    return shard_name(plan.config.name, trial // plan.config.record.trials_per_shard)
+
+
+def list_shards(plan: Plan) -> list[str]:
+    """Names of the files that a plan's trials may have, in order."""
+    return list(dict.fromkeys(shard_of(plan, trial) for trial in plan.trials.numbers))
 
 
 def path_of_part(path: Path) -> Path:
@@ -82,13 +92,9 @@ class OpenShard:
     """A shard that still waits for episodes.
 
     Attributes:
-        missing: Trials that have neither an episode nor are known to be lost.
+        missing: Trials that neither have an episode nor are known to be lost.
         path: Final path of the shard.
         part: Path of the shard while it is filled.
-
-    Args:
-        path: Final path of the shard.
-        channels: What is recorded.
     """
 
     def __init__(self, path: Path, channels: Channels) -> None:
@@ -102,26 +108,26 @@ class OpenShard:
         self._runs: dict[int, tuple[int, Run]] = {}
 
     def expect(self, trials: Iterable[int]) -> None:
-        """Wait for the episodes or losses of more trials."""
+        """Wait for the episodes, or losses, of more trials."""
         self.missing.update(trials)
 
-    def adopt(self, runs: Iterable[tuple[int, int, Run]], *, size: int) -> None:
-        """Go on with the unfinished file of a shard.
+    def adopt(self, runs: Mapping[int, tuple[int, Run]]) -> None:
+        """Go on with the unfinished file of a shard; what follows its last whole episode is cut off.
 
         Args:
-            runs: Trial, offset [bytes] and records of each episode that lies in the file already.
-            size: Where its last whole episode ends [bytes]; what follows is cut off.
+            runs: By trial, where the run of an episode begins in the file [bytes], and its records.
 
         Raises:
             DatasetError: If the file cannot be written.
         """
+        size = max(offset + run.length for offset, run in runs.values())
         try:
             self._descriptor = open_regular(self.part, os.O_RDWR)
             self._cut(self._descriptor, size)
         except OSError as error:
             raise unwritable(self.part, error) from error
         self._size = size
-        for trial, offset, run in runs:
+        for trial, (offset, run) in runs.items():
             self._remember(trial, offset, run)
 
     def append(self, episode: Episode) -> None:
@@ -154,7 +160,7 @@ class OpenShard:
             DatasetError: If the shard cannot be written.
         """
         if self._descriptor is None or not self._runs:
-            return FinishedShard(None, {}, None)
+            return FinishedShard(None, {})
         with replacing(self.path) as descriptor:
             write = partial(write_all, descriptor)
             finished = write_in_order(write, self._channels, self._runs, self._read, name=self.path.name)
@@ -166,7 +172,7 @@ class OpenShard:
         return finished
 
     def sync(self) -> None:
-        """Have what was appended survive a power cut.
+        """Make the appended episodes survive a power cut.
 
         Raises:
             DatasetError: If the disk fails.
@@ -180,13 +186,13 @@ class OpenShard:
         self._synced = True
 
     def close(self) -> None:
-        """Close the file; it stays where it is."""
+        """Close the file, which stays on disk."""
         if self._descriptor is not None:
             os.close(self._descriptor)
             self._descriptor = None
 
     def _remember(self, trial: int, offset: int, run: Run) -> None:
-        # The bytes are in the file; keeping them in memory too would hold whole shards there.
+        # The file has the bytes; with them, whole shards would be in memory.
         self._runs[trial] = (offset, replace(run, data=b""))
         self.missing.discard(trial)
 

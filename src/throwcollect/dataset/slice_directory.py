@@ -1,15 +1,15 @@
-"""Where the slices of a dataset lie while it is collected by many, and how the files of one appear all at once.
+"""Directories of the slices of a dataset while many tasks collect it, and how the files of a slice appear all at once.
 
 A slice is collected as a dataset of its own, in a directory that nobody else uses: that of an **attempt**. When it is
 finished, its recordings, its table and its manifest go to the directory of the slice by one rename, which succeeds for
-one attempt alone. So nothing has to be locked, and an attempt that was believed dead, or was started twice, can change
-nothing: what it would put there is the same, byte for byte::
+one attempt alone. So nothing has to be locked, and an attempt that seemed dead, or was started twice, does no harm, as
+it would put the same bytes there::
 
     slices/3-of-8/                      a finished slice
     slices/3-of-8.attempt-<id>/         an attempt, unfinished; its logs are in it
 
-An attempt begins with what earlier ones have recorded. Those that were stopped in order are removed then, so that a
-task that is queued again and again does not fill the disk; those that ended otherwise stay for their logs.
+An attempt begins with what earlier ones have recorded. It removes those that were stopped in order, so that a task that
+is queued again and again does not fill the disk; those that ended otherwise stay for their logs.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import re
 import secrets
 import shutil
 import socket
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
@@ -36,17 +36,12 @@ _NAME = re.compile(r"(\d+)-of-(\d+)", re.ASCII)
 
 
 def slice_directory(directory: Path, slice: Slice) -> Path:
-    """Directory of a finished slice.
-
-    Args:
-        directory: Directory of the dataset.
-        slice: Which one.
-    """
+    """Directory of a finished slice of a dataset."""
     return directory / SLICES / f"{slice.index}-of-{slice.count}"
 
 
 def find_finished(directory: Path) -> frozenset[Slice]:
-    """The slices of a dataset that are finished.
+    """Find the finished slices of a dataset.
 
     Raises:
         DatasetError: If the directory of slices cannot be read.
@@ -56,7 +51,7 @@ def find_finished(directory: Path) -> frozenset[Slice]:
 
 
 def find_attempts(directory: Path, slice: Slice) -> list[Path]:
-    """Directories of unfinished attempts at a slice, by name.
+    """Find the directories of unfinished attempts at a slice, by name.
 
     Raises:
         DatasetError: If the directory of slices cannot be read.
@@ -66,12 +61,7 @@ def find_attempts(directory: Path, slice: Slice) -> list[Path]:
 
 
 def make_attempt(directory: Path, slice: Slice, *, scratch: Path | None = None) -> Path:
-    """Make a directory for an attempt at a slice, empty and unlike any other.
-
-    Args:
-        directory: Directory of the dataset.
-        slice: Which one.
-        scratch: Where it is made; None for the place beside all slices.
+    """Make an empty directory for an attempt at a slice, in `scratch` or else beside all slices, unlike any other.
 
     Raises:
         DatasetError: If it cannot be made.
@@ -86,14 +76,10 @@ def make_attempt(directory: Path, slice: Slice, *, scratch: Path | None = None) 
 
 
 def take_recordings(earlier: Sequence[Path], attempt: Path) -> None:
-    """Give an attempt what earlier ones have recorded: of each shard the copy with the most in it.
+    """Copy what earlier attempts have recorded into the directory of a new one: of each shard the longest copy.
 
-    Copies are made, as what is unfinished will be written to, and some of the earlier ones may go on writing: whole
-    episodes are found later.
-
-    Args:
-        earlier: Directories of earlier attempts.
-        attempt: Directory of the new one.
+    A finished file counts as longer than an unfinished one. Unfinished files are not moved, as an earlier attempt may
+    still write to them; the new one looks for whole episodes in its copy.
 
     Raises:
         DatasetError: If something cannot be copied.
@@ -113,7 +99,7 @@ def take_recordings(earlier: Sequence[Path], attempt: Path) -> None:
 
 
 def _how_much(path: Path) -> tuple[bool, int]:
-    """Orders the recordings of one shard: finished ones are last, and among others the longest."""
+    """Key that sorts the recordings of one shard: unfinished ones by length, then finished ones."""
     try:
         return not path.name.endswith(_UNFINISHED), path.lstat().st_size
     except FileNotFoundError:
@@ -121,24 +107,16 @@ def _how_much(path: Path) -> tuple[bool, int]:
 
 
 def mark_stopped(attempt: Path) -> None:
-    """Say that an attempt was stopped in order, so that nobody writes to it any more.
-
-    Args:
-        attempt: Its directory.
-    """
-    with suppress(OSError):  # it is kept beside the next one then
+    """Mark an attempt as stopped in order, after which nobody writes to it any more."""
+    with suppress(OSError):  # without the mark, it only stays on disk
         (attempt / _STOPPED).touch()
 
 
 def remove_stopped(attempts: Sequence[Path]) -> None:
-    """Remove those of some attempts that were stopped in order, when another one has what they recorded.
-
-    Args:
-        attempts: Their directories.
-    """
-    for each in attempts:
-        if (each / _STOPPED).exists():
-            shutil.rmtree(each, ignore_errors=True)
+    """Remove those of some attempts that were stopped in order, once another one has their recordings."""
+    for attempt in attempts:
+        if (attempt / _STOPPED).exists():
+            shutil.rmtree(attempt, ignore_errors=True)
 
 
 def publish(attempt: Path, directory: Path, slice: Slice) -> bool:
@@ -156,11 +134,12 @@ def publish(attempt: Path, directory: Path, slice: Slice) -> bool:
         DatasetError: If files cannot be moved; the attempt stays then.
     """
     place = slice_directory(directory, slice)
-    # Should this end half way, it counts as an attempt that the next one begins with.
+    # If this process is killed in between, the next attempt takes the recordings from here, as from any other one.
     packed = directory / SLICES / f"{attempt.name}-packed"
     try:
         packed.mkdir(parents=True, exist_ok=True)
-        for name in _names_to_publish(attempt):
+        shards = [name for name in _list(attempt) if name.endswith(SHARD_SUFFIX)]
+        for name in (*shards, THROWS, MANIFEST):
             _move(attempt / name, packed / name)
         try:
             packed.rename(place)
@@ -174,11 +153,6 @@ def publish(attempt: Path, directory: Path, slice: Slice) -> bool:
         raise unwritable(packed, error) from error
     shutil.rmtree(attempt, ignore_errors=True)
     return first
-
-
-def _names_to_publish(attempt: Path) -> Iterator[str]:
-    yield from (name for name in _list(attempt) if name.endswith(SHARD_SUFFIX))
-    yield from (THROWS, MANIFEST)
 
 
 def _move(source: Path, target: Path) -> None:

@@ -1,4 +1,4 @@
-"""The summary of a dataset: light to import, as records of runs hold it, and most commands read those."""
+"""The summary of a dataset, apart from what computes it, as commands that only read records of runs must start fast."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class MissSummary:
         targets: Number of trials with such a target.
         measured: Number of those that ended somewhere.
         median: Median of their misses; None if there is none, like all that follow.
-        share90: What nine of ten are below.
+        share90: The miss that nine of ten trials stay below.
         largest: The largest one.
     """
 
@@ -73,17 +73,12 @@ class Info:
     misses: Mapping[str, MissSummary] = field(default_factory=dict)
 
     def as_dict(self) -> dict[str, object]:
-        """The same for JSON."""
+        """The fields by name, for JSON."""
         return asdict(self)
 
 
 def explain_loss(outcomes: Mapping[str, int], *, hint: str | None) -> LossError | None:
-    """The error that says that trials of a finished dataset are lost; None if none is.
-
-    Args:
-        outcomes: Number of trials of each outcome.
-        hint: How to go on.
-    """
+    """Make the error for a finished dataset with lost trials, with this hint; None if none is lost."""
     lost, all_of_them = outcomes.get(LOST, 0), sum(outcomes.values())
     if not lost:
         return None

@@ -1,4 +1,4 @@
-"""One throw as people read it: numbers in arrays of their own, read when they are looked at."""
+"""One throw as people read it: arrays that are read from the recording when they are first looked at."""
 
 from __future__ import annotations
 
@@ -49,8 +49,8 @@ class ContactInterval:
 
     Attributes:
         body: Name of the tool, ``ground``, or the name of the robot's link.
-        start_s: When it began, since the start of the trial [s].
-        end_s: When it ended [s]; None when it lasted to the end.
+        start_s: Time of its start, since the start of the trial [s].
+        end_s: Time of its end [s]; None if it lasted to the end of the trial.
     """
 
     body: str
@@ -235,14 +235,14 @@ def _make_event(row: Row, name: str) -> BallEvent | None:
 
 
 class Throw:
-    """One throw; what is asked for is read then, and kept as long as the throw is.
+    """One throw; its recording is read when it is first asked for, and kept as long as the throw is.
 
     Args:
         table: Table of throws.
         position: Its row there.
         parameters: Swept keys.
         episode: Its episode; None if it has none.
-        source: What it belongs to, for messages: the directory of a dataset, or a configuration.
+        source: Directory of its dataset, or its configuration, for messages.
     """
 
     def __init__(
@@ -278,11 +278,11 @@ class Throw:
             raise refuse_name("no column", column, self._table.column_names)
         return self.row[column]
 
-    # Without it, an index would make the throw a sequence.
+    # Python iterates over everything that can be indexed, and a throw is no sequence.
     __iter__ = None
 
     def __reduce__(self) -> tuple[type[Throw], tuple[object, ...]]:
-        # Neither the whole table nor what has been read travels with it.
+        # Another process gets neither the whole table nor the arrays that were read.
         table = pa.Table.from_pylist([self.row], schema=self._table.schema)
         return Throw, (table, 0, self._keys, self._episode, self._source)
 
@@ -373,7 +373,7 @@ class Throw:
         return Joints(self._recording)
 
     def to_pandas(self) -> DataFrame:
-        """What ball and joints did, as a DataFrame: one row a sample, by the time since the start of the trial.
+        """The motion of ball and joints as a DataFrame: one row a sample, by the time since the start of the trial.
 
         Columns are named as those of `throwcollect dataset export --to parquet`, such as ``ball_x_m`` and
         ``arm_right_4_joint_position_rad``.

@@ -1,4 +1,4 @@
-"""The table of throws: one row a trial, with what was swept, what came of it, and where its episode lies."""
+"""The table of throws: one row a trial, with its swept values, its result, and the place of its episode."""
 
 from __future__ import annotations
 
@@ -36,13 +36,9 @@ _KINDS = {"number": pa.float64(), "count": pa.int64(), "text": pa.string()}
 
 @dataclass(frozen=True)
 class Place:
-    """Where an episode lies.
+    """The place of an episode in a dataset: its MCAP file and the offset of its first chunk there [bytes].
 
-    Attributes:
-        shard: Name of the MCAP file.
-        chunk_offset: Where its chunk begins in that file [bytes].
-        samples: Number of samples.
-        digest: Digest of the episode.
+    Number of samples and digest say which episode it is.
     """
 
     shard: str
@@ -62,29 +58,23 @@ def _describe_swept(key: str) -> pa.Field:
 
 
 def name_alias(key: str) -> str:
-    """Name of a swept key without dots and with its unit at the end, for SQL and formulas.
-
-    Args:
-        key: The dotted key.
-    """
+    """Name of a swept key without dots and with its unit at the end, for SQL and formulas."""
     name = key.replace(".", "_")
     unit = unit_of_key(key).replace("/", "p").replace("²", "2").replace("³", "3").replace(" ", "")
     return name if not unit or unit_of_name(key) else f"{name}_{unit.lower()}"
 
 
 def ball_state(row: Row, name: str) -> BallState | None:
-    """The ball as a row has it; None if the trial came to no such event, or its task knows none.
+    """Read the state of the ball at ``release``, ``apex`` or ``landing`` from a row of the table of throws.
 
-    Args:
-        row: A row of the table of throws.
-        name: ``release``, ``apex`` or ``landing``.
+    It is None if the trial came to no such event, or its task knows none.
     """
     values: list[Any] = [row.get(column) for column in ball_columns(name)]
     return None if None in values else join_ball(values)
 
 
 class ThrowsTable:
-    """Schema of one collection's table; makes rows of results, and results of rows.
+    """The schema of one collection's table; turns results into rows, and rows into results.
 
     Attributes:
         schema: Columns with their types and descriptions.
@@ -93,7 +83,7 @@ class ThrowsTable:
     Args:
         parameters: Swept dotted configuration keys, in the order of their columns.
         config: Configuration of the collection.
-        targets: Columns of targets.
+        targets: Names of the columns of targets.
     """
 
     def __init__(self, parameters: Sequence[str], config: Config, targets: Sequence[str] = ()) -> None:
@@ -125,13 +115,7 @@ class ThrowsTable:
         return cls(plan.keys, plan.config, plan.trials.target_names)
 
     def row(self, trial: Trial, result: Result, place: Place | None) -> Row:
-        """Row of a trial that was run.
-
-        Args:
-            trial: The trial.
-            result: What came of it.
-            place: Where its episode lies; None if there is none.
-        """
+        """Make the row of a trial that was run; `place` is None if it has no episode."""
         row = self._start_row(trial, result.outcome.value, result.reason)
         row.update(self._columns.write(result))
         row.update(self._misses.measure(trial.target, row))
@@ -140,15 +124,11 @@ class ThrowsTable:
         return row
 
     def make_refused_row(self, trial: Trial) -> Row:
-        """Row of a trial that the plan refused."""
+        """Make the row of a trial that the plan refused."""
         return self._start_row(trial, REFUSED, trial.refused)
 
     def result(self, row: Row) -> Result:
-        """The result that `row` made a row of.
-
-        Args:
-            row: The row of a trial that was run.
-        """
+        """Make the result of a trial that was run from its row, as `row` wrote it."""
         result: Result = self._columns.read(self._outcomes(row["outcome"]), row["reason"], row)
         return result
 
@@ -157,28 +137,23 @@ class ThrowsTable:
         return {"trial": trial.number, **values, **trial.target, "outcome": outcome, "reason": reason}
 
     def table(self, rows: Iterable[Row]) -> pa.Table:
-        """Rows, in the given order, as an Arrow table; what a row lacks is null."""
+        """Make an Arrow table of rows, in the given order; a value that a row lacks is null."""
         rows = list(rows)
         return make_table([[row.get(name) for row in rows] for name in self.schema.names], self.schema)
 
 
 def read_throws_table(path: Path, plan: Plan) -> pa.Table:
-    """A table of throws, whatever trials its rows are of.
+    """Read a table of throws with the columns of a plan, whatever trials its rows are of.
 
-    Args:
-        path: The file.
-        plan: Its trials; they say which columns there are.
-
-    Returns:
-        The table; that of an earlier version lacks the columns that came later.
+    The table of an earlier version lacks the columns that came later.
 
     Raises:
         DatasetError: If the table is missing or damaged, or has other columns.
     """
     table = read_parquet(path)
-    wanted = ThrowsTable.of(plan)
-    lacking = wanted.later - set(table.schema.names)
-    schema = pa.schema([field for field in wanted.schema if field.name not in lacking])
+    expected = ThrowsTable.of(plan)
+    lacking = expected.later - set(table.schema.names)
+    schema = pa.schema([field for field in expected.schema if field.name not in lacking])
     if not table.schema.equals(schema):
         wrong = sorted(set(table.schema.names) ^ set(schema.names)) or "types of columns"
         raise DatasetError(f"not the table of this plan: differs in {wrong}", path=path)
@@ -186,7 +161,7 @@ def read_throws_table(path: Path, plan: Plan) -> pa.Table:
 
 
 def read_throws(directory: Path, plan: Plan) -> pa.Table:
-    """The table of throws of a dataset, whose rows are the trials of its plan in order.
+    """Read the table of throws of a dataset, whose rows are the trials of its plan in order.
 
     Raises:
         DatasetError: If the table is missing or damaged, or is not one of this plan.

@@ -18,7 +18,7 @@ from throwcollect.wording import format_count
 _BLOCK = 16
 """Throws that are read at once: enough to be worth an array, few enough for the caches."""
 _MOST_THREADS = 4
-"""What stays with the interpreter keeps more of them from being of use."""
+"""More are of no use, as part of the work holds the lock of the interpreter."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -74,14 +74,12 @@ class Trajectories:
         return np.diff(self.offsets)
 
     def padded(self, column: str, *, fill: float = np.nan) -> NDArray[np.float64]:
-        """A column in one shape for all throws: what is recorded, then as much of `fill` as the longest throw needs.
+        """Copy a column into one shape for all throws: the samples of each, then `fill` up to the longest throw.
 
-        Args:
-            column: Name of the column; stamps become floating point numbers, which hold them to some hundred ns.
-            fill: What follows the samples of a throw.
+        Stamps become floating point numbers, which are off by up to some hundred nanoseconds.
 
         Returns:
-            Shape ``(n_throws, n_longest)`` or ``(n_throws, n_longest, n)``; a copy.
+            Shape ``(n_throws, n_longest)`` or ``(n_throws, n_longest, n)``.
 
         Raises:
             KeyError: If the column was not read.
@@ -127,7 +125,7 @@ def read_trajectories(
 
     threads = threads or min(_MOST_THREADS, os.cpu_count() or 1)
     with nullcontext() if threads == 1 else ThreadPoolExecutor(threads) as pool:
-        # Decompressing lets go of the interpreter, and so does copying.
+        # Decompressing and copying release the lock of the interpreter.
         for _ in (pool.map if pool else map)(read, blocks, starts[:-1], starts[1:]):
             pass
     return Trajectories(np.array(trials, np.int64), offsets, found, joints)

@@ -1,4 +1,4 @@
-"""Opens a dataset for people: a finished one as it is, one that is still collected with what it holds so far."""
+"""Opens a dataset to read it: a finished one as it is, an unfinished one with the trials that have ended."""
 
 from __future__ import annotations
 
@@ -8,13 +8,10 @@ from pathlib import Path
 
 from throwcollect.config.loader import load as load_config
 from throwcollect.dataset.directory import METADATA, PLAN, config_path
-from throwcollect.dataset.judging import judge_episode
 from throwcollect.dataset.reader import Dataset
-from throwcollect.dataset.scan import scan_whole
-from throwcollect.dataset.shard import path_of_part
-from throwcollect.dataset.throws_table import Place, Row, ThrowsTable
-from throwcollect.dataset.verify_tables import shard_of
-from throwcollect.errors import DatasetError
+from throwcollect.dataset.recovery import find_episodes
+from throwcollect.dataset.shard import list_shards, path_of_part
+from throwcollect.dataset.throws_table import Row, ThrowsTable
 from throwcollect.files import StrPath, is_there
 from throwcollect.sweep.plan import Plan
 from throwcollect.wording import command, format_count
@@ -30,9 +27,6 @@ def load(directory: StrPath) -> Dataset:
     Its tables are read and checked against each other; recordings are opened when they are looked at. Of a dataset that
     is not finished, the recordings are read through, and its rows are the trials that have ended so far: row i is not
     trial i, and `Dataset.digest` is an error.
-
-    Args:
-        directory: Its directory.
 
     Raises:
         DatasetError: If the directory holds no dataset, or its tables or plan are damaged.
@@ -56,29 +50,10 @@ def load(directory: StrPath) -> Dataset:
 
 
 def _list_rows(directory: Path, plan: Plan) -> Iterator[Row]:
-    """Rows of the trials that were refused, and of those whose episodes are there, each once."""
+    """Make the rows of the refused trials, and of those whose episodes are on disk as `resume` would keep them."""
     table = ThrowsTable.of(plan)
     yield from (table.make_refused_row(plan.trial(number)) for number in plan.trials.refused)
-    for name in dict.fromkeys(shard_of(plan, number) for number in plan.trials.numbers):
+    for name in list_shards(plan):
         final = directory / name
-        for path in (final, path_of_part(final)):
-            if is_there(path):
-                yield from _read_rows(path, plan, table)
-                break
-
-
-def _read_rows(path: Path, plan: Plan, table: ThrowsTable) -> Iterator[Row]:
-    seen: set[int] = set()
-    for found in scan_whole(path):
-        episode = found.stored.episode
-        number = episode.header.trial
-        if number in seen or number not in plan.trials.numbers:
-            continue
-        trial = plan.trial(number)
-        try:
-            result = judge_episode(plan.config_of(trial), episode)
-        except DatasetError:
-            # `resume` collects it again.
-            continue
-        seen.add(number)
-        yield table.row(trial, result, Place(path.name, found.stored.offset, episode.header.samples, episode.digest))
+        for found in find_episodes(final if is_there(final) else path_of_part(final), plan).values():
+            yield table.row(plan.trial(found.trial), found.result, found.place)

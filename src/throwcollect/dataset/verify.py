@@ -15,17 +15,23 @@ from typing import Any
 from throwcollect.config.schema import Config
 from throwcollect.dataset.bag import FileSummary, bag_information, read_bag_metadata
 from throwcollect.dataset.digest import combine_digests
-from throwcollect.dataset.directory import CARD, FORMAT, METADATA, SHARD_SUFFIX, THROWS, TRIALS
+from throwcollect.dataset.directory import CARD, CONFIG, FORMAT, MANIFEST, METADATA, PLAN, SHARD_SUFFIX, THROWS, TRIALS
 from throwcollect.dataset.findings import Finding
+from throwcollect.dataset.manifest import find_changed_files, find_manifest_problems, read_manifest
+from throwcollect.dataset.mcap_file import MAGIC
+from throwcollect.dataset.mcap_reader import open_mcap
+from throwcollect.dataset.shard import shard_of
+from throwcollect.dataset.throws_table import read_throws_table
 from throwcollect.dataset.verify_episode import EpisodeCheck
-from throwcollect.dataset.verify_manifest import find_manifest_problems
 from throwcollect.dataset.verify_plan import CheckOf, can_draw, find_drawing_problems, find_refusal_problems
 from throwcollect.dataset.verify_shard import ShardReport, check_shard
-from throwcollect.dataset.verify_tables import Tables, check_tables, shard_of
+from throwcollect.dataset.verify_tables import Tables, check_tables
 from throwcollect.errors import DatasetError
+from throwcollect.files import is_there
 from throwcollect.robots.description import is_available as robot_is_available
 from throwcollect.side_by_side import working_side_by_side
 from throwcollect.sweep.digest import is_digest
+from throwcollect.sweep.plan import Plan
 from throwcollect.wording import format_count
 
 _MANY_EPISODES = 1000
@@ -33,7 +39,7 @@ _MANY_EPISODES = 1000
 _TELL_EVERY_S = 2.0
 _UNFINISHED = (".part", ".new")
 _short = reprlib.Repr()
-"""Values from a file may be as large and as deep as they like."""
+"""Shortens values from files, which somebody may have made as large and as deep as possible."""
 _short.maxstring = _short.maxother = 120
 _short.maxlevel = _short.maxdict = _short.maxlist = 3
 
@@ -51,14 +57,14 @@ def verify(
     plan is drawn again; the bag's metadata against the files; of each file every record, index, count and CRC, the
     latched topics and the order of trials; of each episode its digest, layout and stamps, and that the simulation can
     have recorded it; the table of throws against the episodes, which are judged again, and against the plan; and the
-    dataset's digest. What takes packages that are not installed is left out, and `find_unchecked` names it.
+    dataset's digest. Checks that need packages that are not installed are left out; `find_unchecked` names them.
 
     Args:
         directory: Its directory.
         check_of: Makes the check that says which trials the plan refuses; None leaves refusals as they are.
         processes: How many processes may check the recordings of a large dataset; more than one import the program that
             calls this, as those of `multiprocessing` do.
-        say: Is told how far the check of a large dataset has come.
+        say: Receives the progress of the check of a large dataset.
 
     Returns:
         What is wrong, file by file; empty when nothing is.
@@ -83,7 +89,7 @@ def verify(
     findings += [finding for check in checks.values() for finding in check.findings]
     if bag is not None:
         findings += _find_bag_problems(bag, checks)
-        # Targets are part of the digest, and without a plan those of a list are not known.
+        # Targets are part of the digest, and only the plan has those of a list.
         if tables.plan is not None or not (directory / TRIALS).exists():
             findings += _find_digest_problems(bag, tables, checks)
     findings += _find_stray_files(directory, checks)
@@ -102,6 +108,29 @@ def find_unchecked(config: Config) -> tuple[str, ...]:
     return left_out
 
 
+def find_damage(directory: Path, plan: Plan | None, *, in_full: bool) -> list[Finding]:
+    """Find the files of a finished dataset that are not as they were written.
+
+    Files are compared with the manifest. Earlier versions wrote none: then the recordings that the table of throws
+    names
+    have to begin and end as MCAP files do, or, in full, the dataset is verified.
+
+    Args:
+        directory: Directory of a dataset that has its ``metadata.yaml``.
+        plan: Its trials; None if they cannot be read.
+        in_full: Whether all bytes are compared, and not only the sizes.
+    """
+    if not is_there(directory / MANIFEST):
+        if plan is None:
+            return [Finding(PLAN, "", "is missing or damaged")]
+        return list(_find_damage_without_manifest(directory, plan, in_full=in_full))
+    try:
+        entries = read_manifest(directory)
+    except DatasetError as error:
+        return [Finding.of(MANIFEST, error)]
+    return list(find_changed_files(directory, entries, in_full=in_full))
+
+
 def _plan_findings(directory: Path, tables: Tables, check_of: CheckOf | None) -> Iterator[Finding]:
     if tables.plan is None:
         return
@@ -114,7 +143,7 @@ def _plan_findings(directory: Path, tables: Tables, check_of: CheckOf | None) ->
 def _checking_shards(
     directory: Path, tables: Tables, processes: int, say: Callable[[str], object]
 ) -> Iterator[Iterator[tuple[str, ShardReport]]]:
-    """Have the files checked that rows name; all that are there if there are no rows."""
+    """Start to check the files that rows name, or all that are there if there are no rows."""
     expected = _trials_by_file(directory, tables)
     names = sorted(_list_shards(directory) if expected is None else expected)
     many = expected is not None and sum(map(len, expected.values())) >= _MANY_EPISODES
@@ -123,7 +152,7 @@ def _checking_shards(
     with working_side_by_side(
         names,
         _file_check,
-        (directory, tables),
+        (directory, tables, expected),
         processes=processes if many else 1,
         doing="checks recordings",
         fork=True,
@@ -134,18 +163,19 @@ def _checking_shards(
 def _tell(
     reports: Iterator[tuple[str, ShardReport]], count: int, say: Callable[[str], object]
 ) -> Iterator[tuple[str, ShardReport]]:
-    """The same, with word of how far it has come."""
-    told = time.monotonic()
+    """Pass the reports on, and say how many there are every few seconds."""
+    last_told = time.monotonic()
     for number, report in enumerate(reports, start=1):
         yield report
-        if number < count and time.monotonic() >= told + _TELL_EVERY_S:
-            told = time.monotonic()
+        if number < count and time.monotonic() >= last_told + _TELL_EVERY_S:
+            last_told = time.monotonic()
             say(f"{number} of {format_count(count, 'recording')} checked")
 
 
-def _file_check(directory: Path, tables: Tables) -> Callable[[str], ShardReport]:
-    """What checks the files of a dataset, by their names."""
-    expected = _trials_by_file(directory, tables)
+def _file_check(
+    directory: Path, tables: Tables, expected: Mapping[str, list[int]] | None
+) -> Callable[[str], ShardReport]:
+    """Make the function that checks a file of a dataset, by its name."""
     robot = tables.config is not None and robot_is_available(tables.config)
     check = EpisodeCheck(tables.plan, tables.rows or {}, doubtful=tables.doubtful, robot=robot)
 
@@ -157,14 +187,14 @@ def _file_check(directory: Path, tables: Tables) -> Callable[[str], ShardReport]
 
 
 def _trials_by_file(directory: Path, tables: Tables) -> dict[str, list[int]] | None:
-    """Trials whose episodes each file should hold, in order; None if that is not known."""
+    """List the trials whose episodes each file should hold, in order; None if that is not known."""
     if tables.plan is None or tables.rows is None:
         return None
     names, expected = _list_shards(directory), dict[str, list[int]]()
     refused = tables.plan.trials.refused
     for trial in sorted({*range(len(tables.plan.trials)), *tables.rows}):
         name, row = shard_of(tables.plan, trial), tables.rows.get(trial)
-        # A trial whose row is missing most likely has an episode.
+        # If the row of a trial is missing, its episode is most likely in its file all the same.
         if (trial not in refused and name in names) if row is None else row["shard"] == name:
             expected.setdefault(name, []).append(trial)
     return expected
@@ -187,7 +217,7 @@ def _find_bag_problems(bag: Mapping[str, Any], checks: Mapping[str, ShardReport]
     if not channels:
         del expected["topics_with_message_count"]
     if not whole:
-        # Some files cannot be read, which is reported above, so totals over all files cannot be checked.
+        # Other findings report the unreadable files; without them, the totals over all files are not known.
         yield from _find_file_problems(bag, summaries)
         return
     for key, value in expected.items():
@@ -197,11 +227,13 @@ def _find_bag_problems(bag: Mapping[str, Any], checks: Mapping[str, ShardReport]
 
 def _find_file_problems(bag: Mapping[str, Any], summaries: list[FileSummary]) -> Iterator[Finding]:
     entries = bag.get("files")
-    said = {each.get("path"): each for each in entries if isinstance(each, dict)} if isinstance(entries, list) else {}
+    entries_by_path = (
+        {each.get("path"): each for each in entries if isinstance(each, dict)} if isinstance(entries, list) else {}
+    )
     for summary in summaries:
         (expected,) = bag_information([summary], (), {})["files"]
-        if said.get(summary.path) != expected:
-            found = _shorten(said.get(summary.path))
+        if entries_by_path.get(summary.path) != expected:
+            found = _shorten(entries_by_path.get(summary.path))
             yield Finding(METADATA, f"files: {summary.path}", f"is {found}, the file gives {_shorten(expected)}")
 
 
@@ -209,20 +241,22 @@ def _find_digest_problems(
     bag: Mapping[str, Any], tables: Tables, checks: Mapping[str, ShardReport]
 ) -> Iterator[Finding]:
     custom = bag.get("custom_data")
-    said = custom if isinstance(custom, dict) else {}
-    if said.get("throwcollect.format") != FORMAT:
-        yield Finding(METADATA, "custom_data: throwcollect.format", f"is {_shorten(said.get('throwcollect.format'))}")
-    if unknown := sorted(map(str, set(said) - {"throwcollect.format", "throwcollect.digest"})):
+    entries = custom if isinstance(custom, dict) else {}
+    if entries.get("throwcollect.format") != FORMAT:
+        yield Finding(
+            METADATA, "custom_data: throwcollect.format", f"is {_shorten(entries.get('throwcollect.format'))}"
+        )
+    if unknown := sorted(map(str, set(entries) - {"throwcollect.format", "throwcollect.digest"})):
         yield Finding(METADATA, "custom_data", f"has unknown keys: {_shorten(unknown)}")
     digests = {trial: digest for check in checks.values() for trial, digest in check.digests.items()}
     damaged = any(check.summary is None for check in checks.values())
     if damaged:
         if tables.rows is None:
             return
-        # The table stands in for episodes that cannot be read.
+        # For episodes that cannot be read, the digests are taken from the table.
         digests = {trial: row["digest"] for trial, row in tables.rows.items() if is_digest(row["digest"])} | digests
     targets = None if tables.plan is None else tables.plan.trials.targets
-    written = said.get("throwcollect.digest")
+    written = entries.get("throwcollect.digest")
     digest = combine_digests((digests[trial] for trial in sorted(digests)), targets)
     if written != digest:
         giver = THROWS if damaged else "the episodes"
@@ -245,3 +279,24 @@ def _find_stray_files(directory: Path, checks: Mapping[str, ShardReport]) -> Ite
 
 def _shorten(value: object) -> str:
     return _short.repr(value)
+
+
+def _find_damage_without_manifest(directory: Path, plan: Plan, *, in_full: bool) -> Iterator[Finding]:
+    try:
+        shards = set(read_throws_table(directory / THROWS, plan)["shard"].drop_null().to_pylist())
+    except DatasetError as error:
+        yield Finding.of(THROWS, error)
+        return
+    if in_full:
+        # The manifest and the data card follow from these, and a dataset without them counts as whole.
+        promised = {CONFIG, PLAN, THROWS, METADATA, *shards}
+        yield from (finding for finding in verify(directory) if finding.file in promised)
+        return
+    for name in sorted(shards):
+        try:
+            with open_mcap(directory / Path(name).name) as contents:
+                # An MCAP file begins and ends with the same bytes, and the end is written last.
+                if contents.slice(len(contents) - len(MAGIC), len(contents)) != MAGIC:
+                    yield Finding(name, "", "is cut off")
+        except DatasetError as error:
+            yield Finding.of(name, error)

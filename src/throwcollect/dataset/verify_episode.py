@@ -22,6 +22,7 @@ from throwcollect.episode.record import Samples, find_infinite_columns
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.robots.description import robot_of, touchable_bodies
 from throwcollect.sweep.plan import Plan
+from throwcollect.tasks.result import Result
 from throwcollect.tasks.task import task_of
 from throwcollect.units import NS_PER_S
 from throwcollect.wording import format_count
@@ -29,19 +30,15 @@ from throwcollect.wording import format_count
 _RELATIVE_TOLERANCE = 1e-9
 """Numbers that are judged again on another machine may differ in their last bits."""
 _MOST_NAMED = 3
-"""Differing columns of a row that are named; the others are counted."""
+"""Most differing columns of a row that are named; the others are counted."""
 
 
 class _TrialsOf:
-    """What the trials of a plan are simulated with, worked out once for all checks of an episode.
-
-    Attributes:
-        trial: Gives a trial, by its number.
-        config: Gives the configuration of a trial.
-        trajectory: Gives what its controllers are sent.
-    """
+    """Trials of a plan, with what they are simulated with, worked out once for all checks of an episode."""
 
     def __init__(self, plan: Plan) -> None:
+        self.plan = plan
+        self.table = ThrowsTable.of(plan)
         self.trial = lru_cache(maxsize=1)(plan.trial)
         self.config = lru_cache(maxsize=1)(lambda number: plan.config_of(self.trial(number)))
         self.trajectory = lru_cache(maxsize=1)(lambda number: task_of(self.config(number)).trajectory())
@@ -54,32 +51,24 @@ class EpisodeCheck:
         plan: Its trials; None if they are not known, and then neither rows nor physics are looked at.
         rows: Rows of the table of throws, by trial; where there is none, the episode is not compared with it.
         doubtful: Trials that the plan has wrong; neither rows nor physics of theirs are looked at.
-        robot: Whether to look at what only the robot's model tells: the motion of the joints, the names of bodies that
-            the ball touches, and what came of the throw.
+        robot: Whether the robot's model is available, which the motion of the joints, the names of bodies that the ball
+            touches, and the result of the trial need.
     """
 
     def __init__(
         self, plan: Plan | None, rows: Mapping[int, Row], *, doubtful: Collection[int] = (), robot: bool = True
     ) -> None:
-        self._plan = plan
         self._trials = _TrialsOf(plan) if plan else None
         self._rows = rows
         self._doubtful = doubtful
-        self._table = ThrowsTable.of(plan) if plan else None
         self._robot = robot
         self._joints = robot_of(plan.config).joints if plan else None
         self._bodies = touchable_bodies(plan.config) if plan and robot else None
 
     def find_problems(self, stored: StoredEpisode, shard: str, channels: Channels | None) -> Iterator[str]:
-        """Everything that is wrong with an episode.
+        """Find everything that is wrong with an episode in the file `shard`, a sentence each.
 
-        Args:
-            stored: The episode as it lies in its file.
-            shard: Name of that file.
-            channels: What the dataset records; None if that is not known.
-
-        Yields:
-            What is wrong, a sentence each.
+        `channels` are what the dataset records; None if that is not known.
         """
         episode = stored.episode
         try:
@@ -91,45 +80,43 @@ class EpisodeCheck:
         yield from unreadable or self._find_physics_problems(episode)
         row = self._rows.get(episode.header.trial)
         if row is not None and not unreadable and episode.header.trial not in self._doubtful:
-            expected = vars(Place(shard, stored.offset, episode.header.samples, episode.digest))
+            expected = vars(_place_of(stored, shard))
             if self._robot:
-                # Swept values were compared with the plan, and that is where they come from here.
+                # The row made here takes the swept values from the plan, with which the table was compared already.
                 expected = {name: value for name, value in self.row(stored, shard).items() if "." not in name}
             yield from _find_row_problems(expected, row)
 
     def row(self, stored: StoredEpisode, shard: str) -> Row:
-        """The row that an episode should have in the table of throws; the plan is known.
-
-        Args:
-            stored: The episode.
-            shard: Name of its file.
+        """Make the row that an episode in the file `shard` should have in the table of throws; needs the plan.
 
         Raises:
             DatasetError: If the episode is damaged, or the plan is not known.
         """
-        if self._plan is None or self._trials is None or self._table is None:
+        trials = self._need_trials()
+        trial = trials.trial(stored.episode.header.trial)
+        return trials.table.row(trial, self.judge(stored.episode), _place_of(stored, shard))
+
+    def judge(self, episode: Episode) -> Result:
+        """Say how the trial of an episode ended; needs the plan.
+
+        Raises:
+            DatasetError: If the episode is damaged, or the plan is not known.
+        """
+        trials, number = self._need_trials(), episode.header.trial
+        return judge_episode(trials.config(number), episode, trials.trajectory(number))
+
+    def _need_trials(self) -> _TrialsOf:
+        if self._trials is None:
             raise DatasetError("no plan says which trial it is")
-        episode = stored.episode
-        number = episode.header.trial
-        place = Place(shard, stored.offset, episode.header.samples, episode.digest)
-        result = judge_episode(self._trials.config(number), episode, self._trials.trajectory(number))
-        return self._table.row(self._trials.trial(number), result, place)
+        return self._trials
 
     def find_content_problems(self, episode: Episode, channels: Channels | None) -> Iterator[str]:
-        """Everything that is wrong with an episode wherever it lies.
-
-        Args:
-            episode: The episode.
-            channels: What the dataset records; None if that is not known.
-
-        Yields:
-            What is wrong, a sentence each.
-        """
+        """Yield a sentence for everything that is wrong with an episode, wherever it lies; see `find_problems`."""
         problems = list(self._find_layout_problems(episode, channels))
         yield from problems or self._find_physics_problems(episode)
 
     def _find_layout_problems(self, episode: Episode, channels: Channels | None) -> Iterator[str]:
-        """What keeps an episode from being measured: by its records, its layout, its trial or its stamps."""
+        """Find what keeps an episode from being measured: wrong records, layout, trial or stamps."""
         try:
             samples = episode.samples(self._joints)
             episode.check_records()
@@ -138,21 +125,21 @@ class EpisodeCheck:
             return
         if channels is not None:
             yield from _find_message_problems(episode, channels)
-        if self._plan is None or self._trials is None or episode.header.trial in self._doubtful:
+        if self._trials is None or episode.header.trial in self._doubtful:
             return
-        if episode.header.trial >= len(self._plan.trials):
-            yield f"the plan has {format_count(len(self._plan.trials), 'trial')}"
+        if episode.header.trial >= len(self._trials.plan.trials):
+            yield f"the plan has {format_count(len(self._trials.plan.trials), 'trial')}"
             return
         try:
             config = self._trials.config(episode.header.trial)
         except ConfigError as error:
             yield f"the plan has values that cannot be: {error}"
             return
-        yield from find_stamp_problems(episode, samples, config)
-        yield from find_sensor_problems(episode)
+        yield from _find_stamp_problems(episode, samples, config)
+        yield from _find_sensor_problems(episode)
 
     def _find_physics_problems(self, episode: Episode) -> Iterator[str]:
-        """What the simulation cannot have recorded."""
+        """Find what the simulation cannot have recorded."""
         if self._trials is None or episode.header.trial in self._doubtful:
             return
         config = self._trials.config(episode.header.trial)
@@ -161,13 +148,17 @@ class EpisodeCheck:
             yield from infinite
             return
         trial = RecordedTrial(samples, episode.header, config, self._trials.trajectory(episode.header.trial))
-        # Numbers of a forger may be as large as they like.
+        # Numbers that somebody forged may overflow in these computations.
         with np.errstate(all="ignore"):
             problems = list(find_header_problems(trial, self._bodies))
             if self._robot:
                 problems += find_joint_problems(trial)
             problems += find_ball_problems(trial)
         yield from problems
+
+
+def _place_of(stored: StoredEpisode, shard: str) -> Place:
+    return Place(shard, stored.offset, stored.episode.header.samples, stored.episode.digest)
 
 
 def _find_row_problems(expected: Mapping[str, Any], row: Mapping[str, Any]) -> Iterator[str]:
@@ -184,7 +175,7 @@ def _find_row_problems(expected: Mapping[str, Any], row: Mapping[str, Any]) -> I
 
 def _find_message_problems(episode: Episode, channels: Channels) -> Iterator[str]:
     expected = {channel.id: topic for channel, topic in channels.recorded.items()}
-    if problems := list(find_channel_problems(episode, channels)):
+    if problems := list(_find_channel_problems(episode, channels)):
         yield from problems
         return
     for channel, topic in expected.items():
@@ -201,7 +192,7 @@ def _find_message_problems(episode: Episode, channels: Channels) -> Iterator[str
 
 
 def _find_record_problems(stored: StoredEpisode) -> Iterator[str]:
-    """Differences between the records around chunks and what the contents of these call for."""
+    """Find differences between the records around chunks and those that their contents call for."""
     run = stored.intact_run
     for chunk, expected in zip(stored.chunks, run.chunk_indexes, strict=True):
         first = expected.chunk_start_offset + expected.chunk_length
@@ -212,8 +203,8 @@ def _find_record_problems(stored: StoredEpisode) -> Iterator[str]:
         yield f"the metadata at byte {stored.facts.offset} do not fit the chunk (digest, trial or header)"
 
 
-def find_sensor_problems(episode: Episode) -> Iterator[str]:
-    """What chunks of sensors cannot have recorded, a sentence each."""
+def _find_sensor_problems(episode: Episode) -> Iterator[str]:
+    """Find what chunks of sensors cannot have recorded, a sentence each."""
     last_ns = episode.chunk.end_ns
     for number, sensor in enumerate(episode.sensors, start=1):
         messages, times = sensor.messages, sensor.messages.headers["log_time"]
@@ -231,17 +222,8 @@ def find_sensor_problems(episode: Episode) -> Iterator[str]:
                 yield f"chunk {number}: the messages of channel {channel} are not numbered from 0"
 
 
-def find_stamp_problems(episode: Episode, samples: Samples, config: Config) -> Iterator[str]:
-    """Everything that is wrong with the times of an episode.
-
-    Args:
-        episode: The episode.
-        samples: Its samples.
-        config: Configuration of its trial.
-
-    Yields:
-        What is wrong, a sentence each.
-    """
+def _find_stamp_problems(episode: Episode, samples: Samples, config: Config) -> Iterator[str]:
+    """Find everything that is wrong with the times of an episode and its samples, a sentence each."""
     stamps, header = samples.stamps_ns, episode.header
     if not episode.table.are_timed_by(stamps):
         yield "times or numbers of the message records differ from the stamps of /joint_states"
@@ -255,19 +237,19 @@ def find_stamp_problems(episode: Episode, samples: Samples, config: Config) -> I
         yield f"stamps are not spaced by 1/{config.record.rate_hz} s: {steps.min()} to {steps.max()} ns"
 
 
-def find_channel_problems(episode: Episode, channels: Channels) -> Iterator[str]:
-    """Whether the chunks of an episode have other channels than are recorded; a sentence if so."""
+def _find_channel_problems(episode: Episode, channels: Channels) -> Iterator[str]:
+    """Compare the channels of the chunks of an episode with those that are recorded; a sentence if they differ."""
     if not channels.fit(episode.channels()):
         yield f"has the channels {_list(episode.channels())} instead of {_list(channels.numbers)}"
 
 
 def _list(numbers: Sequence[Sequence[int]]) -> str:
-    """The channels of each chunk, in words."""
+    """Describe the channels of each chunk in words."""
     return " and ".join(str(list(chunk)) for chunk in numbers)
 
 
 def _same(value: object, other: object) -> bool:
-    # Judged again by the same build, nearly all are equal.
+    # The same build computes equal numbers, so `isclose` is rarely needed.
     return value == other or (
         isinstance(value, float)
         and isinstance(other, float)

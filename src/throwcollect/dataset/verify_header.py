@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-import reprlib
 from collections.abc import Collection, Iterator
 
 import numpy as np
 
-from throwcollect.dataset.recorded_trial import RecordedTrial
+from throwcollect.dataset.recorded_trial import ABORTED, CANCELED, EXECUTING, SUCCEEDED, RecordedTrial, shorten
 from throwcollect.robots.description import robot_of
 from throwcollect.units import NS_PER_S
 
@@ -16,29 +15,20 @@ _END_REASONS = ("landed", "rest", "timeout")
 _REST_S = 0.5
 _REST_SPEED = 0.01
 """The simulation ends a trial as `rest` when the ball has been slower than this [m/s] for so long [s]."""
-_EXECUTING, _SUCCEEDED, _CANCELED, _ABORTED = 2, 4, 5, 6
-"""Of action_msgs/msg/GoalStatus."""
 _LEAST_ERROR_CODE = -5
 """Of control_msgs/action/FollowJointTrajectory; 0 is success."""
 _ROUNDING = 1e-9
-_short = reprlib.Repr()
-_short.maxstring = 60
 
 
 def find_header_problems(trial: RecordedTrial, bodies: Collection[str] | None) -> Iterator[str]:
-    """What a header says that cannot be, or that its samples contradict.
+    """Find what a header says that cannot be, or that its samples contradict, a sentence each.
 
-    Args:
-        trial: The trial.
-        bodies: Names of all bodies that can touch the ball; None if they are not known.
-
-    Yields:
-        What is wrong, a sentence each.
+    `bodies` has the names of all bodies that can touch the ball; None if they are not known.
     """
     yield from _find_contact_problems(trial, bodies)
     yield from _find_goal_problems(trial)
     if trial.header.end_reason not in _END_REASONS:
-        yield f"ended as {_short.repr(trial.header.end_reason)}, not as {', '.join(_END_REASONS)}"
+        yield f"ended as {shorten(trial.header.end_reason)}, not as {', '.join(_END_REASONS)}"
     else:
         yield from _find_end_problems(trial)
 
@@ -68,17 +58,17 @@ def _find_goal_problems(trial: RecordedTrial) -> Iterator[str]:
     expected = [name for name in robot.controllers if name in sent]
     found = [goal.controller for goal in header.goals]
     if found != expected:
-        yield f"has goals of {_short.repr(found)}, the trajectory is sent to {expected}"
+        yield f"has goals of {shorten(found)}, the trajectory is sent to {expected}"
     duration_s = float(trial.samples.stamps_ns[-1] - trial.samples.stamps_ns[0]) / NS_PER_S
     for goal in header.goals:
-        what = f"the goal of {_short.repr(goal.controller)}"
-        if goal.status not in (_EXECUTING, _SUCCEEDED, _CANCELED, _ABORTED):
+        what = f"the goal of {shorten(goal.controller)}"
+        if goal.status not in (EXECUTING, SUCCEEDED, CANCELED, ABORTED):
             yield f"{what} has the unknown status {goal.status}"
         if not _LEAST_ERROR_CODE <= goal.error_code <= 0:
             yield f"{what} has the unknown error code {goal.error_code}"
-        if goal.status in (_EXECUTING, _SUCCEEDED) and goal.error_code:
+        if goal.status in (EXECUTING, SUCCEEDED) and goal.error_code:
             yield f"{what} has status {goal.status} and an error code all the same"
-        if goal.status == _SUCCEEDED and duration_s < trajectory.times[-1] - _ROUNDING:
+        if goal.status == SUCCEEDED and duration_s < trajectory.times[-1] - _ROUNDING:
             yield f"{what} succeeded, but the trial ended at {duration_s:.3f} s, before its trajectory"
 
 
@@ -119,7 +109,6 @@ def _explain_unrest(trial: RecordedTrial) -> str | None:
         return f"nothing held the ball in the last {_REST_S} s"
     moves_s = float(trial.trajectory.times[-1]) + trial.config.sim.command_delay_s
     # A goal that was given up ends the motion at another time.
-    given_up = any(goal.status in (_CANCELED, _ABORTED) for goal in trial.header.goals)
-    if not given_up and since / physics_hz < moves_s - 1 / physics_hz:
+    if not trial.has_failed_goal and since / physics_hz < moves_s - 1 / physics_hz:
         return f"the arm moved until {moves_s:.3f} s, less than {_REST_S} s before"
     return None

@@ -1,6 +1,7 @@
 """Checks the motion of robot and ball in an episode: what the simulation cannot have recorded.
 
-The tolerances are far above what honest recordings of all settings show, and far below what a change is made for.
+The tolerances are far above the errors of honest recordings with all settings, and far below changes that are worth a
+forgery.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ _SPIN = 1e-10
 _ORIENTATION_RAD = 1e-9
 _UNIT = 1e-9
 _MOST_TURN_RAD = 0.75
-"""The physics turns a body by at most an eighth of a turn in a step; what spins faster is not compared."""
+"""The physics turns a body by at most an eighth of a turn a step, so faster spins are not compared."""
 _AFTER_CONTACT_S = 0.02
 _AFTER_CONTACT_STEPS = 10
 """The contact solver may act on a ball for some steps after its normal force has gone: up to 12 ms were seen."""
@@ -35,11 +36,10 @@ _REACH_M = 0.02
 _FOLLOW_RAD = 0.02
 """With the default gains, motors that are not saturated stay within 0.0002 rad of their commands."""
 _AT_LIMIT = 0.999
-_FAILED_GOALS = (5, 6)
 
 
 def find_joint_problems(trial: RecordedTrial) -> Iterator[str]:
-    """What the joints did that they cannot have done, a sentence each."""
+    """Find what the joints cannot have done, a sentence each."""
     samples, config, trajectory = trial.samples, trial.config, trial.trajectory
     robot = robot_of(config)
     locked = find_locked_joints(config)
@@ -61,10 +61,9 @@ def find_joint_problems(trial: RecordedTrial) -> Iterator[str]:
     if apart.max() > tolerance:
         joint = robot.joints[int(apart.argmax())]
         yield f"{joint} starts {apart.max():.3g} rad away from the start posture of the trial"
-    # Where a goal failed, the joints need not have followed it.
-    if any(goal.status in _FAILED_GOALS for goal in trial.header.goals):
+    if trial.has_failed_goal:
         return
-    # A motor at its limit falls behind, and what comes after it says nothing about honesty.
+    # A motor at its limit falls behind, so from there on honest recordings depart from the trajectory, too.
     followed = len(samples)
     if peaks.max() >= _AT_LIMIT:
         followed = int((torques / limits >= _AT_LIMIT).any(axis=1).argmax())
@@ -78,7 +77,7 @@ def find_joint_problems(trial: RecordedTrial) -> Iterator[str]:
 
 
 def _where_motors_should_be(trial: RecordedTrial) -> NDArray[np.float64]:
-    """Where motors that follow their commands are at each sample [rad], shape ``(n_samples, n_moving)``."""
+    """Positions at each sample of motors that follow their commands [rad], shape ``(n_samples, n_moving)``."""
     config, trajectory = trial.config, trial.trajectory
     speed, lag_s, hz = config.robot.speed_scale, config.robot.motor_lag_s, config.sim.physics_hz
     if not lag_s:
@@ -99,10 +98,10 @@ def _following_tolerance(config: Config) -> float:
 
 
 def find_ball_problems(trial: RecordedTrial) -> Iterator[str]:
-    """What the ball did that it cannot have done, given its contacts.
+    """Find what the ball cannot have done, given its contacts.
 
-    From one sample to the next, a ball that nothing touches follows exactly from the physics, bit for bit but for
-    rounding; and one that something presses on does not.
+    From one sample to the next, the motion of a ball that nothing touches follows from the physics, bit for bit but for
+    rounding; that of a ball that something presses on does not.
 
     Yields:
         What is wrong, a sentence each.
@@ -117,7 +116,7 @@ def find_ball_problems(trial: RecordedTrial) -> Iterator[str]:
     departures = _measure_departures(trial)
     free = _find_free_intervals(trial)
     for what, (values, tolerance, unit) in departures.items():
-        # What is too large to be computed departs, too.
+        # A departure that overflows to NaN counts as one.
         wrong = free & ~(values <= tolerance)
         if wrong.any():
             place = f"first at {trial.times_s[int(wrong.argmax()) + 1]:.3f} s, where no contact is"
@@ -140,7 +139,7 @@ def find_ball_problems(trial: RecordedTrial) -> Iterator[str]:
 
 
 def _find_intervals(contact: tuple[int, int], trial: RecordedTrial) -> tuple[int, slice, slice]:
-    """Of a contact in steps: the sample at or after its start, and the intervals between samples it touches, and fills.
+    """Find, of a contact in steps, the sample at or after its start, and the intervals that it touches, and fills.
 
     Interval k has the steps after sample k, up to and with that of sample k + 1.
     """
@@ -153,7 +152,7 @@ def _find_intervals(contact: tuple[int, int], trial: RecordedTrial) -> tuple[int
 
 
 def _find_free_intervals(trial: RecordedTrial) -> NDArray[np.bool_]:
-    """Intervals between samples that no contact acts in, shape ``(n_samples - 1,)``."""
+    """Find the intervals between samples in which no contact acts, shape ``(n_samples - 1,)``."""
     after = max(math.ceil(_AFTER_CONTACT_S * trial.config.sim.physics_hz), _AFTER_CONTACT_STEPS)
     begins = np.arange(0, trial.last_step, trial.stride)
     free = np.ones(len(begins), dtype=bool)
@@ -166,7 +165,7 @@ def _find_free_intervals(trial: RecordedTrial) -> NDArray[np.bool_]:
 def _measure_departures(
     trial: RecordedTrial,
 ) -> dict[str, tuple[NDArray[np.float64], NDArray[np.float64] | float, str]]:
-    """How far each sample is from where ballistic motion leads from the one before; with tolerance and unit."""
+    """Measure how far each sample is from the ballistic continuation of the one before; with tolerance and unit."""
     samples, stride, config = trial.samples, trial.stride, trial.config
     position, velocity = ballistic_steps(
         samples.ball_position[:-1], samples.ball_linear_velocity[:-1], steps=stride, config=config
@@ -187,7 +186,7 @@ def _measure_departures(
 
 
 def _turn(orientation: NDArray[np.float64], spin: NDArray[np.float64], duration_s: float) -> NDArray[np.float64]:
-    """Unit quaternions (xyzw) after turning with constant angular velocities in world [rad/s], shape ``(n, 4)``."""
+    """Turn unit quaternions (xyzw) with constant angular velocities in world [rad/s]; shape ``(n, 4)``."""
     rate = _measure_lengths(spin)[:, np.newaxis]
     half = rate * (duration_s / 2)
     # sin(x)/x, also where nothing turns.
@@ -212,7 +211,7 @@ def _measure_lengths(rows: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _explain_off_ground(trial: RecordedTrial, first: int) -> str | None:
-    """Why a contact with the ground cannot begin by this sample; None if nothing is against it."""
+    """Say why a contact with the ground cannot begin by this sample; None if nothing is against it."""
     config, samples = trial.config, trial.samples
     if not config.scene.landing_height_m > 0:
         return "the ground stops nothing, as the landing plane is on it"

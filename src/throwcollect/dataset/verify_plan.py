@@ -35,15 +35,16 @@ CheckOf = Callable[[Config], Check]
 
 
 def can_draw(config: Config) -> bool:
-    """Whether the trials of a configuration can be drawn here: SciPy, which `sweep.target` needs, may be missing."""
+    """Whether the trials of a configuration can be drawn here: `sweep.target` needs SciPy, which may be missing."""
     return config.sweep.target is None or is_installed("scipy")
 
 
 def find_drawing_problems(directory: Path, plan: Plan, rows: Mapping[int, Row] | None) -> Iterator[Finding]:
-    """Trials that are not those that the configuration draws.
+    """Find trials that are not those that the configuration draws.
 
-    The rounds of a plan that grows are drawn from the results in the table of throws, which is compared with the
-    episodes elsewhere. What cannot be drawn here (see `can_draw`) is not compared.
+    The rounds of a plan that grows are drawn from the results in the table of throws, which other checks compare with
+    the
+    episodes. A plan that cannot be drawn here (see `can_draw`) is not compared.
 
     Args:
         directory: Directory of the dataset.
@@ -70,7 +71,7 @@ def find_drawing_problems(directory: Path, plan: Plan, rows: Mapping[int, Row] |
 
 
 def find_refusal_problems(plan: Plan, doubtful: Collection[int], check_of: CheckOf) -> Iterator[Finding]:
-    """Refusals that the plan should not have, and ones that it lacks.
+    """Find refusals that the plan should not have, and ones that it lacks.
 
     All refused trials are checked again, and `CHECKED_AGAIN` others that the seed of the configuration chooses.
 
@@ -91,11 +92,9 @@ def find_refusal_problems(plan: Plan, doubtful: Collection[int], check_of: Check
 
 
 class _Drawing(NamedTuple):
-    """The trials that a configuration draws, as far as they are known.
+    """The trials that a configuration draws, as far as they are known: values of shape ``(n_trials, n_keys)``.
 
-    Attributes:
-        values: Their values, shape ``(n_trials, n_keys)``.
-        problem: Why they are not as many as the plan has; None if they are, or if that is not known.
+    The problem says why they are not as many as the plan has; None if they are, or if that is not known.
     """
 
     values: NDArray[np.float64]
@@ -103,7 +102,7 @@ class _Drawing(NamedTuple):
 
 
 def _draw(directory: Path, plan: Plan) -> _Drawing:
-    """The drawing of a plan that is fixed before anything runs.
+    """Draw the trials of a plan that is fixed before anything runs.
 
     Raises:
         ConfigError: If it cannot be drawn.
@@ -120,7 +119,7 @@ def _draw(directory: Path, plan: Plan) -> _Drawing:
 
 
 def _draw_rounds(plan: Plan, rows: Mapping[int, Row] | None) -> _Drawing:
-    """The drawing of a plan that grew, round by round from the results of its trials.
+    """Draw the trials of a plan that grew, round by round from their results.
 
     Raises:
         ConfigError: If it cannot be drawn.
@@ -153,7 +152,7 @@ def _of_keys(points: Points, plan: Plan) -> Points:
 
 
 def _kind(reason: str | None) -> str | None:
-    """A reason without its numbers, which may differ in their last digits on another machine."""
+    """Replace the numbers of a reason, whose last digits may differ on another machine."""
     return None if reason is None else _NUMBER.sub("#", reason)
 
 

@@ -7,24 +7,22 @@ once more, as the writer of the file does, and compared record by record.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from isal.isal_zlib import crc32
 from mcap import records
 from mcap.opcode import Opcode
 
-from rclzenoh.interfaces import deserialize, get_message
 from throwcollect.config.schema import Config
 from throwcollect.dataset.bag import FileSummary
 from throwcollect.dataset.directory import THROWS
 from throwcollect.dataset.findings import Finding
 from throwcollect.dataset.mcap_file import BAG, LIBRARY, MAGIC, PROFILE, McapFile
-from throwcollect.dataset.mcap_reader import McapContents, Record, StoredEpisode, map_file
+from throwcollect.dataset.mcap_reader import McapContents, Record, StoredEpisode, map_file, read_latched_table
 from throwcollect.dataset.scan import scan
-from throwcollect.episode.channels import ROBOT_DESCRIPTION_ID, Channels
-from throwcollect.episode.chunk import Chunk, encode_records
-from throwcollect.episode.message_table import MessageTable
+from throwcollect.episode.channels import Channels
+from throwcollect.episode.chunk import encode_records
 from throwcollect.errors import DatasetError, ThrowcollectError
 from throwcollect.robots.description import full_description
 
@@ -36,13 +34,13 @@ _PROBLEMS = {
     Opcode.METADATA: f"the copy of the bag's metadata ({BAG}) does not fit the file",
     Opcode.DATA_END: "the CRC of the data section differs from its contents",
 }
-"""What is wrong with a record of this kind that differs from the one that should be there."""
+"""The problem with a record of this kind that differs from the one that should be there."""
 
 FindProblems = Callable[[StoredEpisode, str, Channels | None], Iterator[str]]
-"""What is wrong with an episode of the file of this name, recorded on these channels."""
+"""Finds what is wrong with an episode of the file of this name, recorded on these channels."""
 
 
-@dataclass(frozen=True)
+@dataclass
 class ShardReport:
     """What was found in a file.
 
@@ -54,10 +52,10 @@ class ShardReport:
         digests: Digest of each episode that could be read, by trial.
     """
 
-    findings: list[Finding]
-    summary: FileSummary | None
-    channels: Channels | None
-    digests: dict[int, str]
+    findings: list[Finding] = field(default_factory=list)
+    summary: FileSummary | None = None
+    channels: Channels | None = None
+    digests: dict[int, str] = field(default_factory=dict)
 
 
 def check_shard(
@@ -67,25 +65,20 @@ def check_shard(
 
     Args:
         path: The file.
-        config: Configuration of the dataset; None if it is not known, and then episodes and checksums alone are
-            checked.
+        config: Configuration of the dataset; None if it is not known, and then only episodes and checksums are checked.
         trials: Trials whose episodes the file should hold, in order; None if they are not known.
         find_problems: Finds what is wrong with an episode.
     """
-    check = _ShardCheck(path, config, trials, find_problems)
-    return ShardReport(check.findings, check.summary, check.channels, check.digests)
+    return _ShardCheck(path, config, trials, find_problems).run()
 
 
 class _ShardCheck:
-    """Checks one file as it is made; see `check_shard`."""
+    """Checks one file once; see `check_shard`."""
 
     def __init__(
         self, path: Path, config: Config | None, trials: Sequence[int] | None, find_problems: FindProblems
     ) -> None:
-        self.findings: list[Finding] = []
-        self.summary: FileSummary | None = None
-        self.channels: Channels | None = None
-        self.digests: dict[int, str] = {}
+        self._result = ShardReport()
         self._path = path
         self._config = config
         self._waiting = None if trials is None else list(trials)
@@ -93,23 +86,27 @@ class _ShardCheck:
         self._damaged = False
         self._expected = bytearray()
         self._model: McapFile | None = None
+
+    def run(self) -> ShardReport:
+        """Check the file and return the findings; everything that is wrong with it is one, and never an error."""
         try:
-            with map_file(path) as contents:
+            with map_file(self._path) as contents:
                 self._check(contents)
         except DatasetError as error:
             self._report(error.place, error.details)
         except ThrowcollectError as error:
             self._report("", str(error))
+        return self._result
 
     def _report(self, place: str, problem: str) -> None:
-        self.findings.append(Finding(self._path.name, place, problem))
+        self._result.findings.append(Finding(self._path.name, place, problem))
 
     def _report_damage(self, error: DatasetError, *, start: int | None = None, resumed: int = -1) -> None:
         """Report that records cannot be read.
 
         Args:
-            error: Says why.
-            start: Where the run of records begins that is damaged, if it is not where the error says [bytes].
+            error: The reason.
+            start: Where the damaged run of records begins [bytes], if it is not where the error says.
             resumed: Where the next one begins [bytes]; -1 if there is none.
         """
         self._damaged = True
@@ -136,7 +133,7 @@ class _ShardCheck:
                 self._check_magic(contents)
                 if len(contents) != self._model.size:
                     self._report("", f"has {len(contents)} bytes, its records have {self._model.size}")
-                self.summary = summary
+                self._result.summary = summary
         except DatasetError as error:
             self._report_damage(error)
 
@@ -146,12 +143,12 @@ class _ShardCheck:
         first = next((found.stored for found in scan(contents) if found.readable), None)
         try:
             if self._config is not None:
-                self.channels = self._read_channels(contents, self._config, latched)
+                self._result.channels = _read_channels(contents, self._config)
             if first is not None and first.offset == latched:
                 raise DatasetError("latched topics: missing, an episode is here", place=f"byte {latched}")
-            if self.channels is not None and first is not None:
+            if self._result.channels is not None and first is not None:
                 start_ns = first.episode.chunk.start_ns
-                self._model = McapFile(self._expected.extend, self.channels, start_ns=start_ns)
+                self._model = McapFile(self._expected.extend, self._result.channels, start_ns=start_ns)
                 return self._compare(contents, len(MAGIC), bytes(self._expected[len(MAGIC) :]))
             if latched >= 0:
                 return contents.message_indexes(contents.record(latched).end)[1].offset
@@ -163,23 +160,13 @@ class _ShardCheck:
         # The episodes can still be checked; the damage before the first of them is reported above.
         return first.offset if first else -1
 
-    def _read_channels(self, contents: McapContents, config: Config, latched: int) -> Channels:
-        """What is recorded, for the robot that the file describes; for the installed one if that is not readable."""
-        try:
-            table = _read_latched_table(contents.record(latched))
-            text = deserialize(table.messages(ROBOT_DESCRIPTION_ID)[0].tobytes(), get_message("std_msgs/msg/String"))
-            return Channels(config, text.data)
-        except (KeyError, ValueError, ThrowcollectError):
-            # It differs from what the installed robot gives, so it is reported when the two are compared.
-            return Channels(config, full_description(config))
-
     def _compare(self, contents: McapContents, start: int, expected: bytes) -> int:
         """Compare records with those that should be there; returns where the record after them begins [bytes].
 
         Args:
-            contents: Those of the file.
+            contents: The contents of the file.
             start: Where the records begin [bytes].
-            expected: The bytes of those that should be there.
+            expected: The bytes that should be there.
 
         Raises:
             DatasetError: If the file ends before they do, or holds records of other kinds.
@@ -207,14 +194,14 @@ class _ShardCheck:
         elif wanted.opcode == Opcode.CHUNK:
             self._report_latched(actual, wanted)
         else:
-            told = f"summary: the {actual.kind} does not fit the file"
-            self._report(place, _PROBLEMS.get(Opcode(wanted.opcode), told))
+            other = f"summary: the {actual.kind} does not fit the file"
+            self._report(place, _PROBLEMS.get(Opcode(wanted.opcode), other))
 
     def _report_latched(self, actual: Record, wanted: Record) -> None:
         """Report how the chunk of the latched topics differs from the one that should be there."""
         place = f"byte {actual.offset}"
         try:
-            found, expected = _read_latched_table(actual), _read_latched_table(wanted)
+            found, expected = read_latched_table(actual), read_latched_table(wanted)
         except DatasetError as error:
             self._report(place, f"latched topics: {error}")
             return
@@ -235,7 +222,7 @@ class _ShardCheck:
         """Check all episodes; returns where the record after the last of them begins, -1 if that is not known.
 
         Args:
-            contents: Those of the file.
+            contents: The contents of the file.
             start: Where the first episode should begin [bytes]; -1 if there is none.
         """
         places: dict[int, int] = {}
@@ -249,7 +236,7 @@ class _ShardCheck:
                 self._report_gap(contents, expected, resumed=stored.offset)
             if self._model is not None:
                 self._model.append(replace(stored.run(), data=contents.slice(stored.offset, stored.end)))
-                # Only the bytes before and behind the episodes are compared here; the others need not be kept.
+                # The bytes of episodes are checked elsewhere, so here only those before and behind them are kept.
                 self._expected.clear()
             self._check_place(stored, places)
             expected = stored.end
@@ -260,8 +247,7 @@ class _ShardCheck:
             if record.opcode == Opcode.METADATA and record.parse(records.Metadata).name == BAG:
                 return expected
         except DatasetError:
-            # What is there instead of a record is reported with the episode that could be there.
-            pass
+            pass  # `_report_gap` reports it, as an episode could begin there
         self._report_gap(contents, expected)
         return -1
 
@@ -269,7 +255,7 @@ class _ShardCheck:
         """Report a stretch of the file in which no episode can be read.
 
         Args:
-            contents: Those of the file.
+            contents: The contents of the file.
             start: Where an episode should begin [bytes].
             resumed: Where the next episode begins [bytes]; -1 if there is none.
         """
@@ -278,11 +264,11 @@ class _ShardCheck:
         except DatasetError as error:
             self._report_damage(error, start=start, resumed=resumed)
         else:
-            told = DatasetError("so much is damaged that the rest is not looked at", place=f"byte {start}")
-            self._report_damage(told)
+            given_up = DatasetError("so much is damaged that the rest is not looked at", place=f"byte {start}")
+            self._report_damage(given_up)
 
     def _check_place(self, stored: StoredEpisode, places: dict[int, int]) -> None:
-        """Check an episode, and that it is the one that should come now; `places` are those of earlier ones [bytes]."""
+        """Check an episode, and that it should come now; `places` has the offsets of earlier ones [bytes]."""
         trial, offset = stored.episode.header.trial, stored.offset
         place = f"trial {trial}"
         if trial in places:
@@ -294,9 +280,9 @@ class _ShardCheck:
         else:
             if places and trial < max(places):
                 self._report(place, f"byte {offset}: comes after trial {max(places)}")
-            for problem in self._find_problems(stored, self._path.name, self.channels):
+            for problem in self._find_problems(stored, self._path.name, self._result.channels):
                 self._report(place, problem)
-            self.digests[trial] = stored.episode.digest
+            self._result.digests[trial] = stored.episode.digest
             if self._waiting is not None:
                 self._waiting.remove(trial)
         places.setdefault(trial, offset)
@@ -308,7 +294,7 @@ class _ShardCheck:
         return ends
 
     def _check_footer(self, contents: McapContents) -> None:
-        """Check the summary by its CRC alone, as it is not known what it should say.
+        """Check only the CRC of the summary, as nobody knows the contents that it should have.
 
         Raises:
             DatasetError: If the file does not end with a footer.
@@ -330,10 +316,10 @@ def _crc(contents: McapContents, start: int, end: int) -> int:
     return crc
 
 
-def _read_latched_table(record: Record) -> MessageTable:
-    """The messages of the chunk of the latched topics.
-
-    Raises:
-        DatasetError: If the record is no such chunk.
-    """
-    return MessageTable(Chunk.parse(record.data).decompress(), 1)
+def _read_channels(contents: McapContents, config: Config) -> Channels:
+    """Read what is recorded, for the robot that the file describes; for the installed one if that is not readable."""
+    try:
+        return Channels(config, contents.read_robot_description())
+    except (KeyError, ValueError, ThrowcollectError):
+        # It differs from what the installed robot gives, so it is reported when the two are compared.
+        return Channels(config, full_description(config))

@@ -1,4 +1,4 @@
-"""Checks what describes a dataset as a whole: its configuration, its plan, and the table of throws against the plan."""
+"""Checks the files that describe a dataset as a whole: configuration, plan, and the table of throws."""
 
 from __future__ import annotations
 
@@ -10,13 +10,15 @@ import numpy as np
 
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
-from throwcollect.dataset.directory import CONFIG, PLAN, THROWS, TRIALS, config_path, shard_name
+from throwcollect.dataset.directory import CONFIG, PLAN, THROWS, TRIALS, config_path
 from throwcollect.dataset.findings import Finding
+from throwcollect.dataset.shard import shard_of
 from throwcollect.dataset.throws_table import REFUSED, Row, read_throws_table
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError
 from throwcollect.sweep.digest import trial_digests
 from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.point_file import read_points
+from throwcollect.sweep.points import Points
 from throwcollect.tasks.result import LOST
 
 WITHOUT_EPISODE = (REFUSED, LOST)
@@ -24,13 +26,13 @@ WITHOUT_EPISODE = (REFUSED, LOST)
 
 @dataclass
 class Tables:
-    """What the files beside the recordings say, as far as they can be read and do not contradict each other.
+    """The contents of the files beside the recordings, as far as they can be read and do not contradict each other.
 
     Attributes:
         config: The configuration; None if it cannot be read or is not the plan's.
         plan: The trials; None if they cannot be read or are not the configuration's.
         rows: Rows of the table of throws, by trial; None if it cannot be read.
-        doubtful: Trials of which the plan says what it was not made with.
+        doubtful: Trials whose values or seed in the plan do not have their digest.
         findings: What is wrong.
     """
 
@@ -42,11 +44,7 @@ class Tables:
 
 
 def check_tables(directory: Path) -> Tables:
-    """Read and check configuration, plan and table of throws.
-
-    Args:
-        directory: Directory of the dataset.
-    """
+    """Read and check configuration, plan and table of throws of a dataset."""
     tables = Tables()
     try:
         tables.config = load(config_path(directory))
@@ -61,12 +59,15 @@ def check_tables(directory: Path) -> Tables:
         except ForeignPlanError:
             problem = f"is not the configuration that {PLAN} was made for; one of the two was changed"
             tables.findings.append(Finding(CONFIG, "", problem))
-            # Nothing says which of them is right, so nothing is checked that follows from one.
+            # Nothing says which of them is right, so all that follows from one of them stays unchecked.
             tables.config = None
         except DatasetError as error:
             tables.findings.append(Finding.of(PLAN, error))
     if tables.plan is not None and tables.plan.config.sweep.file == TRIALS:
-        tables.findings += _find_list_problems(directory, tables.plan)
+        try:
+            read_list(directory, tables.plan)
+        except DatasetError as error:
+            tables.findings.append(Finding.of(TRIALS, error))
     if tables.plan is not None:
         for trial, digest in find_wrong_trials(tables.plan).items():
             problem = f"has digest {tables.plan.trial(trial).digest}, its values and seed give {digest}"
@@ -83,25 +84,28 @@ def check_tables(directory: Path) -> Tables:
     return tables
 
 
-def _find_list_problems(directory: Path, plan: Plan) -> Iterator[Finding]:
-    """Whether a plan takes the first points of the list that lies beside it."""
-    if not (directory / TRIALS).exists():
-        yield Finding(TRIALS, "", "is missing")
-        return
+def read_list(directory: Path, plan: Plan) -> Points:
+    """Read the list of points that a dataset's own configuration names.
+
+    Raises:
+        DatasetError: If it is missing or damaged, or its first points are not those of the plan.
+    """
+    path = directory / TRIALS
+    if not path.exists():
+        raise DatasetError("is missing", path=path)
     try:
-        points = read_points(directory / TRIALS, plan.config).first(len(plan.trials))
+        points = read_points(path, plan.config)
     except ConfigError as error:
-        yield Finding(TRIALS, "", error.problems[0].message)
-        return
-    if points != plan.trials.points:
-        yield Finding(TRIALS, "", f"begins with other points than those of {PLAN}")
+        raise DatasetError(error.problems[0].message, path=path) from error
+    if points.first(len(plan.trials)) != plan.trials.points:
+        raise DatasetError(f"begins with other points than those of {PLAN}", path=path)
+    return points
 
 
 def find_wrong_trials(plan: Plan) -> dict[int, str]:
-    """Trials that are not what a plan was made with, and the digests that their values and seeds give.
+    """Find the trials of a plan that were changed since it was made, and the digests that their values and seeds give.
 
-    Args:
-        plan: The plan.
+    Every trial has its digest in the plan.
     """
     trials = plan.trials
     digests = trial_digests(plan.config, trials.points, trials.seeds)
@@ -139,8 +143,8 @@ def _plan_findings(plan: Plan, rows: Mapping[int, Row], doubtful: Collection[int
             if row[key] != value and trial.number not in doubtful:
                 yield Finding(THROWS, place, f"has {key} = {row[key]!r}, the plan {value!r}")
         for name in plan.trials.target_names:
-            if row[name] != (wanted := trial.target.get(name)):
-                yield Finding(THROWS, place, f"has {name} = {row[name]!r}, the plan {wanted!r}")
+            if row[name] != (planned := trial.target.get(name)):
+                yield Finding(THROWS, place, f"has {name} = {row[name]!r}, the plan {planned!r}")
         if (row["outcome"] == REFUSED) != (trial.refused is not None):
             yield Finding(THROWS, place, f"is {row['outcome']}, the plan says {trial.refused or 'nothing against it'}")
         elif trial.refused is not None and row["reason"] != trial.refused:
@@ -148,8 +152,3 @@ def _plan_findings(plan: Plan, rows: Mapping[int, Row], doubtful: Collection[int
         expected = None if row["outcome"] in WITHOUT_EPISODE else shard_of(plan, trial.number)
         if row["shard"] != expected:
             yield Finding(THROWS, place, f"is {row['outcome']} with shard {row['shard']}, not {expected}")
-
-
-def shard_of(plan: Plan, trial: int) -> str:
-    """Name of the file that holds the episode of a trial, if it has one."""
-    return shard_name(plan.config.name, trial // plan.config.record.trials_per_shard)

@@ -2,17 +2,16 @@
 
 A directory that holds ``config.yaml`` and ``plan.parquet`` is a created dataset; one that also holds ``metadata.yaml``
 is finished, as that file is written last. While a dataset is filled, each open shard lies beside its final name (see
-`shard`), and the rows of finished shards lie on the disk for ``throws.parquet`` (see `row_store`). Whatever ends that,
-the next writer takes in what is there (see `recovery`) and goes on.
+`shard`), and the rows of finished shards are kept on disk for ``throws.parquet`` (see `row_store`). If the process is
+stopped, the next writer takes in the files that it left (see `recovery`) and goes on.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
 
 import pyarrow as pa
 
@@ -33,17 +32,17 @@ from throwcollect.dataset.directory import (
     shard_name,
 )
 from throwcollect.dataset.journal import Event, Journal, was_open
-from throwcollect.dataset.lock import hold_together
+from throwcollect.dataset.lock import hold_lock
 from throwcollect.dataset.manifest import FileEntry
 from throwcollect.dataset.provenance import Provenance, write_provenance
 from throwcollect.dataset.recovery import Part, find_left, recover_shard, remove_unfinished
 from throwcollect.dataset.row_store import Digests, RowStore
-from throwcollect.dataset.shard import FinishedShard, OpenShard
+from throwcollect.dataset.shard import FinishedShard, OpenShard, path_of_part
 from throwcollect.dataset.throws_table import Place, Row, ThrowsTable
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.message import Episode
 from throwcollect.errors import DatasetError
-from throwcollect.files import remove, write_file
+from throwcollect.files import is_there, remove, write_file
 from throwcollect.robots.description import full_description
 from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.points import Points
@@ -57,13 +56,6 @@ Tell = Callable[[int, Result], None]
 """Receives the number of a trial and its result."""
 
 
-class _Finished(NamedTuple):
-    """What is kept of a finished shard."""
-
-    summary: FileSummary | None
-    entry: FileEntry | None
-
-
 class DatasetWriter:
     """Takes the episodes of a plan's trials, each once and in any order, and writes the dataset.
 
@@ -72,8 +64,8 @@ class DatasetWriter:
 
     Args:
         directory: A directory as `create` leaves it.
-        plan: The plan that lies there.
-        journal: Receives what happens; None for datasets that are written in one go.
+        plan: The plan in that directory.
+        journal: Receives events; None for datasets that are written in one go.
         growing: Whether trials may still be added to the plan, until `close_plan`.
         channels: What is recorded; None for what the robot that is installed here gives.
     """
@@ -93,16 +85,17 @@ class DatasetWriter:
         self._journal = journal
         self._growing = growing
         if growing:
-            # Trials will be added to it, and the one that was given is somebody else's.
+            # The caller's plan must not grow with this one.
             self.plan = replace(plan, trials=plan.trials[:])
         self._channels = channels or Channels(self._config, full_description(self._config))
         self._table = ThrowsTable.of(plan)
         self._unfinished: set[int] = set()
         self._shards: dict[int, OpenShard] = {}
-        """Those of the unfinished shards of which an episode or a loss is there."""
+        """Unfinished shards with at least one trial that has ended."""
         self._rows: dict[int, dict[int, Row]] = {}
         """Rows of their trials that have ended."""
-        self._finished: dict[int, _Finished] = {}
+        self._recordings: dict[int, tuple[FileSummary, FileEntry]] = {}
+        """What bag's metadata and manifest say of the file of each finished shard that has one."""
         self._finished_rows = RowStore(directory, self._table.schema)
         self._held = ExitStack()
         self._expect(self.plan.trials)
@@ -130,8 +123,8 @@ class DatasetWriter:
             if not (directory / name).is_file():
                 raise DatasetError(f"holds no {name}", path=directory, expected="a dataset that was created")
         with ExitStack() as held:
-            held.enter_context(hold_together(directory))
-            journal = held.enter_context(Journal(directory))
+            held.enter_context(hold_lock(directory, alone=False))
+            journal = held.enter_context(closing(Journal(directory)))
             plan = Plan.read(directory / PLAN, load(config_path(directory)))
             plan.take_in_rounds(directory / PLAN)
             writer = cls(directory, plan, journal=journal, growing=plan.config.grows)
@@ -157,33 +150,31 @@ class DatasetWriter:
         remove_unfinished(self._directory)
         for name in (METADATA, MANIFEST, THROWS):
             remove(self._directory / name)
-        found = 0
-        numbers = sorted(self._unfinished)
-        all_left = find_left([*map(self._part, numbers)], self._channels, processes=processes)
-        for number, left in zip(numbers, all_left, strict=True):
+        count = 0
+        # Every process gets the trials of the shards that it looks through, and not a whole plan.
+        parts = {number: self._part(number) for number in sorted(self._unfinished) if self._has_file(number)}
+        all_left = find_left([*parts.values()], self._channels, processes=processes)
+        for number, left in zip(parts, all_left, strict=True):
             shard = self._shard(number)
-            recovered = recover_shard(shard, left)
-            for each in recovered.episodes:
-                place = Place(shard.path.name, -1, each.samples, each.digest)
+            episodes = recover_shard(shard, left)
+            for each in episodes:
+                place = replace(each.place, shard=shard.path.name)
                 self._rows[number][each.trial] = self._row(each.trial, each.result, place)
                 if tell is not None:
                     tell(each.trial, each.result)
-            found += len(recovered.episodes)
-            if recovered.finished is not None:
-                self._close_shard(number, recovered.finished)
-            elif recovered.episodes or not shard.missing:
+            count += len(episodes)
+            if left.finished is not None:
+                self._close_shard(number, left.finished)
+            elif episodes or not shard.missing:
                 self._finish_shard_if_complete(number)
             else:
                 del self._shards[number], self._rows[number]
-        if found:
-            self.note("recovered", episodes=found)
-        return found
+        if count:
+            self.note("recovered", episodes=count)
+        return count
 
     def extend(self, trials: Trials) -> None:
-        """Add trials to the plan, and to the one on disk before this returns.
-
-        Args:
-            trials: Numbered on from those that are there.
+        """Add trials to the plan, whose numbers continue it, and write them to disk before this returns.
 
         Raises:
             DatasetError: If the plan cannot be written.
@@ -194,7 +185,7 @@ class DatasetWriter:
         self._expect(trials)
 
     def close_plan(self) -> None:
-        """No trial will be added any more.
+        """Declare that the plan has all its trials.
 
         Raises:
             DatasetError: If the plan, or a shard that is now complete, cannot be written.
@@ -204,13 +195,13 @@ class DatasetWriter:
         for number in list(self._shards):
             self._finish_shard_if_complete(number)
 
-    def take_shard(self, number: int, summary: FileSummary | None, entry: FileEntry | None, rows: pa.Table) -> None:
+    def take_shard(self, number: int, recording: tuple[FileSummary, FileEntry] | None, rows: pa.Table) -> None:
         """Take in a finished shard that lies under its name already.
 
         Args:
             number: Its number.
-            summary: What the bag's metadata say of its file; None if there is none, as no trial of it has an episode.
-            entry: What the manifest says of its file.
+            recording: What bag's metadata and manifest say of its file; None if no trial of it has an episode, and so
+                there is no file.
             rows: The rows of its trials in the table of throws.
 
         Raises:
@@ -218,14 +209,11 @@ class DatasetWriter:
         """
         self._unfinished.discard(number)
         self._finished_rows.put(number, rows)
-        self._finished[number] = _Finished(summary, entry)
+        if recording is not None:
+            self._recordings[number] = recording
 
     def append(self, episode: Episode, result: Result) -> None:
-        """Write an episode.
-
-        Args:
-            episode: The episode.
-            result: What came of it.
+        """Write an episode, whose trial ended with this result.
 
         Raises:
             DatasetError: If the episode is damaged, is of no trial that is waited for, or cannot be written.
@@ -241,11 +229,7 @@ class DatasetWriter:
         self._finish_shard_if_complete(number)
 
     def append_lost(self, trial: int, reason: str) -> None:
-        """Write that a trial has no episode.
-
-        Args:
-            trial: Number of the trial.
-            reason: Why.
+        """Write that a trial has no episode, and the reason for it.
 
         Raises:
             DatasetError: If the trial is not waited for, or the shard that it completes cannot be written.
@@ -266,7 +250,7 @@ class DatasetWriter:
             self._journal.note(event, **details)
 
     def sync(self) -> None:
-        """Have all that was appended survive a power cut.
+        """Make everything that was appended survive a power cut.
 
         Raises:
             DatasetError: If the disk fails.
@@ -283,7 +267,7 @@ class DatasetWriter:
         return Digests(self._finished_rows.table)
 
     def finish(self, *, wall_s: float | None = None, simulations: int | None = None) -> dict[str, int]:
-        """Write everything that describes the dataset as a whole.
+        """Write the files that describe the dataset as a whole.
 
         Args:
             wall_s: Real time that the dataset took [s], for the data card; None if not known, or if a journal tells.
@@ -299,26 +283,25 @@ class DatasetWriter:
             missing = sorted(trial for number in self._unfinished for trial in self._shard(number).missing)
             example = f", such as {missing[0]}" if missing else ""
             raise DatasetError(f"lacks {format_count(len(missing), 'trial')}{example}", path=self._directory)
-        finished = [self._finished[shard] for shard in sorted(self._finished)]
         throws = self._finished_rows.table
         if self._journal is not None:
             wall_s = self._journal.measure_collected_s()
         provenance = Provenance.of_this_machine(
             simulations=simulations, wall_s=wall_s, was_open=was_open(self._directory), robot=self._channels.robot
         )
-        # How it was run may not change the dataset, so what is kept of that stands outside of what the manifest covers.
+        # How it was run must not change the dataset, so only files that the manifest does not cover tell that.
         config = self._config.without_run()
         write_provenance(self._directory, provenance)
         write_file(self._directory / CARD, data_card(config, throws, provenance).encode())
         write_file(self._directory / CONFIG, dump_yaml(config).encode())
-        recordings = [(each.summary, each.entry) for each in finished if each.summary and each.entry]
+        recordings = [self._recordings[number] for number in sorted(self._recordings)]
         let_go = self._finished_rows.let_go
         write_description(self._directory, config.name, throws, self._channels, recordings, on_piece=let_go)
         self.note("finished", wall_s=wall_s)
         return count_outcomes(throws)
 
     def close(self) -> None:
-        """Close all files; what is written stays."""
+        """Close all files; written data stay."""
         for shard in self._shards.values():
             shard.close()
         self._finished_rows.close()
@@ -344,16 +327,21 @@ class DatasetWriter:
         return (each for each in self._members(number) if each not in self.plan.trials.refused)
 
     def _part(self, number: int) -> Part:
-        """What is known of a shard without a look into its files."""
+        """Describe a shard for `find_left`, without a look into its files."""
         members, first = self._members(number), self.plan.trials.first
         trials = self.plan.trials[members.start - first : members.stop - first]
         return Part(self._path(number), Plan(self._config, trials), self._settled(number))
+
+    def _has_file(self, number: int) -> bool:
+        """Whether an earlier writer has begun a shard."""
+        path = self._path(number)
+        return is_there(path) or is_there(path_of_part(path))
 
     def _path(self, number: int) -> Path:
         return self._directory / shard_name(self._config.name, number)
 
     def _shard(self, number: int) -> OpenShard:
-        """An unfinished shard; what is known of it is held in memory only from when it is first asked for."""
+        """An unfinished shard, which takes memory only from when it is first asked for."""
         if number not in self._shards:
             shard = OpenShard(self._path(number), self._channels)
             shard.expect(self._to_run(number))
@@ -383,9 +371,7 @@ class DatasetWriter:
         rows = [ended.get(trial) or refused(self.plan.trial(trial)) for trial in self._members(number)]
         for row in rows:
             row["chunk_offset"] = finished.offsets.get(row["trial"])
-        self._unfinished.remove(number)
-        self._finished_rows.put(number, self._table.table(rows))
-        self._finished[number] = _Finished(finished.summary, finished.entry)
+        self.take_shard(number, finished.recording, self._table.table(rows))
         shard = self._shards.pop(number)
-        if finished.summary is not None:
+        if finished.recording is not None:
             self.note("shard", name=shard.path.name)

@@ -15,7 +15,7 @@ from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.progress import Progress
 from throwcollect.dataset.directory import config_path
-from throwcollect.dataset.lock import hold_together
+from throwcollect.dataset.lock import hold_lock
 from throwcollect.dataset.summary import explain_loss
 from throwcollect.errors import ConfigError, Interrupted, LossError, ThrowcollectError, WorkerError
 from throwcollect.files import open_log
@@ -102,7 +102,7 @@ def launch_host(
     host: Host | None = None
     try:
         host = make_host(place)
-        with hold_together(place.directory):
+        with hold_lock(place.directory, alone=False):
             run.update(launcher=os.getpid(), nodes=(), endpoint=None, stopping=False)
             info = host.collect(session)
             summary = None if info is None else Summary(**vars(info), open=is_open)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from throwcollect.config.loader import load, load_locating_errors
 from throwcollect.config.schema import Config
 from throwcollect.dataset.directory import CONFIG, PLAN, TRIALS, config_path
-from throwcollect.dataset.lock import hold_together
+from throwcollect.dataset.lock import hold_lock
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.ros.middleware import Middleware
 from throwcollect.runs.choice import Choice, begin, choose
@@ -228,7 +228,7 @@ def prepare_run(
         directory = run.directory / "data" if volume else request.directory
         made = not directory.exists()
         plan = plan or _make_plan(request, directory, onlooker)
-        held.enter_context(hold_together(directory))
+        held.enter_context(hold_lock(directory, alone=False))
         if not request.resumed:
             undo.callback(_remove_plan, directory, made=made)
         choice = choice or choose(config, say=onlooker.say, warn=onlooker.warn, begun=begun)

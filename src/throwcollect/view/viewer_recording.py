@@ -12,8 +12,7 @@ from mcap.writer import CompressionType, Writer
 from rclzenoh.interfaces import Message, get_message, serialize
 from throwcollect.config.schema import Config
 from throwcollect.dataset.bag import FileSummary
-from throwcollect.dataset.mcap_contents import declarations
-from throwcollect.dataset.mcap_file import LIBRARY, PROFILE
+from throwcollect.dataset.mcap_file import LIBRARY, PROFILE, declarations
 from throwcollect.episode.channels import Channel, Qos
 from throwcollect.episode.frames import read_frames
 from throwcollect.episode.record import Samples

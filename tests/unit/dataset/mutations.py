@@ -19,6 +19,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from hypothesis import strategies as st
+
 from throwcollect.dataset.inspect import digest, info
 from throwcollect.dataset.manifest import entry_of_file, list_promised_names, manifest_text, read_named_manifest
 from throwcollect.dataset.reader import Dataset
@@ -42,6 +44,15 @@ class Mutation(NamedTuple):
     place: float
     span: int
     number: int
+
+
+any_mutation = st.builds(
+    Mutation,
+    kind=st.sampled_from(KINDS),
+    place=st.floats(0, 1),
+    span=st.integers(1, 4096),
+    number=st.integers(0, 2**32 - 1),
+)
 
 
 def mutate(data: bytes, mutations: Sequence[Mutation]) -> bytes:

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -22,7 +23,7 @@ def events_of(directory: Path) -> list[str]:
 
 
 def test_events_are_read_back_in_order_with_their_times(tmp_path: Path) -> None:
-    with Journal(tmp_path) as journal:
+    with closing(Journal(tmp_path)) as journal:
         journal.note("lease", trial=3, simulation="sim_0")
         journal.note("commit", trial=3, outcome="landed", digest="00")
     events = list(read_journal(tmp_path / "logs" / "journal.jsonl"))
@@ -34,7 +35,7 @@ def test_events_are_read_back_in_order_with_their_times(tmp_path: Path) -> None:
 
 def test_a_line_that_was_cut_off_does_not_spoil_the_next(tmp_path: Path) -> None:
     journal_of(tmp_path, line("opened", 1.0), '{"event": "comm')
-    with Journal(tmp_path) as journal:
+    with closing(Journal(tmp_path)) as journal:
         journal.note("finished")
     assert events_of(tmp_path) == ["opened", "opened", "finished"]
 
@@ -52,7 +53,7 @@ def test_pauses_between_processes_do_not_count_as_time_of_collecting(tmp_path: P
 
 
 def test_the_time_that_the_data_card_has_is_the_one_that_is_told(tmp_path: Path) -> None:
-    with Journal(tmp_path) as journal:
+    with closing(Journal(tmp_path)) as journal:
         journal.note("finished", wall_s=journal.measure_collected_s() + 20.0)
     assert measure_collected_s(tmp_path) == pytest.approx(20.0, abs=0.5)
     # Finishing takes a moment, which nobody counts, and another process goes on.

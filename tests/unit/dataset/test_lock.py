@@ -14,7 +14,7 @@ from tests.unit.dataset.mutations import SETTINGS
 
 from throwcollect.coordinator.resume import resume
 from throwcollect.dataset.creation import create
-from throwcollect.dataset.lock import hold_alone, hold_together
+from throwcollect.dataset.lock import hold_lock
 from throwcollect.dataset.rebuild import rebuild
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.errors import DatasetError
@@ -53,21 +53,21 @@ def test_nobody_changes_a_dataset_that_is_collected_into(begun: Path, change: Ca
 
 
 def test_nobody_changes_a_dataset_whose_coordinator_is_started_again(begun: Path) -> None:
-    with hold_together(begun):
+    with hold_lock(begun, alone=False):
         DatasetWriter.open(begun).close()
         with pytest.raises(DatasetError, match=BUSY):
             go_on(begun)
 
 
 def test_nobody_begins_to_collect_into_a_dataset_that_is_prepared(begun: Path) -> None:
-    with hold_alone(begun), pytest.raises(DatasetError, match=BUSY):
+    with hold_lock(begun), pytest.raises(DatasetError, match=BUSY):
         DatasetWriter.open(begun)
     DatasetWriter.open(begun).close()
 
 
 def test_two_collections_cannot_be_prepared_in_one_directory(tmp_path: Path) -> None:
     (tmp_path / "dataset").mkdir()
-    with hold_alone(tmp_path / "dataset"), pytest.raises(DatasetError, match=BUSY):
+    with hold_lock(tmp_path / "dataset"), pytest.raises(DatasetError, match=BUSY):
         create(tmp_path / "dataset", Collection(SETTINGS).plan)
     assert list((tmp_path / "dataset").iterdir()) == []
 
@@ -75,9 +75,9 @@ def test_two_collections_cannot_be_prepared_in_one_directory(tmp_path: Path) -> 
 def test_another_name_of_the_directory_is_the_same_directory(begun: Path, tmp_path: Path) -> None:
     (tmp_path / "link").symlink_to(begun)
     with (
-        hold_together(begun),
+        hold_lock(begun, alone=False),
         pytest.raises(DatasetError, match="link: another process"),
-        hold_alone(tmp_path / "link"),
+        hold_lock(tmp_path / "link"),
     ):
         pass
 
@@ -89,16 +89,19 @@ def test_who_has_just_been_killed_is_waited_for(begun: Path, monkeypatch: pytest
         assert other.stdout is not None
         other.stdout.readline()
         other.kill()
-        with hold_alone(begun):
+        with hold_lock(begun):
             pass
 
 
 def test_nothing_is_left_of_a_lock(tmp_path: Path) -> None:
-    with hold_alone(tmp_path):
+    with hold_lock(tmp_path):
         pass
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_directory_that_is_not_there_cannot_be_locked(tmp_path: Path) -> None:
-    with pytest.raises(DatasetError, match=r"gone: cannot be read: No such file"), hold_together(tmp_path / "gone"):
+    with (
+        pytest.raises(DatasetError, match=r"gone: cannot be read: No such file"),
+        hold_lock(tmp_path / "gone", alone=False),
+    ):
         pass

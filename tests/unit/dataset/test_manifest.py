@@ -16,12 +16,18 @@ from mcap.opcode import Opcode
 from tests.unit.dataset.conftest import Collection
 from tests.unit.dataset.mutations import SETTINGS, no_plan
 
-from throwcollect.dataset.manifest import RunningHash, entry_of_file, list_promised_names, read_manifest
+from throwcollect.dataset.manifest import (
+    RunningHash,
+    entry_of_file,
+    find_changed_files,
+    find_manifest_problems,
+    list_promised_names,
+    read_manifest,
+)
 from throwcollect.dataset.mcap_reader import open_mcap
 from throwcollect.dataset.rebuild import rebuild
 from throwcollect.dataset.repair import repair
 from throwcollect.dataset.verify import verify
-from throwcollect.dataset.verify_manifest import find_changed_files, find_manifest_problems
 from throwcollect.derive.selection import filter_trials
 from throwcollect.errors import DatasetError
 

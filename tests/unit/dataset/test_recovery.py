@@ -24,19 +24,13 @@ from throwcollect.sweep.round_file import append_round
 from throwcollect.tasks.throw.outcome import ThrowResult
 
 from .conftest import Collection
-from .mutations import KINDS, Mutation, mutate
+from .mutations import Mutation, any_mutation, mutate
 
 TRIALS = 4
 SHARDS = ("quick_00000.mcap", "quick_00001.mcap")
 
 damages = st.lists(
-    st.builds(
-        Mutation,
-        kind=st.sampled_from(KINDS),
-        place=st.floats(0, 1),
-        span=st.integers(1, 4096),
-        number=st.integers(0, 2**32 - 1),
-    ),
+    any_mutation,
     max_size=3,
 )
 

@@ -19,7 +19,7 @@ import zstandard
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.unit.dataset.conftest import Collection
-from tests.unit.dataset.mutations import KINDS, SETTINGS, Mutation, mutate, outcomes
+from tests.unit.dataset.mutations import SETTINGS, Mutation, any_mutation, mutate, outcomes
 
 from throwcollect.config.loader import load
 from throwcollect.dataset.bag import from_yaml
@@ -39,13 +39,7 @@ RECORDING = "quick_00000.mcap"
 FILES = ("config.yaml", "metadata.yaml", "plan.parquet", "throws.parquet", RECORDING)
 
 mutations = st.lists(
-    st.builds(
-        Mutation,
-        kind=st.sampled_from(KINDS),
-        place=st.floats(0, 1),
-        span=st.integers(1, 4096),
-        number=st.integers(0, 2**32 - 1),
-    ),
+    any_mutation,
     min_size=1,
     max_size=4,
 )

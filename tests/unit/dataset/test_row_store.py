@@ -46,7 +46,7 @@ class ShardWithoutFile:
 
     def finish(self) -> FinishedShard:
         name = self.path.name
-        return FinishedShard(FileSummary(name, 0, 1, {}), self.offsets, FileEntry(name, 1, "0" * 64))
+        return FinishedShard((FileSummary(name, 0, 1, {}), FileEntry(name, 1, "0" * 64)), self.offsets)
 
 
 def rows(first: int, count: int) -> pa.Table:
