@@ -1,4 +1,4 @@
-"""`throwcollect up` and `resume`: from a YAML file to a dataset, in this terminal or by a launcher that outlives it."""
+"""`throwcollect up`, `resume`, `join-run` and `join`: collect a dataset, in this terminal or by a detached launcher."""
 
 from __future__ import annotations
 
@@ -6,19 +6,16 @@ import json as jsonlib
 import sys
 from collections.abc import Callable
 from contextlib import ExitStack
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from throwcollect.cli.options import (
-    DatasetArgument,
-    JsonOption,
-    SetOption,
-    TrialsOption,
-    overrides,
-)
+from throwcollect.cli.interruptions import Interruptions
+from throwcollect.cli.options import DatasetArgument, JsonOption, SetOption, TrialsOption, overrides
+from throwcollect.cli.printing import print_json, tell
+from throwcollect.cli.streams import ensure_written, only_log
+from throwcollect.cli.terminal import Display, display
 from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.errors import ConfigError
 from throwcollect.files import write_secret
@@ -26,7 +23,6 @@ from throwcollect.side_by_side import count_cores
 from throwcollect.wording import command
 
 if TYPE_CHECKING:
-    from throwcollect.cli.terminal import Display
     from throwcollect.runs.prepared_run import PreparedRun
 
 SimulationsOption = Annotated[
@@ -48,6 +44,7 @@ TokenOption = Annotated[
 DetachOption = Annotated[
     bool, typer.Option("-d", "--detach", help="Print the id of the run as soon as its nodes are started.")
 ]
+LockOption = Annotated[int, typer.Option("--lock", help="Descriptor of the run's locked file.")]
 
 
 def up(
@@ -95,8 +92,10 @@ def up(
             raise ConfigError(f"--slice {slice}: needs --output DIR, in which the plan lies")
         _collect_slice(output, slice, changes, json=json)
     elif resume is None:
+        from throwcollect.runs.preparation import prepare
+
         _collect(
-            lambda runs, shown: runs.prepare(
+            lambda shown: prepare(
                 config or DEFAULT_CONFIG,
                 overrides=changes,
                 output=output,
@@ -134,17 +133,14 @@ def resume(
     if is_submitted(directory):
         from throwcollect.cluster.submit import submit_missing
 
-        if submit_missing(directory, overrides=changes, say=partial(typer.echo, err=True)) is None:
-            typer.echo(f"{directory}: nothing is left to submit", err=True)
+        if submit_missing(directory, overrides=changes, say=tell) is None:
+            tell(f"{directory}: nothing is left to submit")
         return
     _go_on(directory, None, changes, detach=detach, json=json, check=check)
 
 
-def launch(run: str, lock: Annotated[int, typer.Option("--lock", help="Descriptor of the run's locked file.")]) -> None:
-    """Launch a prepared run, as `up -d` does."""
-    from throwcollect.cli.interruptions import Interruptions
-    from throwcollect.cli.streams import only_log
-    from throwcollect.cli.terminal import display
+def launch(run: str, lock: LockOption) -> None:
+    """Launch a prepared run; `up -d` starts this command."""
     from throwcollect.runs.launcher import launch_inherited
 
     only_log()
@@ -152,11 +148,8 @@ def launch(run: str, lock: Annotated[int, typer.Option("--lock", help="Descripto
         launch_inherited(run, lock, onlooker=shown, interruptions=lambda: interruptions.count)
 
 
-def begin(run: str, lock: Annotated[int, typer.Option("--lock", help="Descriptor of the run's locked file.")]) -> None:
-    """Prepare and launch a run that somebody else has begun, by the order in standard input."""
-    from throwcollect.cli.interruptions import Interruptions
-    from throwcollect.cli.streams import only_log
-    from throwcollect.cli.terminal import display
+def begin(run: str, lock: LockOption) -> None:
+    """Prepare and launch a run that another process has begun, and whose order it writes to standard input."""
     from throwcollect.runs.background import carry_out
 
     only_log()
@@ -166,8 +159,6 @@ def begin(run: str, lock: Annotated[int, typer.Option("--lock", help="Descriptor
 
 
 def _collect_slice(directory: Path, text: str, changes: list[str], *, json: bool) -> None:
-    from throwcollect.cli.interruptions import Interruptions
-    from throwcollect.cli.terminal import display
     from throwcollect.dataset.slice_directory import slice_directory
     from throwcollect.runs.slices import collect_slice
     from throwcollect.sweep.slice import Slice
@@ -193,8 +184,6 @@ def join_run(
     ] = None,
 ) -> None:
     """Add simulations of this machine to a run of another one, until it is over; Ctrl-C takes them away."""
-    from throwcollect.cli.interruptions import Interruptions
-    from throwcollect.cli.terminal import display
     from throwcollect.runs.joining import join_run as join
 
     with display(quiet=False) as shown, Interruptions() as interruptions:
@@ -204,16 +193,12 @@ def join_run(
 
 def join(directory: DatasetArgument, json: JsonOption = False) -> None:
     """Make one dataset of the slices that `up --slice` has collected."""
-    from throwcollect.cli.dataset.info import print_summary
+    from throwcollect.cli.dataset.info import print_collected
     from throwcollect.dataset.inspect import info
     from throwcollect.dataset.join import join as join_slices
-    from throwcollect.dataset.summary import explain_loss
 
     join_slices(directory)
-    found = info(directory)
-    print_summary(found, directory, as_json=json)
-    if (lost := explain_loss(found.outcomes, hint=None)) is not None:
-        raise lost
+    print_collected(info(directory), directory, as_json=json)
 
 
 def _go_on(
@@ -227,8 +212,10 @@ def _go_on(
     token_file: Path | None = None,
     view: bool = False,
 ) -> None:
+    from throwcollect.runs.preparation import resume
+
     launched = _collect(
-        lambda runs, shown: runs.resume(
+        lambda shown: resume(
             directory, config=config, overrides=changes, check=check, ahead=not detach, onlooker=shown
         ),
         detach=detach,
@@ -244,70 +231,60 @@ def _go_on(
 
 
 def _collect(
-    prepare: Callable[[Any, Display], PreparedRun | None],
+    prepare: Callable[[Display], PreparedRun | None],
     *,
     detach: bool,
     json: bool,
     token_file: Path | None,
-    view: bool = False,
+    view: bool,
 ) -> bool:
-    """Launch a run and print its summary or, detached, its id.
+    """Launch a run and print its summary or, if it is detached, its id.
 
     Args:
-        prepare: Prepares the run, with the room that does such things, and a display that shows how that goes.
-        detach: Whether to come back as soon as its nodes are started.
+        prepare: Prepares the run, and shows its progress on the display; returns None if there is nothing to do.
+        detach: Whether to return as soon as the nodes are started.
         json: Whether to print JSON.
-        token_file: Where the token goes of a run that other machines may join; None to print it.
-        view: Whether to print the address of a page on which the run is seen.
+        token_file: File for the token of a run that other machines may join; None prints the token.
+        view: Whether to print the address of a page that shows the run.
 
     Returns:
         Whether there was anything to do.
     """
-    from throwcollect.cli.interruptions import Interruptions
-    from throwcollect.cli.terminal import display
-    from throwcollect.runs import preparation
-
     with ExitStack() as held:
         with display(quiet=json, bar=not detach) as shown:
-            if (run := prepare(preparation, shown)) is None:
+            if (run := prepare(shown)) is None:
                 return False
             held.enter_context(run)
             if token_file is not None:
                 write_secret(token_file, f"{run.token}\n".encode())
             elif run.config.run.listen is not None:
-                # A secret, so it is not among what is said, which may be written down.
-                typer.echo(f"other machines join by: {command('join-run', run.token, '-n', 4)}", err=True)
+                # The token is a secret, and what a display is told may be written to a log.
+                tell(f"other machines join by: {command('join-run', run.token, '-n', 4)}")
             if view:
                 from throwcollect.serve.finding import ensure_server, make_page_address
 
-                typer.echo(f"look inside: {make_page_address(ensure_server(), run.record.run)}", err=True)
+                tell(f"look inside: {make_page_address(ensure_server(), run.record.run)}")
             if not detach:
                 with Interruptions() as interruptions:
                     summary = run.collect(interruptions=lambda: interruptions.count)
         if detach:
             _start(run, json=json)
             return True
-    # They read datasets; what takes long to import is not imported before nodes have begun to.
-    from throwcollect.cli.dataset.info import print_summary
-    from throwcollect.dataset.summary import explain_loss
+    # Only now, because this import takes long, and nodes would start later if it came first.
+    from throwcollect.cli.dataset.info import print_collected
 
-    print_summary(summary, run.directory, as_json=json)
-    if (lost := explain_loss(summary.outcomes, hint=run.place.way_on)) is not None:
-        raise lost
+    print_collected(summary, run.directory, as_json=json, hint=run.place.way_on)
     return True
 
 
 def _start(run: PreparedRun, *, json: bool) -> None:
-    """Hand the run over to a process of its own, and say how to follow it."""
-    from throwcollect.cli.interruptions import Interruptions
-    from throwcollect.cli.streams import ensure_written
-
+    """Hand the run over to a process of its own, and print how to follow it."""
     with Interruptions() as interruptions:
         record = run.start(interruptions=lambda: interruptions.count).record
     if json:
         where = {"volume": record.volume} if record.volume else {"directory": record.directory}
-        typer.echo(jsonlib.dumps({"run": record.run, **where}, indent=2))
+        print_json({"run": record.run, **where})
     else:
         typer.echo(record.run)
-        typer.echo(f"follow it: {command('wait', '--run', record.run)}   (or ps, logs -f, stop)", err=True)
+        tell(f"follow it: {command('wait', '--run', record.run)}   (or ps, logs -f, stop)")
     ensure_written(hint=f"run {record.run} goes on; throwcollect ps lists it")

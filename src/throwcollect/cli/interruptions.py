@@ -1,4 +1,4 @@
-"""Ctrl-C, and whatever else asks to stop, while nodes run."""
+"""Signals that ask a command to stop, such as Ctrl-C, while nodes run."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from throwcollect.interruption import stop_signals
 
 
 class Interruptions:
-    """Counts the signals that ask to stop instead of letting them raise, so that all nodes are seen to their end.
+    """Counts the signals that ask to stop, which would otherwise raise, so that the command can end its nodes in order.
 
     Use it as a context manager, in the main thread.
 

@@ -1,0 +1,30 @@
+"""How commands print: results to standard output, as text or as JSON, and remarks to standard error."""
+
+from __future__ import annotations
+
+import json as jsonlib
+from functools import partial
+
+import typer
+
+tell = partial(typer.echo, err=True)
+"""Print a remark to standard error, where it does not mix with the result."""
+
+
+def print_json(document: object) -> None:
+    """Print a JSON document."""
+    typer.echo(jsonlib.dumps(document, indent=2))
+
+
+def print_result(document: object, text: str, *, json: bool) -> None:
+    """Print a result for programs or for people.
+
+    Args:
+        document: The result for programs.
+        text: The result for people.
+        json: Whether a program asks.
+    """
+    if json:
+        print_json(document)
+    else:
+        typer.echo(text)
