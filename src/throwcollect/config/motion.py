@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, Discriminator, Field, PositiveFloat, Tag, model_validator
+from pydantic import BaseModel, Discriminator, Field, PositiveFloat, Tag
 
 from throwcollect.config.key import Key
-from throwcollect.config.kinds import ContradictionError, Joint
+from throwcollect.config.kinds import Joint
 from throwcollect.config.section import Section
 
 
@@ -34,16 +35,14 @@ class DynamicMovementPrimitive(Section):
     alpha_x: PositiveFloat = 2.0
     """Decay constant of the phase [-]."""
 
-    @model_validator(mode="after")
-    def _weights_fit(self) -> DynamicMovementPrimitive:
-        wrong = {
-            f"weights.{joint}": f"should be basis_functions = {self.basis_functions} numbers, got {len(weights)}"
-            for joint, weights in self.weights.items()
-            if len(weights) != self.basis_functions
-        }
-        if wrong:
-            raise ContradictionError(wrong)
-        return self
+    def find_contradictions(self) -> Iterator[tuple[str, str]]:
+        """See `Section`."""
+        for joint, weights in self.weights.items():
+            if len(weights) != self.basis_functions:
+                yield (
+                    f"weights.{joint}",
+                    f"should be basis_functions = {self.basis_functions} numbers, got {len(weights)}",
+                )
 
 
 def _family(value: Any) -> str | None:

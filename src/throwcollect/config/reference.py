@@ -12,8 +12,6 @@ from throwcollect.config.section import Section
 from throwcollect.config.shape import Shape, json_schema, root
 from throwcollect.config.values import sweepable_keys
 
-__all__ = ["json_schema", "page"]
-
 _INTRODUCTION = """\
 # Configuration
 

@@ -7,18 +7,18 @@ Units are part of the name: ``_s``, ``_m``, ``_kg``, ``_hz``, ``_mps2``; angles 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from functools import reduce
 from operator import or_
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import Discriminator, Field, PositiveInt, Tag, model_validator
+from pydantic import Discriminator, Field, PositiveInt, Tag
 
 from throwcollect.config.cluster import ClusterConfig
 from throwcollect.config.containers import ContainersConfig
 from throwcollect.config.controllers import ControllersConfig
 from throwcollect.config.key import Effect, Key
-from throwcollect.config.kinds import Angle, ContradictionError, Joint, Name
+from throwcollect.config.kinds import Angle, Joint, Name
 from throwcollect.config.motion import DynamicMovementPrimitive, MinimumJerk
 from throwcollect.config.run import RunConfig
 from throwcollect.config.section import Section
@@ -182,11 +182,10 @@ class RecordConfig(Section):
     trials_per_shard: Annotated[PositiveInt, Key(Effect.FILES)] = 1000
     """Trials in one MCAP file."""
 
-    @model_validator(mode="after")
-    def _require_judged_topics(self) -> RecordConfig:
-        if missing := [t for t in ("joint_states", "ball/odometry") if t not in self.topics]:
-            raise ContradictionError({"topics": f"should hold {' and '.join(missing)}, from which throws are judged"})
-        return self
+    def find_contradictions(self) -> Iterator[tuple[str, str]]:
+        """See `Section`."""
+        if missing := [topic for topic in ("joint_states", "ball/odometry") if topic not in self.topics]:
+            yield "topics", f"should hold {' and '.join(missing)}, from which throws are judged"
 
 
 class Config(Section):
@@ -226,8 +225,32 @@ class Config(Section):
     cluster: Annotated[ClusterConfig, Key(Effect.RUN)] = ClusterConfig()
     """Runs on a cluster."""
 
-    @model_validator(mode="after")
-    def _joints_are_those_of_the_robot(self) -> Config:
+    def find_contradictions(self) -> Iterator[tuple[str, str]]:
+        """See `Section`."""
+        yield from self._find_strange_joints()
+        if self.sim.physics_hz % self.record.rate_hz:
+            yield "record.rate_hz", f"should divide sim.physics_hz, {self.sim.physics_hz}, got {self.record.rate_hz}"
+        if isinstance(self.robot.locked, list) and (moving := [j for j in self.robot.locked if j in self.task.end]):
+            yield "robot.locked", f"should not hold joints that task.end moves, got {', '.join(moving)}"
+        for joint in self.robot.joint_offsets:
+            if joint not in self.task.end:
+                yield f"robot.joint_offsets.{joint}", "should be left out, as task.end does not move this joint"
+        for joint in self.robot.posture:
+            if joint in self.task.start:
+                yield f"robot.posture.{joint}", "should be left out, as task.start sets this joint"
+        if self.until is not None and not isinstance(self.until, self.task.until):
+            yield f"until.{self.until.outcome()}", f"should be {self.task.success}, as the task is {self.task.name}"
+        if self.sweep.target is not None and not self.task.throws:
+            yield "sweep.target", f"should be left out, as the task {self.task.name} throws no ball"
+        if self.until is not None and self.sweep.sampler == "list":
+            yield "until", "should be left out, as the file of the sampler list is not part of the dataset"
+        several = f"should be left out, as {self.run.simulations} simulations"
+        if self.containers.sim.ports and self.run.simulations > 1:
+            yield "containers.sim.ports", f"{several} cannot share a port of this machine"
+        if self.run.root_namespace and self.run.simulations > 1:
+            yield "run.root_namespace", f"{several} (-n) cannot share a namespace"
+
+    def _find_strange_joints(self) -> Iterator[tuple[str, str]]:
         robot = load_member("robots", self.robot.name)
         named = {
             "robot.posture": self.robot.posture,
@@ -235,46 +258,10 @@ class Config(Section):
             "task.start": self.task.start,
             "task.end": self.task.end,
         }
-        wrong = {
-            f"{section}.{joint}": f"{robot.title} has no joint {joint!r}"
-            for section, joints in named.items()
-            for joint in joints
-            if joint not in robot.joints
-        }
-        if wrong:
-            raise ContradictionError(wrong)
-        return self
-
-    @model_validator(mode="after")
-    def _sections_agree(self) -> Config:
-        wrong = {}
-        if self.sim.physics_hz % self.record.rate_hz:
-            wrong["record.rate_hz"] = f"should divide sim.physics_hz, {self.sim.physics_hz}, got {self.record.rate_hz}"
-        if isinstance(self.robot.locked, list) and (moving := [j for j in self.robot.locked if j in self.task.end]):
-            wrong["robot.locked"] = f"should not hold joints that task.end moves, got {', '.join(moving)}"
-        for joint in self.robot.joint_offsets:
-            if joint not in self.task.end:
-                wrong[f"robot.joint_offsets.{joint}"] = "should be left out, as task.end does not move this joint"
-        for joint in self.robot.posture:
-            if joint in self.task.start:
-                wrong[f"robot.posture.{joint}"] = "should be left out, as task.start sets this joint"
-        if self.until is not None and not isinstance(self.until, self.task.until):
-            wrong[f"until.{self.until.outcome()}"] = f"should be {self.task.success}, as the task is {self.task.name}"
-        if self.sweep.target is not None and not self.task.throws:
-            wrong["sweep.target"] = f"should be left out, as the task {self.task.name} throws no ball"
-        if self.until is not None and self.sweep.sampler == "list":
-            wrong["until"] = "should be left out, as the file of the sampler list is not part of the dataset"
-        if self.containers.sim.ports and self.run.simulations > 1:
-            wrong["containers.sim.ports"] = (
-                f"should be left out, as {self.run.simulations} simulations cannot share a port of this machine"
-            )
-        if self.run.root_namespace and self.run.simulations > 1:
-            wrong["run.root_namespace"] = (
-                f"should be left out, as {self.run.simulations} simulations (-n) cannot share a namespace"
-            )
-        if wrong:
-            raise ContradictionError(wrong)
-        return self
+        for section, joints in named.items():
+            for joint in joints:
+                if joint not in robot.joints:
+                    yield f"{section}.{joint}", f"{robot.title} has no joint {joint!r}"
 
     @property
     def grows(self) -> bool:

@@ -5,25 +5,43 @@ from __future__ import annotations
 import ast
 import inspect
 import sys
+from collections.abc import Iterator
 from functools import cache
 from itertools import pairwise
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, GetJsonSchemaHandler
+from pydantic import BaseModel, ConfigDict, GetJsonSchemaHandler, model_validator
 from pydantic_core import CoreSchema
+from typing_extensions import Self
+
+from throwcollect.config.kinds import ContradictionError
 
 
 class Section(BaseModel):
-    """Base of all sections: unknown keys are errors, values never change."""
+    """Base of all sections: unknown keys are errors, values never change, and keys must not contradict each other."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    def find_contradictions(self) -> Iterator[tuple[str, str]]:
+        """List the keys that are right alone and wrong together.
+
+        Yields:
+            A dotted key, relative to this section, and a sentence that says what is wrong.
+        """
+        yield from ()
+
+    @model_validator(mode="after")
+    def _refuse_contradictions(self) -> Self:
+        if wrong := dict(self.find_contradictions()):
+            raise ContradictionError(wrong)
+        return self
 
     @classmethod
     def __get_pydantic_json_schema__(cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         """The section's JSON Schema, in which the docstrings of its keys describe them.
 
-        Pydantic's own ``use_attribute_docstrings`` reads them in every process, of which few ask for a schema: a
-        third of the time that importing the configuration takes.
+        Pydantic's own ``use_attribute_docstrings`` would read the docstrings in every process, although few need a
+        schema. That takes a third of the time of importing the configuration.
         """
         schema = handler(core_schema)
         properties = handler.resolve_ref_schema(schema).get("properties", {})
@@ -33,7 +51,7 @@ class Section(BaseModel):
 
 
 def _read_docstrings(section: type[Section]) -> dict[str, str]:
-    """The docstrings that stand below the fields of a section and of its bases, by name of the field."""
+    """Read the docstrings below the fields of a section and of its bases, by name of the field."""
     found: dict[str, str] = {}
     for each in reversed(section.__mro__):
         if issubclass(each, Section):
@@ -43,7 +61,7 @@ def _read_docstrings(section: type[Section]) -> dict[str, str]:
 
 @cache
 def _read_docstrings_of_module(module: str) -> dict[str, dict[str, str]]:
-    """The docstrings of fields, by class: a module is parsed once, as cutting each class out of it takes longer."""
+    """Read the docstrings of fields, by class: to parse a module once is faster than to cut out each class first."""
     classes: dict[str, dict[str, str]] = {}
     for node in ast.parse(inspect.getsource(sys.modules[module])).body:
         if not isinstance(node, ast.ClassDef):

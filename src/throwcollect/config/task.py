@@ -1,14 +1,14 @@
-"""What the sections of all tasks have in common: a motion of some joints from a start to an end."""
+"""Keys of every task: a motion of some joints from a start to an end."""
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from typing import Annotated, ClassVar
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from throwcollect.config.key import Effect, Key
-from throwcollect.config.kinds import Angle, ContradictionError, Joint
+from throwcollect.config.kinds import Angle, Joint
 from throwcollect.config.motion import DynamicMovementPrimitive, MinimumJerk, Trajectory
 from throwcollect.config.section import Section
 from throwcollect.config.target import TargetColumn
@@ -89,17 +89,14 @@ class TaskConfig(Section):
             wrong |= {name: f"is missing beside {join_names(there)}" for name in missing}
         return wrong
 
-    @model_validator(mode="after")
-    def _moving_joints_start_somewhere(self) -> TaskConfig:
-        wrong = {f"end.{joint}": "start should name this joint, too" for joint in self.end if joint not in self.start}
+    def find_contradictions(self) -> Iterator[tuple[str, str]]:
+        """See `Section`."""
         if not self.end:
-            wrong["end"] = "names no joint, so nothing would move"
+            yield "end", "names no joint, so nothing would move"
+        for joint in self.end:
+            if joint not in self.start:
+                yield f"end.{joint}", "start should name this joint, too"
         if isinstance(self.trajectory, DynamicMovementPrimitive):
-            wrong |= {
-                f"trajectory.weights.{joint}": "end does not name this joint, so it does not move"
-                for joint in self.trajectory.weights
-                if joint not in self.end
-            }
-        if wrong:
-            raise ContradictionError(wrong)
-        return self
+            for joint in self.trajectory.weights:
+                if joint not in self.end:
+                    yield f"trajectory.weights.{joint}", "end does not name this joint, so it does not move"
