@@ -51,12 +51,12 @@ def ps(
     held = find_held_runs()
     unrecorded = [each for run, each in held.items() if run not in ids]
     if json:
-        documents = [_document(run) for run in shown] + [_unrecorded_document(*each) for each in unrecorded]
+        documents = [_make_document(run) for run in shown] + [_make_unrecorded_document(*each) for each in unrecorded]
         documents += cluster_runs.documents()
         typer.echo(jsonlib.dumps(documents, indent=2, default=_in_json))
         return
-    rows = [(_row(run), _node_lines(run, held.get(run.id))) for run in shown]
-    rows += [(_unrecorded_row(*each), _list_held_nodes(*each)) for each in unrecorded]
+    rows = [(_make_row(run), _node_lines(run, held.get(run.id))) for run in shown]
+    rows += [(_make_unrecorded_row(*each), _list_held_nodes(*each)) for each in unrecorded]
     rows += [(row, []) for row in cluster_runs.rows()]
     for line in _table(rows):
         typer.echo(line)
@@ -214,16 +214,16 @@ def _in_json(value: datetime) -> str:
     return value.isoformat(timespec="milliseconds")
 
 
-def _document(run: Run) -> dict[str, Any]:
+def _make_document(run: Run) -> dict[str, Any]:
     error = run.record.error if run.record.failure else None
     return {**asdict(run.record), "message": str(error or ""), "status": run.status}
 
 
-def _unrecorded_document(runtime: str, held: HeldRun) -> dict[str, Any]:
+def _make_unrecorded_document(runtime: str, held: HeldRun) -> dict[str, Any]:
     return {"run": held.run_id, "runtime": runtime, "status": "unrecorded", **asdict(held)}
 
 
-def _row(run: Run) -> tuple[str, ...]:
+def _make_row(run: Run) -> tuple[str, ...]:
     record = run.record
     throws = f"{record.progress.ended}/{record.progress.total}" if record.progress is not None else "-"
     dataset = run.place.dataset if record.kind == "collection" else "-"
@@ -237,7 +237,7 @@ def _status(run: Run, record: Record) -> str:
     return f"running for {_age(record.started)}" if run.lives else run.status
 
 
-def _unrecorded_row(runtime: str, held: HeldRun) -> tuple[str, ...]:
+def _make_unrecorded_row(runtime: str, held: HeldRun) -> tuple[str, ...]:
     simulations = sum(node.name.startswith("sim_") for node in held.nodes)
     return held.run_id, runtime, str(simulations), "-", "unrecorded", held.source
 

@@ -1,4 +1,4 @@
-"""Keys for collections on a cluster: what the scheduler is asked for, and what a task begins with."""
+"""Keys for collections on a cluster: what a batch script asks of the scheduler, and how a task begins."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Keys for runs in containers: the image, where the dataset lies, and what each kind of node gets."""
+"""Keys for runs in containers: the image, the volume, and the options of each kind of node."""
 
 from __future__ import annotations
 

@@ -32,12 +32,12 @@ __all__ = ["Config", "DynamicMovementPrimitive", "MinimumJerk", "Parameter", "Ra
 
 
 def _sections_of(family: str) -> Any:
-    """Make the kind of a key that holds the section of any member of a family; its key `name` says which."""
+    """Make the type of a key that holds the section of any member of a family; its key `name` says which."""
     sections = {name: load_member(family, name) for name in names_of(family)}
     default = next(iter(sections))
 
     def choose(value: Any) -> str | None:
-        """Find the class of the section that is meant; without a name, it is that of the family's first member."""
+        """Choose the class of the section by its name; the family's first member is the default."""
         if isinstance(value, Section):
             return type(value).__name__
         name = value.get("name", default) if isinstance(value, dict) else None
@@ -47,11 +47,11 @@ def _sections_of(family: str) -> Any:
 
 
 def _untils() -> Any:
-    """Make the kind of the key `until`, which holds the section that the task wants; its only key says which."""
+    """Make the type of the key `until`, which holds the section `until` of a task; its only key says which."""
     sections = {each.until.outcome(): each.until for each in (load_member("tasks", name) for name in names_of("tasks"))}
 
     def choose(value: Any) -> str | None:
-        """Find the class of the section that is meant; one with unknown keys is meant to be the first."""
+        """Choose the class of the section by its key; the first one reports unknown keys."""
         if isinstance(value, Section):
             return type(value).__name__
         outcome = next((each for each in sections if isinstance(value, dict) and each in value), next(iter(sections)))
@@ -61,11 +61,11 @@ def _untils() -> Any:
 
 
 def _any_of(sections: Iterable[type[Section]], choose: Callable[[Any], str | None]) -> Any:
-    """Make the kind of a key that holds one of some sections.
+    """Make the type of a key that holds one of several sections.
 
     Args:
         sections: Their classes.
-        choose: Finds the name of the class for the contents of the key; None for none.
+        choose: Chooses the name of the class by the value of the key; None for none.
     """
     kinds = list(dict.fromkeys(sections))
     if len(kinds) == 1:
@@ -80,7 +80,7 @@ if TYPE_CHECKING:
     AnyTask = TaskConfig
     AnyUntil = UntilConfig
 else:
-    # Which members there are is known when the program runs; what all of them have in common, before.
+    # The members are known only when the program runs, so type checkers see their common base instead.
     RobotName = Literal[names_of("robots")]
     EngineName = Literal[names_of("engines")]
     AnyTool = _sections_of("tools")

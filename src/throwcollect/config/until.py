@@ -1,4 +1,4 @@
-"""When enough has been collected: what the sections `until` of all tasks have in common."""
+"""Base of the sections `until` of all tasks, which say when enough has been collected."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class UntilConfig(Section):
 
     @classmethod
     def outcome(cls) -> str:
-        """Return the outcome that is counted."""
+        """The outcome that is counted."""
         return next(iter(cls.model_fields))
 
     @property
