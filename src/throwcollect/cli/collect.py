@@ -6,6 +6,7 @@ import json as jsonlib
 import sys
 from collections.abc import Callable
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -15,7 +16,7 @@ from throwcollect.cli.interruptions import Interruptions
 from throwcollect.cli.options import DatasetArgument, JsonOption, SetOption, TrialsOption, overrides
 from throwcollect.cli.printing import print_json, tell
 from throwcollect.cli.streams import ensure_written, only_log
-from throwcollect.cli.terminal import Display, display
+from throwcollect.cli.terminal import display
 from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.errors import ConfigError
 from throwcollect.files import write_secret
@@ -91,27 +92,19 @@ def up(
         if output is None:
             raise ConfigError(f"--slice {slice}: needs --output DIR, in which the plan lies")
         _collect_slice(output, slice, changes, json=json)
-    elif resume is None:
-        from throwcollect.runs.preparation import prepare
+        return
+    from throwcollect.runs.preparation import prepare
+    from throwcollect.runs.preparation import resume as go_on
 
-        _collect(
-            lambda shown: prepare(
-                config or DEFAULT_CONFIG,
-                overrides=changes,
-                output=output,
-                processes=count_cores(),
-                ahead=not detach,
-                onlooker=shown,
-            ),
-            detach=detach,
-            json=json,
-            token_file=token_file,
-            view=view,
-        )
+    prepare_run: Callable[..., PreparedRun | None]
+    if resume is None:
+        config = config or DEFAULT_CONFIG
+        prepare_run = partial(prepare, config, overrides=changes, output=output, processes=count_cores())
     elif output is not None:
         raise ConfigError(f"--output {output}: should be left out with --resume, which names the directory")
     else:
-        _go_on(resume, config, changes, detach=detach, json=json, token_file=token_file, view=view)
+        prepare_run = partial(go_on, resume, config=config, overrides=changes)
+    _collect(prepare_run, directory=resume, detach=detach, json=json, token_file=token_file, view=view)
 
 
 def resume(
@@ -136,7 +129,10 @@ def resume(
         if submit_missing(directory, overrides=changes, say=tell) is None:
             tell(f"{directory}: nothing is left to submit")
         return
-    _go_on(directory, None, changes, detach=detach, json=json, check=check)
+    from throwcollect.runs.preparation import resume as go_on
+
+    prepare_run = partial(go_on, directory, overrides=changes, check=check)
+    _collect(prepare_run, directory=directory, detach=detach, json=json)
 
 
 def launch(run: str, lock: LockOption) -> None:
@@ -201,80 +197,58 @@ def join(directory: DatasetArgument, json: JsonOption = False) -> None:
     print_collected(info(directory), directory, as_json=json)
 
 
-def _go_on(
-    directory: Path,
-    config: Path | None,
-    changes: list[str],
+def _collect(
+    prepare_run: Callable[..., PreparedRun | None],
     *,
+    directory: Path | None,
     detach: bool,
     json: bool,
-    check: bool = False,
     token_file: Path | None = None,
     view: bool = False,
 ) -> None:
-    from throwcollect.runs.preparation import resume
+    """Launch a run and print its summary or, if it is detached, its id.
 
-    launched = _collect(
-        lambda shown: resume(
-            directory, config=config, overrides=changes, check=check, ahead=not detach, onlooker=shown
-        ),
-        detach=detach,
-        json=json,
-        token_file=token_file,
-        view=view,
-    )
-    if not launched:
-        from throwcollect.cli.dataset.info import print_summary
+    Args:
+        prepare_run: Prepares the run; returns None if its dataset is finished already.
+        directory: Directory of the dataset that the run goes on with; None for a new one.
+        detach: Whether to return as soon as the nodes are started.
+        json: Whether to print JSON.
+        token_file: File for the token; None prints it.
+        view: Whether to print the address of a page that shows the run.
+    """
+    with ExitStack() as held:
+        with display(quiet=json, bar=not detach) as shown:
+            if (run := prepare_run(ahead=not detach, onlooker=shown)) is not None:
+                held.enter_context(run)
+                _announce(run, token_file, view=view)
+                if not detach:
+                    with Interruptions() as interruptions:
+                        summary = run.collect(interruptions=lambda: interruptions.count)
+        if run is not None and detach:
+            _start(run, json=json)
+            return
+    # Only now, because these imports take long, and nodes would start later if they came first.
+    from throwcollect.cli.dataset.info import print_collected, print_summary
+
+    if run is not None:
+        print_collected(summary, run.directory, as_json=json, hint=run.place.way_on)
+    elif directory is not None:
         from throwcollect.dataset.inspect import info
 
         print_summary(info(directory), directory, as_json=json)
 
 
-def _collect(
-    prepare: Callable[[Display], PreparedRun | None],
-    *,
-    detach: bool,
-    json: bool,
-    token_file: Path | None,
-    view: bool,
-) -> bool:
-    """Launch a run and print its summary or, if it is detached, its id.
+def _announce(run: PreparedRun, token_file: Path | None, *, view: bool) -> None:
+    """Hand out the token of a run that other machines may join, and the address of the page if it is asked for."""
+    if token_file is not None:
+        write_secret(token_file, f"{run.token}\n".encode())
+    elif run.config.run.listen is not None:
+        # The token is a secret, and what a display is told may be written to a log.
+        tell(f"other machines join by: {command('join-run', run.token, '-n', 4)}")
+    if view:
+        from throwcollect.serve.finding import ensure_server, make_page_address
 
-    Args:
-        prepare: Prepares the run, and shows its progress on the display; returns None if there is nothing to do.
-        detach: Whether to return as soon as the nodes are started.
-        json: Whether to print JSON.
-        token_file: File for the token of a run that other machines may join; None prints the token.
-        view: Whether to print the address of a page that shows the run.
-
-    Returns:
-        Whether there was anything to do.
-    """
-    with ExitStack() as held:
-        with display(quiet=json, bar=not detach) as shown:
-            if (run := prepare(shown)) is None:
-                return False
-            held.enter_context(run)
-            if token_file is not None:
-                write_secret(token_file, f"{run.token}\n".encode())
-            elif run.config.run.listen is not None:
-                # The token is a secret, and what a display is told may be written to a log.
-                tell(f"other machines join by: {command('join-run', run.token, '-n', 4)}")
-            if view:
-                from throwcollect.serve.finding import ensure_server, make_page_address
-
-                tell(f"look inside: {make_page_address(ensure_server(), run.record.run)}")
-            if not detach:
-                with Interruptions() as interruptions:
-                    summary = run.collect(interruptions=lambda: interruptions.count)
-        if detach:
-            _start(run, json=json)
-            return True
-    # Only now, because this import takes long, and nodes would start later if it came first.
-    from throwcollect.cli.dataset.info import print_collected
-
-    print_collected(summary, run.directory, as_json=json, hint=run.place.way_on)
-    return True
+        tell(f"look inside: {make_page_address(ensure_server(), run.record.run)}")
 
 
 def _start(run: PreparedRun, *, json: bool) -> None:

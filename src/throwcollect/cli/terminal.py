@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
-from abc import ABC, abstractmethod
+from contextlib import AbstractContextManager
 from types import TracebackType
 from typing import TYPE_CHECKING
 
@@ -21,19 +21,7 @@ _TEXT_COLUMNS = 72
 """Columns of the terminal that everything beside the bar takes."""
 
 
-class Display(Onlooker, ABC):
-    """Shows the progress of a run; a context manager."""
-
-    @abstractmethod
-    def __enter__(self) -> Display: ...
-
-    @abstractmethod
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None: ...
-
-
-def display(*, quiet: bool, bar: bool = True) -> Display:
+def display(*, quiet: bool, bar: bool = True) -> _Lines | _Bar:
     """Choose a display by where standard error goes.
 
     Args:
@@ -45,14 +33,11 @@ def display(*, quiet: bool, bar: bool = True) -> Display:
     return _Lines(quiet=quiet)
 
 
-class _Lines(Display):
+class _Lines(Onlooker, AbstractContextManager["_Lines"]):
     def __init__(self, *, quiet: bool) -> None:
         self._quiet = quiet
         self._next = 0.0
         self._shown: Progress | None = None
-
-    def __enter__(self) -> _Lines:
-        return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -77,7 +62,7 @@ class _Lines(Display):
         print(line, file=sys.stderr, flush=True)
 
 
-class _Bar(Display):
+class _Bar(Onlooker):
     def __init__(self) -> None:
         from rich import progress
         from rich.console import Console

@@ -254,8 +254,7 @@ class ContainersConfig(Section):
     coordinator: NodeContainerConfig = NodeContainerConfig()
     """The coordinator."""
 
-    def find_contradictions(self) -> Iterator[tuple[str, str]]:
-        """See `Section`."""
+    def _find_contradictions(self) -> Iterator[tuple[str, str]]:
         taken: dict[int, str] = {}
         for node in ("router", "sim", "coordinator"):
             for port, host_port in getattr(self, node).ports.items():

@@ -47,6 +47,7 @@ class Document:
         self.problems: list[Problem] = []
         self._path = path
         self._count = 0
+        self._in_file = True
         self._lines: dict[Location, int | None] = {}
         try:
             node = compose(_text_of(path))
@@ -57,10 +58,11 @@ class Document:
         if not isinstance(node, MappingNode):
             problem = Problem("the file should hold keys and values", path=path, line=node.start_mark.line + 1)
             raise ConfigError([problem], expected="keys such as task and sweep")
-        values = self._plain(node, (), in_file=True)
+        values = self._plain(node, ())
         if not isinstance(values, dict):
             raise ConfigError(self.problems)
         self.values = values
+        self._in_file = False  # all further values are those of overrides
 
     def problem(self, location: Location, sentence: str) -> Problem:
         """Make a problem with the value or the key at a location, with the line in which it stands."""
@@ -124,9 +126,9 @@ class Document:
         # The lines of values that the override replaces do not hold any more.
         self._lines = {known: line for known, line in self._lines.items() if known[: len(location)] != location}
         self._lines[location] = None
-        holder[index] = self._plain(node, location, in_file=False)
+        holder[index] = self._plain(node, location)
 
-    def _plain(self, node: Node | None, location: Location, *, in_file: bool, inside: tuple[Node, ...] = ()) -> Any:
+    def _plain(self, node: Node | None, location: Location, inside: tuple[Node, ...] = ()) -> Any:
         if node is None:
             return None
         self._count += 1
@@ -134,47 +136,46 @@ class Document:
             # Aliases of aliases can make a short text arbitrarily large.
             raise ConfigError([Problem(f"holds more than {MOST_VALUES} values", path=self._path)])
         if node in inside:
-            self._note(node, location, "an alias cannot be inside its own anchor", in_file=in_file)
+            self._note(node, location, "an alias cannot be inside its own anchor")
             return None
         if len(inside) >= MOST_LEVELS:
-            self._note(node, location, "values are nested too deeply", in_file=in_file)
+            self._note(node, location, "values are nested too deeply")
             return None
         inside = (*inside, node)
         if isinstance(node, MappingNode) and node.tag == _TAG + "map":
-            return self._mapping(node, location, in_file=in_file, inside=inside)
+            return self._mapping(node, location, inside)
         if isinstance(node, SequenceNode) and node.tag == _TAG + "seq":
             items = []
             for index, item in enumerate(node.value):
-                self._lines[(*location, index)] = item.start_mark.line + 1 if in_file else None
-                items.append(self._plain(item, (*location, index), in_file=in_file, inside=inside))
+                self._lines[(*location, index)] = self._line(item)
+                items.append(self._plain(item, (*location, index), inside))
             return items
         try:
             return _scalar(node)
         except ValueError as error:
-            self._note(node, location, str(error), in_file=in_file)
+            self._note(node, location, str(error))
             return None
 
-    def _mapping(
-        self, node: MappingNode, location: Location, *, in_file: bool, inside: tuple[Node, ...]
-    ) -> dict[str, Any]:
+    def _mapping(self, node: MappingNode, location: Location, inside: tuple[Node, ...]) -> dict[str, Any]:
         values: dict[str, Any] = {}
-        first: dict[str, int] = {}
         for key_node, value_node in node.value:
             name = key_node.value
             if not isinstance(name, str):
-                self._note(key_node, location, "a key should be a word", in_file=in_file)
+                self._note(key_node, location, "a key should be a word")
             elif name in values:
-                line = f", first in line {first[name]}" if in_file else ""
-                self._note(key_node, (*location, name), f"the key is here twice{line}", in_file=in_file)
+                first = f", first in line {self._lines[(*location, name)]}" if self._in_file else ""
+                self._note(key_node, (*location, name), f"the key is here twice{first}")
             else:
-                first[name] = key_node.start_mark.line + 1
-                self._lines[(*location, name)] = first[name] if in_file else None
-                values[name] = self._plain(value_node, (*location, name), in_file=in_file, inside=inside)
+                self._lines[(*location, name)] = self._line(key_node)
+                values[name] = self._plain(value_node, (*location, name), inside)
         return values
 
-    def _note(self, node: Node, location: Location, sentence: str, *, in_file: bool) -> None:
-        path, line = (self._path, node.start_mark.line + 1) if in_file else (None, None)
-        self.problems.append(Problem(sentence, join_key(location), path, line))
+    def _note(self, node: Node, location: Location, sentence: str) -> None:
+        path = self._path if self._in_file else None
+        self.problems.append(Problem(sentence, join_key(location), path, self._line(node)))
+
+    def _line(self, node: Node) -> int | None:
+        return node.start_mark.line + 1 if self._in_file else None
 
 
 def _text_of(path: Path) -> str:

@@ -35,8 +35,7 @@ class DynamicMovementPrimitive(Section):
     alpha_x: PositiveFloat = 2.0
     """Decay constant of the phase [-]."""
 
-    def find_contradictions(self) -> Iterator[tuple[str, str]]:
-        """See `Section`."""
+    def _find_contradictions(self) -> Iterator[tuple[str, str]]:
         for joint, weights in self.weights.items():
             if len(weights) != self.basis_functions:
                 yield (

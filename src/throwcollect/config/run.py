@@ -71,8 +71,7 @@ class RunConfig(Section):
     restarts: Annotated[int, Field(ge=0, le=1000)] = 10
     """How often one simulation is restarted before it is given up."""
 
-    def find_contradictions(self) -> Iterator[tuple[str, str]]:
-        """See `Section`."""
+    def _find_contradictions(self) -> Iterator[tuple[str, str]]:
         if self.listen is None and self.simulations == 0:
             yield "simulations", "should be 1 or more, as no other machine can join (run.listen), got 0"
         if self.listen is not None and self.open:

@@ -182,8 +182,7 @@ class RecordConfig(Section):
     trials_per_shard: Annotated[PositiveInt, Key(Effect.FILES)] = 1000
     """Trials in one MCAP file."""
 
-    def find_contradictions(self) -> Iterator[tuple[str, str]]:
-        """See `Section`."""
+    def _find_contradictions(self) -> Iterator[tuple[str, str]]:
         if missing := [topic for topic in ("joint_states", "ball/odometry") if topic not in self.topics]:
             yield "topics", f"should hold {' and '.join(missing)}, from which throws are judged"
 
@@ -225,8 +224,7 @@ class Config(Section):
     cluster: Annotated[ClusterConfig, Key(Effect.RUN)] = ClusterConfig()
     """Runs on a cluster."""
 
-    def find_contradictions(self) -> Iterator[tuple[str, str]]:
-        """See `Section`."""
+    def _find_contradictions(self) -> Iterator[tuple[str, str]]:
         yield from self._find_strange_joints()
         if self.sim.physics_hz % self.record.rate_hz:
             yield "record.rate_hz", f"should divide sim.physics_hz, {self.sim.physics_hz}, got {self.record.rate_hz}"

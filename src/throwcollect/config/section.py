@@ -22,7 +22,7 @@ class Section(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
-    def find_contradictions(self) -> Iterator[tuple[str, str]]:
+    def _find_contradictions(self) -> Iterator[tuple[str, str]]:
         """List the keys that are right alone and wrong together.
 
         Yields:
@@ -32,7 +32,7 @@ class Section(BaseModel):
 
     @model_validator(mode="after")
     def _refuse_contradictions(self) -> Self:
-        if wrong := dict(self.find_contradictions()):
+        if wrong := dict(self._find_contradictions()):
             raise ContradictionError(wrong)
         return self
 

@@ -29,8 +29,7 @@ class Range(Section):
     count: Annotated[int, Field(ge=1, le=10_000_000)] | None = None
     """Number of grid points, both ends included; for the sampler `grid` only."""
 
-    def find_contradictions(self) -> Iterator[tuple[str, str]]:
-        """See `Section`."""
+    def _find_contradictions(self) -> Iterator[tuple[str, str]]:
         if self.min > self.max:
             yield "min", f"should be at most max, {self.max}, got {self.min}"
         elif self.scale == "log" and self.min <= 0:
@@ -67,8 +66,7 @@ class Bins(Section):
     bins: Annotated[int, Field(ge=1, le=1000)]
     """Number of intervals."""
 
-    def find_contradictions(self) -> Iterator[tuple[str, str]]:
-        """See `Section`."""
+    def _find_contradictions(self) -> Iterator[tuple[str, str]]:
         if self.min >= self.max:
             yield "min", f"should be below max, {self.max}, got {self.min}"
 
@@ -89,8 +87,7 @@ class TargetConfig(Section):
         named = {"distance_m": self.distance_m, "height_m": self.height_m, "hit_angle_rad": self.hit_angle_rad}
         return {name: bins for name, bins in named.items() if bins is not None}
 
-    def find_contradictions(self) -> Iterator[tuple[str, str]]:
-        """See `Section`."""
+    def _find_contradictions(self) -> Iterator[tuple[str, str]]:
         if not self.dimensions:
             yield "distance_m", "missing; at least one of distance_m, height_m and hit_angle_rad should be there"
         if self.distance_m and self.distance_m.min < 0:
@@ -122,8 +119,7 @@ class SweepConfig(Section):
     target: Annotated[TargetConfig | None, Key(later=True)] = None
     """Spreads throws over landing targets: trials are added to the plan where throws are few."""
 
-    def find_contradictions(self) -> Iterator[tuple[str, str]]:
-        """See `Section`."""
+    def _find_contradictions(self) -> Iterator[tuple[str, str]]:
         if self.sampler == "list":
             if self.file is None:
                 yield "file", "missing; the sampler list should have a CSV or Parquet file"

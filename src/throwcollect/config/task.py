@@ -89,8 +89,7 @@ class TaskConfig(Section):
             wrong |= {name: f"is missing beside {join_names(there)}" for name in missing}
         return wrong
 
-    def find_contradictions(self) -> Iterator[tuple[str, str]]:
-        """See `Section`."""
+    def _find_contradictions(self) -> Iterator[tuple[str, str]]:
         if not self.end:
             yield "end", "names no joint, so nothing would move"
         for joint in self.end:
