@@ -22,11 +22,7 @@ _SOURCES = (".py", ".msg", ".srv", ".action", ".json")
 
 @cache
 def build_digest(engine: str) -> str:
-    """SHA-256, in hexadecimal, over the installed sources, and over versions of engine, model and added packages.
-
-    Args:
-        engine: Name of the engine that computes; versions of other engines do not count.
-    """
+    """SHA-256, in hexadecimal, over the installed sources, and over versions of engine, model and added packages."""
     digest = hashlib.sha256()
     root = Path(__file__).parents[1]
     # The ROS client counts, too, because it lays out the messages of an episode.

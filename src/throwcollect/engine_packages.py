@@ -35,9 +35,6 @@ PACKAGES = MappingProxyType(
 def require_engine(name: str) -> None:
     """Check that the package of an engine is installed, before anything begins.
 
-    Args:
-        name: Name of the engine, as in ``sim.engine``.
-
     Raises:
         MissingExtraError: If its package is not installed.
     """

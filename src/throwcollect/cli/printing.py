@@ -17,13 +17,7 @@ def print_json(document: object) -> None:
 
 
 def print_result(document: object, text: str, *, json: bool) -> None:
-    """Print a result for programs or for people.
-
-    Args:
-        document: The result for programs.
-        text: The result for people.
-        json: Whether a program asks.
-    """
+    """Print a result: as a JSON document for programs, or as text for people."""
     if json:
         print_json(document)
     else:

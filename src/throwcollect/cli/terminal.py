@@ -121,9 +121,6 @@ class _InPlace:
     The cursor rests at the start of the line. It stays there when the terminal breaks the line, so everything to erase
     is behind it. From the end of the line, the number of rows to go up would be unknown, because some terminals break
     lines and others cut them. While rich does not know the new width yet, the terminal cuts the line at its edge.
-
-    Args:
-        line: The line.
     """
 
     def __init__(self, line: RenderableType) -> None:

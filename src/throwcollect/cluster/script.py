@@ -78,11 +78,7 @@ class BatchScripts:
         )
 
     def live(self, nodes: int) -> str:
-        """Write the script of one run on several nodes: the first has the coordinator, and the others join it.
-
-        Args:
-            nodes: Number of nodes.
-        """
+        """Write the script of one run on several nodes: the first has the coordinator, and the others join it."""
         cluster = self.config.cluster
         directives = {
             "job-name": f"throwcollect-{self.config.name}",

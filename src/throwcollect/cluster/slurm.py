@@ -70,11 +70,7 @@ class Task:
 
 
 def submit(script: Path, *options: str) -> str:
-    """Submit a batch script.
-
-    Args:
-        script: The script.
-        options: Options of ``sbatch`` besides those in the script.
+    """Submit a batch script, with further options of ``sbatch`` than those in the script.
 
     Returns:
         Number of the job.

@@ -120,10 +120,7 @@ def submit(
 def submit_missing(directory: Path, *, overrides: Sequence[str] = (), say: Say) -> Submitted | None:
     """Submit the slices of a dataset that are neither finished nor on their way; of one run, what is left of it.
 
-    Args:
-        directory: Directory of the dataset.
-        overrides: Overrides of keys that do not change the dataset.
-        say: Receives messages on the progress.
+    Overrides may change only keys that do not change the dataset.
 
     Returns:
         The submission; None if nothing is missing.

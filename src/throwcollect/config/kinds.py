@@ -25,13 +25,7 @@ class ContradictionError(ValueError):
 
 
 class UnknownJointError(ValueError):
-    """A joint that the robot does not have.
-
-    Args:
-        name: Name of the joint.
-        robot: Name of the robot in sentences.
-        joints: Names of its joints.
-    """
+    """A joint that the robot does not have; `problems` proposes another one of its joints."""
 
     def __init__(self, name: str, robot: str, joints: tuple[str, ...]) -> None:
         self.name, self.robot, self.joints = name, robot, joints

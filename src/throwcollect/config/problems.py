@@ -55,12 +55,7 @@ def join_key(location: Location) -> str:
 
 
 def unknown_key(name: str, known: list[str]) -> str:
-    """Make the sentence for a key that does not exist.
-
-    Args:
-        name: The key.
-        known: All keys that would be right in its place.
-    """
+    """Make the sentence for a key that does not exist, by the keys that would be right in its place."""
     if meant := _did_you_mean(name, known):
         return f"unknown key{meant}"
     return "unknown key; " + (f"known keys here: {', '.join(known)}" if known else "no keys are expected here")

@@ -27,12 +27,7 @@ def samplers() -> list[str]:
 
 
 def make_starter(robot: str, task: str, sampler: str) -> dict[str, str]:
-    """Write a configuration to begin with.
-
-    Args:
-        robot: Name of the robot.
-        task: Name of the task.
-        sampler: Name of the sampler.
+    """Write a configuration to begin with, for the robot, the task and the sampler of these names.
 
     Returns:
         The text of the configuration as ``throwcollect.yaml``, and of `POINTS` if the sampler reads it.

@@ -21,7 +21,7 @@ def with_values(config: Config, values: Mapping[str, float]) -> Config:
     """Make a configuration with some of its values replaced, such as that of one trial.
 
     Args:
-        config: Configuration to start from; it stays as it is.
+        config: The configuration, which stays as it is.
         values: New values by dotted key, which `config` must have; items of lists go by their index from 0.
 
     Raises:
@@ -71,12 +71,7 @@ def differences(one: Config, other: Config) -> dict[str, tuple[Any, Any]]:
 
 
 def sweepable_keys(config: Config, effect: Effect | None = None) -> list[str]:
-    """List the dotted keys that a sweep of this configuration may vary.
-
-    Args:
-        config: The configuration.
-        effect: Only keys that have this effect; None for all.
-    """
+    """List the dotted keys that a sweep of this configuration may vary, or those of them that have one effect."""
     return [
         leaf.name
         for leaf in leaves(config)
@@ -89,10 +84,6 @@ def reason_not_sweepable(config: Config, key: str) -> str | None:
 
     Numbers of the task's motion, of the ball, the scene and the motors may vary from trial to trial. The world is built
     and the recording is set up only once, so their other keys may not.
-
-    Args:
-        config: Configuration that is swept.
-        key: Dotted key.
     """
     leaf = next((leaf for leaf in leaves(config) if leaf.name == key), None)
     return unknown_key(key, sweepable_keys(config)) if leaf is None else _find_obstacle(config, leaf)

@@ -35,17 +35,11 @@ def show_digest(directory: DatasetArgument) -> None:
 
 
 def print_collected(found: Info, directory: Path | None, *, as_json: bool, hint: str | None = None) -> None:
-    """Print the summary of a collection that has ended, and fail if it has lost trials.
-
-    Args:
-        found: Summary of its dataset.
-        directory: Directory of the dataset; None if it is in a volume.
-        as_json: Whether to print one JSON document.
-        hint: How to go on with lost trials.
+    """Print the summary of a collection that has ended as `print_summary` does, and fail if it has lost trials.
 
     Raises:
         OutputError: If the summary cannot be printed.
-        LossError: If trials are lost.
+        LossError: If trials are lost; its hint says how to go on.
     """
     from throwcollect.dataset.summary import explain_loss
 
@@ -55,12 +49,7 @@ def print_collected(found: Info, directory: Path | None, *, as_json: bool, hint:
 
 
 def print_summary(found: Info, directory: Path | None, *, as_json: bool) -> None:
-    """Print the summary of a collection.
-
-    Args:
-        found: Summary of its dataset.
-        directory: Directory of the dataset; None if it is in a volume.
-        as_json: Whether to print one JSON document.
+    """Print the summary of a collection, and how to look into its dataset, unless that is in a volume.
 
     Raises:
         OutputError: If it cannot be printed.

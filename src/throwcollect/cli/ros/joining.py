@@ -9,10 +9,7 @@ from throwcollect.runs.selection import require_living, to_change
 
 
 def find_way(run: str | None) -> tuple[Run, Connection]:
-    """Find a run, and the connection by which our own processes join it.
-
-    Args:
-        run: Id of a run, unique beginning of one, or directory of the dataset; None for the only one that lives.
+    """Find a run, or the only one that lives, and the connection by which our own processes join it.
 
     Raises:
         ConfigError: If there is no such run, or it has ended.

@@ -85,10 +85,7 @@ class Session:
 
 @contextmanager
 def join_graph(run: str | None) -> Iterator[Session]:
-    """Join the graph of a run, or of the router that the environment names.
-
-    Args:
-        run: Id of a run, unique beginning of one, or directory of the dataset; None for the environment's router.
+    """Join the graph of a run, or without one that of the router that the environment names.
 
     Raises:
         ConfigError: If there is no such run or no router.
