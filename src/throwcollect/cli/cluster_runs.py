@@ -12,7 +12,7 @@ from typing import Any
 import typer
 
 from throwcollect.cli.dataset.info import print_collected
-from throwcollect.cli.interruptions import Interruptions
+from throwcollect.cli.interruptions import count_interruptions
 from throwcollect.cli.terminal import display
 from throwcollect.cluster.following import ClusterRun, Look, ProgressOfSlices, find_queued, follow
 from throwcollect.dataset.inspect import info
@@ -24,8 +24,8 @@ def follow_to_the_end(directory: Path, *, json: bool) -> None:
     """Show the progress of a run until it ends, and then its summary; Ctrl-C leaves the run alone."""
     run = ClusterRun.open(directory)
     progress = ProgressOfSlices(run)
-    with display(quiet=json) as shown, Interruptions() as interruptions:
-        for look in follow(run, keep_on=lambda: not interruptions.count):
+    with display(quiet=json) as shown, count_interruptions() as interruptions:
+        for look in follow(run, keep_on=lambda: not interruptions()):
             shown.update(progress.at(look))
     if look.lives and not look.complete:
         raise Interrupted(f"left; {directory} goes on", hint=command("wait", "--run", directory))

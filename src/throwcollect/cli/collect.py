@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from throwcollect.cli.interruptions import Interruptions
+from throwcollect.cli.interruptions import count_interruptions
 from throwcollect.cli.options import DatasetArgument, JsonOption, SetOption, TrialsOption, overrides
 from throwcollect.cli.printing import print_json, tell
 from throwcollect.cli.streams import ensure_written, only_log
@@ -140,8 +140,8 @@ def launch(run: str, lock: LockOption) -> None:
     from throwcollect.runs.launcher import launch_inherited
 
     only_log()
-    with display(quiet=True) as shown, Interruptions() as interruptions:
-        launch_inherited(run, lock, onlooker=shown, interruptions=lambda: interruptions.count)
+    with display(quiet=True) as shown, count_interruptions() as interruptions:
+        launch_inherited(run, lock, onlooker=shown, interruptions=interruptions)
 
 
 def begin(run: str, lock: LockOption) -> None:
@@ -150,8 +150,8 @@ def begin(run: str, lock: LockOption) -> None:
 
     only_log()
     order = sys.stdin.buffer.read()
-    with display(quiet=True) as shown, Interruptions() as interruptions:
-        carry_out(run, lock, order, onlooker=shown, interruptions=lambda: interruptions.count)
+    with display(quiet=True) as shown, count_interruptions() as interruptions:
+        carry_out(run, lock, order, onlooker=shown, interruptions=interruptions)
 
 
 def _collect_slice(directory: Path, text: str, changes: list[str], *, json: bool) -> None:
@@ -160,8 +160,8 @@ def _collect_slice(directory: Path, text: str, changes: list[str], *, json: bool
     from throwcollect.sweep.slice import Slice
 
     slice = Slice.parse(text)
-    with display(quiet=json) as shown, Interruptions() as interruptions:
-        collect_slice(directory, slice, overrides=changes, onlooker=shown, interruptions=lambda: interruptions.count)
+    with display(quiet=json) as shown, count_interruptions() as interruptions:
+        collect_slice(directory, slice, overrides=changes, onlooker=shown, interruptions=interruptions)
     place = slice_directory(directory, slice)
     typer.echo(jsonlib.dumps({"slice": str(slice), "directory": str(place)}) if json else f"{place}: finished")
 
@@ -182,9 +182,9 @@ def join_run(
     """Add simulations of this machine to a run of another one, until it is over; Ctrl-C takes them away."""
     from throwcollect.runs.joining import join_run as join
 
-    with display(quiet=False) as shown, Interruptions() as interruptions:
+    with display(quiet=False) as shown, count_interruptions() as interruptions:
         word = sys.stdin.readline() if token == "-" else token  # noqa: S105 - it is no password
-        join(word, simulations or count_cores(), onlooker=shown, interruptions=lambda: interruptions.count)
+        join(word, simulations or count_cores(), onlooker=shown, interruptions=interruptions)
 
 
 def join(directory: DatasetArgument, json: JsonOption = False) -> None:
@@ -222,8 +222,8 @@ def _collect(
                 held.enter_context(run)
                 _announce(run, token_file, view=view)
                 if not detach:
-                    with Interruptions() as interruptions:
-                        summary = run.collect(interruptions=lambda: interruptions.count)
+                    with count_interruptions() as interruptions:
+                        summary = run.collect(interruptions=interruptions)
         if run is not None and detach:
             _start(run, json=json)
             return
@@ -253,8 +253,8 @@ def _announce(run: PreparedRun, token_file: Path | None, *, view: bool) -> None:
 
 def _start(run: PreparedRun, *, json: bool) -> None:
     """Hand the run over to a process of its own, and print how to follow it."""
-    with Interruptions() as interruptions:
-        record = run.start(interruptions=lambda: interruptions.count).record
+    with count_interruptions() as interruptions:
+        record = run.start(interruptions=interruptions).record
     if json:
         where = {"volume": record.volume} if record.volume else {"directory": record.directory}
         print_json({"run": record.run, **where})

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from throwcollect.cli.interruptions import Interruptions
+from throwcollect.cli.interruptions import count_interruptions
 from throwcollect.cli.options import JsonOption, RunOption
 from throwcollect.cli.printing import tell
 from throwcollect.cli.streams import end_with_reader
@@ -74,8 +74,8 @@ def wait(run: RunOption = None, json: JsonOption = False) -> None:
     from throwcollect.runs.selection import describe_death
 
     found = _find_run(run)
-    with display(quiet=json) as shown, Interruptions() as interruptions:
-        for look in follow(found, keep_on=lambda: not interruptions.count):
+    with display(quiet=json) as shown, count_interruptions() as interruptions:
+        for look in follow(found, keep_on=lambda: not interruptions()):
             found = look.run
             if look.progress is not None:
                 shown.update(look.progress)
@@ -155,8 +155,8 @@ def stop(run: RunOption = None) -> None:
     collects = found.record.kind == "collection"
     if collects:
         tell(f"{found.id}: finishing the running trials")
-    with Interruptions() as interruptions:
-        found = control.stop(found, keep_on=lambda: not interruptions.count)
+    with count_interruptions() as interruptions:
+        found = control.stop(found, keep_on=lambda: not interruptions())
     if found.status == "running":
         raise Interrupted(f"not waited for; run {found.id} is stopping all the same")
     error = describe_death(found) if found.status == "died" else found.record.error

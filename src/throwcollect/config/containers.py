@@ -152,7 +152,7 @@ class DeviceRequest(TypedDict, total=False):
     capabilities: list[list[str]]
     """Alternatives of what the devices must be able to do, such as `[[gpu]]`."""
     options: dict[str, str]
-    """What the driver is told besides."""
+    """Further options for the driver."""
 
 
 class ContainerOptions(TypedDict, total=False):
@@ -191,7 +191,7 @@ class ContainerOptions(TypedDict, total=False):
     oom_score_adj: Annotated[int, Field(ge=-1000, le=1000)]
     """How readily the kernel ends it when the host runs out of memory."""
     cpu_shares: PositiveInt
-    """Weight of its computing time; 1024 if nothing is said."""
+    """Weight of its computing time; 1024 if absent."""
     cpuset_mems: Cores
     """NUMA nodes whose memory it uses."""
     blkio_weight: Annotated[int, Field(ge=10, le=1000)]
@@ -205,7 +205,7 @@ class ContainerOptions(TypedDict, total=False):
 
 
 class NodeContainerConfig(Section):
-    """What the containers of one kind of node get beyond what they need."""
+    """Further properties of the containers of one kind of node."""
 
     cpus: PositiveFloat | None = None
     """Upper bound of processor time, in cores."""

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import BaseModel, Discriminator, Field, PositiveFloat, Tag
+from pydantic import Field, PositiveFloat
 
 from throwcollect.config.key import Key
 from throwcollect.config.kinds import Joint
-from throwcollect.config.section import Section
+from throwcollect.config.section import Section, any_of
 
 
 class MinimumJerk(Section):
@@ -44,14 +44,10 @@ class DynamicMovementPrimitive(Section):
                 )
 
 
-def _family(value: Any) -> str | None:
-    if isinstance(value, BaseModel):
-        return type(value).__name__
-    family = value.get("family", "minimum_jerk") if isinstance(value, dict) else None
-    return {"minimum_jerk": "MinimumJerk", "dmp": "DynamicMovementPrimitive"}.get(str(family))
-
-
-Trajectory = Annotated[
-    Annotated[MinimumJerk, Tag("MinimumJerk")] | Annotated[DynamicMovementPrimitive, Tag("DynamicMovementPrimitive")],
-    Discriminator(_family),
-]
+if TYPE_CHECKING:
+    Trajectory = MinimumJerk | DynamicMovementPrimitive
+else:
+    Trajectory = any_of(
+        {"minimum_jerk": MinimumJerk, "dmp": DynamicMovementPrimitive},
+        lambda value: value.get("family", "minimum_jerk") if isinstance(value, dict) else None,
+    )

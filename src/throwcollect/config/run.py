@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import AfterValidator, Field, PositiveFloat
 
-from throwcollect.config.kinds import in_words, match
+from throwcollect.config.kinds import in_words
 from throwcollect.config.section import Section
 from throwcollect.members import names_of
 
@@ -18,19 +19,14 @@ else:
     RuntimeName = Literal[("auto", *names_of("runtimes"))]
 
 
-def _require_port(text: str) -> str:
-    if int(text.rpartition(":")[2]) > 65535:
-        raise ValueError(f"should be {_LISTEN}, got '{text}'")
+def _listen_address(text: str) -> str:
+    found = re.fullmatch(r"tcp/(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9.-]+):([1-9]\d{0,4})", text)
+    if found is None or int(found[2]) > 65535:
+        raise ValueError(f"should be tcp/ADDRESS:PORT, such as tcp/0.0.0.0:7447, got '{text}'")
     return text
 
 
-_LISTEN = "tcp/ADDRESS:PORT, such as tcp/0.0.0.0:7447"
-ListenAddress = Annotated[
-    str,
-    match(r"tcp/(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9.-]+):[1-9]\d{0,4}", _LISTEN),
-    AfterValidator(_require_port),
-    in_words("tcp/ADDRESS:PORT"),
-]
+ListenAddress = Annotated[str, AfterValidator(_listen_address), in_words("tcp/ADDRESS:PORT")]
 
 
 class RunConfig(Section):

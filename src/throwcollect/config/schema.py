@@ -7,12 +7,10 @@ Units are part of the name: ``_s``, ``_m``, ``_kg``, ``_hz``, ``_mps2``; angles 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator
-from functools import reduce
-from operator import or_
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import Discriminator, Field, PositiveInt, Tag
+from pydantic import Field, PositiveInt
 
 from throwcollect.config.cluster import ClusterConfig
 from throwcollect.config.containers import ContainersConfig
@@ -21,7 +19,7 @@ from throwcollect.config.key import Effect, Key
 from throwcollect.config.kinds import Angle, Joint, Name
 from throwcollect.config.motion import DynamicMovementPrimitive, MinimumJerk
 from throwcollect.config.run import RunConfig
-from throwcollect.config.section import Section
+from throwcollect.config.section import Section, any_of
 from throwcollect.config.sweep import Parameter, Range, SweepConfig, Values
 from throwcollect.config.task import TaskConfig
 from throwcollect.config.tool import ToolConfig
@@ -35,42 +33,17 @@ def _sections_of(family: str) -> Any:
     """Make the type of a key that holds the section of any member of a family; its key `name` says which."""
     sections = {name: load_member(family, name) for name in names_of(family)}
     default = next(iter(sections))
-
-    def choose(value: Any) -> str | None:
-        """Choose the class of the section by its name; the family's first member is the default."""
-        if isinstance(value, Section):
-            return type(value).__name__
-        name = value.get("name", default) if isinstance(value, dict) else None
-        return str(sections[name].__name__) if isinstance(name, str) and name in sections else None
-
-    return _any_of(sections.values(), choose)
+    return any_of(sections, lambda value: value.get("name", default) if isinstance(value, dict) else None)
 
 
 def _untils() -> Any:
     """Make the type of the key `until`, which holds the section `until` of a task; its only key says which."""
     sections = {each.until.outcome(): each.until for each in (load_member("tasks", name) for name in names_of("tasks"))}
-
-    def choose(value: Any) -> str | None:
-        """Choose the class of the section by its key; the first one reports unknown keys."""
-        if isinstance(value, Section):
-            return type(value).__name__
-        outcome = next((each for each in sections if isinstance(value, dict) and each in value), next(iter(sections)))
-        return str(sections[outcome].__name__)
-
-    return _any_of(sections.values(), choose)
-
-
-def _any_of(sections: Iterable[type[Section]], choose: Callable[[Any], str | None]) -> Any:
-    """Make the type of a key that holds one of several sections.
-
-    Args:
-        sections: Their classes.
-        choose: Chooses the name of the class by the value of the key; None for none.
-    """
-    kinds = list(dict.fromkeys(sections))
-    if len(kinds) == 1:
-        return kinds[0]
-    return Annotated[reduce(or_, [Annotated[kind, Tag(kind.__name__)] for kind in kinds]), Discriminator(choose)]
+    # The first section reports unknown keys.
+    default = next(iter(sections))
+    return any_of(
+        sections, lambda value: next((key for key in sections if isinstance(value, dict) and key in value), default)
+    )
 
 
 if TYPE_CHECKING:
@@ -111,11 +84,12 @@ class RobotConfig(Section):
     effort_scale: Annotated[float, Field(gt=0, le=10), Key(swept=True)] = 1.0
     """Factor on the effort limits of all joints [-]."""
     joint_offsets: Annotated[dict[Joint, Angle], Key(swept=True, later=True)] = {}
-    """Errors of the joints' zeros: such a joint stands by so much farther than it is told to, and than it says."""
+    """Errors of the joints' zeros: such a joint stands by this angle farther than its command and its measurement
+    say."""
     speed_scale: Annotated[float, Field(gt=0.5, lt=2), Key(swept=True, later=True)] = 1.0
     """Speed of the clock by which controllers follow trajectories [-]: below 1, motions take longer than planned."""
     motor_lag_s: Annotated[float, Field(ge=0, le=0.2), Key(swept=True, later=True)] = 0.0
-    """Time constant with which motors go after their commands; 0: at once."""
+    """Time constant with which motors follow their commands; 0: at once."""
 
 
 class BallConfig(Section):
@@ -151,8 +125,8 @@ class SimConfig(Section):
 
     engine: Annotated[EngineName, Key(later=True)] = "bullet"
     """Physics engine: `bullet` simulates contacts; so does `mujoco`, which is faster and computes throws that differ by
-    some millimetres (docs/engines.md); `ballistic` is for trying things out: an arm that is always where it is told to
-    be, and a ball that leaves the spoon when the spoon would have to pull it. Packages may add others."""
+    some millimetres (docs/engines.md); `ballistic` is for trying things out: an arm that is always where its commands
+    are, and a ball that leaves the spoon when the spoon would have to pull it. Packages may add others."""
     physics_hz: Annotated[int, Field(ge=100, le=10000)] = 500
     """Physics steps per simulated second; also the controllers' update rate."""
     solver_iterations: Annotated[int, Field(ge=1, le=1000)] = 50

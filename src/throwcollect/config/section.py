@@ -1,16 +1,17 @@
-"""What all sections of a configuration have in common."""
+"""The base of all sections of a configuration, and keys that hold one of several sections."""
 
 from __future__ import annotations
 
 import ast
 import inspect
 import sys
-from collections.abc import Iterator
-from functools import cache
+from collections.abc import Callable, Iterator, Mapping
+from functools import cache, reduce
 from itertools import pairwise
-from typing import Any
+from operator import or_
+from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, GetJsonSchemaHandler, model_validator
+from pydantic import BaseModel, ConfigDict, Discriminator, GetJsonSchemaHandler, Tag, model_validator
 from pydantic_core import CoreSchema
 from typing_extensions import Self
 
@@ -48,6 +49,26 @@ class Section(BaseModel):
         for name, docstring in _read_docstrings(cls).items():
             properties[name]["description"] = docstring
         return schema
+
+
+def any_of(sections: Mapping[str, type[Section]], choose: Callable[[Any], Any]) -> Any:
+    """Make the type of a key that holds one of several sections.
+
+    Args:
+        sections: The sections, by a name that the value of the key implies.
+        choose: Finds that name in the value; anything else is an error.
+    """
+    kinds = list(dict.fromkeys(sections.values()))
+    if len(kinds) == 1:
+        return kinds[0]
+
+    def find_tag(value: Any) -> str | None:
+        if isinstance(value, Section):
+            return type(value).__name__
+        name = choose(value)
+        return sections[name].__name__ if isinstance(name, str) and name in sections else None
+
+    return Annotated[reduce(or_, [Annotated[kind, Tag(kind.__name__)] for kind in kinds]), Discriminator(find_tag)]
 
 
 def _read_docstrings(section: type[Section]) -> dict[str, str]:

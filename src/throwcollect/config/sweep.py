@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import BaseModel, Discriminator, Field, Tag
+from pydantic import Field
 
 from throwcollect.config.key import Key
-from throwcollect.config.section import Section
+from throwcollect.config.section import Section, any_of
 
 LANDING_HEIGHT = "scene.landing_height_m"
 """Key that must be swept where heights are a target."""
@@ -45,15 +45,13 @@ class Values(Section):
     """The values, in the unit of the key."""
 
 
-def _parameter_kind(value: Any) -> str | None:
-    if isinstance(value, BaseModel):
-        return type(value).__name__
-    if not isinstance(value, dict):
-        return None
-    return "Values" if "values" in value else "Range"
-
-
-Parameter = Annotated[Annotated[Range, Tag("Range")] | Annotated[Values, Tag("Values")], Discriminator(_parameter_kind)]
+if TYPE_CHECKING:
+    Parameter = Range | Values
+else:
+    Parameter = any_of(
+        {"range": Range, "values": Values},
+        lambda value: ("values" if "values" in value else "range") if isinstance(value, dict) else None,
+    )
 
 
 class Bins(Section):
@@ -114,8 +112,8 @@ class SweepConfig(Section):
 
     A relative path starts at the directory of the configuration file."""
     feasibility: Annotated[Literal["actual", "nominal"], Key(later=True)] = "actual"
-    """Which robot the plan is checked for: the one that throws, or the one that somebody believes to have who plans
-    motions for a robot he does not know: the keys of `robot`, `tool` and `ball` have their defaults then."""
+    """Robot that the plan is checked for: the `actual` one that throws, or the `nominal` one, for which the keys of
+    `robot`, `tool` and `ball` have their defaults: a user who plans motions for a robot knows only this one."""
     target: Annotated[TargetConfig | None, Key(later=True)] = None
     """Spreads throws over landing targets: trials are added to the plan where throws are few."""
 

@@ -59,17 +59,17 @@ class TaskConfig(Section):
 
     @property
     def noun(self) -> str:
-        """What one of its trials is called."""
+        """Noun for one of its trials."""
         return "throw" if self.throws else "trial"
 
     @property
     def keyword(self) -> str:
-        """By what its datasets are found on a hub."""
+        """Keyword by which a hub finds its datasets."""
         return "throwing" if self.throws else self.name
 
     @property
     def subject(self) -> str:
-        """What its trials are, in a sentence behind their number."""
+        """Description of its trials, for a sentence in which it follows their number."""
         return "throws of a ball" if self.throws else f"trials of the task {self.name}"
 
     def find_wrong_targets(self, columns: Collection[str]) -> dict[str, str]:
@@ -79,7 +79,7 @@ class TaskConfig(Section):
             columns: Their names.
 
         Returns:
-            What is wrong, by column; empty if they are targets of this task, or none at all.
+            Sentence that says what is wrong, by column; empty if they are targets of this task, or none at all.
         """
         known = {each.name: each for each in self.target_columns}
         has = f"it has {', '.join(known)}" if known else "it has none"

@@ -9,7 +9,7 @@ from pydantic import Field
 from throwcollect.config.section import Section
 
 Wanted = Annotated[int, Field(ge=1, le=1_000_000)]
-"""How many trials should end with an outcome."""
+"""Number of trials that should end with an outcome."""
 
 
 class UntilConfig(Section):
@@ -22,5 +22,5 @@ class UntilConfig(Section):
 
     @property
     def wanted(self) -> int:
-        """How many trials should end with that outcome."""
+        """Number of trials that should end with that outcome."""
         return int(getattr(self, self.outcome()))
