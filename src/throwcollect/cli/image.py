@@ -62,13 +62,12 @@ def sif(
     """Make the image that Apptainer and Singularity run: one file, from the Docker image, or without any engine."""
     from throwcollect.runtimes.apptainer.sif import make_sif
 
-    given = {"--image": image, "--archive": archive}
-    named = [name for name, value in given.items() if value is not None]
-    if len(named) > 1:
+    if image is not None and archive is not None:
         raise ConfigError("--image and --archive: should be one of them")
-    if named and (unfit := {"--base": base, "--wheelhouse": wheelhouse}):
-        for name, value in unfit.items():
+    if image is not None or archive is not None:
+        source = "--archive" if image is None else "--image"
+        for name, value in {"--base": base, "--wheelhouse": wheelhouse}.items():
             if value is not None:
-                raise ConfigError(f"{name}: should be left out with {named[0]}, as nothing is built")
+                raise ConfigError(f"{name}: should be left out with {source}, as nothing is built")
     size = make_sif(output, image=image, archive=archive, base=base, wheelhouse=wheelhouse, say=tell)
     typer.echo(f"{output}  {size / 1e6:.0f} MB")

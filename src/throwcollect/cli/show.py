@@ -44,10 +44,10 @@ def config(
 ) -> None:
     """Print the resolved configuration."""
     from throwcollect.config.loader import dump_yaml, load
-    from throwcollect.config.shape import json_schema
+    from throwcollect.config.shape import root
 
     if schema:
-        print_json(json_schema())
+        print_json(root().node)
         return
     found = load(path, overrides(settings))
     typer.echo(found.model_dump_json(indent=2) if json else dump_yaml(found), nl=json)
