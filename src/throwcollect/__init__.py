@@ -1,7 +1,7 @@
 """throwcollect: databases of robot throws from many simulations at once.
 
-`__all__` lists what other programs may use; `docs/python.md` describes it. What stands behind a name is imported when
-it is taken, so `import throwcollect` costs nothing; a name that needs an extra says so there and then.
+`__all__` lists the names that other programs may use; `docs/python.md` describes them. `import throwcollect` costs
+nothing, because each name is imported when it is first used. A name that needs an extra fails at that moment.
 """
 
 from typing import TYPE_CHECKING
@@ -83,11 +83,11 @@ _PLACES = {
     "split_dataset": "derive.split:split",
     "verify_dataset": "replay.verification:verify_dataset",
 }
-"""Where each name comes from, for `__getattr__`; type checkers read the same from the imports above."""
+"""Module and attribute of each name, for `__getattr__`; type checkers need the imports above instead."""
 
 
 def __getattr__(name: str) -> object:
-    """Import what stands behind a public name.
+    """Import the object with a public name.
 
     Raises:
         AttributeError: If there is no such name.

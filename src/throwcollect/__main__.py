@@ -1,4 +1,4 @@
-"""The command `throwcollect`, also `python -m throwcollect`: what has to hold before its libraries are loaded."""
+"""The command `throwcollect`, also `python -m throwcollect`: prepares the process, and then loads the libraries."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def main() -> None:
 
 
 def _leave(_number: int, _frame: FrameType | None) -> NoReturn:
-    """End at once: where nothing has begun there is nothing to end in order, and libraries would not do so."""
+    """End at once: nothing has begun that has to end in order, and a library that loads may ignore exceptions."""
     os._exit(130)
 
 

@@ -1,6 +1,6 @@
-"""What computes here, as one digest: sources, a physics engine, robot model, compression.
+"""One digest over everything that computes episodes: sources, physics engine, robot model, compression.
 
-Two processes with the same digest compute the same episodes, so a coordinator takes those of such simulations alone.
+Two processes with the same digest compute the same episodes. A coordinator takes only episodes with its own digest.
 """
 
 from __future__ import annotations
@@ -16,20 +16,16 @@ import rclzenoh
 from throwcollect.engine_packages import PACKAGES
 
 _PACKAGES = ("example-robot-data", "zstandard")
-"""Packages whose versions count, whatever simulates."""
+"""Packages whose versions count with every engine."""
 _SOURCES = (".py", ".msg", ".srv", ".action", ".json")
 
 
 @cache
 def build_digest(engine: str) -> str:
-    """SHA-256, in hexadecimal, over the installed sources, and over versions of engine, model and added packages.
-
-    Args:
-        engine: Name of the engine that computes; no other one matters.
-    """
+    """SHA-256, in hexadecimal, over the installed sources, and over versions of engine, model and added packages."""
     digest = hashlib.sha256()
     root = Path(__file__).parents[1]
-    # The ROS client lays out the messages of an episode.
+    # The ROS client counts, too, because it lays out the messages of an episode.
     packages = (Path(__file__).parent, Path(rclzenoh.__file__).parent)
     for path in sorted(path for package in packages for path in package.rglob("*") if path.suffix in _SOURCES):
         content = path.read_bytes()
@@ -45,12 +41,12 @@ def _facts(engine: str) -> Iterator[str]:
     if engine in PACKAGES:
         package = PACKAGES[engine]
         yield _version_of(package.distribution)
-        # Two compilations of one version differ in size. Its hash would take each node a second: Bullet has 140 MB.
+        # Two builds of one version differ in size. A hash would take each node a second, as Bullet has 140 MB.
         found = find_spec(package.module)
         beside = Path(found.origin).parent.glob(package.compiled) if found and found.origin else []
         sizes = [path.stat().st_size for path in sorted(beside)]
         yield f"{package.module} {sizes or 'missing'} bytes"
-    # Robots, tools, engines and tasks of other packages.
+    # Other packages may add robots, tools, engines and tasks.
     for group in sorted(group for group in entry_points().groups if group.startswith("throwcollect.")):
         for point in sorted(entry_points(group=group), key=lambda point: point.name):
             owner = f"{point.dist.name} {point.dist.version}" if point.dist else "an unknown package"

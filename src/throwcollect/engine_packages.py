@@ -1,4 +1,4 @@
-"""The packages that engines compute with, known without importing them."""
+"""The packages that engines compute with, as a table that can be read without importing them."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ class EnginePackage:
     """The package of an engine.
 
     Attributes:
-        distribution: Its name on the package index, which has its version.
-        module: Its name when it is imported.
-        compiled: Which file beside its module holds what is compiled.
+        distribution: Its name on the package index.
+        module: Its name in imports.
+        compiled: Pattern of the compiled file beside its module.
     """
 
     distribution: str
@@ -29,14 +29,11 @@ PACKAGES = MappingProxyType(
         "mujoco": EnginePackage("mujoco-core", "mujoco", "libmujoco.so.*"),
     }
 )
-"""The package of each engine that has one; of engines of other packages, the version of that package counts."""
+"""The package of each engine of our own that has one, by name of the engine."""
 
 
 def require_engine(name: str) -> None:
-    """Find out whether an engine can compute on this Python, before anything is begun.
-
-    Args:
-        name: Its name, as in ``sim.engine``.
+    """Check that the package of an engine is installed, before anything begins.
 
     Raises:
         MissingExtraError: If its package is not installed.

@@ -1,24 +1,24 @@
-"""Every error that throwcollect raises on purpose, as a tree.
+"""All errors that throwcollect raises on purpose.
 
 ::
 
     ThrowcollectError                exit 1
     ├── ConfigError                  exit 2   the request is wrong; nothing has been started
     │   ├── PlanError                exit 2   the sweep yields no trial that could be run
-    │   ├── NotFoundError            exit 2   what is named does not exist
-    │   └── ConflictError            exit 2   it does, but in a state that does not allow what is asked for
+    │   ├── NotFoundError            exit 2   the request names something that does not exist
+    │   └── ConflictError            exit 2   the request does not fit the state of the thing that it names
     ├── MissingExtraError            exit 2   a package that an extra brings is not installed (`throwcollect.extras`)
-    ├── MissingLibraryError          exit 2   a library of the system is missing that such a package loads (likewise)
+    ├── MissingLibraryError          exit 2   the system lacks a library that such a package loads (likewise)
     ├── WorkerError                  exit 3   a process of the run could not be started or was lost for good
     ├── LossError                    exit 5   a dataset is there, but trials of it are lost or doubtful
     ├── DatasetError                 exit 4   a dataset is missing, torn or contradicts itself
     │   └── ForeignPlanError         exit 4   a plan was made for another configuration
-    ├── OutputError                  exit 6   all is done, but the result could not be printed
-    ├── RequestError                 exit 1   what a client asks of a running simulation cannot be done
-    └── Interrupted                  exit 130 stopped by the user; what is finished is on disk
+    ├── OutputError                  exit 6   everything is done, but the result could not be printed
+    ├── RequestError                 exit 1   a running simulation cannot do what a client asks
+    └── Interrupted                  exit 130 stopped by the user; finished episodes are on disk
 
-A message has up to five facts, in this order: where, what was wrong and what was got; what would be right; the
-evidence; what to try.
+A message says, in this order: where the problem is, what is wrong and which value was given; what would be right; the
+evidence; and what to try.
 """
 
 from __future__ import annotations
@@ -28,17 +28,17 @@ from dataclasses import dataclass
 from pathlib import Path
 
 _MOST_PROBLEMS = 20
-"""Problems of a configuration that are told; the others are counted."""
+"""Number of problems of a configuration that a message lists; the others are counted."""
 
 
 class ThrowcollectError(Exception):
     """Root of all errors raised on purpose.
 
     Args:
-        message: Where and what: one line.
+        message: One line that says where the problem is and what it is.
         expected: What would have been right.
-        evidence: What was seen: the tail of a log, a path.
-        hint: One command or one edit that gets further.
+        evidence: What was observed, such as the tail of a log.
+        hint: One command or one edit that helps.
     """
 
     exit_code = 1
@@ -68,7 +68,7 @@ class Problem:
     """One thing that is wrong in a configuration."""
 
     message: str
-    """What was wrong, what was got and what would be right."""
+    """Says what is wrong, which value was given and what would be right."""
     key: str = ""
     """Dotted path of the key."""
     path: Path | None = None
@@ -89,8 +89,8 @@ class ConfigError(ThrowcollectError):
     Args:
         problems: All problems that were found, at least one; or a single sentence.
         expected: What would have been right.
-        hint: One command or one edit that gets further.
-        more: Number of problems beside these, which are only counted.
+        hint: One command or one edit that helps.
+        more: Number of further problems, which are only counted.
     """
 
     exit_code = 2
@@ -105,8 +105,8 @@ class ConfigError(ThrowcollectError):
     ) -> None:
         self.problems = [Problem(problems)] if isinstance(problems, str) else list(problems)
         lines = list(map(str, self.problems[:_MOST_PROBLEMS]))
-        if untold := len(self.problems) - len(lines) + more:
-            lines.append(f"and {untold} more")
+        if unlisted := len(self.problems) - len(lines) + more:
+            lines.append(f"and {unlisted} more")
         super().__init__("\n".join(lines), expected=expected, hint=hint)
 
 
@@ -115,11 +115,11 @@ class PlanError(ConfigError):
 
 
 class NotFoundError(ConfigError):
-    """What is named does not exist."""
+    """The request names something that does not exist."""
 
 
 class ConflictError(ConfigError):
-    """What is named exists, but in a state that does not allow what is asked for."""
+    """The request does not fit the state of the thing that it names."""
 
 
 class WorkerError(ThrowcollectError):
@@ -138,12 +138,12 @@ class DatasetError(ThrowcollectError):
     """A dataset is missing, torn or contradicts itself.
 
     Args:
-        problem: What is wrong: one line.
-        path: The file or directory in which it is wrong; None if only the caller knows that.
-        place: Where in that file, such as ``byte 17``; empty when it is the file as a whole.
+        problem: One line that says what is wrong.
+        path: The damaged file or directory; None if only the caller knows it.
+        place: Place in that file, such as ``byte 17``; empty for the file as a whole.
         expected: What would have been right.
-        evidence: What was seen.
-        hint: One command or one edit that gets further.
+        evidence: What was observed.
+        hint: One command or one edit that helps.
     """
 
     exit_code = 4
@@ -166,15 +166,15 @@ class DatasetError(ThrowcollectError):
 
     @property
     def details(self) -> str:
-        """What is wrong with all facts but where, for reports that have columns of their own for file and place."""
+        """The message without file and place, for reports that have columns of their own for these."""
         return self._with_facts(self.problem)
 
     def locate(self, path: Path | None = None, place: str = "") -> DatasetError:
-        """Return the same error in more detail, for a caller that knows where the bytes came from.
+        """Return the same error with file and place, for a caller that knows where the bytes came from.
 
         Args:
-            path: The file that they came from; None if that is not known here either.
-            place: Where they began; the place of the error itself follows it.
+            path: The file of the bytes; None if the caller does not know it either.
+            place: Place of the bytes in the file, which comes before the place of the error in the bytes.
         """
         whole = ": ".join(filter(None, (place, self.place)))
         facts = {"expected": self.expected, "evidence": self.evidence, "hint": self.hint}
@@ -186,19 +186,19 @@ class ForeignPlanError(DatasetError):
 
 
 class OutputError(ThrowcollectError):
-    """What was asked for is done, but its result could not be written to standard output."""
+    """The command is done, but its result could not be written to standard output."""
 
     exit_code = 6
 
 
 class RequestError(ThrowcollectError):
-    """What a client asks of a running simulation cannot be done; it is told so and the simulation goes on.
+    """A running simulation cannot do what a client asks; the client gets the reason, and the simulation goes on.
 
     Args:
-        reason: Name of the result code that says why, as the interface definitions spell it: ``NAME_INVALID``.
-        message: What was asked for and what is wrong with it: one line.
+        reason: Name of the result code in the interface definitions, such as ``NAME_INVALID``.
+        message: One line that says what was asked for and what is wrong with it.
         expected: What would have been right.
-        hint: What gets further.
+        hint: One call or one edit that helps.
     """
 
     def __init__(self, reason: str, message: str, *, expected: str | None = None, hint: str | None = None) -> None:
@@ -207,6 +207,6 @@ class RequestError(ThrowcollectError):
 
 
 class Interrupted(ThrowcollectError):
-    """Stopped by the user; what is finished is on disk."""
+    """Stopped by the user; finished episodes are on disk."""
 
     exit_code = 130

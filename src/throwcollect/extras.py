@@ -1,9 +1,9 @@
-"""The extras of the distribution: which of them brings a package, and what is said where that package is missing.
+"""The extras of the distribution: the packages that they bring, and the errors where such a package is missing.
 
 `pip install throwcollect` reads, exports and derives datasets and checks configurations, on any Python from 3.10 on.
-What simulating, containers, reports and further formats need besides comes with extras, such as
-`pip install 'throwcollect[collect]'`; `docs/installing.md` lists them. Modules that cannot do without such a package
-import it as any other; modules that can import it through `lazily`.
+Extras such as `pip install 'throwcollect[collect]'` bring the packages for simulating, containers, reports and further
+formats; `docs/installing.md` lists them. A module that is useless without such a package imports it as any other; a
+module that is useful even so imports it through `lazily`.
 """
 
 from __future__ import annotations
@@ -44,20 +44,20 @@ EXTRA_OF = MappingProxyType(
         "websockets": "serve",
     }
 )
-"""The extra that brings a package, by the name under which the package is imported."""
+"""The extra that brings a package, by the name of the package in imports."""
 
 _LAST_WITH_BULLET = (3, 11)
-"""The latest Python that pybullet has a wheel for. A Bullet that is compiled anew computes other bytes."""
+"""The latest Python with a wheel of pybullet. To compile Bullet is no way out, because it would compute other bytes."""
 
 _FIRST_WITH_MUJOCO = (3, 11)
-"""The first Python that MuJoCo has a wheel for."""
+"""The first Python with a wheel of MuJoCo."""
 
 
 class MissingExtraError(ThrowcollectError, ImportError):
     """A package that an extra brings is not installed; nothing has been started.
 
     Attributes:
-        package: Name under which the package is imported.
+        package: Name of the package in imports.
         extra: The extra that brings it.
     """
 
@@ -78,18 +78,17 @@ _INSTEAD = {
     "other throws, `up --runtime docker` the same ones, and `dataset view` shows them",
     "mujoco": "Python 3.11 or later, or `sim.engine: bullet`",
 }
-"""What helps where an engine, which also draws pictures if it is Bullet, has no wheel for this Python."""
-
+"""The hint where the package of an engine has no wheel for this Python. Bullet also draws pictures."""
 
 _SYSTEM_LIBRARY_OF = MappingProxyType({"pinocchio": ("libgomp.so.1", "libgomp1")})
-"""The library that a package loads and no wheel brings, and the package of Debian that has it."""
+"""The system library that a package loads and no wheel brings, and the package of Debian that has it."""
 
 
 class MissingLibraryError(ThrowcollectError, ImportError):
     """A package is installed, but this system lacks a library that it loads; nothing has been started.
 
     Attributes:
-        package: Name under which the package is imported.
+        package: Name of the package in imports.
         library: File name of the library.
     """
 
@@ -105,11 +104,7 @@ class MissingLibraryError(ThrowcollectError, ImportError):
 
 
 def has_wheel(package: str) -> bool:
-    """Whether a package can be installed on this Python without being compiled.
-
-    Args:
-        package: Name under which it is imported.
-    """
+    """Whether a package can be installed on this Python without a compiler."""
     python = sys.version_info[:2]
     if package == "pybullet":
         return python <= _LAST_WITH_BULLET
@@ -122,18 +117,18 @@ def install_command(extra: str) -> str:
 
 
 def is_installed(package: str) -> bool:
-    """Whether a package can be imported, judged without importing it."""
+    """Whether a package can be imported, found out without importing it."""
     spec = find_spec(package)
-    # Without an origin it is any directory of that name, such as `docker` where `python -m` is run in a clone.
+    # Any directory of that name has a spec without an origin, such as `docker` where `python -m` runs in a clone.
     return spec is not None and spec.origin is not None
 
 
 def require(*packages: str, extra: str | None = None) -> None:
-    """Find out whether packages that an extra brings are installed, before anything is begun.
+    """Check that packages are installed, before anything begins.
 
     Args:
-        packages: Names under which they are imported.
-        extra: The extra to name; None for the one that `EXTRA_OF` has.
+        packages: Names of the packages in imports.
+        extra: The extra that the error names; None for that of `EXTRA_OF`.
 
     Raises:
         MissingExtraError: If one is not installed; it names the first.
@@ -145,10 +140,10 @@ def require(*packages: str, extra: str | None = None) -> None:
 
 @contextmanager
 def explain_missing(extra: str | None = None) -> Iterator[None]:
-    """Have imports in the block say which extra they lack.
+    """Turn a failed import in the block into an error that names the extra.
 
     Args:
-        extra: The extra to name; None for the one that `EXTRA_OF` has.
+        extra: The extra that the error names; None for that of `EXTRA_OF`.
 
     Raises:
         MissingExtraError: If a package that an extra brings is not installed.
@@ -163,24 +158,23 @@ def explain_missing(extra: str | None = None) -> Iterator[None]:
 
 
 def lazily(name: str, *, extra: str | None = None) -> Any:
-    """A module that is imported when something of it is used for the first time.
+    """Make a stand-in for a module, which imports the module when an attribute of it is first used.
+
+    The use of an attribute raises `MissingExtraError` if the package is not installed, and `MissingLibraryError` if the
+    system lacks a library that the package loads.
 
     Args:
         name: Full name of a module of a package in `EXTRA_OF`.
-        extra: The extra to name where the package is missing; None for the one that `EXTRA_OF` has.
-
-    Returns:
-        Stands for the module. Asking it for an attribute raises `MissingExtraError` if the package is not installed,
-        and `MissingLibraryError` if it is, without a library of the system that it loads.
+        extra: The extra that the error names; None for that of `EXTRA_OF`.
     """
     return _LazyModule(name, extra)
 
 
 def _lacks_library(package: str) -> bool:
-    """Whether a package is there, and a library of the system that it loads is not."""
+    """Whether a package is installed, but a system library that it loads is missing."""
     if package not in _SYSTEM_LIBRARY_OF or not is_installed(package):
         return False
-    import ctypes  # takes 7 ms, and nobody needs it who has the library
+    import ctypes  # takes 7 ms, and is needed only after an import has failed
 
     try:
         ctypes.CDLL(_SYSTEM_LIBRARY_OF[package][0])
@@ -204,6 +198,6 @@ class _LazyModule:
                     raise MissingLibraryError(self._name) from error
                 raise
         value = getattr(module, attribute)
-        # The next look-up finds the value here and does not come by this function.
+        # The next look-up finds the value in the instance, and does not call this function.
         setattr(self, attribute, value)
         return value

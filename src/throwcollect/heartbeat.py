@@ -1,7 +1,7 @@
-"""What a node shows of its state without ROS: that it is ready, as a line in its log, and that its loop goes on.
+"""Signs of a node that need no ROS: a line in its log when it is ready, and a file that shows that its loop runs.
 
-The sign of life is a file that the loop of a node touches, and a health check looks at. Nodes on Fast DDS have it: to
-join them takes a second of processor time, too much for a check that is made often. The image names the file; outside
+The loop of a node touches the file, and a health check reads its time. The file exists for nodes on Fast DDS: to join
+their graph takes a second of processor time, too much for a check that runs often. The image names the file; outside
 of containers there is none.
 """
 
@@ -12,18 +12,14 @@ import time
 from pathlib import Path
 
 VARIABLE = "THROWCOLLECT_HEARTBEAT"
-"""Names the file."""
+"""Name of the environment variable that names the file."""
 SILENT_S = 5.0
-"""A node that has not touched its file for so long is stuck: its loop goes round several times a second."""
+"""Age of the file at which a node counts as stuck: its loop runs several times a second."""
 _PERIOD_S = 1.0
 
 
 def ready_line(name: str) -> str:
-    """The line by which a simulation announces in its log that it is ready for trials.
-
-    Args:
-        name: Name of its node.
-    """
+    """The line in the log of a simulation that says that its node is ready for trials."""
     return f"{name} is ready"
 
 
@@ -36,7 +32,7 @@ class Heartbeat:
         self._due = 0.0
 
     def beat(self) -> None:
-        """Say that the loop goes on; call it as often as you like."""
+        """Touch the file, at most once a second, so that the loop may call this each time."""
         now = time.monotonic()
         if self._path is not None and now >= self._due:
             self._due = now + _PERIOD_S
@@ -44,7 +40,7 @@ class Heartbeat:
 
 
 def is_beating() -> bool:
-    """Whether the node of this container has touched its file of late."""
+    """Whether the node of this container has touched its file within the last seconds."""
     try:
         return time.time() - Path(os.environ[VARIABLE]).stat().st_mtime < SILENT_S
     except (KeyError, OSError):

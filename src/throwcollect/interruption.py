@@ -1,4 +1,4 @@
-"""What ends a process: signals by which somebody asks for it, and its parent's end."""
+"""Reasons for a process to end: signals that ask for it, and the death of its parent."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ _LIBC = ctypes.CDLL(None)
 
 
 def stop_signals() -> tuple[signal.Signals, ...]:
-    """SIGINT, SIGTERM, and SIGHUP, which comes when a terminal is closed, unless `nohup` or the like has it ignored."""
+    """SIGINT, SIGTERM, and SIGHUP, which a closed terminal sends, unless it is ignored, as `nohup` arranges."""
     if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
         return (signal.SIGINT, signal.SIGTERM)
     return (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 def die_with_parent(parent: int) -> None:
-    """Have the kernel end this process by force when its parent dies; for children right after a fork.
+    """Ask the kernel to kill this process when its parent dies; to be called by a child right after the fork.
 
     Args:
-        parent: Process id of the parent. If it has died already, which the kernel tells nobody, this process ends now.
+        parent: Process id of the parent. If it has died before the call, no signal comes, so this process ends at once.
     """
     _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != parent:

@@ -1,13 +1,14 @@
-"""Families of things that a collection is made of, such as robots and tools, and their members by name.
+"""Families of parts of a collection, such as robots and tools, and their members by name.
 
-A family has members of its own, and those that other installed packages add with an entry point of the group
-``throwcollect.<family>``; its name is the member's, and it points to the same kind of object as the table here::
+A family has members of our own, and those that other installed packages add by an entry point of the group
+``throwcollect.<family>``. The name of the entry point is that of the member, and its object is of the same kind as the
+objects in the table here::
 
     [project.entry-points."throwcollect.robots"]
     planar_arm = "my_package.robot:PLANAR_ARM"
 
-The table holds names of objects instead of the objects, so that a configuration can be read without importing what
-only simulations need.
+The table holds names of objects and not the objects, so that a configuration can be read without importing the
+libraries of simulations.
 """
 
 from __future__ import annotations
@@ -39,20 +40,20 @@ _OWN = MappingProxyType(
 
 
 def names_of(family: str) -> tuple[str, ...]:
-    """List the names of the members of a family: its own first, then those of other packages, by name."""
+    """List the names of the members of a family: our own first, then those of other packages, by name."""
     return tuple(_table(family))
 
 
 @cache
 def load_member(family: str, name: str) -> Any:
-    """Import a member of a family, once: it is asked for with every trial.
+    """Import a member of a family; the cache is for callers that ask with every trial.
 
     Args:
         family: ``robots``, ``tools``, ``engines``, ``tasks`` or ``runtimes``.
         name: Name of the member.
 
     Returns:
-        A `Robot`; the class of an engine or a runtime; of a tool or a task, the class of its section.
+        A `Robot`; the class of an engine or a runtime; for a tool or a task, the class of its section.
 
     Raises:
         KeyError: If the family has no such member.
@@ -62,7 +63,7 @@ def load_member(family: str, name: str) -> Any:
 
 
 def load_object(path: str) -> Any:
-    """Import what ``module:name`` stands for."""
+    """Import the object ``module:name``."""
     module, _, name = path.partition(":")
     return getattr(import_module(module), name)
 

@@ -1,7 +1,7 @@
-"""Whether this process is that of a command of ours, or of somebody's program that has imported us.
+"""Tells the process of a command of ours from that of another program that imports us.
 
-What a command holds is known: it may be forked where others may not, as threads, files and settings of a stranger would
-be in the copy, too.
+A command may be forked, because its threads, files and settings are known. Those of another program are not, and a fork
+of it would have them, too.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ _commands: list[bool] = []
 
 
 def claim_process() -> None:
-    """Say that this process runs a command and nothing else."""
+    """Declare that this process runs a command and nothing else."""
     _commands.append(True)
 
 
 def may_be_forked() -> bool:
-    """Whether a copy of this process would hold nothing but what commands hold, and no lock of another thread."""
+    """Whether this process runs a command, and has no other thread whose locks a fork would copy."""
     return bool(_commands) and threading.active_count() == 1

@@ -1,4 +1,4 @@
-"""Pinocchio, imported when it is first used: reading a dataset asks the robot for names of joints, and not for more."""
+"""Pinocchio, imported when it is first used, because a reader of datasets needs a robot's names of joints alone."""
 
 from typing import TYPE_CHECKING
 

@@ -1,9 +1,10 @@
 """Arithmetic with the same result, bit for bit, on every x86-64 processor.
 
-NumPy chooses its code for exponentials, logarithms, powers and sines by the processor (with AVX-512 they differ in the
-last bits), and BLAS and LAPACK do so for products and solutions of matrices. What the bytes of a dataset depend on
-takes these functions instead, and of NumPy's only what IEEE 754 determines: + - * /, square roots, comparisons. The C
-library behind `math` has one code for all processors with fused multiply-add (Intel since 2013, AMD since 2012).
+NumPy chooses its code for exponentials, logarithms, powers and sines by the processor (with AVX-512 the last bits
+differ), and so do BLAS and LAPACK for products and solutions of matrices. Code that determines bytes of a dataset calls
+these functions instead. Of NumPy, it uses only operations that IEEE 754 defines: + - * /, square roots, comparisons.
+The C library behind `math` has the same code for all processors with fused multiply-add (Intel since 2013, AMD since
+2012).
 """
 
 from __future__ import annotations
@@ -64,7 +65,7 @@ def cos(angles: Array) -> Array:
 
 
 def add_up(values: Iterable[float]) -> float:
-    """Sum from the first value to the last, each rounded: from Python 3.12 on, `sum` makes up for what was rounded."""
+    """Add from the first value to the last, and round each sum; from Python 3.12 on, `sum` compensates for rounding."""
     return reduce(add, values, 0.0)
 
 

@@ -1,6 +1,6 @@
-"""What of genuine ROS 2 this Python finds, without importing any of it.
+"""Finds out which parts of genuine ROS 2 are installed for this Python, without importing any of them.
 
-Apart from `ros`, whose import already needs the answer.
+This is no part of `ros`, because the import of `ros` already needs the answer.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ _INTERFACES = "packaging/ros_interfaces"
 
 
 def missing() -> list[str]:
-    """What nodes need of genuine ROS 2 and Python does not find: rclpy itself, else packages, or single interfaces."""
+    """List what nodes need of genuine ROS 2 and Python does not find: rclpy, or else packages and single interfaces."""
     if _directory("rclpy") is None:
         return ["rclpy"]
     lacking = []
@@ -69,7 +69,7 @@ def rmws() -> list[str]:
 
 
 def rclpy_version() -> str | None:
-    """Version of rclpy, as its wheel or else its package says it; None where neither is there."""
+    """Version of rclpy, by its wheel or else by its package; None without either."""
     for distribution in ("ros-rclpy", "rclpy"):
         try:
             return version(distribution)
@@ -79,7 +79,7 @@ def rclpy_version() -> str | None:
 
 
 def how_to_install() -> str:
-    """What makes rclpy and all interfaces available to this Python: a command where wheels are for it."""
+    """Say how to install rclpy and all interfaces: a command if there are wheels for this Python."""
     if not _has_wheels():
         this = f"{platform.python_implementation()} {platform.python_version()} on {platform.system()}"
         return f"{_SETUP}: by pip it is for {_BY_PIP} alone, and this is {this}, {platform.machine()}"
@@ -90,7 +90,7 @@ def how_to_install() -> str:
 
 
 def module_name(interface: str) -> str:
-    """Name of the module that an interface is in, without its underscore: ``SpawnEntity`` is in ``spawn_entity``."""
+    """Name of the module of an interface, without its leading underscore: ``SpawnEntity`` is in ``spawn_entity``."""
     words = re.sub(r"(.)([A-Z][a-z]+)", r"\1_\2", interface)
     return re.sub(r"([a-z0-9])([A-Z])", r"\1_\2", words).lower()
 
@@ -106,5 +106,5 @@ def _has_wheels() -> bool:
 
 def _directory(package: str) -> Path | None:
     spec = find_spec(package)
-    # A directory of that name without a module in it, as may lie in the working directory, is no package of ROS.
+    # A directory of that name in the working directory, without a module in it, is no package of ROS.
     return Path(spec.origin).parent if spec is not None and spec.origin else None

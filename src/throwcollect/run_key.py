@@ -1,9 +1,9 @@
-"""The key of a run: whoever has it may join the run, and only what is signed with it is taken into the dataset.
+"""The key of a run: processes that have it may join the run, and the dataset takes only episodes signed with it.
 
-A key is a directory of two files, which only its owner can read: a private key, and the certificate that belongs to it.
-Every run makes its own. The router and all nodes of a run show each other this certificate (mutual TLS), and no other
-one is trusted. Mutual TLS is chosen because it is the one way of keeping others out that the Zenoh library inside the
-genuine rmw_zenoh_cpp was built with: that has no user/password, and no Unix sockets.
+A key is a directory of two files, which only its owner can read: a private key, and its certificate. Every run makes
+its own. The router and all nodes of a run show each other the certificate (mutual TLS), and trust no other one. We use
+mutual TLS because the Zenoh library inside the genuine rmw_zenoh_cpp was built without user/password and without Unix
+sockets, so it has no other way to keep strangers out.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from throwcollect.errors import ConfigError
 from throwcollect.files import beside, write_all
 
 KEY_VARIABLE = "THROWCOLLECT_KEY"
-"""Names the directory of the key of the run that a process belongs to."""
+"""Environment variable that names the directory of the key of the run that a process belongs to."""
 
 _PRIVATE_KEY, _CERTIFICATE = "key.pem", "certificate.pem"
 _NAME = "throwcollect"
 _LASTS = timedelta(days=3650)
 _CLOCKS_DIFFER_BY = timedelta(days=1)
-"""Machines of one run may disagree about the time."""
+"""Largest difference between the clocks of the machines of one run."""
 _SECRET_BYTES = 32
 _PURPOSE = b"throwcollect signature 1\0"
 
@@ -35,7 +35,7 @@ class RunKey:
     """The key of a run.
 
     Attributes:
-        directory: Where its two files lie.
+        directory: Directory of its two files.
     """
 
     directory: Path
@@ -62,7 +62,7 @@ class RunKey:
         return cls(Path(named).absolute()) if named else None
 
     def check(self) -> None:
-        """Find out whether this process may use the key.
+        """Check that this process can read the key.
 
         Raises:
             ConfigError: If one of its files is missing, or cannot be read.
@@ -72,7 +72,7 @@ class RunKey:
 
     @property
     def secret(self) -> bytes:
-        """What the key can be made again from on another machine, 32 bytes.
+        """The 32 bytes from which another machine can make the key again.
 
         Raises:
             ConfigError: If the private key cannot be read.
@@ -86,20 +86,20 @@ class RunKey:
         return key.private_numbers().private_value.to_bytes(_SECRET_BYTES, "big")
 
     def create(self, secret: bytes | None = None) -> None:
-        """Make a new key, or one that there is on another machine; the directory is made if it is missing.
+        """Make a new key, or make the key of another machine again; the directory is created if it is missing.
 
-        The certificate of a key that is made again is another one, which counts as much: trusted is who signed it.
+        The certificate of a key that is made again differs, but nodes trust it, because they check only who signed it.
 
         Args:
-            secret: The secret of that key; None for a new key.
+            secret: The secret of the key of another machine; None for a new key.
 
         Raises:
-            ConfigError: If the files cannot be written, or there is no such secret.
+            ConfigError: If the files cannot be written, or no key has this secret.
         """
         private_key, certificate = _make_pair(secret)
         try:
             self.directory.mkdir(mode=0o700, parents=True, exist_ok=True)
-            # The private key comes last: whoever waits for a key waits for that file.
+            # The private key comes last, because processes that wait for a key wait for that file.
             for path, data in ((self.certificate, certificate), (self.private_key, private_key)):
                 with beside(path, mode=0o600) as descriptor:
                     write_all(descriptor, data)
@@ -108,11 +108,11 @@ class RunKey:
 
 
 class Signer:
-    """Signs what nodes of one run hand each other, and checks it.
+    """Signs the data that nodes of one run exchange, and checks signatures.
 
     Args:
-        secret: What only the run's nodes know; empty for nodes that were started by hand without a key, which take
-            each other's signatures and are protected from nobody.
+        secret: Bytes that only the run's nodes know; empty for nodes that were started by hand without a key, which
+            accept each other's signatures and are not protected from others.
     """
 
     def __init__(self, secret: bytes) -> None:
@@ -120,7 +120,7 @@ class Signer:
 
     @classmethod
     def of_environment(cls) -> Signer:
-        """The signer of the run that this process belongs to.
+        """Make the signer of the run that this process belongs to.
 
         Raises:
             ConfigError: If the environment names a key that cannot be read.
@@ -130,7 +130,7 @@ class Signer:
 
     @classmethod
     def of_key(cls, key: RunKey) -> Signer:
-        """The signer of a run.
+        """Make the signer of the run with a key.
 
         Raises:
             ConfigError: If its key cannot be read.
@@ -138,7 +138,7 @@ class Signer:
         return cls(hashlib.sha256(_PURPOSE + _read(key.private_key)).digest())
 
     def sign(self, *parts: bytes | memoryview) -> str:
-        """Signature (HMAC-SHA256, in hexadecimal) of the parts one after the other."""
+        """Make the signature (HMAC-SHA256, in hexadecimal) of the parts one after the other."""
         signature = hmac.new(self._secret, digestmod=hashlib.sha256)
         for part in parts:
             signature.update(part)
@@ -150,12 +150,7 @@ class Signer:
 
 
 def unreadable_key(path: Path, reason: str) -> ConfigError:
-    """What to raise when a file of a key cannot be read.
-
-    Args:
-        path: The file.
-        reason: Why, in words.
-    """
+    """Make the error for a file of a key that cannot be read, for some reason in words."""
     return ConfigError(
         f"the key of the run cannot be read: {path}: {reason}",
         expected=f"a directory with the key of a run, which only its owner can read (--key, {KEY_VARIABLE})",
@@ -170,12 +165,12 @@ def _read(path: Path) -> bytes:
 
 
 def _make_pair(secret: bytes | None) -> tuple[bytes, bytes]:
-    """Private key and self-signed certificate, both in PEM.
+    """Make a private key and its self-signed certificate, both in PEM.
 
     Raises:
-        ConfigError: If there is no key of that secret.
+        ConfigError: If no key has this secret.
     """
-    # Imported here, as only the process that makes a key needs it.
+    # Imported here, because only the process that makes a key needs it.
     from cryptography import x509
     from cryptography.hazmat.primitives import hashes, serialization
     from cryptography.hazmat.primitives.asymmetric import ec

@@ -1,4 +1,4 @@
-"""Work in pieces that processes do side by side, with the results in order."""
+"""Splits work into pieces that several processes do at the same time, and returns the results in order."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def work_side_by_side(
     doing: str,
     fork: bool = False,
 ) -> Iterator[_Found]:
-    """Do what `working_side_by_side` does, from when the first result is asked for to when the last one is had."""
+    """Do pieces of work as `working_side_by_side` does, from the request for the first result to the last result."""
     with working_side_by_side(pieces, begin, arguments, processes=processes, doing=doing, fork=fork) as found:
         yield from found
 
@@ -48,28 +48,28 @@ def working_side_by_side(
     doing: str,
     fork: bool = False,
 ) -> Iterator[Iterator[_Found]]:
-    """Do pieces of work in several processes, which import the program that calls this, as `multiprocessing` does.
+    """Do pieces of work in several processes, which import the calling program, as `multiprocessing` does.
 
-    They begin at once, and this one may do something else meanwhile. Whatever ends it or the block, Ctrl-C too, ends
-    them at once.
+    They begin at once, so this process can do something else meanwhile. The end of this process or of the block, by
+    Ctrl-C, too, ends them at once.
 
     Args:
         pieces: The pieces; each is sent to a process.
-        begin: Called once in each process; returns what does a piece.
-        arguments: What `begin` is called with.
-        processes: How many processes there are at most; 1 is this process alone.
-        doing: What a process does, for messages: ``checks trials``.
-        fork: Whether processes are forked off this one, with all that it has imported and read, if it has one thread of
-            Python. The libraries that they use must not mind that: the ones with threads of their own are not used.
+        begin: Called once in each process; returns the function that does a piece.
+        arguments: Arguments of `begin`.
+        processes: Largest number of processes; with 1, this process does the work itself.
+        doing: Verb and object for messages, such as ``checks trials``.
+        fork: Whether to fork the processes off this one, with everything that it has imported and read, if it has only
+            one Python thread. The pieces must not use libraries with threads of their own.
 
     Yields:
-        Gives what came of each piece, in order.
+        The results, in the order of the pieces.
 
     Raises:
         WorkerError: If a process is killed.
-        ThrowcollectError: What a piece raises, when it is its turn.
+        ThrowcollectError: When it is the turn of a piece that has raised it.
     """
-    # Most commands need neither.
+    # Imported here, because most commands need neither.
     import multiprocessing
     from concurrent.futures import ProcessPoolExecutor
     from concurrent.futures.process import BrokenProcessPool
@@ -79,15 +79,15 @@ def working_side_by_side(
         yield _do_here(pieces, begin, arguments)
         return
     others = set(multiprocessing.active_children())
-    # New interpreters otherwise, as a process that was forked off might wait for what threads of this one had locked.
+    # With several threads, new interpreters are started: a fork could wait for ever for a lock of another thread.
     context = multiprocessing.get_context("fork" if fork and threading.active_count() == 1 else "spawn")
     pool = ProcessPoolExecutor(processes, context, _begin, (partial(begin, *arguments), os.getpid()))
     try:
-        # Ctrl-C is for this process, which ends those that start here with the signal blocked.
+        # Only this process shall see Ctrl-C, and then end the others, so these start with the signal blocked.
         unblocked = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT,))
         try:
             with warnings.catch_warnings():
-                # Arrow and BLAS have threads, which are not used by those that are forked. Python warns from 3.12 on.
+                # From 3.12 on, Python warns of the threads of Arrow and BLAS, which forked processes do not use.
                 warnings.filterwarnings("ignore", "This process .* is multi-threaded", DeprecationWarning)
                 found = pool.map(_work, pieces)
         finally:
@@ -110,14 +110,14 @@ def _do_here(
 
 
 _make: list[Callable[[], Callable[[Any], Any]]] = []
-"""Gives what does a piece in this process."""
+"""Returns the function that does a piece in this process; empty before the process begins."""
 
 
 def _begin(make: Callable[[], Callable[[Any], Any]], parent: int) -> None:
     die_with_parent(parent)
-    # What is here now stays until the end; the garbage collector need not go through it again and again.
+    # All objects so far live until the end, so the garbage collector need not examine them again and again.
     gc.freeze()
-    # It is made for the first piece and not here, where an error would not reach whoever wants the work done.
+    # The function is made with the first piece, because an error here would not reach the parent.
     _make[:] = [cache(make)]
 
 

@@ -1,4 +1,4 @@
-"""Units: which one a name ends with, and how many nanoseconds a second has."""
+"""Units that names end with, and the number of nanoseconds in a second."""
 
 from __future__ import annotations
 
@@ -22,9 +22,5 @@ _SUFFIXES = {
 
 
 def unit_of_name(name: str) -> str:
-    """Unit that a name ends with, such as ``m/s²`` of ``gravity_mps2``; empty if it ends with none.
-
-    Args:
-        name: Name of a key, a column or an argument.
-    """
+    """Unit that the name of a key or a column ends with, such as ``m/s²`` of ``gravity_mps2``; empty if none."""
     return next((unit for suffix, unit in _SUFFIXES.items() if name.endswith(suffix)), "")

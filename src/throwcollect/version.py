@@ -1,4 +1,4 @@
-"""The version, apart from the package's face so that rooms can tell it without looking at the rooms above them."""
+"""The version. It is not in the package's `__init__`, which all rooms would then have to import."""
 
 __version__ = "0.2.0"
-"""That of the distribution, too."""
+"""Version of the package and of the distribution."""

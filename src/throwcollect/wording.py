@@ -1,4 +1,4 @@
-"""How messages put what they count, the commands that they recommend, and what may stand in them."""
+"""Wording of messages: counts, lists of names, recommended commands, and characters that are safe to print."""
 
 from __future__ import annotations
 
@@ -12,41 +12,32 @@ _NUMBER = re.compile(r"(?<![\w.])-?\d[\d.]*(?:e[-+]?\d+)?")
 
 
 def format_count(number: int, noun: str) -> str:
-    """A number and what it counts, such as ``1 trial`` and ``0 trials``."""
+    """Write a number with a noun, such as ``1 trial`` and ``0 trials``."""
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 def join_names(names: Sequence[str], word: str = "and") -> str:
-    """Names in a sentence, such as ``a, b and c``; of more than six, the others are counted.
-
-    Args:
-        names: The names.
-        word: What stands before the last one.
-    """
+    """List names in a sentence, such as ``a, b and c``; of more than six, the others are counted."""
     if len(names) > _MOST_NAMES:
         names = [*names[: _MOST_NAMES - 1], f"{len(names) - _MOST_NAMES + 1} more"]
     return f" {word} ".join(filter(None, [", ".join(names[:-1]), *names[-1:]]))
 
 
 def blank_numbers(text: str) -> str:
-    """A text with ``#`` in place of each number, so that reasons that differ only in numbers can be counted as one.
+    """Put ``#`` in place of each number of a text, so that reasons that differ only in numbers count as the same.
 
-    Plans and datasets store reasons as text alone; numbers in names such as ``arm_right_4_joint`` stay.
+    Plans and datasets store reasons as text alone. Numbers in names such as ``arm_right_4_joint`` stay.
     """
     return _NUMBER.sub("#", text)
 
 
 def command(*words: object) -> str:
-    """A command of throwcollect as a shell takes it, such as ``throwcollect resume 'my data'``.
-
-    Args:
-        words: What follows ``throwcollect``; a path may have blanks.
-    """
+    """Write a command of throwcollect for a shell, such as ``throwcollect resume 'my data'``."""
     return shlex.join(["throwcollect", *map(str, words)])
 
 
 def printable(text: str) -> str:
-    """A message for a terminal: in lines that are not endless, and without characters that would steer it."""
+    """Make a message safe for a terminal: shorten long lines, and escape control characters."""
     return "\n".join(_printable_line(line) for line in text.split("\n"))
 
 
@@ -59,7 +50,7 @@ def _printable_line(line: str) -> str:
 
 
 def is_text(text: str) -> bool:
-    """Whether a name that the system gave can be written as UTF-8: that of a file may hold any bytes."""
+    """Whether a name from the system can be written as UTF-8: the name of a file may hold any bytes."""
     try:
         text.encode()
     except UnicodeEncodeError:

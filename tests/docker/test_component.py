@@ -9,8 +9,7 @@ from pathlib import Path
 import pytest
 from docker.client import DockerClient
 
-from throwcollect.config.container_spec import ContainerSpec
-from throwcollect.config.containers import NodeContainerConfig
+from throwcollect.config.containers import ContainerSpec, NodeContainerConfig
 from throwcollect.runs import control
 from throwcollect.runs.background import begin_container, begin_run
 from throwcollect.runs.component_container import ContainerOrder

@@ -1,18 +1,15 @@
-"""`throwcollect submit`: a collection as an array of tasks of Slurm."""
+"""`throwcollect submit`: submits a collection to Slurm."""
 
 from __future__ import annotations
 
-import json as jsonlib
-from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 
 from throwcollect.cli.options import ConfigArgument, JsonOption, SetOption, TrialsOption, overrides
+from throwcollect.cli.printing import print_json, tell
 from throwcollect.wording import command
-
-_tell = partial(typer.echo, err=True)
 
 
 def submit(
@@ -38,17 +35,15 @@ def submit(
     from throwcollect.cluster.submit import submit as submit_dataset
 
     done = submit_dataset(
-        config, output, tasks, overrides=overrides(settings, trials=trials), live=mode == "live", dry=dry_run, say=_tell
+        config, output, tasks, overrides=overrides(settings, trials=trials), live=mode == "live", dry=dry_run, say=tell
     )
     if done.job is None:
         typer.echo(done.script, nl=False)
-        return
-    if wait:
+    elif wait:
         from throwcollect.cli.cluster_runs import follow_to_the_end
 
         follow_to_the_end(done.directory, json=json)
     elif json:
-        document = {"directory": str(done.directory), "array": done.job.array, "join": done.job.join}
-        typer.echo(jsonlib.dumps(document, indent=2))
+        print_json({"directory": str(done.directory), "array": done.job.array, "join": done.job.join})
     else:
-        _tell(f"follow it: {command('wait', '--run', done.directory)}   (or ps, logs, stop)")
+        tell(f"follow it: {command('wait', '--run', done.directory)}   (or ps, logs, stop)")

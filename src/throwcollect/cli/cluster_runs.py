@@ -1,4 +1,7 @@
-"""What commands for runs do with a submitted dataset: the same as with others, as far as a queue knows it."""
+"""The commands for runs, applied to a dataset that was submitted to a cluster: `wait`, `logs`, `events`, `stop`, `ps`.
+
+They do the same as for runs of this machine, as far as the queue and the files of the dataset tell.
+"""
 
 from __future__ import annotations
 
@@ -8,36 +11,31 @@ from typing import Any
 
 import typer
 
+from throwcollect.cli.dataset.info import print_collected
+from throwcollect.cli.interruptions import count_interruptions
+from throwcollect.cli.terminal import display
 from throwcollect.cluster.following import ClusterRun, Look, ProgressOfSlices, find_queued, follow
+from throwcollect.dataset.inspect import info
 from throwcollect.errors import ConfigError, Interrupted
 from throwcollect.wording import command, format_count
 
 
 def follow_to_the_end(directory: Path, *, json: bool) -> None:
-    """Show the progress of a run until it is over, and then its summary; Ctrl-C leaves it alone."""
-    from throwcollect.cli.dataset.info import print_summary
-    from throwcollect.cli.interruptions import Interruptions
-    from throwcollect.cli.terminal import display
-    from throwcollect.dataset.inspect import info
-    from throwcollect.dataset.summary import explain_loss
-
+    """Show the progress of a run until it ends, and then its summary; Ctrl-C leaves the run alone."""
     run = ClusterRun.open(directory)
     progress = ProgressOfSlices(run)
-    with display(quiet=json) as shown, Interruptions() as interruptions:
-        for look in follow(run, keep_on=lambda: not interruptions.count):
+    with display(quiet=json) as shown, count_interruptions() as interruptions:
+        for look in follow(run, keep_on=lambda: not interruptions()):
             shown.update(progress.at(look))
     if look.lives and not look.complete:
         raise Interrupted(f"left; {directory} goes on", hint=command("wait", "--run", directory))
     if (error := run.explain(look)) is not None:
         raise error
-    found = info(directory)
-    print_summary(found, directory, as_json=json)
-    if (lost := explain_loss(found.outcomes, hint=None)) is not None:
-        raise lost
+    print_collected(info(directory), directory, as_json=json)
 
 
 def print_logs(run: ClusterRun, tasks: list[str]) -> None:
-    """Print what tasks have printed; all if none is named."""
+    """Print the logs of tasks; of all tasks if none is named."""
     logs = run.logs
     for text in tasks or logs:
         if not text.isdigit() or int(text) >= run.submission.tasks:
@@ -50,7 +48,7 @@ def print_logs(run: ClusterRun, tasks: list[str]) -> None:
 
 
 def print_events(run: ClusterRun) -> None:
-    """Print what happens to the tasks of a run until it is over."""
+    """Print each change of the state of a task, until the run ends."""
     before: dict[int | None, str] = {}
     for look in follow(run):
         states = {task.index: f"{task.state.lower()}{f' on {task.node}' if task.node else ''}" for task in look.tasks}
@@ -63,7 +61,7 @@ def print_events(run: ClusterRun) -> None:
 
 
 def end(run: ClusterRun) -> None:
-    """End all jobs of a run in order, and wait until they have ended."""
+    """Ask all jobs of a run to end, and wait until they have."""
     run.stop()
     for look in follow(run):
         last = look
@@ -72,7 +70,7 @@ def end(run: ClusterRun) -> None:
 
 
 def rows() -> Iterator[tuple[str, ...]]:
-    """A row of the table of runs for each run in the queue."""
+    """The rows of the runs in the queue, for the table that `ps` prints."""
     for run in find_queued():
         look = run.look()
         yield (
@@ -86,7 +84,7 @@ def rows() -> Iterator[tuple[str, ...]]:
 
 
 def documents() -> list[dict[str, Any]]:
-    """The same for JSON."""
+    """The runs in the queue, for the JSON document that `ps` prints."""
     found = []
     for run in find_queued():
         look = run.look()

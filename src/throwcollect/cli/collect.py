@@ -1,4 +1,4 @@
-"""`throwcollect up` and `resume`: from a YAML file to a dataset, in this terminal or by a launcher that outlives it."""
+"""`throwcollect up`, `resume`, `join-run` and `join`: collect a dataset, in this terminal or by a detached launcher."""
 
 from __future__ import annotations
 
@@ -8,17 +8,15 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from throwcollect.cli.options import (
-    DatasetArgument,
-    JsonOption,
-    SetOption,
-    TrialsOption,
-    overrides,
-)
+from throwcollect.cli.interruptions import count_interruptions
+from throwcollect.cli.options import DatasetArgument, JsonOption, SetOption, TrialsOption, overrides
+from throwcollect.cli.printing import print_json, tell
+from throwcollect.cli.streams import ensure_written, only_log
+from throwcollect.cli.terminal import display
 from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.errors import ConfigError
 from throwcollect.files import write_secret
@@ -26,7 +24,6 @@ from throwcollect.side_by_side import count_cores
 from throwcollect.wording import command
 
 if TYPE_CHECKING:
-    from throwcollect.cli.terminal import Display
     from throwcollect.runs.prepared_run import PreparedRun
 
 SimulationsOption = Annotated[
@@ -48,6 +45,7 @@ TokenOption = Annotated[
 DetachOption = Annotated[
     bool, typer.Option("-d", "--detach", help="Print the id of the run as soon as its nodes are started.")
 ]
+LockOption = Annotated[int, typer.Option("--lock", help="Descriptor of the run's locked file.")]
 
 
 def up(
@@ -94,25 +92,19 @@ def up(
         if output is None:
             raise ConfigError(f"--slice {slice}: needs --output DIR, in which the plan lies")
         _collect_slice(output, slice, changes, json=json)
-    elif resume is None:
-        _collect(
-            lambda runs, shown: runs.prepare(
-                config or DEFAULT_CONFIG,
-                overrides=changes,
-                output=output,
-                processes=count_cores(),
-                ahead=not detach,
-                onlooker=shown,
-            ),
-            detach=detach,
-            json=json,
-            token_file=token_file,
-            view=view,
-        )
+        return
+    from throwcollect.runs.preparation import prepare
+    from throwcollect.runs.preparation import resume as go_on
+
+    prepare_run: Callable[..., PreparedRun | None]
+    if resume is None:
+        config = config or DEFAULT_CONFIG
+        prepare_run = partial(prepare, config, overrides=changes, output=output, processes=count_cores())
     elif output is not None:
         raise ConfigError(f"--output {output}: should be left out with --resume, which names the directory")
     else:
-        _go_on(resume, config, changes, detach=detach, json=json, token_file=token_file, view=view)
+        prepare_run = partial(go_on, resume, config=config, overrides=changes)
+    _collect(prepare_run, directory=resume, detach=detach, json=json, token_file=token_file, view=view)
 
 
 def resume(
@@ -134,47 +126,42 @@ def resume(
     if is_submitted(directory):
         from throwcollect.cluster.submit import submit_missing
 
-        if submit_missing(directory, overrides=changes, say=partial(typer.echo, err=True)) is None:
-            typer.echo(f"{directory}: nothing is left to submit", err=True)
+        if submit_missing(directory, overrides=changes, say=tell) is None:
+            tell(f"{directory}: nothing is left to submit")
         return
-    _go_on(directory, None, changes, detach=detach, json=json, check=check)
+    from throwcollect.runs.preparation import resume as go_on
+
+    prepare_run = partial(go_on, directory, overrides=changes, check=check)
+    _collect(prepare_run, directory=directory, detach=detach, json=json)
 
 
-def launch(run: str, lock: Annotated[int, typer.Option("--lock", help="Descriptor of the run's locked file.")]) -> None:
-    """Launch a prepared run, as `up -d` does."""
-    from throwcollect.cli.interruptions import Interruptions
-    from throwcollect.cli.streams import only_log
-    from throwcollect.cli.terminal import display
+def launch(run: str, lock: LockOption) -> None:
+    """Launch a prepared run; `up -d` starts this command."""
     from throwcollect.runs.launcher import launch_inherited
 
     only_log()
-    with display(quiet=True) as shown, Interruptions() as interruptions:
-        launch_inherited(run, lock, onlooker=shown, interruptions=lambda: interruptions.count)
+    with display(quiet=True) as shown, count_interruptions() as interruptions:
+        launch_inherited(run, lock, onlooker=shown, interruptions=interruptions)
 
 
-def begin(run: str, lock: Annotated[int, typer.Option("--lock", help="Descriptor of the run's locked file.")]) -> None:
-    """Prepare and launch a run that somebody else has begun, by the order in standard input."""
-    from throwcollect.cli.interruptions import Interruptions
-    from throwcollect.cli.streams import only_log
-    from throwcollect.cli.terminal import display
+def begin(run: str, lock: LockOption) -> None:
+    """Prepare and launch a run that another process has begun, and whose order it writes to standard input."""
     from throwcollect.runs.background import carry_out
 
     only_log()
     order = sys.stdin.buffer.read()
-    with display(quiet=True) as shown, Interruptions() as interruptions:
-        carry_out(run, lock, order, onlooker=shown, interruptions=lambda: interruptions.count)
+    with display(quiet=True) as shown, count_interruptions() as interruptions:
+        carry_out(run, lock, order, onlooker=shown, interruptions=interruptions)
 
 
 def _collect_slice(directory: Path, text: str, changes: list[str], *, json: bool) -> None:
-    from throwcollect.cli.interruptions import Interruptions
-    from throwcollect.cli.terminal import display
     from throwcollect.dataset.slice_directory import slice_directory
     from throwcollect.runs.slices import collect_slice
     from throwcollect.sweep.slice import Slice
 
     slice = Slice.parse(text)
-    with display(quiet=json) as shown, Interruptions() as interruptions:
-        collect_slice(directory, slice, overrides=changes, onlooker=shown, interruptions=lambda: interruptions.count)
+    with display(quiet=json) as shown, count_interruptions() as interruptions:
+        collect_slice(directory, slice, overrides=changes, onlooker=shown, interruptions=interruptions)
     place = slice_directory(directory, slice)
     typer.echo(jsonlib.dumps({"slice": str(slice), "directory": str(place)}) if json else f"{place}: finished")
 
@@ -193,121 +180,85 @@ def join_run(
     ] = None,
 ) -> None:
     """Add simulations of this machine to a run of another one, until it is over; Ctrl-C takes them away."""
-    from throwcollect.cli.interruptions import Interruptions
-    from throwcollect.cli.terminal import display
     from throwcollect.runs.joining import join_run as join
 
-    with display(quiet=False) as shown, Interruptions() as interruptions:
+    with display(quiet=False) as shown, count_interruptions() as interruptions:
         word = sys.stdin.readline() if token == "-" else token  # noqa: S105 - it is no password
-        join(word, simulations or count_cores(), onlooker=shown, interruptions=lambda: interruptions.count)
+        join(word, simulations or count_cores(), onlooker=shown, interruptions=interruptions)
 
 
 def join(directory: DatasetArgument, json: JsonOption = False) -> None:
     """Make one dataset of the slices that `up --slice` has collected."""
-    from throwcollect.cli.dataset.info import print_summary
+    from throwcollect.cli.dataset.info import print_collected
     from throwcollect.dataset.inspect import info
     from throwcollect.dataset.join import join as join_slices
-    from throwcollect.dataset.summary import explain_loss
 
     join_slices(directory)
-    found = info(directory)
-    print_summary(found, directory, as_json=json)
-    if (lost := explain_loss(found.outcomes, hint=None)) is not None:
-        raise lost
+    print_collected(info(directory), directory, as_json=json)
 
 
-def _go_on(
-    directory: Path,
-    config: Path | None,
-    changes: list[str],
+def _collect(
+    prepare_run: Callable[..., PreparedRun | None],
     *,
+    directory: Path | None,
     detach: bool,
     json: bool,
-    check: bool = False,
     token_file: Path | None = None,
     view: bool = False,
 ) -> None:
-    launched = _collect(
-        lambda runs, shown: runs.resume(
-            directory, config=config, overrides=changes, check=check, ahead=not detach, onlooker=shown
-        ),
-        detach=detach,
-        json=json,
-        token_file=token_file,
-        view=view,
-    )
-    if not launched:
-        from throwcollect.cli.dataset.info import print_summary
+    """Launch a run and print its summary or, if it is detached, its id.
+
+    Args:
+        prepare_run: Prepares the run; returns None if its dataset is finished already.
+        directory: Directory of the dataset that the run goes on with; None for a new one.
+        detach: Whether to return as soon as the nodes are started.
+        json: Whether to print JSON.
+        token_file: File for the token; None prints it.
+        view: Whether to print the address of a page that shows the run.
+    """
+    with ExitStack() as held:
+        with display(quiet=json, bar=not detach) as shown:
+            if (run := prepare_run(ahead=not detach, onlooker=shown)) is not None:
+                held.enter_context(run)
+                _announce(run, token_file, view=view)
+                if not detach:
+                    with count_interruptions() as interruptions:
+                        summary = run.collect(interruptions=interruptions)
+        if run is not None and detach:
+            _start(run, json=json)
+            return
+    # Only now, because these imports take long, and nodes would start later if they came first.
+    from throwcollect.cli.dataset.info import print_collected, print_summary
+
+    if run is not None:
+        print_collected(summary, run.directory, as_json=json, hint=run.place.way_on)
+    elif directory is not None:
         from throwcollect.dataset.inspect import info
 
         print_summary(info(directory), directory, as_json=json)
 
 
-def _collect(
-    prepare: Callable[[Any, Display], PreparedRun | None],
-    *,
-    detach: bool,
-    json: bool,
-    token_file: Path | None,
-    view: bool = False,
-) -> bool:
-    """Launch a run and print its summary or, detached, its id.
+def _announce(run: PreparedRun, token_file: Path | None, *, view: bool) -> None:
+    """Hand out the token of a run that other machines may join, and the address of the page if it is asked for."""
+    if token_file is not None:
+        write_secret(token_file, f"{run.token}\n".encode())
+    elif run.config.run.listen is not None:
+        # The token is a secret, and what a display is told may be written to a log.
+        tell(f"other machines join by: {command('join-run', run.token, '-n', 4)}")
+    if view:
+        from throwcollect.serve.finding import ensure_server, make_page_address
 
-    Args:
-        prepare: Prepares the run, with the room that does such things, and a display that shows how that goes.
-        detach: Whether to come back as soon as its nodes are started.
-        json: Whether to print JSON.
-        token_file: Where the token goes of a run that other machines may join; None to print it.
-        view: Whether to print the address of a page on which the run is seen.
-
-    Returns:
-        Whether there was anything to do.
-    """
-    from throwcollect.cli.interruptions import Interruptions
-    from throwcollect.cli.terminal import display
-    from throwcollect.runs import preparation
-
-    with ExitStack() as held:
-        with display(quiet=json, bar=not detach) as shown:
-            if (run := prepare(preparation, shown)) is None:
-                return False
-            held.enter_context(run)
-            if token_file is not None:
-                write_secret(token_file, f"{run.token}\n".encode())
-            elif run.config.run.listen is not None:
-                # A secret, so it is not among what is said, which may be written down.
-                typer.echo(f"other machines join by: {command('join-run', run.token, '-n', 4)}", err=True)
-            if view:
-                from throwcollect.serve.finding import ensure_server, make_page_address
-
-                typer.echo(f"look inside: {make_page_address(ensure_server(), run.record.run)}", err=True)
-            if not detach:
-                with Interruptions() as interruptions:
-                    summary = run.collect(interruptions=lambda: interruptions.count)
-        if detach:
-            _start(run, json=json)
-            return True
-    # They read datasets; what takes long to import is not imported before nodes have begun to.
-    from throwcollect.cli.dataset.info import print_summary
-    from throwcollect.dataset.summary import explain_loss
-
-    print_summary(summary, run.directory, as_json=json)
-    if (lost := explain_loss(summary.outcomes, hint=run.place.way_on)) is not None:
-        raise lost
-    return True
+        tell(f"look inside: {make_page_address(ensure_server(), run.record.run)}")
 
 
 def _start(run: PreparedRun, *, json: bool) -> None:
-    """Hand the run over to a process of its own, and say how to follow it."""
-    from throwcollect.cli.interruptions import Interruptions
-    from throwcollect.cli.streams import ensure_written
-
-    with Interruptions() as interruptions:
-        record = run.start(interruptions=lambda: interruptions.count).record
+    """Hand the run over to a process of its own, and print how to follow it."""
+    with count_interruptions() as interruptions:
+        record = run.start(interruptions=interruptions).record
     if json:
         where = {"volume": record.volume} if record.volume else {"directory": record.directory}
-        typer.echo(jsonlib.dumps({"run": record.run, **where}, indent=2))
+        print_json({"run": record.run, **where})
     else:
         typer.echo(record.run)
-        typer.echo(f"follow it: {command('wait', '--run', record.run)}   (or ps, logs -f, stop)", err=True)
+        tell(f"follow it: {command('wait', '--run', record.run)}   (or ps, logs -f, stop)")
     ensure_written(hint=f"run {record.run} goes on; throwcollect ps lists it")

@@ -1,4 +1,4 @@
-"""A command from its command line to its exit code: every error becomes a message here."""
+"""Runs a command from its command line to its exit code, and turns every error into a message."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from throwcollect.interruption import stop_signals
 from throwcollect.wording import is_text, printable
 
 _WRONG_PATHS = (errno.ENAMETOOLONG, errno.ELOOP, errno.EACCES, errno.ENOTDIR)
-"""What a path that somebody has named may lead to."""
+"""Errors of the system that a path of the user may cause, and that are no errors of ours."""
 
 
 def execute(command: Callable[..., Any]) -> NoReturn:
     """Run a command of typer, print errors as messages, exit with their codes."""
     for number in stop_signals():
-        # What cleans up after Ctrl-C does so after the others, too.
+        # The other signals raise KeyboardInterrupt as Ctrl-C does, so that the same code cleans up after them.
         signal.signal(number, signal.default_int_handler)
     try:
         _check_surroundings()
@@ -50,10 +50,10 @@ def execute(command: Callable[..., Any]) -> NoReturn:
 
 
 def _check_surroundings() -> None:
-    """Refuse what would end up in names of files and in records, and cannot.
+    """Refuse a command line and a directory that cannot be written into records and names of files.
 
     Raises:
-        ConfigError: If the current directory is gone, or a word of the command line is not UTF-8.
+        ConfigError: If the current directory is gone, or it or a word of the command line is not UTF-8.
     """
     try:
         here = os.getcwd()
@@ -73,7 +73,7 @@ def _describe(error: Exception) -> tuple[str, int]:
     if isinstance(error, TyperException):
         message = error.format_message()
         command = getattr(getattr(error, "ctx", None), "command_path", "throwcollect")
-        # Without any argument, the help has been printed already.
+        # The message is empty if there was no argument: typer has printed the help then.
         return (f"{message}\n  try: {command} --help" if message else ""), error.exit_code
     if isinstance(error, OSError) and error.errno in _WRONG_PATHS and error.filename is not None:
         return f"{error.filename}: {error.strerror}", ConfigError.exit_code

@@ -1,14 +1,14 @@
-"""`throwcollect image`: makes what containers are made from, for Docker and for Apptainer."""
+"""`throwcollect image`: makes the image of the nodes, for Docker and for Apptainer."""
 
 from __future__ import annotations
 
 from contextlib import closing
-from functools import partial
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from throwcollect.cli.printing import tell
 from throwcollect.errors import ConfigError
 
 BaseOption = Annotated[
@@ -41,8 +41,7 @@ def build(
 
     tag = tag or default_tag()
     with closing(connect()) as client:
-        say = partial(typer.echo, err=True)
-        size = build_image(client, tag, base=base or DEFAULT_BASE, wheelhouse=wheelhouse, say=say)
+        size = build_image(client, tag, base=base or DEFAULT_BASE, wheelhouse=wheelhouse, say=tell)
     typer.echo(f"{tag}  {size / 1e6:.0f} MB")
 
 
@@ -63,14 +62,12 @@ def sif(
     """Make the image that Apptainer and Singularity run: one file, from the Docker image, or without any engine."""
     from throwcollect.runtimes.apptainer.sif import make_sif
 
-    given = {"--image": image, "--archive": archive}
-    named = [name for name, value in given.items() if value is not None]
-    if len(named) > 1:
+    if image is not None and archive is not None:
         raise ConfigError("--image and --archive: should be one of them")
-    if named and (unfit := {"--base": base, "--wheelhouse": wheelhouse}):
-        for name, value in unfit.items():
+    if image is not None or archive is not None:
+        source = "--archive" if image is None else "--image"
+        for name, value in {"--base": base, "--wheelhouse": wheelhouse}.items():
             if value is not None:
-                raise ConfigError(f"{name}: should be left out with {named[0]}, as nothing is built")
-    say = partial(typer.echo, err=True)
-    size = make_sif(output, image=image, archive=archive, base=base, wheelhouse=wheelhouse, say=say)
+                raise ConfigError(f"{name}: should be left out with {source}, as nothing is built")
+    size = make_sif(output, image=image, archive=archive, base=base, wheelhouse=wheelhouse, say=tell)
     typer.echo(f"{output}  {size / 1e6:.0f} MB")

@@ -1,34 +1,33 @@
-"""Ctrl-C, and whatever else asks to stop, while nodes run."""
+"""Counts signals that ask a command to stop, such as Ctrl-C, while nodes run."""
 
 from __future__ import annotations
 
 import signal
-from types import FrameType, TracebackType
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import FrameType
 
 from throwcollect.interruption import stop_signals
 
 
-class Interruptions:
-    """Counts the signals that ask to stop instead of letting them raise, so that all nodes are seen to their end.
+@contextmanager
+def count_interruptions() -> Iterator[Callable[[], int]]:
+    """Count the signals that ask to stop, which would otherwise raise, so that the block can end its nodes in order.
 
-    Use it as a context manager, in the main thread.
+    Only the main thread may use it.
 
-    Attributes:
-        count: Signals so far.
+    Yields:
+        Returns the number of signals so far.
     """
+    count = 0
 
-    def __init__(self) -> None:
-        self.count = 0
+    def note(_number: int, _frame: FrameType | None) -> None:
+        nonlocal count
+        count += 1
 
-    def __enter__(self) -> Interruptions:
-        self._previous = {number: signal.signal(number, self._note) for number in stop_signals()}
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        for number, handler in self._previous.items():
+    previous = {number: signal.signal(number, note) for number in stop_signals()}
+    try:
+        yield lambda: count
+    finally:
+        for number, handler in previous.items():
             signal.signal(number, handler)
-
-    def _note(self, _number: int, _frame: FrameType | None) -> None:
-        self.count += 1

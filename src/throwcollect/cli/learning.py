@@ -1,4 +1,4 @@
-"""`throwcollect fit`, `aim`, `throw`, `score` and `adapt`: from a dataset to a throw at a target."""
+"""`throwcollect fit`, `aim`, `throw`, `score` and `adapt`: learn from a dataset how to hit a target."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from throwcollect.cli.options import ConfigArgument, DatasetArgument, JsonOption, SetOption, overrides
+from throwcollect.cli.printing import print_json, tell
 from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.errors import ConfigError, PlanError
 from throwcollect.extras import require
@@ -19,6 +20,7 @@ from throwcollect.side_by_side import count_cores
 from throwcollect.wording import command, format_count, join_names
 
 if TYPE_CHECKING:
+    from throwcollect.config.task import TaskConfig
     from throwcollect.learning.model import Aim, Model
     from throwcollect.learning.score import Errors, Score
 
@@ -84,8 +86,8 @@ def fit(
     for names, what in ((model.given, "given with a target"), (model.latents, "of the world")):
         if names:
             typer.echo(f"{what}: {', '.join(names)}")
-    told = ((degree, tell_length(error, model.targets)) for degree, error in trained.folds_error.items())
-    errors = ", ".join(f"degree {degree}: {error}" for degree, error in told)
+    folds = trained.folds_error.items()
+    errors = ", ".join(f"degree {degree}: {tell_length(error, model.targets)}" for degree, error in folds)
     typer.echo(f"error for throws that it was not fitted to, in simulation, median: {errors}")
     typer.echo(f"model: {output}\naim with it: {command('aim', output, '--at', _example(model))}")
 
@@ -108,34 +110,32 @@ def aim(
     json: JsonOption = False,
 ) -> None:
     """Find parameters of throws at targets."""
-    from throwcollect.cli.aimed_list import write_aims
     from throwcollect.config.loader import load as load_config
     from throwcollect.learning.model import load_model
     from throwcollect.learning.model_directory import CONFIG
 
     model = load_model(directory)
     names = (*model.targets, *model.given)
-    wanted = [_read_target(text, names) for text in at or ()]
+    given = [_read_target(text, names) for text in at or ()]
     if targets is not None:
-        wanted += [[row[name] for name in names] for row in _read_table(targets, names)]
-    if not wanted:
+        given += [[row[name] for name in names] for row in _read_table(targets, names)]
+    if not given:
         raise ConfigError(
             "no target", expected="--at, or --targets FILE", hint=command("aim", directory, "--at", _example(model))
         )
-    aims = model.aim(wanted, choose=choose)
+    aims = model.aim(given, choose=choose)
     if json:
-        typer.echo(jsonlib.dumps([_aim_as_json(each) for each in aims], indent=2))
+        print_json([_aim_as_json(aim) for aim in aims])
     elif output is None:
-        for each in aims:
-            typer.echo(" ".join(f"--set {key}={value!r}" for key, value in each.parameters.items()))
+        for aim in aims:
+            typer.echo(" ".join(f"--set {key}={value!r}" for key, value in aim.parameters.items()))
     if output is not None:
-        write_aims(output, aims, names, load_config(directory / CONFIG).task)
-    if unreached := [each for each in aims if not each.reachable]:
-        for each in unreached:
-            typer.echo(
-                f"out of reach: {_numbers(each.target)}; the nearest point that was reached: {_numbers(each.nearest)}",
-                err=True,
-            )
+        _write_aims(output, aims, names, load_config(directory / CONFIG).task)
+    unreached = [aim for aim in aims if not aim.reachable]
+    for aim in unreached:
+        nearest = _join_numbers(aim.nearest)
+        tell(f"out of reach: {_join_numbers(aim.target)}; the nearest point that was reached: {nearest}")
+    if unreached:
         raise typer.Exit(1)
 
 
@@ -167,12 +167,14 @@ def throw(
                 if points is None:
                     raise
                 refused += 1
-                typer.echo(f"throw {number}: refused: {error.problems[0]}", err=True)
+                tell(f"throw {number}: refused: {error.problems[0]}")
                 continue
             if json:
                 typer.echo(jsonlib.dumps(found.row, default=str))
                 continue
-            ends = ", ".join(f"{name} {found.row[name]:.6f}" for name in _list_measured(found.row, measures))
+            ends = ", ".join(
+                f"{name} {found.row[name]:.6f}" for name in measures if isinstance(found.row.get(name), float)
+            )
             typer.echo(f"throw {number}: {found.outcome}" + (f": {ends}" if ends else f": {found.reason}"))
     if refused:
         raise typer.Exit(1)
@@ -210,7 +212,7 @@ def score(
             simulator, targets=targets, seed=seed, seeds=seeds, world=other, scatter=scatter, processes=count_cores()
         )
     write_score(directory, found)
-    typer.echo(found.model_dump_json(indent=2) if json else "\n".join(_score_lines(found)))
+    typer.echo(found.model_dump_json(indent=2) if json else "\n".join(_describe_score(found)))
 
 
 def adapt(
@@ -245,9 +247,9 @@ def adapt(
         typer.echo(entry.model_dump_json(indent=2))
         return
     typer.echo(f"{format_count(entry.throws, 'throw')}; what differs: {entry.method.value}")
-    for each in entry.found:
-        typer.echo(f"{each.name}: {each.value:.4g} (standard deviation {each.deviation:.2g})")
-    before, after = (sorted(each)[len(each) // 2] if each else None for each in (entry.before, entry.after))
+    for estimate in entry.found:
+        typer.echo(f"{estimate.name}: {estimate.value:.4g} (standard deviation {estimate.deviation:.2g})")
+    before, after = (sorted(misses)[len(misses) // 2] if misses else None for misses in (entry.before, entry.after))
     typer.echo(
         f"throws were off by {before:.4f} before, median"
         + ("" if after is None else f"; {after:.4f} by a model of the others")
@@ -265,10 +267,10 @@ def _example(model: Model) -> str:
 
 
 def _read_target(text: str, names: Sequence[str]) -> list[float]:
-    """The numbers of an option --at.
+    """Read the numbers of an option --at, one for each name.
 
     Raises:
-        ConfigError: If they are none, or not as many as names.
+        ConfigError: If they are no numbers, or not as many as names.
     """
     try:
         values = [float(part) for part in text.split(",")]
@@ -280,7 +282,7 @@ def _read_target(text: str, names: Sequence[str]) -> list[float]:
 
 
 def _read_table(path: Path, names: Sequence[str]) -> list[dict[str, float]]:
-    """Rows of a CSV file with a header line; further columns are left out.
+    """Read some columns of a CSV file with a header line.
 
     Raises:
         ConfigError: If it cannot be read, a column is missing, or a cell is no finite number.
@@ -307,7 +309,7 @@ def _read_table(path: Path, names: Sequence[str]) -> list[dict[str, float]]:
 
 
 def _to_number(text: str | None) -> float:
-    """The number that a cell holds; NaN if it holds none."""
+    """Read the number in a cell; NaN if the cell holds none."""
     try:
         return float(text or "")
     except ValueError:
@@ -315,11 +317,11 @@ def _to_number(text: str | None) -> float:
 
 
 def _read_dataset(directory: Path, keys: Sequence[str], model: Model) -> list[dict[str, float]]:
-    """Throws of a dataset that succeeded.
+    """Read the throws of a dataset that succeeded: the keys and the targets of each.
 
     Raises:
-        ConfigError: If it does not vary a key of the model, or is one of another robot.
-        DatasetError: If it is damaged.
+        ConfigError: If the dataset does not vary a key of the model, or is of another robot or task.
+        DatasetError: If the dataset is damaged.
     """
     from throwcollect.dataset.reader import Dataset
 
@@ -339,10 +341,6 @@ def _read_dataset(directory: Path, keys: Sequence[str], model: Model) -> list[di
     return rows
 
 
-def _list_measured(row: dict[str, object], names: Sequence[str]) -> list[str]:
-    return [name for name in names if isinstance(row.get(name), float)]
-
-
 def _aim_as_json(aim: Aim) -> dict[str, object]:
     return {
         "target": aim.target.tolist(),
@@ -353,11 +351,33 @@ def _aim_as_json(aim: Aim) -> dict[str, object]:
     }
 
 
-def _numbers(values: Iterable[float]) -> str:
+def _join_numbers(values: Iterable[float]) -> str:
     return ",".join(f"{value:.3f}" for value in values)
 
 
-def _score_lines(score: Score) -> list[str]:
+def _write_aims(path: Path, aims: Sequence[Aim], names: Sequence[str], task: TaskConfig) -> None:
+    """Write a list that the sampler `list` reads: a CSV file with a row for each aim, of which there is at least one.
+
+    Each of the names says what a number of their targets is: a column of the table of throws, or a key that is given.
+    The list has columns for those targets alone that the task declares.
+
+    Raises:
+        ConfigError: If the file cannot be written.
+    """
+    columns = {column.name: names.index(column.of) for column in task.target_columns if column.of in names}
+    if task.find_wrong_targets(columns):
+        columns = {}
+    rows = [{**aim.parameters, **{name: float(aim.target[at]) for name, at in columns.items()}} for aim in aims]
+    try:
+        with path.open("w", encoding="utf-8", newline="") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(rows[0])
+            writer.writerows([map(repr, row.values()) for row in rows])
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be written: {error.strerror}") from error
+
+
+def _describe_score(score: Score) -> list[str]:
     lines = [
         f"throws at {format_count(score.targets, 'target')} for each of {format_count(score.seeds, 'seed')}, medians "
         "of the seeds, in simulation: median, 9 of 10 below, largest; not landed"

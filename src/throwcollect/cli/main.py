@@ -1,4 +1,4 @@
-"""The command line as a whole; every command imports what does its work when it is called."""
+"""All commands of the command line. Each of them imports what it needs when it is called, so that all start fast."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from throwcollect.cli import cluster, collect, image, learning, nodes, runs, serve, show, starting
-from throwcollect.cli.dataset.commands import dataset_app
+from throwcollect.cli import cluster, collect, image, learning, nodes, runs, serve, show
+from throwcollect.cli.dataset import derive, info, repair, replay, verify, writing
 from throwcollect.cli.execution import execute
 from throwcollect.cli.ros.commands import ros_app
 from throwcollect.version import __version__
@@ -20,8 +20,9 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.add_typer(dataset_app, name="dataset")
+dataset_app = typer.Typer(help="Look into datasets, and make others of them.", no_args_is_help=True)
 image_app = typer.Typer(help="Make the image that containers are made from.", no_args_is_help=True)
+app.add_typer(dataset_app, name="dataset")
 app.add_typer(image_app, name="image")
 app.add_typer(ros_app, name="ros")
 
@@ -31,7 +32,7 @@ def _add(*commands: Callable[..., None], panel: str | None = None, hidden: bool 
         app.command(rich_help_panel=panel, hidden=hidden)(command)
 
 
-_add(starting.init, collect.up, collect.resume, collect.join_run, cluster.submit, collect.join)
+_add(show.init, collect.up, collect.resume, collect.join_run, cluster.submit, collect.join)
 _add(runs.ps, runs.wait, runs.logs, runs.events, runs.scale, runs.stop, runs.down, panel="Runs")
 _add(serve.serve, serve.view, panel="Runs")
 _add(learning.fit, learning.aim, learning.throw, learning.score, learning.adapt, panel="From a dataset to a throw")
@@ -40,6 +41,21 @@ _add(nodes.router, nodes.sim, nodes.coordinator, nodes.health, panel="Nodes, as 
 _add(collect.launch, collect.begin, nodes.simulate, hidden=True)
 image_app.command("build")(image.build)
 image_app.command("sif")(image.sif)
+dataset_app.command("info")(info.show_info)
+dataset_app.command("verify")(verify.verify_dataset)
+dataset_app.command("rebuild")(repair.rebuild_dataset)
+dataset_app.command("repair")(repair.repair_dataset)
+dataset_app.command("digest")(info.show_digest)
+dataset_app.command("export")(writing.export_dataset)
+dataset_app.command("merge")(derive.merge_datasets)
+dataset_app.command("filter")(derive.filter_dataset)
+dataset_app.command("sample")(derive.sample_dataset)
+dataset_app.command("split")(derive.split_dataset)
+dataset_app.command("stats")(derive.show_statistics)
+dataset_app.command("report")(writing.report_dataset)
+dataset_app.command("view")(writing.view_dataset)
+dataset_app.command("render")(writing.render_dataset)
+dataset_app.command("replay")(replay.replay_dataset)
 
 
 def _print_version(wanted: bool) -> None:
@@ -58,7 +74,7 @@ def _options(
 
 
 command = typer.main.get_command(app)
-"""The whole command. Making it takes 50 ms of a processor, which nodes that are forked from a process with it save."""
+"""The whole command. Making it takes 50 ms of processor time, which a node saves that is forked off this process."""
 
 
 def main() -> None:

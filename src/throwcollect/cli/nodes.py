@@ -11,6 +11,8 @@ import typer
 from throwcollect.cli.options import ConfigArgument, DatasetArgument
 from throwcollect.cli.streams import only_log
 from throwcollect.config.default_path import DEFAULT_CONFIG
+from throwcollect.errors import LossError
+from throwcollect.wording import format_count
 
 
 def router(
@@ -71,23 +73,20 @@ def coordinator(
     from throwcollect.coordinator.prepare import more_trials
     from throwcollect.coordinator.resume import prepare_or_resume
     from throwcollect.dataset.inspect import info
-    from throwcollect.errors import LossError
-    from throwcollect.wording import format_count
 
     plan = prepare_or_resume(config, directory)
     print(f"plan: {format_count(len(plan.trials), 'trial')}{more_trials(plan)}; dataset: {directory}", flush=True)
-    loss: LossError | None = None
     try:
         run(directory)
-    except LossError as error:
-        loss = error
-    typer.echo(describe(info(directory)), nl=False)
-    if loss is not None:
-        raise loss
+    except LossError:
+        # The dataset is finished even so.
+        typer.echo(describe(info(directory)))
+        raise
+    typer.echo(describe(info(directory)))
 
 
 def simulate(directory: DatasetArgument, trials: list[int]) -> None:
-    """Simulate trials of a plan and print the digests of their episodes, as a coordinator wants to know them."""
+    """Simulate trials of a plan and print the digests of their episodes; the coordinator starts this command."""
     from throwcollect.config.loader import load
     from throwcollect.dataset.directory import CONFIG, PLAN
     from throwcollect.replay.throw import Replayer

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 ConfigArgument = Annotated[
-    # Whether it can be read is found where it is read, and said there.
+    # The loader checks that the file can be read, and its message is better than that of typer.
     Path,
     typer.Argument(metavar="CONFIG", help="YAML file of the collection.", show_default=True, readable=False),
 ]
@@ -19,14 +19,20 @@ SetOption = Annotated[
     list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Replace a key of the file; may be repeated.")
 ]
 TrialsOption = Annotated[str | None, typer.Option("--trials", metavar="K", help="Number of trials.")]
+RunOption = Annotated[
+    str | None,
+    typer.Option(
+        "--run", metavar="RUN", help="Id of a run, its beginning, or the dataset's directory; by default, the only one."
+    ),
+]
 
 
 def overrides(settings: list[str] | None, **options: str | None) -> list[str]:
-    """What replaces keys of a configuration: options for single keys are overrides like any other.
+    """Turn options into overrides of configuration keys, as ``--set`` takes them.
 
     Args:
         settings: ``key=value`` pairs.
-        options: Values of further keys, whose dots are written as ``__``; None for those that are not given.
+        options: Values of further keys, whose dots are written as ``__``; None for options that were not given.
     """
     named = (f"{key.replace('__', '.')}={value}" for key, value in options.items() if value is not None)
     return [*(settings or []), *named]

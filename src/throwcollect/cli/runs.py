@@ -1,4 +1,4 @@
-"""`throwcollect ps`, `wait`, `logs`, `events`, `scale`, `stop` and `down`: runs, watched and changed."""
+"""`throwcollect ps`, `wait`, `logs`, `events`, `scale`, `stop` and `down`: watch runs and change them."""
 
 from __future__ import annotations
 
@@ -6,14 +6,16 @@ import json as jsonlib
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from datetime import datetime, timezone
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from throwcollect.cli.options import JsonOption
+from throwcollect.cli.interruptions import count_interruptions
+from throwcollect.cli.options import JsonOption, RunOption
+from throwcollect.cli.printing import tell
 from throwcollect.cli.streams import end_with_reader
+from throwcollect.cli.terminal import display
 from throwcollect.errors import ConfigError, Interrupted
 from throwcollect.wording import command, format_count
 
@@ -23,16 +25,8 @@ if TYPE_CHECKING:
     from throwcollect.runs.records import Run
     from throwcollect.runtimes.runtime import HeldRun, NodeState
 
-RunOption = Annotated[
-    str | None,
-    typer.Option(
-        "--run", metavar="RUN", help="Id of a run, its beginning, or the dataset's directory; by default, the only one."
-    ),
-]
-
 _UNITS = (("d", 86400), ("h", 3600), ("min", 60), ("s", 1))
 _HEADINGS = ("RUN", "RUNTIME", "SIMULATIONS", "THROWS", "STATUS", "DATASET")
-_tell = partial(typer.echo, err=True)
 
 
 def ps(
@@ -45,24 +39,24 @@ def ps(
     from throwcollect.runs.selection import find_held_runs
 
     records = Records()
+    ids = records.ids()
     known: list[Run] = []
-    for name in records.ids():
+    for name in ids:
         try:
             known.append(records.get(name))
         except ConfigError as error:
-            typer.echo(f"throwcollect: {error}", err=True)
+            tell(f"throwcollect: {error}")
     shown = [run for run in known if everything or run.status != "ended"]
     shown.sort(key=lambda run: run.record.started)
-    ids = records.ids()
     held = find_held_runs()
-    strangers = [each for run, each in held.items() if run not in ids]
+    unrecorded = [each for run, each in held.items() if run not in ids]
     if json:
-        documents = [_document(run) for run in shown] + [_strange_document(*each) for each in strangers]
+        documents = [_make_document(run) for run in shown] + [_make_unrecorded_document(*each) for each in unrecorded]
         documents += cluster_runs.documents()
         typer.echo(jsonlib.dumps(documents, indent=2, default=_in_json))
         return
-    rows = [(_row(run), _node_lines(run, held.get(run.id))) for run in shown]
-    rows += [(_strange_row(*each), _list_held_nodes(*each)) for each in strangers]
+    rows = [(_make_row(run), _node_lines(run, held.get(run.id))) for run in shown]
+    rows += [(_make_unrecorded_row(*each), _list_held_nodes(*each)) for each in unrecorded]
     rows += [(row, []) for row in cluster_runs.rows()]
     for line in _table(rows):
         typer.echo(line)
@@ -76,15 +70,12 @@ def wait(run: RunOption = None, json: JsonOption = False) -> None:
         follow_to_the_end(submitted.directory, json=json)
         return
     from throwcollect.cli.dataset.info import print_summary
-    from throwcollect.cli.interruptions import Interruptions
-    from throwcollect.cli.terminal import display
     from throwcollect.runs.following import follow
-    from throwcollect.runs.records import Records
-    from throwcollect.runs.selection import describe_death, to_watch
+    from throwcollect.runs.selection import describe_death
 
-    found = to_watch(Records(), run, say=_tell)
-    with display(quiet=json) as shown, Interruptions() as interruptions:
-        for look in follow(found, keep_on=lambda: not interruptions.count):
+    found = _find_run(run)
+    with display(quiet=json) as shown, count_interruptions() as interruptions:
+        for look in follow(found, keep_on=lambda: not interruptions()):
             found = look.run
             if look.progress is not None:
                 shown.update(look.progress)
@@ -115,11 +106,8 @@ def logs(
         print_logs(submitted, nodes or [])
         return
     from throwcollect.runs.following import read_logs
-    from throwcollect.runs.records import Records
-    from throwcollect.runs.selection import to_watch
 
-    found = to_watch(Records(), run, say=_tell)
-    for name, line, width in read_logs(found, nodes or (), follow=follow):
+    for name, line, width in read_logs(_find_run(run), nodes or (), follow=follow):
         typer.echo(f"{name:{width}} | {line}")
 
 
@@ -132,10 +120,8 @@ def events(run: RunOption = None, json: JsonOption = False) -> None:
         print_events(submitted)
         return
     from throwcollect.runs.following import read_events
-    from throwcollect.runs.records import Records
-    from throwcollect.runs.selection import to_watch
 
-    for event, line in read_events(to_watch(Records(), run, say=_tell)):
+    for event, line in read_events(_find_run(run)):
         typer.echo(line if json else f"{event.time}  {event}")
 
 
@@ -160,7 +146,6 @@ def stop(run: RunOption = None) -> None:
 
         end(submitted)
         return
-    from throwcollect.cli.interruptions import Interruptions
     from throwcollect.runs import control
     from throwcollect.runs.records import Records
     from throwcollect.runs.selection import describe_death, require_living, to_change
@@ -169,9 +154,9 @@ def stop(run: RunOption = None) -> None:
     require_living(found)
     collects = found.record.kind == "collection"
     if collects:
-        typer.echo(f"{found.id}: finishing the running trials", err=True)
-    with Interruptions() as interruptions:
-        found = control.stop(found, keep_on=lambda: not interruptions.count)
+        tell(f"{found.id}: finishing the running trials")
+    with count_interruptions() as interruptions:
+        found = control.stop(found, keep_on=lambda: not interruptions())
     if found.status == "running":
         raise Interrupted(f"not waited for; run {found.id} is stopping all the same")
     error = describe_death(found) if found.status == "died" else found.record.error
@@ -200,7 +185,7 @@ def down(
 
     ended, removed = control.down(run, volumes=volumes)
     for name in removed:
-        typer.echo(f"removed {name}", err=True)
+        tell(f"removed {name}")
     typer.echo(f"{ended}: ended and forgotten")
 
 
@@ -208,7 +193,7 @@ def _find_submitted(run: str | None) -> ClusterRun | None:
     """The submitted dataset that a command means; None if it means a run of this machine."""
     from throwcollect.runs.records import Records
 
-    # A run of this machine is meant rather, and a scheduler that is not asked costs no time.
+    # A run of this machine comes first, and then the scheduler need not be asked, which would take time.
     if run is None and any(each.status == "running" for each in Records().all()):
         return None
     from throwcollect.cluster.following import find_cluster_run
@@ -216,21 +201,29 @@ def _find_submitted(run: str | None) -> ClusterRun | None:
     return find_cluster_run(run)
 
 
+def _find_run(named: str | None) -> Run:
+    """The run of this machine that a command is to look at."""
+    from throwcollect.runs.records import Records
+    from throwcollect.runs.selection import to_watch
+
+    return to_watch(Records(), named, say=tell)
+
+
 def _in_json(value: datetime) -> str:
-    """A time by RFC 3339, as events have it."""
+    """A time by RFC 3339, in the form that events have."""
     return value.isoformat(timespec="milliseconds")
 
 
-def _document(run: Run) -> dict[str, Any]:
+def _make_document(run: Run) -> dict[str, Any]:
     error = run.record.error if run.record.failure else None
     return {**asdict(run.record), "message": str(error or ""), "status": run.status}
 
 
-def _strange_document(runtime: str, held: HeldRun) -> dict[str, Any]:
+def _make_unrecorded_document(runtime: str, held: HeldRun) -> dict[str, Any]:
     return {"run": held.run_id, "runtime": runtime, "status": "unrecorded", **asdict(held)}
 
 
-def _row(run: Run) -> tuple[str, ...]:
+def _make_row(run: Run) -> tuple[str, ...]:
     record = run.record
     throws = f"{record.progress.ended}/{record.progress.total}" if record.progress is not None else "-"
     dataset = run.place.dataset if record.kind == "collection" else "-"
@@ -244,7 +237,7 @@ def _status(run: Run, record: Record) -> str:
     return f"running for {_age(record.started)}" if run.lives else run.status
 
 
-def _strange_row(runtime: str, held: HeldRun) -> tuple[str, ...]:
+def _make_unrecorded_row(runtime: str, held: HeldRun) -> tuple[str, ...]:
     simulations = sum(node.name.startswith("sim_") for node in held.nodes)
     return held.run_id, runtime, str(simulations), "-", "unrecorded", held.source
 
@@ -252,7 +245,7 @@ def _strange_row(runtime: str, held: HeldRun) -> tuple[str, ...]:
 def _node_lines(run: Run, held: tuple[str, HeldRun] | None) -> list[tuple[str, ...]]:
     if run.status == "running":
         return [_node_line(node, _handle(run.record.runtime)) for node in run.record.nodes]
-    # What a launcher that is gone wrote of its nodes may be true no more.
+    # If the launcher has ended, its record of the nodes may be out of date.
     return _list_held_nodes(*held) if held is not None else []
 
 
@@ -271,7 +264,7 @@ def _list_held_nodes(runtime: str, held: HeldRun) -> list[tuple[str, ...]]:
 
 
 def _handle(name: str) -> str:
-    """What the nodes of a runtime are known by, as a noun; that of processes if the runtime is not known here."""
+    """The noun for the handle of a node, such as "pid"; that of processes if the runtime is unknown on this machine."""
     from throwcollect.runtimes.registry import get_runtime
     from throwcollect.runtimes.runtime import Runtime
 
@@ -298,6 +291,6 @@ def _align(rows: Sequence[Sequence[str]]) -> list[str]:
 
 
 def _age(since: datetime) -> str:
-    """A time in its largest unit."""
+    """The time since an instant, in its largest unit."""
     seconds = max(0, int((datetime.now(timezone.utc) - since).total_seconds()))
     return next((f"{seconds // size} {unit}" for unit, size in _UNITS if seconds >= size), "0 s")

@@ -1,4 +1,4 @@
-"""`throwcollect serve` and `view`: look inside runs, and manage them, from a browser or by programs."""
+"""`throwcollect serve` and `view`: let a browser or a program look inside runs and manage them."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from throwcollect.cli.options import JsonOption
-from throwcollect.cli.runs import RunOption
+from throwcollect.cli.options import JsonOption, RunOption
+from throwcollect.cli.printing import tell
 from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.errors import ConfigError
 
@@ -74,12 +74,12 @@ def serve(
         )
     tls = None if certificate is None or key is None else Tls(certificate, key)
 
-    def tell(address: Address, code: str) -> None:
+    def show_address(address: Address, code: str) -> None:
         if json:
             typer.echo(jsonlib.dumps({"url": address.url, "page": address.page(code), "pid": address.pid}))
         else:
             typer.echo(f"open {address.page(code)}")
-            typer.echo(f"from another machine: {_tunnel(address)}", err=True)
+            tell(f"from another machine: {_tunnel(address)}")
 
     serve_all(
         Instances(Catalogue.read(catalogue) if catalogue else Catalogue.find(DEFAULT_CONFIG), datasets.absolute()),
@@ -89,7 +89,7 @@ def serve(
         tls=tls,
         origins=frozenset(origins or ()),
         names=frozenset(names or ()),
-        tell=tell,
+        tell=show_address,
     )
 
 
@@ -106,13 +106,13 @@ def view(run: RunOption = None, json: JsonOption = False) -> None:
         typer.echo(jsonlib.dumps({"url": address.url, "page": page}))
         return
     typer.echo(page)
-    typer.echo(f"from another machine: {_tunnel(address)}   and then the same address, which opens once", err=True)
+    tell(f"from another machine: {_tunnel(address)}   and then the same address, which opens once")
     if sys.stdout.isatty() and (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         webbrowser.open(page)
 
 
 def _tunnel(address: Address) -> str:
-    """The command that brings the port to another machine."""
+    """The command by which another machine reaches the port of the server."""
     import socket
 
     port = address.url.rpartition(":")[2]

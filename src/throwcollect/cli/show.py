@@ -1,25 +1,39 @@
-"""`throwcollect config`, `plan` and `doctor`: what would be done, and where."""
+"""`throwcollect init`, `config`, `plan` and `doctor`: prepare a collection, and look at what it would do."""
 
 from __future__ import annotations
 
-import json as jsonlib
-from functools import partial
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from throwcollect.cli.options import (
-    ConfigArgument,
-    JsonOption,
-    SetOption,
-    TrialsOption,
-    overrides,
-)
+from throwcollect.cli.options import ConfigArgument, JsonOption, SetOption, TrialsOption, overrides
+from throwcollect.cli.printing import print_json, print_result, tell
 from throwcollect.cli.streams import end_with_reader
 from throwcollect.config.default_path import DEFAULT_CONFIG
+from throwcollect.errors import ConfigError
 from throwcollect.side_by_side import count_cores
-from throwcollect.wording import format_count
+from throwcollect.wording import command, format_count
+
+
+def init(
+    robot: Annotated[str, typer.Option("--robot", metavar="NAME", help="The robot: robot.name.")] = "talos",
+    task: Annotated[str, typer.Option("--task", metavar="NAME", help="What it does: task.name.")] = "throw",
+    sampler: Annotated[
+        str, typer.Option("--sampler", metavar="NAME", help="How trials are drawn: sweep.sampler.")
+    ] = "sobol",
+) -> None:
+    """Write a commented throwcollect.yaml, for `throwcollect up`."""
+    from throwcollect.config.starter import make_starter
+    from throwcollect.files import write_file
+
+    texts = make_starter(robot, task, sampler)
+    if existing := [name for name in texts if Path(name).exists()]:
+        raise ConfigError(f"{existing[0]}: is there already", hint="move it away, or go to another directory")
+    for name, text in texts.items():
+        write_file(Path(name), text.encode())
+    typer.echo(f"{' and '.join(texts)}: written. Look at the trials with {command('plan')}, and collect them with:")
+    typer.echo(f"  {command('up')}")
 
 
 def config(
@@ -30,10 +44,10 @@ def config(
 ) -> None:
     """Print the resolved configuration."""
     from throwcollect.config.loader import dump_yaml, load
-    from throwcollect.config.reference import json_schema
+    from throwcollect.config.shape import root
 
     if schema:
-        typer.echo(jsonlib.dumps(json_schema(), indent=2))
+        print_json(root().node)
         return
     found = load(path, overrides(settings))
     typer.echo(found.model_dump_json(indent=2) if json else dump_yaml(found), nl=json)
@@ -58,11 +72,9 @@ def plan(
     end_with_reader()
     with load_locating_errors(path, overrides(settings, trials=trials)) as config:
         if output is None:
-            found = draw_plan(config, directory=path.parent, processes=count_cores(), say=partial(typer.echo, err=True))
+            found = draw_plan(config, directory=path.parent, processes=count_cores(), say=tell)
         else:
-            found = prepare(
-                config, output, sweep_directory=path.parent, processes=count_cores(), say=partial(typer.echo, err=True)
-            )
+            found = prepare(config, output, sweep_directory=path.parent, processes=count_cores(), say=tell)
     if json:
         rows = [
             {
@@ -75,19 +87,18 @@ def plan(
             }
             for trial in found.trials
         ]
-        typer.echo(jsonlib.dumps(rows, indent=2))
+        print_json(rows)
         return
     names = (*found.keys, *found.trials.target_names)
-    columns = ["trial", *names]
     shown = found.trials if output is None else ()
     if shown:
-        typer.echo("  ".join(columns))
+        typer.echo("  ".join(["trial", *names]))
     for trial in shown:
         numbers = [_show(name, {**trial.values, **trial.target}.get(name)) for name in names]
         note = f"  refused: {trial.refused}" if trial.refused else ""
         typer.echo("  ".join([str(trial.number).rjust(len("trial")), *numbers]) + note)
     planned, refused = format_count(len(found.trials), "trial"), len(found.trials.refused)
-    typer.echo(f"{planned}, {refused} refused{more_trials(found)}", err=True)
+    tell(f"{planned}, {refused} refused{more_trials(found)}")
 
 
 def _show(name: str, value: float | None) -> str:
@@ -99,11 +110,8 @@ def doctor(json: JsonOption = False) -> None:
     from throwcollect.runs.doctor import examine
 
     checks = examine(Path.cwd())
-    if json:
-        typer.echo(jsonlib.dumps([vars(check) for check in checks], indent=2))
-    else:
-        width = max(len(check.name) for check in checks)
-        for check in checks:
-            typer.echo(f"{check.status:8}{check.name:{width}}  {check.finding}")
+    width = max(len(check.name) for check in checks)
+    lines = [f"{check.status:8}{check.name:{width}}  {check.finding}" for check in checks]
+    print_result([vars(check) for check in checks], "\n".join(lines), json=json)
     if any(check.status == "problem" for check in checks):
         raise typer.Exit(1)

@@ -1,7 +1,7 @@
-"""Standard streams that nobody can break by closing them, neither before a command starts nor while it runs.
+"""Standard streams that survive being closed, before a command starts or while it runs.
 
-Standard error is a courtesy: what cannot be written there is dropped. What cannot be written to standard output is
-dropped as well, so that the command comes to its own end, and is told by an exit code if it matters.
+Output that cannot be written is dropped, so that the command still does its work and ends in order. Lost standard
+output is reported by the exit code where it matters; lost standard error never is.
 """
 
 from __future__ import annotations
@@ -18,19 +18,19 @@ if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
 
 _READER_IS_GONE = (errno.EPIPE, errno.EIO)
-"""A pipe that nobody reads any more, and a terminal that was closed."""
+"""Errors of a pipe whose reader has ended, and of a terminal that was closed."""
 
 
 class ReaderGone(Exception):
-    """Nobody reads standard output any more, for which alone the command goes on."""
+    """The reader of standard output has ended, and the command has nothing else to do than to print."""
 
 
 class _Stream(io.FileIO):
-    """A standard stream; at its first failure it becomes one that takes everything and keeps nothing.
+    """A standard stream that drops all output after its first failure.
 
     Attributes:
-        kind: What is written: the ``result`` of a command, ``lines`` as long as somebody reads them, or a ``log``.
-        failure: Why nothing is written any more; None as long as it is.
+        kind: Kind of output: the ``result`` of a command, ``lines`` that matter only to a reader, or a ``log``.
+        failure: The error after which output is dropped; None while output is written.
     """
 
     kind: Literal["result", "lines", "log"] = "result"
@@ -48,48 +48,48 @@ class _Stream(io.FileIO):
 
     @property
     def reader_is_gone(self) -> bool:
-        """Whether the failure is that nobody reads any more."""
+        """Whether output is dropped because its reader has ended."""
         return self.failure is not None and self.failure.errno in _READER_IS_GONE
 
 
 def open_streams() -> None:
-    """Have all three standard streams, and have output survive its readers.
+    """Make all three standard streams exist, and output outlive its readers.
 
-    A stream that was closed, as by ``>&-``, becomes ``/dev/null``; otherwise the next file that is opened would get its
-    number, and with it whatever is printed.
+    A stream that was closed, as by ``>&-``, becomes ``/dev/null``. Otherwise the next file that is opened would get its
+    descriptor, and the output would be written into that file.
     """
     for number in (0, 1, 2):
         try:
             os.fstat(number)
         except OSError:
-            # It gets the lowest number that is free, which is this one; processes that are started have it, too.
+            # open() takes the lowest free descriptor, which is this one. Child processes shall inherit it, too.
             os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)
     if sys.stdin is None:
         sys.stdin = open(0, closefd=False)  # noqa: SIM115 - it stays open
-    sys.stdout = _text(1, sys.stdout)
-    sys.stderr = _text(2, sys.stderr)
+    sys.stdout = _open_text(1, sys.stdout)
+    sys.stderr = _open_text(2, sys.stderr)
 
 
 def end_with_reader() -> None:
-    """End this command, quietly, when nobody reads its output any more: it prints lines and does nothing else."""
+    """Make this command end without a message when its reader does, because it does nothing but print lines."""
     _set_kind("lines")
 
 
 def only_log() -> None:
-    """Let output get lost: it is the log of a node, whose work is elsewhere."""
+    """Ignore lost output, because it is only the log of a node."""
     _set_kind("log")
 
 
 def ensure_written(*, reader_may_leave: bool = False, hint: str | None = None) -> None:
-    """Make sure that all output so far has been written.
+    """Check that all output so far has been written.
 
     Args:
-        reader_may_leave: Whether a reader that has gone has seen enough.
-        hint: What to do if it has not.
+        reader_may_leave: Whether output may be lost because its reader has ended, as `head` does.
+        hint: How the user gets the output that was lost.
 
     Raises:
-        OutputError: If it could not be written.
-        ReaderGone: If the command should end with its reader, who is gone.
+        OutputError: If output was lost.
+        ReaderGone: If the reader has ended, and the command should end with it.
     """
     sys.stdout.flush()
     stream = _standard_output()
@@ -109,8 +109,8 @@ def _set_kind(kind: Literal["lines", "log"]) -> None:
         stream.kind = kind
 
 
-def _text(number: int, as_started: TextIO | None) -> TextIO:
-    """Text to a descriptor, encoded as Python has chosen, and without delay if it has chosen so."""
+def _open_text(number: int, as_started: TextIO | None) -> TextIO:
+    """Open a descriptor for text, with the encoding and the buffering that Python has chosen for it."""
     chosen = as_started if isinstance(as_started, io.TextIOWrapper) else None
     prompt = (
         number == 2 or os.isatty(number) or (chosen is not None and (chosen.line_buffering or chosen.write_through))
@@ -118,7 +118,7 @@ def _text(number: int, as_started: TextIO | None) -> TextIO:
     return io.TextIOWrapper(
         io.BufferedWriter(_Stream(number, "w", closefd=False)),
         encoding=chosen.encoding if chosen else "utf-8",
-        # A name of a file may hold bytes that are no text.
+        # The name of a file may hold bytes that are no text.
         errors="backslashreplace",
         line_buffering=prompt,
     )

@@ -1,10 +1,10 @@
-"""What people see while a collection runs: a progress bar on a terminal, plain lines elsewhere."""
+"""Shows the progress of a collection: as a bar on a terminal, and as plain lines elsewhere."""
 
 from __future__ import annotations
 
 import sys
 import time
-from abc import ABC, abstractmethod
+from contextlib import AbstractContextManager
 from types import TracebackType
 from typing import TYPE_CHECKING
 
@@ -16,43 +16,28 @@ if TYPE_CHECKING:
     from throwcollect.coordinator.progress import Progress
 
 _LINE_EVERY_S = 2.0
-
+"""Least time between two lines."""
 _TEXT_COLUMNS = 72
-"""Width of everything beside the bar."""
+"""Columns of the terminal that everything beside the bar takes."""
 
 
-class Display(Onlooker, ABC):
-    """Shows the progress of a run; a context manager."""
-
-    @abstractmethod
-    def __enter__(self) -> Display: ...
-
-    @abstractmethod
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None: ...
-
-
-def display(*, quiet: bool, bar: bool = True) -> Display:
-    """The display that fits where standard error goes.
+def display(*, quiet: bool, bar: bool = True) -> _Lines | _Bar:
+    """Choose a display by where standard error goes.
 
     Args:
-        quiet: Show nothing but warnings.
-        bar: Whether there will be progress to show.
+        quiet: Whether to show nothing but warnings.
+        bar: Whether to show a bar; a run that is detached has no progress.
     """
     if sys.stderr.isatty() and bar and not quiet:
         return _Bar()
     return _Lines(quiet=quiet)
 
 
-class _Lines(Display):
+class _Lines(Onlooker, AbstractContextManager["_Lines"]):
     def __init__(self, *, quiet: bool) -> None:
         self._quiet = quiet
         self._next = 0.0
-        self._said: Progress | None = None
-
-    def __enter__(self) -> _Lines:
-        return self
+        self._shown: Progress | None = None
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -61,12 +46,12 @@ class _Lines(Display):
 
     def update(self, progress: Progress) -> None:
         now = time.monotonic()
-        # The last trial is told at once, but only once: reports go on while the dataset is checked and finished.
+        # The last trial is shown without delay, but only once: reports go on while the dataset is checked and finished.
         over = progress.ended >= progress.total
-        told = self._said is not None and self._said.outcomes == progress.outcomes
-        if (over and told) or (not over and now < self._next):
+        repeated = self._shown is not None and self._shown.outcomes == progress.outcomes
+        if (over and repeated) or (not over and now < self._next):
             return
-        self._next, self._said = now + _LINE_EVERY_S, progress
+        self._next, self._shown = now + _LINE_EVERY_S, progress
         self.say(progress.line)
 
     def say(self, line: str) -> None:
@@ -77,7 +62,7 @@ class _Lines(Display):
         print(line, file=sys.stderr, flush=True)
 
 
-class _Bar(Display):
+class _Bar(Onlooker):
     def __init__(self) -> None:
         from rich import progress
         from rich.console import Console
@@ -86,7 +71,7 @@ class _Bar(Display):
         from rich.text import Text
 
         class Counts(progress.ProgressColumn):
-            """The words, which give way where there is little room, so that the numbers beside them do not."""
+            """The outcomes in words, which are cut in a narrow terminal so that the numbers beside them are not."""
 
             def render(self, task: progress.Task) -> Text:
                 return Text(task.description, no_wrap=True, overflow="ellipsis")
@@ -119,7 +104,7 @@ class _Bar(Display):
 
     def update(self, progress: Progress) -> None:
         completed, total = progress.steps
-        # The terminal may have another width by now.
+        # The user may have changed the width of the terminal.
         self._bar.bar_width = min(max(self._progress.console.width - _TEXT_COLUMNS, 4), 40)
         self._progress.update(self._task, total=total, completed=completed, description=progress.counts)
 
@@ -131,14 +116,11 @@ class _Bar(Display):
 
 
 class _InPlace:
-    """A line that leaves no remains when the terminal is narrowed, which then breaks it into several.
+    """A line that is erased completely even if the terminal is narrowed, and breaks it into several rows.
 
-    The cursor waits at the start of the line: it stays there when the line is broken, so all that is to be erased lies
-    behind it. From the end of the line, nobody could tell how far up to go, as some terminals break lines and others
-    cut them. A line that is too long, because the terminal has not told of its new width yet, is cut at its edge.
-
-    Args:
-        line: What takes one line.
+    The cursor rests at the start of the line. It stays there when the terminal breaks the line, so everything to erase
+    is behind it. From the end of the line, the number of rows to go up would be unknown, because some terminals break
+    lines and others cut them. While rich does not know the new width yet, the terminal cuts the line at its edge.
     """
 
     def __init__(self, line: RenderableType) -> None:
@@ -148,8 +130,8 @@ class _InPlace:
         from rich.segment import ControlType, Segment
 
         (segments,) = console.render_lines(self._line, options, pad=False)
-        # rich has erased this row. It has no names for what follows: the rows below are erased, and nothing is wrapped.
-        # Erased from its first row on, a screen would go into the history of tmux.
+        # rich has erased this row, and has no names for these codes: they erase the rows below and switch wrapping off.
+        # They begin below the first row, because tmux keeps a screen in its history that is erased from there on.
         yield Segment("\x1b7\x1b[B\x1b[J\x1b8\x1b[?7l", None, [(ControlType.ERASE_IN_LINE, 0)])
         yield from segments
         yield Segment("\x1b[?7h\r", None, [(ControlType.CARRIAGE_RETURN,)])

@@ -1,4 +1,4 @@
-"""What became of a submitted dataset: seen in its files and, as far as that tells, in the scheduler's queue."""
+"""Follows a submitted dataset, by its files and by the queue of the scheduler."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class ClusterRun:
 
     Attributes:
         directory: Its directory.
-        submission: What was submitted for it.
+        submission: The record of what was submitted for it.
     """
 
     directory: Path
@@ -42,7 +42,7 @@ class ClusterRun:
 
     @classmethod
     def open(cls, directory: Path) -> ClusterRun:
-        """The run of a dataset.
+        """Open the run of a dataset.
 
         Raises:
             ConfigError: If nothing was submitted for it.
@@ -61,7 +61,7 @@ class ClusterRun:
 
     @property
     def simulations_per_task(self) -> int:
-        """Number of simulations of a task; of one run on several nodes, of all of them."""
+        """Number of simulations of a task; for one run on several nodes, of all nodes."""
         return self.config.cluster.cores * (self.submission.tasks if self.submission.live else 1)
 
     @property
@@ -70,14 +70,14 @@ class ClusterRun:
         return tuple(job for each in self.submission.jobs for job in (each.array, each.join) if job)
 
     def look(self) -> Look:
-        """How it is by now.
+        """Look at the queue and the files.
 
         Raises:
             ConfigError: If there is no Slurm here.
             WorkerError: If it does not answer.
             DatasetError: If the directory cannot be read.
         """
-        # The queue first: a task that ends in between has put its slice into place before.
+        # The queue comes first: a task that has left the queue has put its slice into place before.
         tasks: dict[int | None, Task] = {}
         joining: Task | None = None
         for job in self.submission.jobs:
@@ -88,7 +88,7 @@ class ClusterRun:
         return Look(finished, tuple(tasks.values()), joining, complete)
 
     def stop(self) -> None:
-        """End all its jobs: tasks stop in order, and keep what they have.
+        """End all jobs: tasks stop in order, and keep the episodes that they have.
 
         Raises:
             ConfigError: If there is no Slurm here.
@@ -97,11 +97,7 @@ class ClusterRun:
         slurm.cancel(self.jobs)
 
     def explain(self, look: Look) -> ThrowcollectError | None:
-        """The error that says why a run that is over has no finished dataset; None if it has one.
-
-        Args:
-            look: How it is.
-        """
+        """Make the error that says why a run that has ended has no finished dataset; None if it has one."""
         if look.complete:
             return None
         again = command("resume", self.directory)
@@ -158,7 +154,7 @@ class ClusterRun:
 
 @dataclass(frozen=True)
 class Look:
-    """What is seen of a submitted dataset at a time.
+    """The state of a submitted dataset at one time.
 
     Attributes:
         finished: Slices that are finished.
@@ -184,17 +180,13 @@ class Look:
 
     @property
     def lives(self) -> bool:
-        """Whether anything of it still runs, or will."""
+        """Whether a job of it runs, or waits to run."""
         joins = self.joining is not None and self.joining.lives and self.joining.reason != "DependencyNeverSatisfied"
         return any(task.lives for task in self.tasks) or joins
 
 
 class ProgressOfSlices:
-    """Counts the trials of finished slices; each is read once.
-
-    Args:
-        run: The run.
-    """
+    """Counts the trials of finished slices, and reads each slice only once."""
 
     def __init__(self, run: ClusterRun) -> None:
         self._run = run
@@ -202,17 +194,13 @@ class ProgressOfSlices:
         self._read: set[Slice] = set()
 
     def at(self, look: Look) -> Progress:
-        """How far it has come.
-
-        Args:
-            look: How the run is.
-        """
+        """Count the trials that have ended."""
         if not look.complete:
             for each in look.finished - self._read:
                 try:
                     table = read_parquet(slice_directory(self._run.directory, each) / THROWS)
                 except ThrowcollectError:
-                    continue  # it is being joined just now
+                    continue  # a join moves the files of slices
                 self._outcomes.update(table["outcome"].to_pylist())
                 self._read.add(each)
         if self._run.submission.live and not look.complete:
@@ -232,14 +220,10 @@ class ProgressOfSlices:
 
 
 def follow(run: ClusterRun, *, keep_on: Callable[[], bool] = lambda: True) -> Iterator[Look]:
-    """Look at a run until it is over, every few seconds.
-
-    Args:
-        run: The run.
-        keep_on: Asked again and again whether to go on.
+    """Look at a run every few seconds, until it has ended or `keep_on` returns False.
 
     Yields:
-        What is seen; at last of a run that is over, unless `keep_on` refused.
+        The state of the run; the last is that of a run that has ended, unless `keep_on` refused.
 
     Raises:
         ConfigError: If there is no Slurm here.
@@ -255,11 +239,11 @@ def follow(run: ClusterRun, *, keep_on: Callable[[], bool] = lambda: True) -> It
 
 
 def find_cluster_run(named: str | None) -> ClusterRun | None:
-    """The submitted dataset that a command means; None if it means none.
+    """Find the submitted dataset that a command means; None if it means none.
 
     Args:
-        named: Directory of the dataset, or anything else that names a run; None for the one in the queue
-            that lies below the current directory.
+        named: Directory of the dataset, or any other name of a run; None for the only dataset in the queue that lies
+            below the current directory.
     """
     if named is not None:
         directory = Path(named)
@@ -269,7 +253,7 @@ def find_cluster_run(named: str | None) -> ClusterRun | None:
 
 
 def find_queued() -> list[ClusterRun]:
-    """The submitted datasets of this user that have jobs in the queue, by directory; none where there is no Slurm."""
+    """Find the submitted datasets of this user that have jobs in the queue, by directory; none without Slurm."""
     try:
         directories = sorted(set(slurm.find_directories().values()))
     except (ConfigError, WorkerError):

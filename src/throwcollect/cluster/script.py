@@ -1,6 +1,6 @@
-"""The batch scripts of a collection: what a task of the array runs, and what joins the slices.
+"""Writes the batch scripts of a collection: for the tasks of the array, and for the job that joins the slices.
 
-They are for people, too: whoever wants to, reads them, changes them and submits them by hand.
+Users may read the scripts, change them and submit them by hand.
 """
 
 from __future__ import annotations
@@ -14,15 +14,15 @@ from pathlib import Path
 
 from throwcollect.cluster.slurm import MARK
 from throwcollect.cluster.submission import CLUSTER
-from throwcollect.config.cluster import ClusterConfig
 from throwcollect.config.schema import Config
 from throwcollect.dataset.directory import PLAN
 from throwcollect.errors import Interrupted
 
 _ENDING_S = 30
-"""What a task needs besides `run.grace_s` to end in order: nodes end, files are closed."""
+"""Time that a task needs besides `run.grace_s` to end in order: to end nodes and close files."""
 _JOIN_MEMORY = "4G"
 _EXPANDED = re.compile(r"\$SLURM_|cluster\.scratch=|--bind=\$|tcp/0\.0\.0\.0:\$PORT$")
+"""Words in which the shell of the task replaces variables; all other words are quoted."""
 
 
 @dataclass(frozen=True)
@@ -32,8 +32,8 @@ class BatchScripts:
     Attributes:
         config: Its configuration.
         directory: Its directory, absolute.
-        logs: Where the tasks write their logs.
-        program: Words that stand for the ``throwcollect`` command outside of an image.
+        logs: Directory of the logs of tasks.
+        program: Words that start ``throwcollect`` outside of an image.
         image: Image that tasks run in, absolute; None for none.
     """
 
@@ -44,11 +44,11 @@ class BatchScripts:
     image: Path | None
 
     def collect(self, tasks: int, indexes: str) -> str:
-        """Text of the script of a task.
+        """Write the script of a task that collects a slice.
 
         Args:
             tasks: Number of slices.
-            indexes: Which of them, as ``sbatch --array`` takes them.
+            indexes: Indexes of the slices to collect, as ``sbatch --array`` takes them.
         """
         cluster = self.config.cluster
         directives = {
@@ -58,39 +58,27 @@ class BatchScripts:
             "cpus-per-task": cluster.cores,
             "mem": cluster.memory,
             "time": cluster.time,
-            # To the step alone, so that this script lives on and can have the task queued again.
             "signal": self._signal,
         }
-        collected = [
+        words = [
             *("up", "--slice", f"$SLURM_ARRAY_TASK_ID/{tasks}", "--output", str(self.directory)),
             *("-n", str(cluster.cores), "--runtime", "local"),
             *(("--set", f"cluster.scratch={cluster.scratch}") if cluster.scratch else ()),
         ]
-        flag = "--requeue" if cluster.requeue else "--no-requeue"
-        return "\n".join(
-            [
-                "#!/bin/bash",
-                f"# Collects one slice of {tasks} of a dataset of throwcollect.",
-                *self._directives(directives, cluster),
-                f"#SBATCH {flag}",
-                *self._start(cluster),
-                "",
-                "# As a step, so that signals reach it.",
-                self._step(collected, cores=cluster.cores),
-                "code=$?",
-                # The id of its last task is that of an array, too, and would have all of them queued again.
-                *_requeue(cluster.requeue, "${SLURM_ARRAY_JOB_ID}_$SLURM_ARRAY_TASK_ID"),
-                "exit $code",
-                "",
-            ]
+        return self._write(
+            f"Collects one slice of {tasks} of a dataset of throwcollect.",
+            directives,
+            (self._requeue_flag,),
+            "# As a step, so that signals reach it.",
+            self._step(words, cores=cluster.cores),
+            "code=$?",
+            # SLURM_JOB_ID of the last task is the id of the whole array, all of which would be queued again.
+            *_requeue(cluster.requeue, "${SLURM_ARRAY_JOB_ID}_$SLURM_ARRAY_TASK_ID"),
+            "exit $code",
         )
 
     def live(self, nodes: int) -> str:
-        """Text of the script of one run on several nodes: the first has the coordinator, and the others join it.
-
-        Args:
-            nodes: Number of nodes.
-        """
+        """Write the script of one run on several nodes: the first has the coordinator, and the others join it."""
         cluster = self.config.cluster
         directives = {
             "job-name": f"throwcollect-{self.config.name}",
@@ -103,41 +91,35 @@ class BatchScripts:
             "time": cluster.time,
             "signal": self._signal,
         }
-        token = str(self.directory / CLUSTER / "token")
+        path = str(self.directory / CLUSTER / "token")
         begin = [
             *("up", "--resume", str(self.directory), "-n", str(cluster.cores), "--runtime", "local"),
-            *("--listen", "tcp/0.0.0.0:$PORT", "--token-file", token),
+            *("--listen", "tcp/0.0.0.0:$PORT", "--token-file", path),
         ]
         join = ["join-run", "-", "-n", str(cluster.cores)]
-        return "\n".join(
-            [
-                "#!/bin/bash",
-                f"# Collects a dataset of throwcollect in one run on {nodes} nodes.",
-                *self._directives(directives, cluster),
-                "#SBATCH --no-kill",
-                f"#SBATCH {'--requeue' if cluster.requeue else '--no-requeue'}",
-                *self._start(cluster),
-                "",
-                "export PORT=$((20000 + SLURM_JOB_ID % 20000))",
-                f"rm -f {shlex.quote(token)}",
-                "# The first task begins the run; the others go on without one that is lost.",
-                f"srun --no-kill --kill-on-bad-exit=0 --cpus-per-task={cluster.cores} bash -c '",
-                'if [ "$SLURM_PROCID" = 0 ]; then',
-                f"    exec {_inside_quotes(self._words(begin))}",
-                "fi",
-                f"until [ -s {_inside_quotes(shlex.quote(token))} ]; do sleep 0.5; done",
-                f"exec {_inside_quotes(self._words(join))} < {_inside_quotes(shlex.quote(token))}",
-                "'",
-                "code=$?",
-                f"rm -f {shlex.quote(token)}",
-                *_requeue(cluster.requeue, "$SLURM_JOB_ID"),
-                "exit $code",
-                "",
-            ]
+        token = shlex.quote(path)
+        return self._write(
+            f"Collects a dataset of throwcollect in one run on {nodes} nodes.",
+            directives,
+            ("--no-kill", self._requeue_flag),
+            "export PORT=$((20000 + SLURM_JOB_ID % 20000))",
+            f"rm -f {token}",
+            "# The first task begins the run; the others go on without one that is lost.",
+            f"srun --no-kill --kill-on-bad-exit=0 --cpus-per-task={cluster.cores} bash -c '",
+            'if [ "$SLURM_PROCID" = 0 ]; then',
+            f"    exec {_escape_quotes(self._words(begin))}",
+            "fi",
+            f"until [ -s {_escape_quotes(token)} ]; do sleep 0.5; done",
+            f"exec {_escape_quotes(self._words(join))} < {_escape_quotes(token)}",
+            "'",
+            "code=$?",
+            f"rm -f {token}",
+            *_requeue(cluster.requeue, "$SLURM_JOB_ID"),
+            "exit $code",
         )
 
     def join(self) -> str:
-        """Text of the script that joins the slices."""
+        """Write the script that joins the slices."""
         cluster = self.config.cluster
         directives = {
             "job-name": f"throwcollect-{self.config.name}-join",
@@ -146,27 +128,28 @@ class BatchScripts:
             "mem": cluster.memory and _JOIN_MEMORY,
             "time": cluster.time,
         }
-        return "\n".join(
-            [
-                "#!/bin/bash",
-                "# Joins the slices of a dataset of throwcollect.",
-                *self._directives(directives, cluster),
-                "#SBATCH --requeue",
-                *self._start(cluster),
-                "",
-                self._step(["join", str(self.directory)], cores=1),
-                "",
-            ]
-        )
+        step = self._step(["join", str(self.directory)], cores=1)
+        return self._write("Joins the slices of a dataset of throwcollect.", directives, ("--requeue",), step)
+
+    def _write(self, purpose: str, directives: dict[str, object], flags: Sequence[str], *commands: str) -> str:
+        """Write a script: the options for Slurm, what all scripts begin with, and then its own commands."""
+        head = ["#!/bin/bash", f"# {purpose}", *self._directives(directives), *(f"#SBATCH {flag}" for flag in flags)]
+        return "\n".join([*head, *self._start(), "", *commands, ""])
+
+    @property
+    def _requeue_flag(self) -> str:
+        return "--requeue" if self.config.cluster.requeue else "--no-requeue"
 
     @property
     def _signal(self) -> str:
+        # Without the letter B, Slurm signals the step alone: the script lives on, and can have the task queued again.
         return f"TERM@{math.ceil(self.config.run.grace_s) + _ENDING_S}"
 
     def _output(self, name: str) -> str:
         return f"{str(self.logs).replace('%', '%%')}/{name}"
 
-    def _directives(self, own: dict[str, object], cluster: ClusterConfig) -> Iterator[str]:
+    def _directives(self, own: dict[str, object]) -> Iterator[str]:
+        cluster = self.config.cluster
         shared = {
             "partition": cluster.partition,
             "account": cluster.account,
@@ -180,11 +163,11 @@ class BatchScripts:
         for name, value in {**shared, **own}.items():
             if value is not None:
                 text = str(value)
-                yield f"#SBATCH --{name}={text if _plain(text) else _quote(text)}"
+                yield f"#SBATCH --{name}={text if _is_plain(text) else _quote(text)}"
 
-    def _start(self, cluster: ClusterConfig) -> Iterator[str]:
-        yield from cluster.lines
-        yield from (f"module load {shlex.quote(module)}" for module in cluster.modules)
+    def _start(self) -> Iterator[str]:
+        yield from self.config.cluster.lines
+        yield from (f"module load {shlex.quote(module)}" for module in self.config.cluster.modules)
         plan = shlex.quote(str(self.directory / PLAN))
         yield f"if ! [ -r {plan} ]; then"
         question = "is it on a file system that all nodes share?"
@@ -196,7 +179,7 @@ class BatchScripts:
         return f"srun --ntasks=1 --cpus-per-task={cores} {self._words(words)}"
 
     def _words(self, words: Sequence[str]) -> str:
-        """A command of throwcollect as the shell takes it, in the image if there is one."""
+        """Write a command of throwcollect for the shell, in the image if there is one."""
         program = list(self.program)
         if self.image is not None:
             bound = [str(self.directory), *self.config.cluster.binds, *filter(None, [self.config.cluster.scratch])]
@@ -214,21 +197,21 @@ def _requeue(times: int, job: str) -> Iterator[str]:
 
 
 def _in_shell(word: str) -> str:
-    """A word in the shell; variables stand for their values where a task or the scratch directory is named."""
+    """Quote a word for the shell, which replaces variables in names of tasks and of the scratch directory alone."""
     if "$" in word and _EXPANDED.match(word):
         return f'"{word}"'
     return shlex.quote(word)
 
 
-def _inside_quotes(text: str) -> str:
-    """A part of a command within a word in single quotes."""
+def _escape_quotes(text: str) -> str:
+    """Write a part of a command that stands in single quotes."""
     return text.replace("'", "'\\''")
 
 
-def _plain(text: str) -> bool:
+def _is_plain(text: str) -> bool:
     return shlex.quote(text) == text or not set(text) & set(" \t\"'\\#")
 
 
 def _quote(text: str) -> str:
-    """A value of an option in a script, as sbatch reads it."""
+    """Quote the value of an option as sbatch reads it."""
     return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'

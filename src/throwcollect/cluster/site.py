@@ -1,4 +1,4 @@
-"""What all collections of a user have in common on a cluster: a file of its own, below the dataset's configuration."""
+"""The user's own file with the keys of `cluster` that hold for all collections on a cluster."""
 
 from __future__ import annotations
 
@@ -14,16 +14,13 @@ from throwcollect.errors import ConfigError
 
 
 def site_path() -> Path:
-    """The file, whether it is there or not."""
+    """Path of the file, which need not exist."""
     home = os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config"
     return Path(home) / "throwcollect" / "cluster.yaml"
 
 
 def with_site(cluster: ClusterConfig) -> ClusterConfig:
-    """The section of a configuration on top of what the site's file says.
-
-    Args:
-        cluster: The section; what it sets itself wins.
+    """Complete the section `cluster` of a configuration by the user's file; keys that the section sets itself win.
 
     Raises:
         ConfigError: If the file is wrong.

@@ -1,4 +1,4 @@
-"""Slurm by its commands: what is submitted, what became of it, and its own words where it refuses."""
+"""Calls the commands of Slurm: submits jobs, asks for their state, and passes on why Slurm refuses them."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ from pathlib import Path
 from throwcollect.errors import ConfigError, WorkerError
 
 MARK = "throwcollect:"
-"""Begins the comment of our jobs; the directory of the dataset follows."""
+"""Begin of the comment of our jobs; the directory of the dataset follows."""
 
 _PATIENCE_S = 60.0
+"""Longest wait for a command of Slurm."""
 _GLANCE_S = 5.0
-"""The same for commands that only look whether there is something."""
+"""Longest wait where the answer is only a courtesy, as in the list of all runs."""
 _RUNNING = frozenset({"RUNNING", "COMPLETING", "SIGNALING"})
 _ENDED = frozenset(
     [
@@ -31,20 +32,20 @@ _ENDED = frozenset(
         "TIMEOUT",
     ]
 )
-"""All others, of which new versions of Slurm have more, are those of tasks that run or will."""
+"""States of tasks that have ended. All others, including those of future versions of Slurm, count as living."""
 _UNSEEN_OUTPUT = "0:53"
 """Exit code of a task whose log could not be opened: its node does not see the directory."""
 
 
 @dataclass(frozen=True)
 class Task:
-    """One task of an array, or a job that is none.
+    """One task of an array, or a job that is no array.
 
     Attributes:
         index: Its index in the array; None for a job that is no array.
-        state: State of Slurm, such as ``PENDING`` or ``RUNNING``.
-        node: Where it runs or ran; empty if nowhere.
-        reason: Why it waits, or the exit code that it ended with, as Slurm says it.
+        state: Its state in the words of Slurm, such as ``PENDING`` or ``RUNNING``.
+        node: The node that it runs or ran on; empty if none.
+        reason: The reason why it waits, or its exit code, in the words of Slurm.
     """
 
     index: int | None
@@ -54,42 +55,35 @@ class Task:
 
     @property
     def lives(self) -> bool:
-        """Whether it runs, or will."""
+        """Whether it runs, or waits to run."""
         return self.state not in _ENDED
 
     @property
     def runs(self) -> bool:
-        """Whether it is on a node."""
+        """Whether it runs on a node."""
         return self.state in _RUNNING
 
     @property
     def saw_no_directory(self) -> bool:
-        """Whether it ended before its first line, as its node does not see the directory of its log."""
+        """Whether it ended before its first line, because its node does not see the directory of its log."""
         return self.state == "FAILED" and self.reason == _UNSEEN_OUTPUT
 
 
 def submit(script: Path, *options: str) -> str:
-    """Submit a batch script.
-
-    Args:
-        script: The script.
-        options: Options of ``sbatch`` besides those in the script.
+    """Submit a batch script, with further options of ``sbatch`` than those in the script.
 
     Returns:
         Number of the job.
 
     Raises:
         ConfigError: If there is no Slurm here.
-        WorkerError: If Slurm refuses it.
+        WorkerError: If Slurm refuses the script.
     """
     return _run("sbatch", "--parsable", *options, str(script)).strip().partition(";")[0]
 
 
 def check(script: Path) -> None:
-    """Ask Slurm whether it would take a batch script; nothing is submitted.
-
-    Args:
-        script: The script.
+    """Check that Slurm would take a batch script, and submit nothing.
 
     Raises:
         ConfigError: If there is no Slurm here, or it would refuse the script.
@@ -101,16 +95,13 @@ def check(script: Path) -> None:
 
 
 def find_tasks(job: str) -> tuple[Task, ...]:
-    """The tasks of a job that Slurm remembers: those that live, and those that ended some minutes ago.
-
-    Args:
-        job: Number of the job.
+    """Find the tasks of a job that Slurm remembers: those that live, and those that ended some minutes ago.
 
     Raises:
         ConfigError: If there is no Slurm here.
         WorkerError: If it does not answer.
     """
-    # A job that is long forgotten is an error for squeue; all jobs of this user are none.
+    # squeue fails if it is asked for a job that Slurm has forgotten, and not if it is asked for all jobs of this user.
     format_ = "%F|%K|%T|%N|%r"
     lines = _run("squeue", "--noheader", "--array", "--me", "--states=all", f"--format={format_}").splitlines()
     rows = (line.strip().split("|") for line in lines)
@@ -119,10 +110,7 @@ def find_tasks(job: str) -> tuple[Task, ...]:
 
 
 def find_ended(job: str) -> dict[int | None, Task]:
-    """The tasks of a job that ended, by index: as accounting has them, or as the controller still remembers them.
-
-    Args:
-        job: Number of the job.
+    """Find the tasks of a job that have ended, by index, in the accounting or in the memory of the controller.
 
     Raises:
         ConfigError: If there is no Slurm here.
@@ -147,7 +135,7 @@ def _find_accounted(job: str) -> dict[int | None, Task]:
             "sacct", "--noheader", "--parsable2", "-X", f"--jobs={job}", "--format=JobID,State,NodeList,ExitCode"
         )
     except (WorkerError, ConfigError):
-        return {}  # accounting is often off
+        return {}  # many clusters have no accounting
     found = {}
     for line in text.splitlines():
         name, state, node, code = line.split("|")
@@ -158,7 +146,7 @@ def _find_accounted(job: str) -> dict[int | None, Task]:
 
 
 def find_directories() -> dict[str, str]:
-    """Directories of the datasets that jobs of this user in the queue collect, by the job's number.
+    """Find the directories of the datasets that jobs of this user in the queue collect, by number of the job.
 
     Raises:
         ConfigError: If there is no Slurm here.
@@ -170,7 +158,7 @@ def find_directories() -> dict[str, str]:
 
 
 def cancel(jobs: Sequence[str]) -> None:
-    """End jobs, or single tasks of arrays as ``JOB_INDEX``; those that have ended are left alone.
+    """End jobs; those that have ended stay as they are.
 
     Raises:
         ConfigError: If there is no Slurm here.
@@ -180,7 +168,7 @@ def cancel(jobs: Sequence[str]) -> None:
 
 
 def find_largest_array() -> int | None:
-    """Largest number of tasks that an array may have; None if Slurm does not say.
+    """Find the limit of Slurm for the size of an array; None if Slurm does not tell it.
 
     Raises:
         ConfigError: If there is no Slurm here.
@@ -194,7 +182,7 @@ def find_largest_array() -> int | None:
 
 
 def _indexes(text: str) -> list[int | None]:
-    """The indexes of array tasks, which may be those of several: ``4``, ``4-7%2``, ``1,4-7``; one job has none."""
+    """Read the indexes of array tasks, such as ``4``, ``4-7%2`` or ``1,4-7``; ``[None]`` for a job that is no array."""
     found: list[int | None] = []
     for part in text.partition("%")[0].split(","):
         first, _, last = part.partition("-")
@@ -208,11 +196,11 @@ def _index(text: str) -> int | None:
 
 
 def _run(program: str, *arguments: str, patience_s: float = _PATIENCE_S) -> str:
-    """What a command of Slurm prints.
+    """Run a command of Slurm, and return its output.
 
     Raises:
         ConfigError: If there is no such command.
-        WorkerError: If it fails; its own words are the evidence.
+        WorkerError: If it fails or does not answer; the message has its own words.
     """
     try:
         done = subprocess.run(
@@ -222,7 +210,7 @@ def _run(program: str, *arguments: str, patience_s: float = _PATIENCE_S) -> str:
             text=True,
             timeout=patience_s,
             check=False,
-            # Its tables and times in one form, whatever the user has set.
+            # These variables and the locale of the user would change the format of its output.
             env={**{k: v for k, v in os.environ.items() if not k.startswith(("SQUEUE_", "SACCT_"))}, "LC_ALL": "C"},
         )
     except FileNotFoundError as error:

@@ -1,4 +1,4 @@
-"""What was submitted for a dataset: written into its directory, so that any machine that sees it can go on."""
+"""The record of what was submitted for a dataset; it lies in its directory, so any machine that sees that can go on."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from throwcollect.files import read_text, write_file
 from throwcollect.sweep.slice import Slice
 
 CLUSTER = "cluster"
-"""Name of the directory of scripts and logs in that of a dataset."""
+"""Name of the directory of scripts and logs, in that of a dataset."""
 
 _FILE = "submission.json"
 _MOST_BYTES = 10_000_000
@@ -25,9 +25,9 @@ class Job:
 
     Attributes:
         array: Number of the array; empty if the slices were only to be joined.
-        join: Number of the joining job; empty if there is none, as behind one run.
-        slices: Indexes of the slices that it collects.
-        submitted: When.
+        join: Number of the joining job; empty for one run on several nodes.
+        slices: Indexes of the slices that the array collects.
+        submitted: Time of the submission.
     """
 
     array: str
@@ -38,14 +38,14 @@ class Job:
 
 @dataclass(frozen=True)
 class Submission:
-    """All that was submitted for a dataset.
+    """Everything that was submitted for a dataset.
 
     Attributes:
         name: Name of the collection.
         tasks: Number of slices; of nodes, if it is one run.
-        program: Words that stand for the ``throwcollect`` command outside of an image.
+        program: Words that start ``throwcollect`` outside of an image.
         image: Image that tasks run in; None for none.
-        jobs: In the order in which they were submitted.
+        jobs: The jobs, in the order in which they were submitted.
         live: Whether it is one run on several nodes, and not an array.
     """
 
@@ -71,10 +71,10 @@ def is_submitted(directory: Path) -> bool:
 
 
 def read_submission(directory: Path) -> Submission:
-    """Read what was submitted for a dataset.
+    """Read the record of a dataset.
 
     Raises:
-        ConfigError: If nothing was, or the file is damaged.
+        ConfigError: If nothing was submitted for it, or the record is damaged.
     """
     path = directory / CLUSTER / _FILE
     try:
@@ -85,7 +85,7 @@ def read_submission(directory: Path) -> Submission:
 
 
 def write_submission(directory: Path, submission: Submission) -> None:
-    """Write it, whole or not at all.
+    """Write the record of a dataset, whole or not at all.
 
     Raises:
         DatasetError: If it cannot be written.
@@ -94,10 +94,10 @@ def write_submission(directory: Path, submission: Submission) -> None:
 
 
 def format_indexes(indexes: tuple[int, ...]) -> str:
-    """Indexes as ``sbatch --array`` takes them, such as ``0-4,7``.
+    """Write indexes as ``sbatch --array`` takes them, such as ``0-4,7``.
 
     Args:
-        indexes: In ascending order, at least one.
+        indexes: The indexes in ascending order, at least one.
     """
     ranges: list[list[int]] = []
     for index in indexes:

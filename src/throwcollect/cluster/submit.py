@@ -44,12 +44,12 @@ Say = Callable[[str], object]
 
 @dataclass(frozen=True)
 class Submitted:
-    """What was submitted, or would be.
+    """The result of a submission, or of a dry run.
 
     Attributes:
         directory: Directory of the dataset, absolute.
         script: Text of the script of a task.
-        job: The array and its joining job; None if nothing was submitted.
+        job: The array and its joining job; None after a dry run.
     """
 
     directory: Path
@@ -73,10 +73,10 @@ def submit(
         config: The configuration's file.
         directory: Directory of the dataset: new or empty, or with the plan of this configuration; all nodes see it.
         tasks: Number of slices, each of which is a task; of nodes, if it is one run.
-        overrides: What replaces keys of the configuration, as ``--set`` takes them.
+        overrides: Overrides of keys of the configuration, as ``--set`` takes them.
         live: Whether it is one run on several nodes, as a plan needs that grows with its results.
-        dry: Whether only the script is made, and nothing is written.
-        say: Is told what is done.
+        dry: Whether to make only the script, and write nothing.
+        say: Receives messages on the progress.
 
     Raises:
         ConfigError: If the configuration cannot be collected so, something is missing that tasks need, or Slurm would
@@ -88,13 +88,13 @@ def submit(
     if not str(directory).isprintable():
         raise ConfigError(f"{str(directory)!r}: cannot be named in a batch script", expected="printable characters")
     with load_locating_errors(config, overrides) as read, ExitStack() as undo:
-        wanted = read.model_copy(update={"cluster": with_site(read.cluster)})
-        check_closed(wanted)
+        complete = read.model_copy(update={"cluster": with_site(read.cluster)})
+        check_closed(complete)
         if not live:
-            check_sliceable(wanted)
-            if wanted.trials is not None:
-                Slice(0, tasks).trials_of(wanted.trials, trials_per_shard=wanted.record.trials_per_shard)
-        scripts = _scripts(wanted, directory)
+            check_sliceable(complete)
+            if complete.trials is not None:
+                Slice(0, tasks).trials_of(complete.trials, trials_per_shard=complete.record.trials_per_shard)
+        scripts = _make_scripts(complete, directory)
         slices = () if live else tuple(range(tasks))
         text = scripts.live(tasks) if live else scripts.collect(tasks, format_indexes(slices))
         if dry:
@@ -107,11 +107,11 @@ def submit(
             _check_size(tasks)
         made = not directory.exists()
         undo.callback(_remove, directory, made=made, planned=not (directory / PLAN).exists())
-        _freeze(wanted, directory, config.parent, say)
+        _freeze(complete, directory, config.parent, say)
         if not live:
             Plan.read(directory / PLAN, read_frozen_config(directory), slice=Slice(0, tasks))
         image = str(scripts.image) if scripts.image else None
-        submission = Submission(wanted.name, tasks, tuple(scripts.program), image, live=live)
+        submission = Submission(complete.name, tasks, tuple(scripts.program), image, live=live)
         submitted = _submit(scripts, submission, slices, say)
         undo.pop_all()
         return submitted
@@ -120,13 +120,10 @@ def submit(
 def submit_missing(directory: Path, *, overrides: Sequence[str] = (), say: Say) -> Submitted | None:
     """Submit the slices of a dataset that are neither finished nor on their way; of one run, what is left of it.
 
-    Args:
-        directory: Directory of the dataset.
-        overrides: What replaces keys that say how it is run.
-        say: Is told what is done.
+    Overrides may change only keys that do not change the dataset.
 
     Returns:
-        What was submitted; None if nothing is missing.
+        The submission; None if nothing is missing.
 
     Raises:
         ConfigError: If nothing was ever submitted for it, or Slurm would refuse the jobs.
@@ -144,7 +141,7 @@ def submit_missing(directory: Path, *, overrides: Sequence[str] = (), say: Say) 
         return None
     config = read_changed_config(directory, overrides)
     scripts = replace(
-        _scripts(config, directory),
+        _make_scripts(config, directory),
         program=submission.program,
         image=None if submission.image is None else Path(submission.image),
     )
@@ -152,65 +149,54 @@ def submit_missing(directory: Path, *, overrides: Sequence[str] = (), say: Say) 
 
 
 def _submit(scripts: BatchScripts, submission: Submission, slices: tuple[int, ...], say: Say) -> Submitted:
-    """Write the scripts and submit them; without slices, what is there is joined.
+    """Write the scripts and submit them; without slices, submit only the job that joins what is finished.
 
     Raises:
         DatasetError: If a script cannot be written.
     """
-    if submission.live:
-        return _submit_live(scripts, submission, say)
     directory = scripts.directory
-    collect, join = (directory / CLUSTER / name for name in (_COLLECT, _JOIN))
-    text = scripts.collect(submission.tasks, format_indexes(slices)) if slices else ""
     try:
         scripts.logs.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise unwritable(scripts.logs, error) from error
-    write_file(join, scripts.join().encode())
-    slurm.check(join)
-    array = ""
-    if slices:
-        write_file(collect, text.encode())
-        slurm.check(collect)
-        array = slurm.submit(collect)
-    # After all of them, however they end: what is missing then, it says.
-    after = (f"--dependency=afterany:{array}", "--kill-on-invalid-dep=yes") if array else ()
-    with ExitStack() as undo:
-        if array:
-            # Nobody would know of it: what its tasks need is removed if this fails.
-            undo.callback(slurm.cancel, [array])
-        joining = slurm.submit(join, *after)
-        undo.pop_all()
+    if submission.live:
+        text = scripts.live(submission.tasks)
+        array, joining = slurm.submit(_write(directory, _COLLECT, text)), ""
+        message = f"submitted job {array}: one run on {format_count(submission.tasks, 'node')}"
+    else:
+        text = scripts.collect(submission.tasks, format_indexes(slices)) if slices else ""
+        join = _write(directory, _JOIN, scripts.join())
+        if slices:
+            array = slurm.submit(_write(directory, _COLLECT, text))
+            with ExitStack() as undo:
+                # No record would name the array, and its tasks would lack their files, which are removed on failure.
+                undo.callback(slurm.cancel, [array])
+                # The joining job starts after all tasks, however they end, and reports what is missing then.
+                joining = slurm.submit(join, f"--dependency=afterany:{array}", "--kill-on-invalid-dep=yes")
+                undo.pop_all()
+            message = f"submitted job {array}: {format_count(len(slices), 'task')}; job {joining} joins their slices"
+        else:
+            array, joining = "", slurm.submit(join)
+            message = f"submitted job {joining}, which joins the slices; all of them are finished"
     job = Job(array, joining, slices, datetime.now(timezone.utc))
     write_submission(directory, replace(submission, jobs=(*submission.jobs, job)))
-    if array:
-        say(f"submitted job {array}: {format_count(len(slices), 'task')}; job {joining} joins their slices")
-    else:
-        say(f"submitted job {joining}, which joins the slices; all of them are finished")
+    say(message)
     return Submitted(directory, text, job)
 
 
-def _submit_live(scripts: BatchScripts, submission: Submission, say: Say) -> Submitted:
-    """Write the script of one run and submit it.
+def _write(directory: Path, name: str, text: str) -> Path:
+    """Write a script into the directory of a dataset, and check that Slurm would take it.
 
     Raises:
-        DatasetError: If the script cannot be written.
+        DatasetError: If it cannot be written.
     """
-    directory = scripts.directory
-    path, text = directory / CLUSTER / _COLLECT, scripts.live(submission.tasks)
-    try:
-        scripts.logs.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise unwritable(scripts.logs, error) from error
+    path = directory / CLUSTER / name
     write_file(path, text.encode())
     slurm.check(path)
-    job = Job(slurm.submit(path), "", (), datetime.now(timezone.utc))
-    write_submission(directory, replace(submission, jobs=(*submission.jobs, job)))
-    say(f"submitted job {job.array}: one run on {format_count(submission.tasks, 'node')}")
-    return Submitted(directory, text, job)
+    return path
 
 
-def _scripts(config: Config, directory: Path) -> BatchScripts:
+def _make_scripts(config: Config, directory: Path) -> BatchScripts:
     image = None
     if config.cluster.image is not None:
         image = Path(config.cluster.image).absolute()
@@ -235,7 +221,7 @@ def _check_size(tasks: int) -> None:
 
 
 def _freeze(config: Config, directory: Path, sweep_directory: Path, say: Say) -> None:
-    """Have the directory hold the plan of the configuration."""
+    """Make the plan of the configuration in the directory, or check that the plan there is the same."""
     if (directory / PLAN).exists():
         refuse_changes(directory, read_changed_config(directory), config)
         say(f"takes the plan in {directory}")
@@ -247,7 +233,7 @@ def _freeze(config: Config, directory: Path, sweep_directory: Path, say: Say) ->
 
 
 def _remove(directory: Path, *, made: bool, planned: bool) -> None:
-    """Remove what a submission that failed has written."""
+    """Remove the files of a submission that failed."""
     with suppress(OSError):
         shutil.rmtree(directory / CLUSTER, ignore_errors=True)
         if planned:

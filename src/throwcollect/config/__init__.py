@@ -1,1 +1,1 @@
-"""The shape of a run: every key a user may write, and how it is read."""
+"""The configuration: all its keys, and how it is read and written."""

@@ -1,66 +1,48 @@
-"""Keys for collections on a cluster: what the scheduler is asked for, and what a task begins with."""
+"""Keys for collections on a cluster: what a batch script asks of the scheduler, and how a task begins."""
 
 from __future__ import annotations
 
-import re
 from typing import Annotated
 
-from pydantic import AfterValidator, BeforeValidator, Field, PositiveInt, WithJsonSchema
+from pydantic import AfterValidator, BeforeValidator, Field, PositiveInt
 
+from throwcollect.config.kinds import in_words, match
 from throwcollect.config.section import Section
 
 
-def _minutes(value: object) -> object:
-    """A number of minutes, as YAML has it, as text."""
+def _make_text(value: object) -> object:
+    """Turn a number of minutes, which YAML reads as a number, into text."""
     return str(value) if type(value) is int else value
 
 
-def _time(text: str) -> str:
-    if not re.fullmatch(r"\d+|\d+:\d{1,2}(:\d{1,2})?|\d+-\d{1,2}(:\d{1,2}){0,2}", text):
-        raise ValueError(f"should be minutes, HOURS:MINUTES:SECONDS or DAYS-HOURS, such as 4:00:00, got '{text}'")
-    return text
-
-
-def _memory(text: str) -> str:
-    if not re.fullmatch(r"[1-9]\d*[KMGT]", text):
-        raise ValueError(f"should be a number and K, M, G or T, such as 4G, got '{text}'")
-    return text
-
-
-def _word(text: str) -> str:
-    if not re.fullmatch(r"[!-~]+", text):
-        raise ValueError(f"should be one word without blanks, got '{text}'")
-    return text
-
-
-def _line(text: str) -> str:
+def _require_line(text: str) -> str:
     if not text.isprintable():
         raise ValueError(f"should be one line of printable characters, got {text!r}")
     return text
 
 
-def _bind(text: str) -> str:
-    if not re.fullmatch(r"/[^:,]*(:/[^:,]*(:r[ow])?)?", text) or not text.isprintable():
-        raise ValueError(f"should be DIRECTORY or DIRECTORY:INSIDE[:ro] with absolute paths, got '{text}'")
-    return text
-
-
-def _scratch(text: str) -> str:
-    if not re.fullmatch(r"[/$][A-Za-z0-9_./${}-]*", text):
-        raise ValueError(f"should be an absolute path or begin with a variable, such as $TMPDIR, got '{text}'")
-    return text
-
-
-def _in_words(words: str) -> WithJsonSchema:
-    return WithJsonSchema({"type": "string", "words": words})
-
-
-Time = Annotated[str, BeforeValidator(_minutes), AfterValidator(_time), _in_words("a time such as 4:00:00")]
-Memory = Annotated[str, AfterValidator(_memory), _in_words("a size such as 4G")]
-Word = Annotated[str, AfterValidator(_word), _in_words("one word")]
-Line = Annotated[str, AfterValidator(_line)]
-Scratch = Annotated[str, AfterValidator(_scratch), _in_words("a directory such as `$TMPDIR`")]
-Bind = Annotated[str, AfterValidator(_bind), _in_words("DIRECTORY[:INSIDE[:ro]]")]
+_TIME = r"\d+|\d+:\d{1,2}(:\d{1,2})?|\d+-\d{1,2}(:\d{1,2}){0,2}"
+Time = Annotated[
+    str,
+    BeforeValidator(_make_text),
+    match(_TIME, "minutes, HOURS:MINUTES:SECONDS or DAYS-HOURS, such as 4:00:00"),
+    in_words("a time such as 4:00:00"),
+]
+Memory = Annotated[
+    str, match(r"[1-9]\d*[KMGT]", "a number and K, M, G or T, such as 4G"), in_words("a size such as 4G")
+]
+Word = Annotated[str, match(r"[!-~]+", "one word without blanks"), in_words("one word")]
+Line = Annotated[str, AfterValidator(_require_line)]
+Scratch = Annotated[
+    str,
+    match(r"[/$][A-Za-z0-9_./${}-]*", "an absolute path or begin with a variable, such as $TMPDIR"),
+    in_words("a directory such as `$TMPDIR`"),
+]
+Bind = Annotated[
+    Line,
+    match(r"/[^:,]*(:/[^:,]*(:r[ow])?)?", "DIRECTORY or DIRECTORY:INSIDE[:ro] with absolute paths"),
+    in_words("DIRECTORY[:INSIDE[:ro]]"),
+]
 
 
 class ClusterConfig(Section):

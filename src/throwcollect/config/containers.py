@@ -1,28 +1,22 @@
-"""Keys for runs in containers: the image, where the dataset lies, and what each kind of node gets."""
+"""Keys for runs in containers: the image, the volume, and the options of each kind of node."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import PurePosixPath
 from typing import Annotated
 
-from pydantic import (
-    AfterValidator,
-    ConfigDict,
-    Field,
-    PositiveFloat,
-    PositiveInt,
-    WithJsonSchema,
-    model_validator,
-)
+from pydantic import AfterValidator, ConfigDict, Field, PositiveFloat, PositiveInt
 from typing_extensions import TypedDict
 
 from throwcollect.config.host_paths import DEVICES, is_allowed_device, normal_path, refusal
-from throwcollect.config.kinds import ContradictionError
+from throwcollect.config.kinds import in_words, match
 from throwcollect.config.section import Section
 
 _LEAST_MEMORY = 6 * 1024**2
-"""What Docker engines ask for."""
+"""The least that Docker engines accept."""
 
 _SIZE_UNITS = {"": 1, "b": 1, "k": 1024, "m": 1024**2, "g": 1024**3}
 _OWN_VARIABLES = (
@@ -61,14 +55,8 @@ def _size(text: str) -> str:
     return text
 
 
-def _cpuset(text: str) -> str:
-    if not re.fullmatch(r"\d+(-\d+)?(,\d+(-\d+)?)*", text):
-        raise ValueError(f"should be numbers and ranges of cores, such as 0-3,6, got '{text}'")
-    return text
-
-
-def _own_path(text: str) -> bool:
-    """Whether a path in a container belongs to the runtime: the directories of dataset and key, and what is in them."""
+def _is_own_path(text: str) -> bool:
+    """Whether a path in a container is in the directory of the dataset or the key, which belong to the runtime."""
     path = PurePosixPath(text)
     return any(PurePosixPath(own) in (path, *path.parents) for own in _OWN_DIRECTORIES)
 
@@ -82,7 +70,7 @@ def _mount(text: str) -> str:
         raise ValueError(f"{source} is refused, as it is an engine's socket, and gives power over the host")
     if reason := refusal(source):
         raise ValueError(f"{source} {reason}")
-    if _own_path(target) or PurePosixPath(target) == PurePosixPath("/"):
+    if _is_own_path(target) or PurePosixPath(target) == PurePosixPath("/"):
         raise ValueError(f"{target} is refused, as the dataset, the key or the image is there in the container")
     return text
 
@@ -90,12 +78,6 @@ def _mount(text: str) -> str:
 def _network(text: str) -> str:
     if text in ("host", "none") or text.startswith("container:"):
         raise ValueError(f"{text} is refused; a network of the engine is joined besides the run's own")
-    return text
-
-
-def _volume(text: str) -> str:
-    if not re.fullmatch(r"[a-zA-Z0-9][a-zA-Z0-9_.-]+", text):
-        raise ValueError(f"should be a volume's name: letters, digits, _, . and -, got '{text}'")
     return text
 
 
@@ -121,7 +103,7 @@ def _label(text: str) -> str:
 
 
 def _tmpfs(text: str) -> str:
-    if not text.startswith("/") or _own_path(text):
+    if not text.startswith("/") or _is_own_path(text):
         raise ValueError("should be an absolute path in the container, outside of /data and /key")
     return text
 
@@ -136,20 +118,23 @@ def _device(text: str) -> str:
     return text
 
 
-def _in_words(words: str) -> WithJsonSchema:
-    return WithJsonSchema({"type": "string", "words": words})
-
-
-Size = Annotated[str, AfterValidator(_size), _in_words("a size such as 512m or 2g")]
-Cores = Annotated[str, AfterValidator(_cpuset), _in_words("cores such as 0-3,6")]
-Mount = Annotated[str, AfterValidator(_mount), _in_words("HOST:CONTAINER[:ro]")]
-Network = Annotated[str, AfterValidator(_network), _in_words("names of networks")]
-Volume = Annotated[str, AfterValidator(_volume), _in_words("a volume's name")]
+Size = Annotated[str, AfterValidator(_size), in_words("a size such as 512m or 2g")]
+Cores = Annotated[
+    str,
+    match(r"\d+(-\d+)?(,\d+(-\d+)?)*", "numbers and ranges of cores, such as 0-3,6"),
+    in_words("cores such as 0-3,6"),
+]
+Mount = Annotated[str, AfterValidator(_mount), in_words("HOST:CONTAINER[:ro]")]
+Network = Annotated[str, AfterValidator(_network), in_words("names of networks")]
+Volume = Annotated[
+    str,
+    match(r"[a-zA-Z0-9][a-zA-Z0-9_.-]+", "a volume's name: letters, digits, _, . and -"),
+    in_words("a volume's name"),
+]
 Variable = Annotated[str, AfterValidator(_variable)]
 ContainerPort = Annotated[str, AfterValidator(_port)]
 HostPort = Annotated[int, Field(ge=1, le=65535)]
-
-Device = Annotated[str, AfterValidator(_device), _in_words("HOST:CONTAINER:PERMISSIONS")]
+Device = Annotated[str, AfterValidator(_device), in_words("HOST:CONTAINER:PERMISSIONS")]
 
 _OPTIONAL_KEYS = ConfigDict(extra="forbid", use_attribute_docstrings=True)
 
@@ -167,13 +152,13 @@ class DeviceRequest(TypedDict, total=False):
     capabilities: list[list[str]]
     """Alternatives of what the devices must be able to do, such as `[[gpu]]`."""
     options: dict[str, str]
-    """What the driver is told besides."""
+    """Further options for the driver."""
 
 
 class ContainerOptions(TypedDict, total=False):
     """Further keywords of `docker.containers.create` of the Docker SDK for Python; absent ones are the engine's."""
 
-    # Others are unknown; of those that are known and yet not taken, the message tells why.
+    # Unknown keywords are errors. For those that Docker knows and we refuse, the message gives the reason.
     __pydantic_config__ = ConfigDict(**_OPTIONAL_KEYS, json_schema_extra={"refused": _REFUSED})  # type: ignore[misc]
     hostname: str
     """Name of the host inside."""
@@ -206,7 +191,7 @@ class ContainerOptions(TypedDict, total=False):
     oom_score_adj: Annotated[int, Field(ge=-1000, le=1000)]
     """How readily the kernel ends it when the host runs out of memory."""
     cpu_shares: PositiveInt
-    """Weight of its computing time; 1024 if nothing is said."""
+    """Weight of its computing time; 1024 if absent."""
     cpuset_mems: Cores
     """NUMA nodes whose memory it uses."""
     blkio_weight: Annotated[int, Field(ge=10, le=1000)]
@@ -220,7 +205,7 @@ class ContainerOptions(TypedDict, total=False):
 
 
 class NodeContainerConfig(Section):
-    """What the containers of one kind of node get beyond what they need."""
+    """Further properties of the containers of one kind of node."""
 
     cpus: PositiveFloat | None = None
     """Upper bound of processor time, in cores."""
@@ -240,6 +225,21 @@ class NodeContainerConfig(Section):
     """Further options."""
 
 
+@dataclass(frozen=True)
+class ContainerSpec:
+    """A container that a catalogue of `serve` describes as a component; it is no node of a run.
+
+    Attributes:
+        image: Its image.
+        command: The command that it runs; None for that of the image.
+        section: Everything else that it gets.
+    """
+
+    image: str
+    command: tuple[str, ...] | None
+    section: NodeContainerConfig
+
+
 class ContainersConfig(Section):
     """How nodes run in containers; nothing in this section changes the dataset."""
 
@@ -254,16 +254,11 @@ class ContainersConfig(Section):
     coordinator: NodeContainerConfig = NodeContainerConfig()
     """The coordinator."""
 
-    @model_validator(mode="after")
-    def _host_ports_differ(self) -> ContainersConfig:
+    def _find_contradictions(self) -> Iterator[tuple[str, str]]:
         taken: dict[int, str] = {}
-        wrong = {}
         for node in ("router", "sim", "coordinator"):
             for port, host_port in getattr(self, node).ports.items():
                 key = f"{node}.ports.{port}"
                 if host_port in taken:
-                    wrong[key] = f"should differ from {taken[host_port]}, got {host_port}, too"
+                    yield key, f"should differ from {taken[host_port]}, got {host_port}, too"
                 taken.setdefault(host_port, key)
-        if wrong:
-            raise ContradictionError(wrong)
-        return self

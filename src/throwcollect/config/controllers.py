@@ -1,4 +1,4 @@
-"""Keys for the joint trajectory controllers, where users want something else than ros2_controllers."""
+"""Keys for the joint trajectory controllers, by which they may differ from ros2_controllers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where commands look for a configuration if none is named."""
+"""The configuration that commands take if none is named; apart from others, because its import is cheap."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""A YAML file as plain values that remember their lines, and overrides from the command line."""
+"""Reads a YAML file into plain values, keeps the line of each, and replaces values by overrides."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from throwcollect.errors import ConfigError, Problem
 from throwcollect.wording import command
 
 Plain = bool | float | str | list[float] | None
-"""What a mapping of a configuration holds."""
+"""A value in a mapping of a configuration."""
 
 _TAG = "tag:yaml.org,2002:"
 _MOST_BYTES = 5_000_000
@@ -29,7 +29,7 @@ _SWEPT_FIELDS = ("min", "max", "scale", "count", "values")
 
 
 class Document:
-    """Values of a configuration file and of overrides, with the place where each was written.
+    """Values of a configuration file and of overrides, with the line of each.
 
     Args:
         path: The file.
@@ -39,7 +39,7 @@ class Document:
 
     Attributes:
         values: Plain dictionaries, lists, text, numbers, truth values and None.
-        problems: What was wrong with keys and overrides themselves.
+        problems: Problems of the YAML and of overrides, which are known before the values are validated.
     """
 
     def __init__(self, path: Path) -> None:
@@ -47,6 +47,7 @@ class Document:
         self.problems: list[Problem] = []
         self._path = path
         self._count = 0
+        self._in_file = True
         self._lines: dict[Location, int | None] = {}
         try:
             node = compose(_text_of(path))
@@ -57,13 +58,14 @@ class Document:
         if not isinstance(node, MappingNode):
             problem = Problem("the file should hold keys and values", path=path, line=node.start_mark.line + 1)
             raise ConfigError([problem], expected="keys such as task and sweep")
-        values = self._plain(node, (), in_file=True)
+        values = self._plain(node, ())
         if not isinstance(values, dict):
             raise ConfigError(self.problems)
         self.values = values
+        self._in_file = False  # all further values are those of overrides
 
     def problem(self, location: Location, sentence: str) -> Problem:
-        """A problem with the value or key at a location, wherever that was written."""
+        """Make a problem with the value or the key at a location, with the line in which it stands."""
         for length in range(len(location), 0, -1):
             if location[:length] in self._lines:
                 line = self._lines[location[:length]]
@@ -71,7 +73,7 @@ class Document:
         return Problem(sentence, join_key(location), self._path)
 
     def place(self, problem: Problem) -> Problem:
-        """A problem with the place where its key was written, if it has a key and does not name a place itself."""
+        """Add the line of its key to a problem that has a key and no file."""
         if problem.path or not problem.key:
             return problem
         location: Location = ()
@@ -85,12 +87,12 @@ class Document:
     def override(
         self, given: str, *, find_default: Callable[[Location], Mapping[str, Plain]] = lambda _location: {}
     ) -> None:
-        """Replace one key; what is wrong with the override joins the problems.
+        """Replace one key; errors in the override are added to the problems.
 
         Args:
             given: Dotted key, equals sign and value, as in ``task.duration_s=1.1``; the value is read as YAML.
-            find_default: Says what a mapping holds that the file does not have, so that one key of it is replaced and
-                the others stay.
+            find_default: Finds the default of a mapping that the file leaves out, so that the override replaces one key
+                in it and keeps the others.
         """
         key, equals, text = given.partition("=")
         key = key.strip()
@@ -111,7 +113,7 @@ class Document:
         for part in above:
             index = _index(holder, part)
             location = (*location, index)
-            # A section that the file leaves out gets its defaults, so that the others stay when one key of it is set.
+            # A mapping that the file leaves out gets its default, so that the override changes only one key of it.
             if isinstance(holder, dict) and holder.get(part) is None:
                 holder[part] = dict(find_default(location))
                 self._lines[location] = None
@@ -121,66 +123,65 @@ class Document:
             self.problems.append(Problem(f"nothing of this name can be set; got {quote(text)}", key))
             return
         location = (*location, index)
-        # Problems below the key come from the override now, and not from a line of the file.
+        # The lines of values that the override replaces do not hold any more.
         self._lines = {known: line for known, line in self._lines.items() if known[: len(location)] != location}
         self._lines[location] = None
-        holder[index] = self._plain(node, location, in_file=False)
+        holder[index] = self._plain(node, location)
 
-    def _plain(self, node: Node | None, location: Location, *, in_file: bool, inside: tuple[Node, ...] = ()) -> Any:
+    def _plain(self, node: Node | None, location: Location, inside: tuple[Node, ...] = ()) -> Any:
         if node is None:
             return None
         self._count += 1
         if self._count > MOST_VALUES:
-            # Aliases of aliases make a short text as large as they like.
+            # Aliases of aliases can make a short text arbitrarily large.
             raise ConfigError([Problem(f"holds more than {MOST_VALUES} values", path=self._path)])
         if node in inside:
-            self._note(node, location, "an alias cannot be inside its own anchor", in_file=in_file)
+            self._note(node, location, "an alias cannot be inside its own anchor")
             return None
         if len(inside) >= MOST_LEVELS:
-            self._note(node, location, "values are nested too deeply", in_file=in_file)
+            self._note(node, location, "values are nested too deeply")
             return None
         inside = (*inside, node)
         if isinstance(node, MappingNode) and node.tag == _TAG + "map":
-            return self._mapping(node, location, in_file=in_file, inside=inside)
+            return self._mapping(node, location, inside)
         if isinstance(node, SequenceNode) and node.tag == _TAG + "seq":
             items = []
             for index, item in enumerate(node.value):
-                self._lines[(*location, index)] = item.start_mark.line + 1 if in_file else None
-                items.append(self._plain(item, (*location, index), in_file=in_file, inside=inside))
+                self._lines[(*location, index)] = self._line(item)
+                items.append(self._plain(item, (*location, index), inside))
             return items
         try:
             return _scalar(node)
         except ValueError as error:
-            self._note(node, location, str(error), in_file=in_file)
+            self._note(node, location, str(error))
             return None
 
-    def _mapping(
-        self, node: MappingNode, location: Location, *, in_file: bool, inside: tuple[Node, ...]
-    ) -> dict[str, Any]:
+    def _mapping(self, node: MappingNode, location: Location, inside: tuple[Node, ...]) -> dict[str, Any]:
         values: dict[str, Any] = {}
-        first: dict[str, int] = {}
         for key_node, value_node in node.value:
             name = key_node.value
             if not isinstance(name, str):
-                self._note(key_node, location, "a key should be a word", in_file=in_file)
+                self._note(key_node, location, "a key should be a word")
             elif name in values:
-                line = f", first in line {first[name]}" if in_file else ""
-                self._note(key_node, (*location, name), f"the key is here twice{line}", in_file=in_file)
+                first = f", first in line {self._lines[(*location, name)]}" if self._in_file else ""
+                self._note(key_node, (*location, name), f"the key is here twice{first}")
             else:
-                first[name] = key_node.start_mark.line + 1
-                self._lines[(*location, name)] = first[name] if in_file else None
-                values[name] = self._plain(value_node, (*location, name), in_file=in_file, inside=inside)
+                self._lines[(*location, name)] = self._line(key_node)
+                values[name] = self._plain(value_node, (*location, name), inside)
         return values
 
-    def _note(self, node: Node, location: Location, sentence: str, *, in_file: bool) -> None:
-        path, line = (self._path, node.start_mark.line + 1) if in_file else (None, None)
-        self.problems.append(Problem(sentence, join_key(location), path, line))
+    def _note(self, node: Node, location: Location, sentence: str) -> None:
+        path = self._path if self._in_file else None
+        self.problems.append(Problem(sentence, join_key(location), path, self._line(node)))
+
+    def _line(self, node: Node) -> int | None:
+        return node.start_mark.line + 1 if self._in_file else None
 
 
 def _text_of(path: Path) -> str:
     try:
         if not stat.S_ISREG(kind := path.stat().st_mode):
-            # Reading a pipe or a device may wait for ever.
+            # To read a pipe or a device may block for ever.
             got = "a directory" if stat.S_ISDIR(kind) else "a pipe or a device"
             raise ConfigError([Problem(f"should be a YAML file, got {got}", path=path)])
         with path.open("rb") as file:
@@ -208,10 +209,10 @@ def _constructor() -> SafeConstructor:
 
 
 def _scalar(node: Node) -> Any:
-    """Value of a YAML 1.2 scalar; dates and other extensions stay text.
+    """Read a YAML 1.2 scalar; dates and other extensions stay text.
 
     Raises:
-        ValueError: If it cannot be read as what its tag says.
+        ValueError: If the text does not fit its tag.
     """
     constructor = _constructor()
     readers: dict[str, Callable[[ScalarNode], Any]] = {
@@ -228,7 +229,7 @@ def _scalar(node: Node) -> Any:
 
 
 def _parts(key: str) -> tuple[str, ...]:
-    """Parts of a dotted key; the dots inside the key of a swept parameter do not part it."""
+    """Split a dotted key, but not the key of a swept parameter in it, which has dots itself."""
     parts = tuple(key.split("."))
     if parts[:2] != _SWEPT or len(parts) < 3:
         return parts

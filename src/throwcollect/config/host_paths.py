@@ -1,4 +1,4 @@
-"""What a container may see of its host: which directories can be mounted, and which devices handed over."""
+"""Decides which directories and devices of its host a container may have."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ _SYSTEM = (
     *("/run", "/sbin", "/sys", "/usr", "/var/backups", "/var/cache", "/var/lib", "/var/lock", "/var/log", "/var/mail"),
     *("/var/run", "/var/spool"),
 )
-"""Directories by which a machine is run; nothing in them, and nothing that holds them, is data."""
+"""Directories of the system; neither what is in them nor what holds them is data."""
 
 _SHARED = ("/home", "/tmp", "/var/tmp")  # noqa: S108
-"""Directories in which all users and programs keep something; what is in them may be data."""
+"""Directories that all users and programs share; directories in them may be data."""
 
 SECRETS = (".aws", ".azure", ".docker", ".gnupg", ".kube", ".netrc", ".password-store", ".ssh")
-"""What home directories hold besides data."""
+"""Names of files and directories with secrets in home directories."""
 
 _DEVICE = re.compile(r"/dev/(dri(/.+)?|nvidia[^/]*|nvidia-caps(/.+)?|kfd|dxg)")
-"""Graphics processors, which a simulation may compute with."""
+"""Device files of graphics processors, with which a simulation may compute."""
 
 DEVICES = "graphics processors alone: /dev/dri, /dev/nvidia*, /dev/kfd, /dev/dxg"
 
@@ -32,14 +32,13 @@ def normal_path(text: str) -> str:
 
 
 def refusal(path: str, *, more: Iterable[str] = ()) -> str | None:
-    """Why a directory or file of the host must not be mounted; None if it may be.
+    """Say why a directory or file of the host must not be mounted; None if it may be.
 
-    Mounts are for data, so whatever belongs to the system is refused, whether it could be written or not: reading it
-    gives secrets away.
+    Mounts are for data. What belongs to the system is refused even for reading, because it may hold secrets.
 
     Args:
         path: An absolute path.
-        more: Further directories that belong to the system, such as the engine's own.
+        more: Further directories of the system, such as those of the engine.
     """
     plain = normal_path(path)
     if plain in _SHARED:

@@ -1,6 +1,6 @@
-"""What the product has to know of a configuration key besides its type: it stands on the field, and nowhere else.
+"""The annotation of configuration keys: their effect, and whether a sweep may vary them.
 
-A section says it for all keys below it, and a key may say otherwise for itself::
+It stands on the field, and nowhere else. A section annotates all keys below it, and a key may differ from that::
 
     class BallConfig(Section):
         mass_kg: Annotated[float, Field(gt=0)] = 0.045
@@ -21,9 +21,9 @@ class Effect(Enum):
     """What the value of a key has an effect on."""
 
     PHYSICS = "physics"
-    """The samples of a trial: the simulation heeds it."""
+    """The samples of a trial, which the simulation computes."""
     TASK = "task"
-    """The joint trajectories that simulations are sent, and how episodes are judged: the coordinator heeds it."""
+    """The joint trajectories that simulations are sent, and the outcomes of episodes, which the coordinator judges."""
     PLAN = "plan"
     """Which trials there are: it acts through the values and the seed of each trial."""
     ENCODING = "encoding"
@@ -31,20 +31,20 @@ class Effect(Enum):
     FILES = "files"
     """How episodes are cut into files; the episodes stay the same."""
     APPEARANCE = "appearance"
-    """How a simulation looks from outside while it runs; samples and files stay the same."""
+    """What clients of a running simulation see; samples and files stay the same."""
     RUN = "run"
     """How and where a collection is run; the dataset stays the same."""
 
 
 @dataclass(frozen=True)
 class Key:
-    """Annotation of a field of a section; what is None holds as for the section that the field is in.
+    """Annotation of a field of a section; an attribute that is None is as for the section that has the field.
 
     Attributes:
         effect: What the value has an effect on.
         swept: Whether a sweep may vary the value from trial to trial, if it is a number.
-        later: Whether the key came after datasets had been published. It takes part in digests where it differs from
-            its default, so that older digests hold.
+        later: Whether the key was added after datasets had been published. Digests leave it out where it has its
+            default, so that older digests hold.
     """
 
     effect: Effect | None = None
@@ -57,11 +57,11 @@ class Key:
         return self.effect in (Effect.PHYSICS, Effect.TASK)
 
     def overlay(self, key: Key) -> Key:
-        """What holds for a key in a section that this one describes: its own word, or else that of the section."""
+        """Combine this annotation of a section with that of a key in it, which wins where it is not None."""
         own = {name: value for name, value in vars(key).items() if value is not None}
         return replace(self, **own)
 
 
 def key_of_field(section: type[Section], name: str) -> Key:
-    """Return what a field says of itself; an empty `Key` if it says nothing."""
+    """Return the annotation of a field; an empty one if it has none."""
     return next((each for each in section.model_fields[name].metadata if isinstance(each, Key)), Key())

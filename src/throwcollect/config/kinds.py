@@ -1,11 +1,12 @@
-"""Kinds of values that sections hold, and how a section says that its values contradict each other."""
+"""Kinds of values that sections hold, and the errors that validators of sections raise."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, Field, GetJsonSchemaHandler, ValidationInfo
+from pydantic import AfterValidator, Field, GetJsonSchemaHandler, ValidationInfo, WithJsonSchema
 from pydantic_core import CoreSchema
 
 from throwcollect.members import load_member, names_of
@@ -15,7 +16,7 @@ class ContradictionError(ValueError):
     """Keys that are right alone and wrong together.
 
     Args:
-        sentences: What is wrong with each key; dotted keys are relative to the section that raises.
+        sentences: Sentence that says what is wrong, by dotted key, relative to the section that raises.
     """
 
     def __init__(self, sentences: Mapping[str, str]) -> None:
@@ -24,13 +25,7 @@ class ContradictionError(ValueError):
 
 
 class UnknownJointError(ValueError):
-    """A joint that the robot does not have.
-
-    Args:
-        name: The name that was given.
-        robot: Name of the robot in sentences.
-        joints: Names of its joints.
-    """
+    """A joint that the robot does not have; `problems` proposes another one of its joints."""
 
     def __init__(self, name: str, robot: str, joints: tuple[str, ...]) -> None:
         self.name, self.robot, self.joints = name, robot, joints
@@ -44,7 +39,7 @@ def all_joints() -> tuple[str, ...]:
 
 
 def _require_joint(name: str, info: ValidationInfo) -> str:
-    # Which robot it is, is known of a whole file alone; a `Config` that is made in another way checks that itself.
+    # The context is the name of the robot. Only the loader knows it before it validates; otherwise, `Config` checks.
     if info.context is not None:
         robot = load_member("robots", info.context)
         if name not in robot.joints:
@@ -53,7 +48,7 @@ def _require_joint(name: str, info: ValidationInfo) -> str:
 
 
 class _JointSchema:
-    """Lists the joints in the JSON Schema; not before somebody asks for it, as that imports all robots."""
+    """Lists the joints in the JSON Schema, and not earlier, because that imports all robots."""
 
     @staticmethod
     def __get_pydantic_json_schema__(core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
@@ -63,3 +58,24 @@ class _JointSchema:
 Joint = Annotated[str, AfterValidator(_require_joint), _JointSchema]
 Angle = Annotated[float, Field(ge=-6.3, le=6.3, json_schema_extra={"unit": "rad"})]
 Name = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]*$", max_length=64)]
+
+
+def match(pattern: str, expected: str) -> AfterValidator:
+    """Check that a text matches a regular expression.
+
+    Args:
+        pattern: The regular expression, for the whole text.
+        expected: Description of such a text, for the message.
+    """
+
+    def check(text: str) -> str:
+        if not re.fullmatch(pattern, text):
+            raise ValueError(f"should be {expected}, got '{text}'")
+        return text
+
+    return AfterValidator(check)
+
+
+def in_words(words: str) -> WithJsonSchema:
+    """Describe a text in the reference and in messages by some words, and not as any text."""
+    return WithJsonSchema({"type": "string", "words": words})

@@ -1,4 +1,4 @@
-"""From a YAML file and overrides to a configuration that is complete and valid, and back to text."""
+"""Reads a YAML file and overrides into a configuration that is complete and valid, and writes it as text."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from throwcollect.members import names_of
 
 _PARAMETERS = ("sweep", "parameters")
 _SHALLOWEST_MAPPING = 2
-"""Parts of its key: all keys of the first level are sections or single values."""
+"""Least number of parts in the key of a mapping: keys of the first level are sections or single values."""
 _PLAIN_WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_./-]*")
 _NOT_PLAIN = {"true", "false", "null", "yes", "no", "on", "off", "y", "n"}
 
@@ -48,14 +48,10 @@ def load(path: StrPath, overrides: Sequence[str] = ()) -> Config:
 
 @contextmanager
 def load_locating_errors(path: Path, overrides: Sequence[str] = ()) -> Iterator[Config]:
-    """Read a configuration file as `load` does, and have errors that are raised inside say where their keys stand.
-
-    Args:
-        path: YAML 1.2 file.
-        overrides: ``key=value`` pairs that win over the file.
+    """Read a configuration file as `load` does, and add lines of the file to a `ConfigError` that the block raises.
 
     Raises:
-        ConfigError: If the file cannot be read or anything in it is wrong, or what is done inside finds so later.
+        ConfigError: If the file cannot be read or anything in it is wrong, or the block raises one.
     """
     document = Document(path)
     for override in overrides:
@@ -74,12 +70,15 @@ def load_locating_errors(path: Path, overrides: Sequence[str] = ()) -> Iterator[
 
 
 def dump_yaml(config: Config) -> str:
-    """A configuration with all its keys as YAML that loads back to an equal one."""
+    """Write a configuration with all its keys as YAML that loads back to an equal one.
+
+    The text is part of every dataset, so it must not depend on the version of a library that writes YAML.
+    """
     return "".join(f"{line}\n" for line in _lines(config.model_dump(), ""))
 
 
 def value_as_yaml(value: Any) -> str:
-    """A value of a configuration as YAML in one line."""
+    """Write a value of a configuration as YAML in one line."""
     if isinstance(value, dict):
         return "{" + ", ".join(f"{value_as_yaml(key)}: {value_as_yaml(each)}" for key, each in value.items()) + "}"
     if isinstance(value, list):
@@ -97,7 +96,7 @@ def _character(character: str) -> str:
 
 
 def _find_default(values: dict[str, Any], location: Location) -> Mapping[str, Plain]:
-    """What a mapping that is no section, such as ``task.end``, holds by default; nothing if it is not there at all."""
+    """Find the default of a mapping that is no section, such as ``task.end``; empty if there is no such mapping."""
     if len(location) < _SHALLOWEST_MAPPING:
         return {}
     holder: Any = _check(values)[0]
@@ -107,10 +106,10 @@ def _find_default(values: dict[str, Any], location: Location) -> Mapping[str, Pl
 
 
 def _check(values: dict[str, Any]) -> tuple[Config | None, list[Finding], int]:
-    """Validate values; after a problem go on with defaults in the place of what was wrong, to find what else is.
+    """Validate values; after a problem, put defaults in place of what was wrong, and validate again to find the rest.
 
     Returns:
-        The configuration, if there is any; what is wrong; and how much more is, if that is too much to be told.
+        The configuration, or None; the findings; and the number of further problems, which are only counted.
     """
     values = deepcopy(values)
     robot = _robot_of(values)
@@ -129,21 +128,21 @@ def _check(values: dict[str, Any]) -> tuple[Config | None, list[Finding], int]:
         places = {finding.location[: 3 if finding.location[:2] == _PARAMETERS else 2] for finding in fresh}
         removed = {place for place in places if _remove(values, place)}
         replaced |= places
-        # With another robot than was meant, all joints would be wrong.
+        # Without a known robot, each joint would be reported.
         if not removed or robot is None:
             break
     return config, sorted(found, key=lambda finding: not finding.unknown), more
 
 
 def _robot_of(values: dict[str, Any]) -> str | None:
-    """Find the name of the robot whose joints the values may name; None if there is no such robot."""
+    """The name of the robot whose joints the values may name; None if there is no such robot."""
     section = values.get("robot")
     name = section.get("name") if isinstance(section, dict) else None
     return Config().robot.name if name is None else name if name in names_of("robots") else None
 
 
 def _about(finding: Finding, location: Location) -> bool:
-    """Whether a finding may be about a default that stands at a location, not about what was written."""
+    """Whether a finding may be about the default that was put at a location, and not about a value of the user."""
     if finding.location[: len(location)] == location:
         return True
     if finding.unknown:
@@ -152,7 +151,7 @@ def _about(finding: Finding, location: Location) -> bool:
 
 
 def _remove(values: dict[str, Any], location: Location) -> bool:
-    """Remove what is at a location, or else the section in which it is missing; whether there was something."""
+    """Remove the value at a location, or else the section that lacks it; return whether there was one."""
     holder: Any = values
     for part in location[:-1]:
         holder = holder.get(part) if isinstance(holder, dict) else None

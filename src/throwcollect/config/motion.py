@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import BaseModel, Discriminator, Field, PositiveFloat, Tag, model_validator
+from pydantic import Field, PositiveFloat
 
 from throwcollect.config.key import Key
-from throwcollect.config.kinds import ContradictionError, Joint
-from throwcollect.config.section import Section
+from throwcollect.config.kinds import Joint
+from throwcollect.config.section import Section, any_of
 
 
 class MinimumJerk(Section):
@@ -34,26 +35,19 @@ class DynamicMovementPrimitive(Section):
     alpha_x: PositiveFloat = 2.0
     """Decay constant of the phase [-]."""
 
-    @model_validator(mode="after")
-    def _weights_fit(self) -> DynamicMovementPrimitive:
-        wrong = {
-            f"weights.{joint}": f"should be basis_functions = {self.basis_functions} numbers, got {len(weights)}"
-            for joint, weights in self.weights.items()
-            if len(weights) != self.basis_functions
-        }
-        if wrong:
-            raise ContradictionError(wrong)
-        return self
+    def _find_contradictions(self) -> Iterator[tuple[str, str]]:
+        for joint, weights in self.weights.items():
+            if len(weights) != self.basis_functions:
+                yield (
+                    f"weights.{joint}",
+                    f"should be basis_functions = {self.basis_functions} numbers, got {len(weights)}",
+                )
 
 
-def _family(value: Any) -> str | None:
-    if isinstance(value, BaseModel):
-        return type(value).__name__
-    family = value.get("family", "minimum_jerk") if isinstance(value, dict) else None
-    return {"minimum_jerk": "MinimumJerk", "dmp": "DynamicMovementPrimitive"}.get(str(family))
-
-
-Trajectory = Annotated[
-    Annotated[MinimumJerk, Tag("MinimumJerk")] | Annotated[DynamicMovementPrimitive, Tag("DynamicMovementPrimitive")],
-    Discriminator(_family),
-]
+if TYPE_CHECKING:
+    Trajectory = MinimumJerk | DynamicMovementPrimitive
+else:
+    Trajectory = any_of(
+        {"minimum_jerk": MinimumJerk, "dmp": DynamicMovementPrimitive},
+        lambda value: value.get("family", "minimum_jerk") if isinstance(value, dict) else None,
+    )

@@ -1,4 +1,4 @@
-"""From what pydantic finds to sentences about keys."""
+"""Turns the errors of pydantic into sentences about keys."""
 
 from __future__ import annotations
 
@@ -17,26 +17,26 @@ from throwcollect.config.shape import Shape, shape_of
 _RANGE_ERRORS = ("greater_than", "greater_than_equal", "less_than", "less_than_equal")
 _LONGEST_QUOTE = 60
 _LONGEST_WORD = 200
-"""What is longer is no word that was misspelt."""
+"""A longer text is not a misspelt word, so that no similar word is looked for."""
 
 MOST_EXAMINED = 200
-"""What pydantic finds beyond that is counted and not put into words, as nobody would read them."""
+"""Number of errors of pydantic that are put into words; the others are only counted."""
 
 Location = tuple[str | int, ...]
 """Keys and list indices from the root of a configuration to a value."""
 
 _MEMBERS: tuple[Location, ...] = (("robot", "name"), ("tool", "name"), ("sim", "engine"), ("task", "name"))
-"""Where a member of a family is named, which a package may bring."""
+"""Keys that name a member of a family, which another package may bring."""
 
 
 @dataclass(frozen=True)
 class Finding:
-    """Something that is wrong at one place.
+    """Something that is wrong with one key.
 
     Attributes:
-        location: Where; need not exist.
-        sentence: What was wrong, what was got and what would be right.
-        unknown: Whether the key itself is wrong, not its value.
+        location: The key, which need not exist.
+        sentence: Says what is wrong, which value was given and which would be right.
+        unknown: Whether the key itself is wrong, and not its value.
     """
 
     location: Location
@@ -45,29 +45,24 @@ class Finding:
 
     @property
     def key(self) -> str:
-        """Dotted key of the place."""
+        """The dotted key."""
         return join_key(self.location)
 
 
 def join_key(location: Location) -> str:
-    """Dotted key of a place."""
+    """Join the parts of a location with dots."""
     return ".".join(map(str, location))
 
 
 def unknown_key(name: str, known: list[str]) -> str:
-    """Sentence for a key that does not exist.
-
-    Args:
-        name: The key.
-        known: All keys that would be right in its place.
-    """
+    """Make the sentence for a key that does not exist, by the keys that would be right in its place."""
     if meant := _did_you_mean(name, known):
         return f"unknown key{meant}"
     return "unknown key; " + (f"known keys here: {', '.join(known)}" if known else "no keys are expected here")
 
 
 def quote(value: Any) -> str:
-    """A value as its author would know it again."""
+    """Show a value in a message as its author would recognise it."""
     if isinstance(value, str):
         return repr(value if len(value) <= _LONGEST_QUOTE else value[:_LONGEST_QUOTE] + "…")
     if isinstance(value, Mapping):
@@ -80,22 +75,22 @@ def quote(value: Any) -> str:
 
 
 def findings(error: ValidationError, values: Any, *, above: Location = (), shape: Shape | None = None) -> list[Finding]:
-    """What pydantic found, or the first 200 of it: one finding a key, unknown keys first.
+    """Put the first 200 errors of pydantic into words: one finding for each key, unknown keys first.
 
     Args:
-        error: What pydantic raised.
-        values: The values that it was given.
-        above: Where in a configuration these values are.
-        shape: What these values should be; None for what a configuration has there.
+        error: The error that pydantic raised.
+        values: The values that it validated.
+        above: Location of these values in a configuration.
+        shape: Shape that these values should have; None for the one that a configuration has there.
     """
     expected = shape or shape_of(above)
     found: dict[Location, Finding] = {}
     for details in error.errors(include_url=False)[:MOST_EXAMINED]:
         for finding in _findings(details, values, above, expected):
-            # A union reports once for each alternative; the sentence speaks of all of them anyway.
+            # A union reports an error for each alternative, and the first sentence names all of them.
             found.setdefault(finding.location, finding)
     for location in [place[:length] for place in found for length in range(len(place))]:
-        # A union reports every branch. Keep the deepest error: it is of the branch that the user meant.
+        # A union reports the errors of every branch. The deepest is of the branch that the user meant.
         found.pop(location, None)
     unknown = [finding for finding in found.values() if finding.unknown]
     meant = {(*finding.location[:-1], _nearest(finding)) for finding in unknown}
@@ -108,12 +103,12 @@ def _nearest(finding: Finding) -> str:
 
 
 def _findings(details: ErrorDetails, values: Any, above: Location, expected: Shape) -> Iterator[Finding]:
-    location, shape = _locate(details, values, above, expected)
+    location, shape, section = _locate(details, values, above, expected)
     kind, value = details["type"], details["input"]
     cause = details.get("ctx", {}).get("error")
     is_key = details["loc"][-1:] == ("[key]",)
     if kind == "extra_forbidden":
-        section, name = _section(details, values, above, expected), str(location[-1])
+        name = str(location[-1])
         yield Finding(location, section.refused.get(name) or unknown_key(name, list(section.keys)), unknown=True)
     elif isinstance(cause, ContradictionError):
         for key, sentence in cause.sentences.items():
@@ -137,7 +132,7 @@ def _findings(details: ErrorDetails, values: Any, above: Location, expected: Sha
 
 
 def _should_be(words: str, value: Any, choices: list[str], *, strange: str = "") -> str:
-    """Say what would be right, and which choice was meant; `strange` is what is said if none is like the value."""
+    """Say what would be right, and which choice the user meant; if none is like the value, append `strange`."""
     return f"should be {words}, got {quote(value)}{_did_you_mean(value, choices) or strange}"
 
 
@@ -153,29 +148,28 @@ def _radians(kind: str, shape: Shape, value: Any) -> str:
     return f"; angles are in radians: {value:g} degrees are {math.radians(value):.4f}"
 
 
-def _locate(details: ErrorDetails, values: Any, above: Location, expected: Shape) -> tuple[Location, Shape]:
-    """Where an error is, without the names of models and unions that pydantic mixes into its locations."""
+def _locate(details: ErrorDetails, values: Any, above: Location, expected: Shape) -> tuple[Location, Shape, Shape]:
+    """Find the location of an error, the shape of the value there, and the shape of the section that holds it.
+
+    The locations of pydantic also have names of models and of branches of unions, which are left out.
+    """
     location, shape, here = list(above), expected, values
+    section = shape
     parts = details["loc"]
     for index, part in enumerate(parts):
         inside = part in here if isinstance(here, Mapping) else isinstance(here, list) and isinstance(part, int)
         last_is_missing = details["type"] == "missing" and index == len(parts) - 1
         if inside or last_is_missing:
             location.append(part)
-            shape = shape.child(part)
+            section, shape = shape, shape.child(part)
             here = here[part] if inside else None
         else:
             shape = next((each for each in shape.alternatives if each.node.get("title") == part), shape)
-    return tuple(location), shape
-
-
-def _section(details: ErrorDetails, values: Any, above: Location, expected: Shape) -> Shape:
-    container = ErrorDetails(type="section", loc=details["loc"][:-1], msg="", input=None)
-    return _locate(container, values, above, expected)[1]
+    return tuple(location), shape, section
 
 
 def _split(key: str) -> Location:
-    """Parts of a dotted key of a contradiction; the dots in the key of a swept parameter do not part it."""
+    """Split a dotted key of a contradiction, but not the key of a swept parameter in it, which has dots itself."""
     head, found, rest = key.partition("parameters.")
     if found and not head:
         name, _, field = rest.rpartition(".")

@@ -12,8 +12,6 @@ from throwcollect.config.section import Section
 from throwcollect.config.shape import Shape, json_schema, root
 from throwcollect.config.values import sweepable_keys
 
-__all__ = ["json_schema", "page"]
-
 _INTRODUCTION = """\
 # Configuration
 
@@ -53,11 +51,11 @@ does not depend on them: the table of throws has them, and by how much each thro
 """
 
 _ANY = {"containers.": "<node>", "sweep.target.": "<target>"}
-"""What stands for the name of any of the sections that hold the same."""
+"""Placeholder for the names of sections that have the same keys, by the prefix of these names."""
 
 
 def page() -> str:
-    """The reference of all keys, as Markdown."""
+    """Write the reference of all keys, as Markdown."""
     return "\n".join([_INTRODUCTION, *_sections(root(), "")])
 
 
@@ -90,18 +88,18 @@ def _sections(shape: Shape, prefix: str) -> Iterator[str]:
 
 
 def _twins(shape: Shape, child: Shape) -> list[str]:
-    """Keys of sections that hold the same as one of them."""
+    """Names of the sections that are of the same model as one of them."""
     title = _title(child)
     return [name for name, each in shape.keys.items() if title is not None and _title(each) == title]
 
 
 def _title(shape: Shape) -> str | None:
-    """Name of the model of a section, also of one that may be null; None of everything else."""
+    """Name of the model of a section, also of one that may be null; None if the shape is no section."""
     return next((each.node.get("title") for each in shape.alternatives if each.keys), None)
 
 
 def _own_sentence(shape: Shape) -> str:
-    """What a section says of itself, and not the key that holds it."""
+    """The docstring of a section, and not of the key that holds it."""
     return str(json_schema()["$defs"][_title(shape)]["description"])
 
 
@@ -128,7 +126,7 @@ def _default(child: Shape, name: str, holder: Shape) -> str:
 
 
 def _list_targets() -> str:
-    """The columns of targets that lists of the task throw may have."""
+    """List the columns of targets that lists of the task throw may have."""
     columns = Config().task.target_columns
     rows = [f"| `{each.name}` | {each.description} | {'yes' if each.required else 'no'} |" for each in columns]
     return "\n".join([_TARGETS, "| column | meaning | required |", "|---|---|---|", *rows, ""])

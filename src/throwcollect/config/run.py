@@ -3,31 +3,30 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import AfterValidator, Field, PositiveFloat, WithJsonSchema, model_validator
+from pydantic import AfterValidator, Field, PositiveFloat
 
-from throwcollect.config.kinds import ContradictionError
+from throwcollect.config.kinds import in_words
 from throwcollect.config.section import Section
 from throwcollect.members import names_of
 
 if TYPE_CHECKING:
     RuntimeName = str
 else:
-    # Which runtimes there are is known when the program runs.
+    # Packages may add runtimes, so their names are known only when the program runs.
     RuntimeName = Literal[("auto", *names_of("runtimes"))]
 
 
 def _listen_address(text: str) -> str:
-    match = re.fullmatch(r"tcp/(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9.-]+):([1-9]\d{0,4})", text)
-    if match is None or int(match[2]) > 65535:
+    found = re.fullmatch(r"tcp/(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9.-]+):([1-9]\d{0,4})", text)
+    if found is None or int(found[2]) > 65535:
         raise ValueError(f"should be tcp/ADDRESS:PORT, such as tcp/0.0.0.0:7447, got '{text}'")
     return text
 
 
-ListenAddress = Annotated[
-    str, AfterValidator(_listen_address), WithJsonSchema({"type": "string", "words": "tcp/ADDRESS:PORT"})
-]
+ListenAddress = Annotated[str, AfterValidator(_listen_address), in_words("tcp/ADDRESS:PORT")]
 
 
 class RunConfig(Section):
@@ -68,15 +67,10 @@ class RunConfig(Section):
     restarts: Annotated[int, Field(ge=0, le=1000)] = 10
     """How often one simulation is restarted before it is given up."""
 
-    @model_validator(mode="after")
-    def _fits_machines_that_join(self) -> RunConfig:
-        wrong = {}
+    def _find_contradictions(self) -> Iterator[tuple[str, str]]:
         if self.listen is None and self.simulations == 0:
-            wrong["simulations"] = "should be 1 or more, as no other machine can join (run.listen), got 0"
+            yield "simulations", "should be 1 or more, as no other machine can join (run.listen), got 0"
         if self.listen is not None and self.open:
-            wrong["open"] = "should be false, as other machines can reach the run (run.listen)"
+            yield "open", "should be false, as other machines can reach the run (run.listen)"
         if self.listen is not None and self.runtime not in ("auto", "local"):
-            wrong["runtime"] = f"should be local, as other machines are to join (run.listen), got {self.runtime}"
-        if wrong:
-            raise ContradictionError(wrong)
-        return self
+            yield "runtime", f"should be local, as other machines are to join (run.listen), got {self.runtime}"

@@ -7,21 +7,19 @@ Units are part of the name: ``_s``, ``_m``, ``_kg``, ``_hz``, ``_mps2``; angles 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
-from functools import reduce
-from operator import or_
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import Discriminator, Field, PositiveInt, Tag, model_validator
+from pydantic import Field, PositiveInt
 
 from throwcollect.config.cluster import ClusterConfig
 from throwcollect.config.containers import ContainersConfig
 from throwcollect.config.controllers import ControllersConfig
 from throwcollect.config.key import Effect, Key
-from throwcollect.config.kinds import Angle, ContradictionError, Joint, Name
+from throwcollect.config.kinds import Angle, Joint, Name
 from throwcollect.config.motion import DynamicMovementPrimitive, MinimumJerk
 from throwcollect.config.run import RunConfig
-from throwcollect.config.section import Section
+from throwcollect.config.section import Section, any_of
 from throwcollect.config.sweep import Parameter, Range, SweepConfig, Values
 from throwcollect.config.task import TaskConfig
 from throwcollect.config.tool import ToolConfig
@@ -32,45 +30,20 @@ __all__ = ["Config", "DynamicMovementPrimitive", "MinimumJerk", "Parameter", "Ra
 
 
 def _sections_of(family: str) -> Any:
-    """Make the kind of a key that holds the section of any member of a family; its key `name` says which."""
+    """Make the type of a key that holds the section of any member of a family; its key `name` says which."""
     sections = {name: load_member(family, name) for name in names_of(family)}
     default = next(iter(sections))
-
-    def choose(value: Any) -> str | None:
-        """Find the class of the section that is meant; without a name, it is that of the family's first member."""
-        if isinstance(value, Section):
-            return type(value).__name__
-        name = value.get("name", default) if isinstance(value, dict) else None
-        return str(sections[name].__name__) if isinstance(name, str) and name in sections else None
-
-    return _any_of(sections.values(), choose)
+    return any_of(sections, lambda value: value.get("name", default) if isinstance(value, dict) else None)
 
 
 def _untils() -> Any:
-    """Make the kind of the key `until`, which holds the section that the task wants; its only key says which."""
+    """Make the type of the key `until`, which holds the section `until` of a task; its only key says which."""
     sections = {each.until.outcome(): each.until for each in (load_member("tasks", name) for name in names_of("tasks"))}
-
-    def choose(value: Any) -> str | None:
-        """Find the class of the section that is meant; one with unknown keys is meant to be the first."""
-        if isinstance(value, Section):
-            return type(value).__name__
-        outcome = next((each for each in sections if isinstance(value, dict) and each in value), next(iter(sections)))
-        return str(sections[outcome].__name__)
-
-    return _any_of(sections.values(), choose)
-
-
-def _any_of(sections: Iterable[type[Section]], choose: Callable[[Any], str | None]) -> Any:
-    """Make the kind of a key that holds one of some sections.
-
-    Args:
-        sections: Their classes.
-        choose: Finds the name of the class for the contents of the key; None for none.
-    """
-    kinds = list(dict.fromkeys(sections))
-    if len(kinds) == 1:
-        return kinds[0]
-    return Annotated[reduce(or_, [Annotated[kind, Tag(kind.__name__)] for kind in kinds]), Discriminator(choose)]
+    # The first section reports unknown keys.
+    default = next(iter(sections))
+    return any_of(
+        sections, lambda value: next((key for key in sections if isinstance(value, dict) and key in value), default)
+    )
 
 
 if TYPE_CHECKING:
@@ -80,7 +53,7 @@ if TYPE_CHECKING:
     AnyTask = TaskConfig
     AnyUntil = UntilConfig
 else:
-    # Which members there are is known when the program runs; what all of them have in common, before.
+    # The members are known only when the program runs, so type checkers see their common base instead.
     RobotName = Literal[names_of("robots")]
     EngineName = Literal[names_of("engines")]
     AnyTool = _sections_of("tools")
@@ -111,11 +84,12 @@ class RobotConfig(Section):
     effort_scale: Annotated[float, Field(gt=0, le=10), Key(swept=True)] = 1.0
     """Factor on the effort limits of all joints [-]."""
     joint_offsets: Annotated[dict[Joint, Angle], Key(swept=True, later=True)] = {}
-    """Errors of the joints' zeros: such a joint stands by so much farther than it is told to, and than it says."""
+    """Errors of the joints' zeros: such a joint stands by this angle farther than its command and its measurement
+    say."""
     speed_scale: Annotated[float, Field(gt=0.5, lt=2), Key(swept=True, later=True)] = 1.0
     """Speed of the clock by which controllers follow trajectories [-]: below 1, motions take longer than planned."""
     motor_lag_s: Annotated[float, Field(ge=0, le=0.2), Key(swept=True, later=True)] = 0.0
-    """Time constant with which motors go after their commands; 0: at once."""
+    """Time constant with which motors follow their commands; 0: at once."""
 
 
 class BallConfig(Section):
@@ -151,8 +125,8 @@ class SimConfig(Section):
 
     engine: Annotated[EngineName, Key(later=True)] = "bullet"
     """Physics engine: `bullet` simulates contacts; so does `mujoco`, which is faster and computes throws that differ by
-    some millimetres (docs/engines.md); `ballistic` is for trying things out: an arm that is always where it is told to
-    be, and a ball that leaves the spoon when the spoon would have to pull it. Packages may add others."""
+    some millimetres (docs/engines.md); `ballistic` is for trying things out: an arm that is always where its commands
+    are, and a ball that leaves the spoon when the spoon would have to pull it. Packages may add others."""
     physics_hz: Annotated[int, Field(ge=100, le=10000)] = 500
     """Physics steps per simulated second; also the controllers' update rate."""
     solver_iterations: Annotated[int, Field(ge=1, le=1000)] = 50
@@ -182,11 +156,9 @@ class RecordConfig(Section):
     trials_per_shard: Annotated[PositiveInt, Key(Effect.FILES)] = 1000
     """Trials in one MCAP file."""
 
-    @model_validator(mode="after")
-    def _require_judged_topics(self) -> RecordConfig:
-        if missing := [t for t in ("joint_states", "ball/odometry") if t not in self.topics]:
-            raise ContradictionError({"topics": f"should hold {' and '.join(missing)}, from which throws are judged"})
-        return self
+    def _find_contradictions(self) -> Iterator[tuple[str, str]]:
+        if missing := [topic for topic in ("joint_states", "ball/odometry") if topic not in self.topics]:
+            yield "topics", f"should hold {' and '.join(missing)}, from which throws are judged"
 
 
 class Config(Section):
@@ -226,8 +198,31 @@ class Config(Section):
     cluster: Annotated[ClusterConfig, Key(Effect.RUN)] = ClusterConfig()
     """Runs on a cluster."""
 
-    @model_validator(mode="after")
-    def _joints_are_those_of_the_robot(self) -> Config:
+    def _find_contradictions(self) -> Iterator[tuple[str, str]]:
+        yield from self._find_strange_joints()
+        if self.sim.physics_hz % self.record.rate_hz:
+            yield "record.rate_hz", f"should divide sim.physics_hz, {self.sim.physics_hz}, got {self.record.rate_hz}"
+        if isinstance(self.robot.locked, list) and (moving := [j for j in self.robot.locked if j in self.task.end]):
+            yield "robot.locked", f"should not hold joints that task.end moves, got {', '.join(moving)}"
+        for joint in self.robot.joint_offsets:
+            if joint not in self.task.end:
+                yield f"robot.joint_offsets.{joint}", "should be left out, as task.end does not move this joint"
+        for joint in self.robot.posture:
+            if joint in self.task.start:
+                yield f"robot.posture.{joint}", "should be left out, as task.start sets this joint"
+        if self.until is not None and not isinstance(self.until, self.task.until):
+            yield f"until.{self.until.outcome()}", f"should be {self.task.success}, as the task is {self.task.name}"
+        if self.sweep.target is not None and not self.task.throws:
+            yield "sweep.target", f"should be left out, as the task {self.task.name} throws no ball"
+        if self.until is not None and self.sweep.sampler == "list":
+            yield "until", "should be left out, as the file of the sampler list is not part of the dataset"
+        several = f"should be left out, as {self.run.simulations} simulations"
+        if self.containers.sim.ports and self.run.simulations > 1:
+            yield "containers.sim.ports", f"{several} cannot share a port of this machine"
+        if self.run.root_namespace and self.run.simulations > 1:
+            yield "run.root_namespace", f"{several} (-n) cannot share a namespace"
+
+    def _find_strange_joints(self) -> Iterator[tuple[str, str]]:
         robot = load_member("robots", self.robot.name)
         named = {
             "robot.posture": self.robot.posture,
@@ -235,46 +230,10 @@ class Config(Section):
             "task.start": self.task.start,
             "task.end": self.task.end,
         }
-        wrong = {
-            f"{section}.{joint}": f"{robot.title} has no joint {joint!r}"
-            for section, joints in named.items()
-            for joint in joints
-            if joint not in robot.joints
-        }
-        if wrong:
-            raise ContradictionError(wrong)
-        return self
-
-    @model_validator(mode="after")
-    def _sections_agree(self) -> Config:
-        wrong = {}
-        if self.sim.physics_hz % self.record.rate_hz:
-            wrong["record.rate_hz"] = f"should divide sim.physics_hz, {self.sim.physics_hz}, got {self.record.rate_hz}"
-        if isinstance(self.robot.locked, list) and (moving := [j for j in self.robot.locked if j in self.task.end]):
-            wrong["robot.locked"] = f"should not hold joints that task.end moves, got {', '.join(moving)}"
-        for joint in self.robot.joint_offsets:
-            if joint not in self.task.end:
-                wrong[f"robot.joint_offsets.{joint}"] = "should be left out, as task.end does not move this joint"
-        for joint in self.robot.posture:
-            if joint in self.task.start:
-                wrong[f"robot.posture.{joint}"] = "should be left out, as task.start sets this joint"
-        if self.until is not None and not isinstance(self.until, self.task.until):
-            wrong[f"until.{self.until.outcome()}"] = f"should be {self.task.success}, as the task is {self.task.name}"
-        if self.sweep.target is not None and not self.task.throws:
-            wrong["sweep.target"] = f"should be left out, as the task {self.task.name} throws no ball"
-        if self.until is not None and self.sweep.sampler == "list":
-            wrong["until"] = "should be left out, as the file of the sampler list is not part of the dataset"
-        if self.containers.sim.ports and self.run.simulations > 1:
-            wrong["containers.sim.ports"] = (
-                f"should be left out, as {self.run.simulations} simulations cannot share a port of this machine"
-            )
-        if self.run.root_namespace and self.run.simulations > 1:
-            wrong["run.root_namespace"] = (
-                f"should be left out, as {self.run.simulations} simulations (-n) cannot share a namespace"
-            )
-        if wrong:
-            raise ContradictionError(wrong)
-        return self
+        for section, joints in named.items():
+            for joint in joints:
+                if joint not in robot.joints:
+                    yield f"{section}.{joint}", f"{robot.title} has no joint {joint!r}"
 
     @property
     def grows(self) -> bool:

@@ -1,29 +1,48 @@
-"""What all sections of a configuration have in common."""
+"""The base of all sections of a configuration, and keys that hold one of several sections."""
 
 from __future__ import annotations
 
 import ast
 import inspect
 import sys
-from functools import cache
+from collections.abc import Callable, Iterator, Mapping
+from functools import cache, reduce
 from itertools import pairwise
-from typing import Any
+from operator import or_
+from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, GetJsonSchemaHandler
+from pydantic import BaseModel, ConfigDict, Discriminator, GetJsonSchemaHandler, Tag, model_validator
 from pydantic_core import CoreSchema
+from typing_extensions import Self
+
+from throwcollect.config.kinds import ContradictionError
 
 
 class Section(BaseModel):
-    """Base of all sections: unknown keys are errors, values never change."""
+    """Base of all sections: unknown keys are errors, values never change, and keys must not contradict each other."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    def _find_contradictions(self) -> Iterator[tuple[str, str]]:
+        """List the keys that are right alone and wrong together.
+
+        Yields:
+            A dotted key, relative to this section, and a sentence that says what is wrong.
+        """
+        yield from ()
+
+    @model_validator(mode="after")
+    def _refuse_contradictions(self) -> Self:
+        if wrong := dict(self._find_contradictions()):
+            raise ContradictionError(wrong)
+        return self
 
     @classmethod
     def __get_pydantic_json_schema__(cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         """The section's JSON Schema, in which the docstrings of its keys describe them.
 
-        Pydantic's own ``use_attribute_docstrings`` reads them in every process, of which few ask for a schema: a
-        third of the time that importing the configuration takes.
+        Pydantic's own ``use_attribute_docstrings`` would read the docstrings in every process, although few need a
+        schema. That takes a third of the time of importing the configuration.
         """
         schema = handler(core_schema)
         properties = handler.resolve_ref_schema(schema).get("properties", {})
@@ -32,8 +51,28 @@ class Section(BaseModel):
         return schema
 
 
+def any_of(sections: Mapping[str, type[Section]], choose: Callable[[Any], Any]) -> Any:
+    """Make the type of a key that holds one of several sections.
+
+    Args:
+        sections: The sections, by a name that the value of the key implies.
+        choose: Finds that name in the value; anything else is an error.
+    """
+    kinds = list(dict.fromkeys(sections.values()))
+    if len(kinds) == 1:
+        return kinds[0]
+
+    def find_tag(value: Any) -> str | None:
+        if isinstance(value, Section):
+            return type(value).__name__
+        name = choose(value)
+        return sections[name].__name__ if isinstance(name, str) and name in sections else None
+
+    return Annotated[reduce(or_, [Annotated[kind, Tag(kind.__name__)] for kind in kinds]), Discriminator(find_tag)]
+
+
 def _read_docstrings(section: type[Section]) -> dict[str, str]:
-    """The docstrings that stand below the fields of a section and of its bases, by name of the field."""
+    """Read the docstrings below the fields of a section and of its bases, by name of the field."""
     found: dict[str, str] = {}
     for each in reversed(section.__mro__):
         if issubclass(each, Section):
@@ -43,7 +82,7 @@ def _read_docstrings(section: type[Section]) -> dict[str, str]:
 
 @cache
 def _read_docstrings_of_module(module: str) -> dict[str, dict[str, str]]:
-    """The docstrings of fields, by class: a module is parsed once, as cutting each class out of it takes longer."""
+    """Read the docstrings of fields, by class: to parse a module once is faster than to cut out each class first."""
     classes: dict[str, dict[str, str]] = {}
     for node in ast.parse(inspect.getsource(sys.modules[module])).body:
         if not isinstance(node, ast.ClassDef):

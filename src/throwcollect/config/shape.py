@@ -1,4 +1,4 @@
-"""What a key may hold, in words: read off the JSON Schema of the models, for messages and for the reference."""
+"""Puts into words what a key may hold, by the JSON Schema of the models, for messages and for the reference."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ class Shape:
     """What a key may hold.
 
     Attributes:
-        node: Its part of the JSON Schema, without references.
-        unit: Unit of its numbers; empty when they have none.
+        node: Part of the JSON Schema, without references.
+        unit: Unit of the numbers; empty when they have none.
     """
 
     node: dict[str, Any]
@@ -46,16 +46,16 @@ class Shape:
 
     @property
     def refused(self) -> dict[str, str]:
-        """Why keys that somebody may expect in a section are not taken; empty when it has no such keys."""
+        """Keys that a user may expect in a section and that it refuses, with the reason."""
         return {name: why for shape in self.alternatives for name, why in shape.node.get("refused", {}).items()}
 
     @property
     def choices(self) -> list[str]:
-        """The words it allows, if there are only some."""
+        """The words that are allowed, if not any text is."""
         return [word for shape in self.alternatives for word in _list_words(shape.node)]
 
     def child(self, part: str | int) -> Shape:
-        """The shape of what is in it under a key or an index; any value when it should hold nothing there."""
+        """The shape of the value under a key or an index; that of any value if there should be none."""
         for shape in self.alternatives:
             rest = shape.node.get("items" if isinstance(part, int) else "additionalProperties")
             if node := shape.node.get("properties", {}).get(part) or rest:
@@ -73,16 +73,16 @@ def root() -> Shape:
 
 
 def unit_of_key(key: str) -> str:
-    """Unit of the numbers of a dotted key: that of its field, or else the one that a name in it ends with.
+    """Unit of the numbers of a dotted key: that of its field, or else the one that the key ends with.
 
     Args:
-        key: Dotted key, in which an index is a part of its own; of what is no key, the name alone counts.
+        key: Dotted key, in which an index is a part of its own; a name that is no key is allowed.
     """
     return shape_of([int(part) if part.isdecimal() else part for part in key.split(".")]).unit or unit_of_name(key)
 
 
 def shape_of(parts: Sequence[str | int]) -> Shape:
-    """The shape of what a key of a configuration holds."""
+    """The shape of the value of a key of a configuration."""
     shape = root()
     for part in parts:
         shape = shape.child(part)

@@ -1,4 +1,4 @@
-"""A configuration to begin with: a few keys and words about them, of a robot, task and sampler that are installed."""
+"""Writes the configuration that `throwcollect init` offers to begin with: a few keys, and comments on them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ POINTS = "throws.csv"
 """The list of points that the sampler `list` reads, beside the configuration."""
 
 _NARROW_RAD = 0.2
-"""How far the last angle of a joint is varied to either side."""
+"""Range to either side in which the last angle of a joint is swept."""
 
 
 def samplers() -> list[str]:
@@ -27,12 +27,7 @@ def samplers() -> list[str]:
 
 
 def make_starter(robot: str, task: str, sampler: str) -> dict[str, str]:
-    """Write a configuration to begin with.
-
-    Args:
-        robot: Name of the robot.
-        task: Name of the task.
-        sampler: Name of the sampler.
+    """Write a configuration to begin with, for the robot, the task and the sampler of these names.
 
     Returns:
         The text of the configuration as ``throwcollect.yaml``, and of `POINTS` if the sampler reads it.
@@ -66,7 +61,7 @@ _Motion = tuple[Mapping[str, float], Mapping[str, float], float]
 
 
 def _find_motion(robot: str, task: str) -> _Motion:
-    """The motion that the task has by default or, of another robot than that is for, one from its posture at rest."""
+    """Find a motion for the robot: the default of the task or, if that is for another robot, one from rest."""
     section: dict[str, object] = {"name": task}
     values = {"name": "throws", "robot": {"name": robot}, "task": section}
     try:

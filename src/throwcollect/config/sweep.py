@@ -1,15 +1,15 @@
-"""What varies from trial to trial, and what the throws are spread over."""
+"""Keys for the sweep: the keys that vary from trial to trial, and the targets that throws are spread over."""
 
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import BaseModel, Discriminator, Field, Tag, model_validator
+from pydantic import Field
 
 from throwcollect.config.key import Key
-from throwcollect.config.kinds import ContradictionError
-from throwcollect.config.section import Section
+from throwcollect.config.section import Section, any_of
 
 LANDING_HEIGHT = "scene.landing_height_m"
 """Key that must be swept where heights are a target."""
@@ -29,18 +29,13 @@ class Range(Section):
     count: Annotated[int, Field(ge=1, le=10_000_000)] | None = None
     """Number of grid points, both ends included; for the sampler `grid` only."""
 
-    @model_validator(mode="after")
-    def _check_order(self) -> Range:
-        wrong = {}
+    def _find_contradictions(self) -> Iterator[tuple[str, str]]:
         if self.min > self.max:
-            wrong["min"] = f"should be at most max, {self.max}, got {self.min}"
+            yield "min", f"should be at most max, {self.max}, got {self.min}"
         elif self.scale == "log" and self.min <= 0:
-            wrong["min"] = f"should be above 0 on a logarithmic scale, got {self.min}"
+            yield "min", f"should be above 0 on a logarithmic scale, got {self.min}"
         if self.count == 1 and self.min < self.max:
-            wrong["count"] = "should be 2 or more, as both min and max are grid points"
-        if wrong:
-            raise ContradictionError(wrong)
-        return self
+            yield "count", "should be 2 or more, as both min and max are grid points"
 
 
 class Values(Section):
@@ -50,15 +45,13 @@ class Values(Section):
     """The values, in the unit of the key."""
 
 
-def _parameter_kind(value: Any) -> str | None:
-    if isinstance(value, BaseModel):
-        return type(value).__name__
-    if not isinstance(value, dict):
-        return None
-    return "Values" if "values" in value else "Range"
-
-
-Parameter = Annotated[Annotated[Range, Tag("Range")] | Annotated[Values, Tag("Values")], Discriminator(_parameter_kind)]
+if TYPE_CHECKING:
+    Parameter = Range | Values
+else:
+    Parameter = any_of(
+        {"range": Range, "values": Values},
+        lambda value: ("values" if "values" in value else "range") if isinstance(value, dict) else None,
+    )
 
 
 class Bins(Section):
@@ -71,11 +64,9 @@ class Bins(Section):
     bins: Annotated[int, Field(ge=1, le=1000)]
     """Number of intervals."""
 
-    @model_validator(mode="after")
-    def _check_order(self) -> Bins:
+    def _find_contradictions(self) -> Iterator[tuple[str, str]]:
         if self.min >= self.max:
-            raise ContradictionError({"min": f"should be below max, {self.max}, got {self.min}"})
-        return self
+            yield "min", f"should be below max, {self.max}, got {self.min}"
 
 
 class TargetConfig(Section):
@@ -94,23 +85,18 @@ class TargetConfig(Section):
         named = {"distance_m": self.distance_m, "height_m": self.height_m, "hit_angle_rad": self.hit_angle_rad}
         return {name: bins for name, bins in named.items() if bins is not None}
 
-    @model_validator(mode="after")
-    def _can_be_spread_over(self) -> TargetConfig:
-        wrong = {}
+    def _find_contradictions(self) -> Iterator[tuple[str, str]]:
         if not self.dimensions:
-            wrong["distance_m"] = "missing; at least one of distance_m, height_m and hit_angle_rad should be there"
+            yield "distance_m", "missing; at least one of distance_m, height_m and hit_angle_rad should be there"
         if self.distance_m and self.distance_m.min < 0:
-            wrong["distance_m.min"] = f"should be 0 or more, got {self.distance_m.min}"
+            yield "distance_m.min", f"should be 0 or more, got {self.distance_m.min}"
         if (angle := self.hit_angle_rad) and max(-angle.min, angle.max) > math.pi / 2:
             outer = "max" if angle.max > math.pi / 2 else "min"
-            wrong[f"hit_angle_rad.{outer}"] = f"should be from -1.5708 to 1.5708 rad, got {getattr(angle, outer)}"
+            yield f"hit_angle_rad.{outer}", f"should be from -1.5708 to 1.5708 rad, got {getattr(angle, outer)}"
         cells = math.prod(each.bins for each in self.dimensions.values())
         if cells > _MOST_CELLS:
             last = list(self.dimensions)[-1]
-            wrong[f"{last}.bins"] = f"makes {cells} cells together with the others; there may be {_MOST_CELLS}"
-        if wrong:
-            raise ContradictionError(wrong)
-        return self
+            yield f"{last}.bins", f"makes {cells} cells together with the others; there may be {_MOST_CELLS}"
 
 
 class SweepConfig(Section):
@@ -126,35 +112,30 @@ class SweepConfig(Section):
 
     A relative path starts at the directory of the configuration file."""
     feasibility: Annotated[Literal["actual", "nominal"], Key(later=True)] = "actual"
-    """Which robot the plan is checked for: the one that throws, or the one that somebody believes to have who plans
-    motions for a robot he does not know: the keys of `robot`, `tool` and `ball` have their defaults then."""
+    """Robot that the plan is checked for: the `actual` one that throws, or the `nominal` one, for which the keys of
+    `robot`, `tool` and `ball` have their defaults: a user who plans motions for a robot knows only this one."""
     target: Annotated[TargetConfig | None, Key(later=True)] = None
     """Spreads throws over landing targets: trials are added to the plan where throws are few."""
 
-    @model_validator(mode="after")
-    def _sampler_has_what_it_reads(self) -> SweepConfig:
-        wrong = {}
+    def _find_contradictions(self) -> Iterator[tuple[str, str]]:
         if self.sampler == "list":
             if self.file is None:
-                wrong["file"] = "missing; the sampler list should have a CSV or Parquet file"
+                yield "file", "missing; the sampler list should have a CSV or Parquet file"
             if self.parameters:
-                wrong["parameters"] = "should be left out, as the sampler list takes keys and values from its file"
+                yield "parameters", "should be left out, as the sampler list takes keys and values from its file"
         elif self.file is not None:
-            wrong["file"] = f"should be left out, as the sampler {self.sampler} reads no file"
+            yield "file", f"should be left out, as the sampler {self.sampler} reads no file"
         if self.target is not None:
             if self.sampler != "sobol":
-                wrong["sampler"] = f"should be sobol, with which the search for target begins, got {self.sampler}"
+                yield "sampler", f"should be sobol, with which the search for target begins, got {self.sampler}"
             if not self.parameters:
-                wrong["parameters"] = "missing; target should have parameters to reach it with"
+                yield "parameters", "missing; target should have parameters to reach it with"
             if self.target.height_m and LANDING_HEIGHT not in self.parameters:
-                wrong["target.height_m"] = f"should be left out, as {LANDING_HEIGHT} is not swept"
+                yield "target.height_m", f"should be left out, as {LANDING_HEIGHT} is not swept"
         for key, parameter in self.parameters.items():
             if not isinstance(parameter, Range):
                 continue
             if self.sampler == "grid" and parameter.count is None:
-                wrong[f"parameters.{key}.count"] = "missing; the sampler grid should know how many points to take"
+                yield f"parameters.{key}.count", "missing; the sampler grid should know how many points to take"
             elif self.sampler not in ("grid", "list") and parameter.count is not None:
-                wrong[f"parameters.{key}.count"] = f"should be left out, as the sampler {self.sampler} has no grid"
-        if wrong:
-            raise ContradictionError(wrong)
-        return self
+                yield f"parameters.{key}.count", f"should be left out, as the sampler {self.sampler} has no grid"

@@ -1,11 +1,11 @@
-"""Targets of trials: what a list of trials may want of each of them, beside what it sets."""
+"""Columns of targets: a list of trials may say where each trial should end."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 TARGET_PREFIX = "target_"
-"""Names of columns of targets begin with it, and no others: keys have dots, and results are named otherwise."""
+"""Prefix of the columns of targets, and of no others: keys have dots, and results have other names."""
 
 
 @dataclass(frozen=True)
@@ -14,10 +14,10 @@ class TargetColumn:
 
     Attributes:
         name: Its name, which begins with `TARGET_PREFIX` and ends with its unit.
-        of: What it is wanted of: a column of the task's results, or a key that is given with a target.
-        miss: Column of the table of throws with the distance that it counts in.
-        word: What it is called in a sentence.
-        description: What it is, with its unit.
+        of: The column of the task's results, or the key given with a target, that should have the value.
+        miss: Column of the table of throws with the distance to which it contributes.
+        word: Its name in sentences.
+        description: Its meaning, with the unit.
         required: Whether a target has to have it.
     """
 

@@ -1,14 +1,14 @@
-"""What the sections of all tasks have in common: a motion of some joints from a start to an end."""
+"""Keys of every task: a motion of some joints from a start to an end."""
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from typing import Annotated, ClassVar
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from throwcollect.config.key import Effect, Key
-from throwcollect.config.kinds import Angle, ContradictionError, Joint
+from throwcollect.config.kinds import Angle, Joint
 from throwcollect.config.motion import DynamicMovementPrimitive, MinimumJerk, Trajectory
 from throwcollect.config.section import Section
 from throwcollect.config.target import TargetColumn
@@ -59,17 +59,17 @@ class TaskConfig(Section):
 
     @property
     def noun(self) -> str:
-        """What one of its trials is called."""
+        """Noun for one of its trials."""
         return "throw" if self.throws else "trial"
 
     @property
     def keyword(self) -> str:
-        """By what its datasets are found on a hub."""
+        """Keyword by which a hub finds its datasets."""
         return "throwing" if self.throws else self.name
 
     @property
     def subject(self) -> str:
-        """What its trials are, in a sentence behind their number."""
+        """Description of its trials, for a sentence in which it follows their number."""
         return "throws of a ball" if self.throws else f"trials of the task {self.name}"
 
     def find_wrong_targets(self, columns: Collection[str]) -> dict[str, str]:
@@ -79,7 +79,7 @@ class TaskConfig(Section):
             columns: Their names.
 
         Returns:
-            What is wrong, by column; empty if they are targets of this task, or none at all.
+            Sentence that says what is wrong, by column; empty if they are targets of this task, or none at all.
         """
         known = {each.name: each for each in self.target_columns}
         has = f"it has {', '.join(known)}" if known else "it has none"
@@ -89,17 +89,13 @@ class TaskConfig(Section):
             wrong |= {name: f"is missing beside {join_names(there)}" for name in missing}
         return wrong
 
-    @model_validator(mode="after")
-    def _moving_joints_start_somewhere(self) -> TaskConfig:
-        wrong = {f"end.{joint}": "start should name this joint, too" for joint in self.end if joint not in self.start}
+    def _find_contradictions(self) -> Iterator[tuple[str, str]]:
         if not self.end:
-            wrong["end"] = "names no joint, so nothing would move"
+            yield "end", "names no joint, so nothing would move"
+        for joint in self.end:
+            if joint not in self.start:
+                yield f"end.{joint}", "start should name this joint, too"
         if isinstance(self.trajectory, DynamicMovementPrimitive):
-            wrong |= {
-                f"trajectory.weights.{joint}": "end does not name this joint, so it does not move"
-                for joint in self.trajectory.weights
-                if joint not in self.end
-            }
-        if wrong:
-            raise ContradictionError(wrong)
-        return self
+            for joint in self.trajectory.weights:
+                if joint not in self.end:
+                    yield f"trajectory.weights.{joint}", "end does not name this joint, so it does not move"

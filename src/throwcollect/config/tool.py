@@ -1,4 +1,4 @@
-"""What the sections of all tools have in common."""
+"""Keys of every tool."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""When enough has been collected: what the sections `until` of all tasks have in common."""
+"""Base of the sections `until` of all tasks, which say when enough has been collected."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pydantic import Field
 from throwcollect.config.section import Section
 
 Wanted = Annotated[int, Field(ge=1, le=1_000_000)]
-"""How many trials should end with an outcome."""
+"""Number of trials that should end with an outcome."""
 
 
 class UntilConfig(Section):
@@ -17,10 +17,10 @@ class UntilConfig(Section):
 
     @classmethod
     def outcome(cls) -> str:
-        """Return the outcome that is counted."""
+        """The outcome that is counted."""
         return next(iter(cls.model_fields))
 
     @property
     def wanted(self) -> int:
-        """How many trials should end with that outcome."""
+        """Number of trials that should end with that outcome."""
         return int(getattr(self, self.outcome()))

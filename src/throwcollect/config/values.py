@@ -1,4 +1,4 @@
-"""Single values of a configuration by their dotted keys: read them, replace them, find those that a sweep may vary."""
+"""Single values of a configuration, by their dotted keys: reads, replaces and compares them."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ def with_values(config: Config, values: Mapping[str, float]) -> Config:
     """Make a configuration with some of its values replaced, such as that of one trial.
 
     Args:
-        config: Configuration to start from; it stays as it is.
-        values: New values by dotted key; items of lists go by their index from 0. Keys must be present in `config`.
+        config: The configuration, which stays as it is.
+        values: New values by dotted key, which `config` must have; items of lists go by their index from 0.
 
     Raises:
         ConfigError: If a key does not exist, or the result would not be valid.
@@ -39,12 +39,12 @@ def with_values(config: Config, values: Mapping[str, float]) -> Config:
 
 @dataclass(frozen=True)
 class Leaf:
-    """One value of a configuration that holds nothing further; empty dictionaries and lists are such values, too.
+    """A value of a configuration that holds no other value; an empty dictionary or list is a leaf, too.
 
     Attributes:
         name: Dotted key.
-        value: What it is.
-        key: What holds for the key.
+        value: The value.
+        key: Annotation that holds for the key.
         is_default: Whether the value is the default of the key.
     """
 
@@ -55,12 +55,12 @@ class Leaf:
 
 
 def leaves(config: Config) -> Iterator[Leaf]:
-    """List all values of a configuration, in the order in which their keys are declared."""
+    """List the leaves of a configuration, in the order in which their keys are declared."""
     return _leaves(config, (), Key(), Config())
 
 
 def values_by_key(config: Config) -> dict[str, Any]:
-    """Map the dotted key of everything in a configuration that holds nothing further to its value."""
+    """Map the dotted key of each leaf of a configuration to its value."""
     return {leaf.name: leaf.value for leaf in leaves(config)}
 
 
@@ -71,12 +71,7 @@ def differences(one: Config, other: Config) -> dict[str, tuple[Any, Any]]:
 
 
 def sweepable_keys(config: Config, effect: Effect | None = None) -> list[str]:
-    """List the dotted keys that a sweep of this configuration may vary.
-
-    Args:
-        config: The configuration.
-        effect: What the keys have an effect on; None for all.
-    """
+    """List the dotted keys that a sweep of this configuration may vary, or those of them that have one effect."""
     return [
         leaf.name
         for leaf in leaves(config)
@@ -87,12 +82,8 @@ def sweepable_keys(config: Config, effect: Effect | None = None) -> list[str]:
 def reason_not_sweepable(config: Config, key: str) -> str | None:
     """Say why a sweep may not vary a key; None when it may.
 
-    Numbers of the task's motion, of the ball, the scene, the motors and their delay may vary from trial to trial; what
-    the simulated world is built from, what is recorded and how may not.
-
-    Args:
-        config: Configuration that is swept.
-        key: Dotted key.
+    Numbers of the task's motion, of the ball, the scene and the motors may vary from trial to trial. The world is built
+    and the recording is set up only once, so their other keys may not.
     """
     leaf = next((leaf for leaf in leaves(config) if leaf.name == key), None)
     return unknown_key(key, sweepable_keys(config)) if leaf is None else _find_obstacle(config, leaf)
@@ -131,7 +122,7 @@ def _change(section: AnySection, changes: Mapping[str, Any], location: Location)
             raise _unknown((*location, part), list(values))
         values[part] = _replace(values[part], change, (*location, part))
     try:
-        # Strictly, so that a number in quotes is no number; sections that have not changed are not looked at again.
+        # Strictly, so that a text in quotes is not taken for a number. Pydantic does not validate sections again.
         return type(section).model_validate(values, strict=True)
     except ValidationError as error:
         found = findings(error, values, above=location)

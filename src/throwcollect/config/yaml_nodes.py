@@ -1,4 +1,4 @@
-"""From YAML text to nodes, within bounds: a text that no configuration looks like is refused before it costs time."""
+"""Parses YAML text, and refuses a text that is too large for a configuration before it costs time."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from ruamel.yaml.nodes import Node
 from ruamel.yaml.scanner import Scanner, ScannerError
 
 MOST_LEVELS = 50
-"""Levels of values inside values."""
+"""Most levels of values inside values."""
 MOST_VALUES = 30_000
-"""More than 500 weights for each of 32 joints; a text with so many takes a few seconds to be looked at."""
+"""Most values: more than 500 weights for each of 32 joints, which take a few seconds to parse."""
 
 _MOST_TOKENS = 5 * MOST_VALUES
-"""A key and its value are four."""
+"""Most tokens: a key and its value are four."""
 
 
 class _Scanner(Scanner):
-    """Cuts a text into tokens, and refuses what is nested too deeply or has too many of them."""
+    """Cuts a text into tokens, and refuses one that has too many of them or is nested too deeply."""
 
     def fetch_more_tokens(self) -> Any:
         if self.tokens_taken + len(self.tokens) > _MOST_TOKENS:
@@ -33,10 +33,10 @@ class _Scanner(Scanner):
 
 
 def compose(text: str) -> Node | None:
-    """The node of a text; None if there is nothing in it.
+    """Parse a text into a node; None if the text is empty.
 
     Raises:
-        YAMLError: If it is no YAML, or too much of it.
+        YAMLError: If the text is no YAML, or too large.
     """
     yaml = YAML(typ="safe", pure=True)
     yaml.Scanner = _Scanner
@@ -45,13 +45,13 @@ def compose(text: str) -> Node | None:
 
 
 def reason(error: YAMLError) -> str:
-    """What is wrong with a text, in words."""
+    """Say what is wrong with a text."""
     if isinstance(error, MarkedYAMLError):
         return ", ".join(filter(None, [error.problem, error.context]))
     return str(error).partition("\n")[0]
 
 
 def line(error: YAMLError) -> int | None:
-    """Line in which it is wrong, counted from 1; None if that is not known."""
+    """The line of the error, counted from 1; None if it is unknown."""
     mark = (error.problem_mark or error.context_mark) if isinstance(error, MarkedYAMLError) else None
     return mark.line + 1 if mark else None

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from pydantic import TypeAdapter
 
-from throwcollect.config.container_spec import ContainerSpec
+from throwcollect.config.containers import ContainerSpec
 from throwcollect.errors import ConfigError, ConflictError, Interrupted
 from throwcollect.extras import explain_missing
 from throwcollect.runs.onlooker import Onlooker

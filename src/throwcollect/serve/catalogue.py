@@ -10,10 +10,10 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, PositiveFloat, PositiveInt, ValidationError, model_validator
 
-from throwcollect.config.container_spec import ContainerSpec
 from throwcollect.config.containers import (
     ContainerOptions,
     ContainerPort,
+    ContainerSpec,
     HostPort,
     Mount,
     Network,

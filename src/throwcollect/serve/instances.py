@@ -13,7 +13,7 @@ from pathlib import Path
 
 from pydantic import JsonValue
 
-from throwcollect.config.container_spec import ContainerSpec
+from throwcollect.config.containers import ContainerSpec
 from throwcollect.dataset.directory import config_path
 from throwcollect.errors import ConfigError, ConflictError, NotFoundError, Problem, WorkerError
 from throwcollect.robots.appearance import check_appearance

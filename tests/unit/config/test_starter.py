@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from throwcollect.cli.starting import init
+from throwcollect.cli.show import init
 from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.config.loader import load
 from throwcollect.config.starter import make_starter, samplers

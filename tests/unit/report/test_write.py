@@ -14,7 +14,7 @@ from tests.unit.report.page_parser import Page
 from tests.unit.report.test_page import SECTIONS
 from typer.testing import CliRunner
 
-from throwcollect.cli.dataset.commands import dataset_app
+from throwcollect.cli.main import dataset_app
 from throwcollect.dataset.directory import METADATA
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.extras import MissingExtraError

@@ -11,8 +11,7 @@ from pathlib import Path
 import pytest
 from tests.unit.runtimes.docker.engine import Engine, engine_at
 
-from throwcollect.config.container_spec import ContainerSpec
-from throwcollect.config.containers import NodeContainerConfig
+from throwcollect.config.containers import ContainerSpec, NodeContainerConfig
 from throwcollect.errors import ConfigError, ConflictError, NotFoundError, WorkerError
 from throwcollect.ros.connection import Connection
 from throwcollect.ros.middleware import Middleware

@@ -5,8 +5,7 @@ from pathlib import Path
 import pytest
 from tests.unit.serve.conftest import CONFIG
 
-from throwcollect.config.container_spec import ContainerSpec
-from throwcollect.config.containers import NodeContainerConfig
+from throwcollect.config.containers import ContainerSpec, NodeContainerConfig
 from throwcollect.errors import ConfigError, NotFoundError
 from throwcollect.serve.catalogue import Catalogue
 

@@ -1,8 +1,7 @@
-"""`throwcollect dataset merge|filter|sample|split|stats`: datasets made of others, and statistics."""
+"""`throwcollect dataset merge`, `filter`, `sample`, `split` and `stats`: datasets made of others, and statistics."""
 
 from __future__ import annotations
 
-import json as jsonlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from throwcollect.cli.options import DatasetArgument, JsonOption, OutputArgument
+from throwcollect.cli.printing import print_result
 from throwcollect.wording import format_count
 
 if TYPE_CHECKING:
@@ -75,14 +75,12 @@ def split_dataset(
     from throwcollect.derive.split import SQUARES, split
 
     found = split(directory, output, fractions=fractions, cells=cells or SQUARES, seed=seed)
-    if json:
-        typer.echo(jsonlib.dumps(found.as_dict(), indent=2))
-        return
+    lines = []
     for name, part in found.parts.items():
         elsewhere = f", {part.uncelled} in no cell" if part.uncelled else ""
-        typer.echo(f"{output / name}: {_trials(part.dataset)} in {format_count(part.cells, 'cell')}{elsewhere}")
-        typer.echo(f"  digest  {part.dataset.digest}")
-    _tell_left_out(found.without_episode)
+        lines.append(f"{output / name}: {_count_trials(part.dataset)} in {format_count(part.cells, 'cell')}{elsewhere}")
+        lines.append(f"  digest  {part.dataset.digest}")
+    print_result(found.as_dict(), "\n".join([*lines, *_list_left_out(found.without_episode)]), json=json)
 
 
 def show_statistics(directory: DatasetArgument, json: JsonOption = False) -> None:
@@ -90,47 +88,43 @@ def show_statistics(directory: DatasetArgument, json: JsonOption = False) -> Non
     from throwcollect.derive.statistics import statistics
 
     found = statistics(directory)
-    typer.echo(jsonlib.dumps(found.as_dict(), indent=2) if json else _tables(found), nl=json)
+    print_result(found.as_dict(), _make_tables(found), json=json)
 
 
 def _show(output: Path, derived: Derived, *, json: bool) -> None:
-    if json:
-        typer.echo(jsonlib.dumps({"directory": str(output), **derived.as_dict()}, indent=2))
-        return
-    typer.echo(f"{output}: {_trials(derived)}")
-    typer.echo(f"  digest  {derived.digest}")
-    _tell_left_out(derived.without_episode)
+    lines = [f"{output}: {_count_trials(derived)}", f"  digest  {derived.digest}"]
+    text = "\n".join([*lines, *_list_left_out(derived.without_episode)])
+    print_result({"directory": str(output), **derived.as_dict()}, text, json=json)
 
 
-def _trials(derived: Derived) -> str:
+def _count_trials(derived: Derived) -> str:
     return f"{derived.trials} of {format_count(derived.offered, 'trial')}"
 
 
-def _tell_left_out(without_episode: Mapping[str, int]) -> None:
-    if without_episode:
-        counts = ", ".join(f"{count} {outcome}" for outcome, count in without_episode.items())
-        typer.echo(f"left out, as they have no episode: {counts}")
+def _list_left_out(without_episode: Mapping[str, int]) -> list[str]:
+    counts = ", ".join(f"{count} {outcome}" for outcome, count in without_episode.items())
+    return [f"left out, as they have no episode: {counts}"] if counts else []
 
 
-def _tables(found: Statistics) -> str:
+def _make_tables(found: Statistics) -> str:
     outcomes = ", ".join(f"{count} {outcome}" for outcome, count in found.outcomes.items())
     omitted = f", {found.samples_not_finite} more are not finite" if found.samples_not_finite else ""
     columns = {name: {**vars(column), **column.quantiles} for name, column in found.columns.items()}
-    text = f"{format_count(found.trials, 'trial')}: {outcomes}\n\n" + _table("throws", columns, _COLUMNS)
+    text = f"{format_count(found.trials, 'trial')}: {outcomes}\n\n" + _make_table("throws", columns, _COLUMNS)
     for group, signals in found.signals.items():
-        text += "\n" + _table(group, {name: vars(signal) for name, signal in signals.items()}, _MOMENTS)
+        text += "\n" + _make_table(group, {name: vars(signal) for name, signal in signals.items()}, _MOMENTS)
     of_all = f"{format_count(found.samples, 'sample')} of {format_count(found.episodes, 'episode')}"
-    return f"{text}\nsignals over {of_all}{omitted}\n"
+    return f"{text}\nsignals over {of_all}{omitted}"
 
 
-def _table(title: str, rows: Mapping[str, Mapping[str, Any]], columns: Sequence[str]) -> str:
+def _make_table(title: str, rows: Mapping[str, Mapping[str, Any]], columns: Sequence[str]) -> str:
     lines = [(title, *columns)]
-    lines += [(name, *(_cell(row.get(column)) for column in columns)) for name, row in rows.items()]
+    lines += [(name, *(_format_number(row.get(column)) for column in columns)) for name, row in rows.items()]
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
     return "".join(
         "  ".join([first.ljust(widths[0]), *map(str.rjust, rest, widths[1:])]) + "\n" for first, *rest in lines
     )
 
 
-def _cell(number: float | None) -> str:
+def _format_number(number: float | None) -> str:
     return "-" if number is None else f"{number:.6g}"

@@ -1,4 +1,4 @@
-"""`throwcollect dataset info|digest`: what is in a dataset."""
+"""`throwcollect dataset info` and `digest`, and the summary that commands print when a collection ends."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from throwcollect.cli.options import DatasetArgument, JsonOption
+from throwcollect.cli.printing import print_result
 from throwcollect.cli.streams import ensure_written
 from throwcollect.units import unit_of_name
 from throwcollect.wording import command, format_count
@@ -23,7 +24,7 @@ def show_info(directory: DatasetArgument, json: JsonOption = False) -> None:
     from throwcollect.dataset.inspect import info
 
     found = info(directory)
-    typer.echo(jsonlib.dumps(found.as_dict(), indent=2) if json else describe(found), nl=json)
+    print_result(found.as_dict(), describe(found), json=json)
 
 
 def show_digest(directory: DatasetArgument) -> None:
@@ -33,18 +34,27 @@ def show_digest(directory: DatasetArgument) -> None:
     typer.echo(digest(directory))
 
 
-def print_summary(found: Info, directory: Path | None, *, as_json: bool) -> None:
-    """Print what a collection has given.
+def print_collected(found: Info, directory: Path | None, *, as_json: bool, hint: str | None = None) -> None:
+    """Print the summary of a collection that has ended as `print_summary` does, and fail if it has lost trials.
 
-    Args:
-        found: Summary of its dataset.
-        directory: Directory of the dataset; None if it is in a volume.
-        as_json: Whether to print one JSON document.
+    Raises:
+        OutputError: If the summary cannot be printed.
+        LossError: If trials are lost; its hint says how to go on.
+    """
+    from throwcollect.dataset.summary import explain_loss
+
+    print_summary(found, directory, as_json=as_json)
+    if (lost := explain_loss(found.outcomes, hint=hint)) is not None:
+        raise lost
+
+
+def print_summary(found: Info, directory: Path | None, *, as_json: bool) -> None:
+    """Print the summary of a collection, and how to look into its dataset, unless that is in a volume.
 
     Raises:
         OutputError: If it cannot be printed.
     """
-    typer.echo(jsonlib.dumps(found.as_dict(), indent=2) if as_json else describe(found), nl=as_json)
+    print_result(found.as_dict(), describe(found), json=as_json)
     look = command("dataset", "info", directory) if directory is not None else None
     if look is not None and not as_json:
         typer.echo(f"look into it: {look}   (or open the .mcap files in Foxglove)")
@@ -54,14 +64,14 @@ def print_summary(found: Info, directory: Path | None, *, as_json: bool) -> None
 
 
 def describe(found: Info) -> str:
-    """Summary of a dataset in words, one fact a line; that of a run also says whether the run was open."""
+    """Put the summary of a dataset into words, one fact a line; that of a run also says if anybody could join it."""
     from throwcollect.runs.record import Summary
 
     outcomes = ", ".join(f"{count} {outcome}" for outcome, count in found.outcomes.items())
     lines = {
-        "trials": f"{found.trials}: {outcomes}{_missing(found)}",
-        **({"landing": _landing(found.landing)} if found.noun == "throw" else {}),
-        **{name: _describe_misses(name, each) for name, each in found.misses.items()},
+        "trials": f"{found.trials}: {outcomes}{_describe_shortage(found)}",
+        **({"landing": _describe_landing(found.landing)} if found.noun == "throw" else {}),
+        **{name: _describe_misses(name, misses) for name, misses in found.misses.items()},
         "episodes": f"{found.episodes}, {found.samples} samples, {found.duration_s:.0f} s of simulated time",
         "files": f"{found.shards} MCAP of {found.recordings_bytes / 1e6:.1f} MB, "
         f"{found.size_bytes / 1e6:.1f} MB in all",
@@ -77,24 +87,24 @@ def describe(found: Info) -> str:
     if isinstance(found, Summary) and found.open:
         lines["open"] = "anybody who reached the router could join, read and disturb the run"
     width = max(map(len, lines))
-    return "".join(f"{key:{width}}  {text}\n" for key, text in lines.items())
+    return "\n".join(f"{key:{width}}  {text}" for key, text in lines.items())
 
 
-def _missing(found: Info) -> str:
+def _describe_shortage(found: Info) -> str:
     if found.wanted is None or found.outcomes.get(found.success, 0) >= found.wanted:
         return ""
     return f"; {found.wanted} should have {found.success}, but all trials were used up"
 
 
-def _describe_misses(name: str, found: MissSummary) -> str:
-    targets = f"{found.measured} of {format_count(found.targets, 'target')}"
-    if found.median is None:
+def _describe_misses(name: str, misses: MissSummary) -> str:
+    targets = f"{misses.measured} of {format_count(misses.targets, 'target')}"
+    if misses.median is None:
         return targets
     unit = unit_of_name(name)
-    return f"{targets}: median {found.median:.3g} {unit}, 9 of 10 below {found.share90:.3g} {unit}"
+    return f"{targets}: median {misses.median:.3g} {unit}, 9 of 10 below {misses.share90:.3g} {unit}"
 
 
-def _landing(landing: Mapping[str, tuple[float, float]] | None) -> str:
+def _describe_landing(landing: Mapping[str, tuple[float, float]] | None) -> str:
     if landing is None:
         return "no ball landed"
     x, y = landing["x_m"], landing["y_m"]

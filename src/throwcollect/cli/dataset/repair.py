@@ -1,14 +1,14 @@
-"""`throwcollect dataset rebuild` and `repair`: what is missing is made again, what is damaged is mended."""
+"""`throwcollect dataset rebuild` and `repair`: write missing tables again, and save what is whole in a damaged one."""
 
 from __future__ import annotations
 
-import json as jsonlib
 from collections.abc import Sequence
 from dataclasses import asdict
 
 import typer
 
 from throwcollect.cli.options import DatasetArgument, JsonOption, OutputArgument
+from throwcollect.cli.printing import print_json
 from throwcollect.errors import LossError
 from throwcollect.wording import command, format_count
 
@@ -21,7 +21,7 @@ def rebuild_dataset(directory: DatasetArgument, json: JsonOption = False) -> Non
 
     rebuilt = rebuild(directory)
     if json:
-        typer.echo(jsonlib.dumps(asdict(rebuilt), indent=2))
+        print_json(asdict(rebuilt))
         return
     found = f"{format_count(rebuilt.trials, 'trial')}, {format_count(rebuilt.episodes, 'episode')}"
     typer.echo(f"{directory}: {found}; wrote {', '.join(rebuilt.written)}")
@@ -45,7 +45,7 @@ def repair_dataset(directory: DatasetArgument, output: OutputArgument, json: Jso
 
     repaired = repair(directory, output, remake=lambda config: draw_plan(config, directory=directory))
     if json:
-        typer.echo(jsonlib.dumps(repaired.as_dict(), indent=2))
+        print_json(repaired.as_dict())
     else:
         for remark in repaired.remarks:
             typer.echo(remark)

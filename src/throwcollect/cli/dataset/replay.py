@@ -1,8 +1,7 @@
-"""`throwcollect dataset replay`: whether stored throws come out of the simulation again."""
+"""`throwcollect dataset replay`: simulates stored throws again, and compares the results."""
 
 from __future__ import annotations
 
-import json as jsonlib
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Annotated
 import typer
 
 from throwcollect.cli.options import DatasetArgument, JsonOption
+from throwcollect.cli.printing import print_json
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.extras import require
 from throwcollect.wording import format_count
@@ -50,25 +50,25 @@ def replay_dataset(
     if engine is not None:
         _compare_engines(directory, engine, chosen, plot, json=json)
         return
-    found = []
+    comparisons = []
     for comparison in replay_throws(directory, chosen):
-        found.append(comparison)
+        comparisons.append(comparison)
         if comparison.differences and not json:
             typer.echo(f"trial {comparison.trial}: {'; '.join(comparison.differences)}")
     if json:
-        typer.echo(jsonlib.dumps([asdict(comparison) for comparison in found], indent=2))
-    differ = sum(bool(comparison.differences) for comparison in found)
+        print_json([asdict(comparison) for comparison in comparisons])
+    differ = sum(bool(comparison.differences) for comparison in comparisons)
     if differ:
         raise DatasetError(
-            f"{directory}: {differ} of {format_count(len(found), 'throw')} came out otherwise",
+            f"{directory}: {differ} of {format_count(len(comparisons), 'throw')} came out otherwise",
             hint="README.md in it says with which processor and versions it was made",
         )
     if not json:
-        typer.echo(f"{directory}: {format_count(len(found), 'throw')} replayed, the same bit for bit")
+        typer.echo(f"{directory}: {format_count(len(comparisons), 'throw')} replayed, the same bit for bit")
 
 
 def _compare_engines(directory: Path, engine: str, trials: Sequence[int], plot: Path | None, *, json: bool) -> None:
-    """Tell how much depends on the physics engine.
+    """Simulate throws with another engine, and print by how much the results differ.
 
     Raises:
         ConfigError: If there is no such engine, the dataset was computed by it, or nothing can be drawn.
@@ -90,8 +90,7 @@ def _compare_engines(directory: Path, engine: str, trials: Sequence[int], plot: 
             raise ConfigError("--plot: no throw landed with both engines")
         write_deviations([[each[column] for each in landed] for column in LANDING], plot)
     if json:
-        answer = {"throws": [asdict(each) for each in deviations], "columns": [asdict(each) for each in found]}
-        typer.echo(jsonlib.dumps(answer, indent=2))
+        print_json({"throws": [asdict(each) for each in deviations], "columns": [asdict(each) for each in found]})
         return
     width = max(len(each.column) for each in found)
     typer.echo(f"{'by ' + engine + ', above stored':{width}}  throws       mean        rms     median    largest")

@@ -1,14 +1,13 @@
-"""`throwcollect dataset verify`: whether a dataset is whole, and can have been recorded."""
+"""`throwcollect dataset verify`: checks that a dataset is whole, and that its throws are physically possible."""
 
 from __future__ import annotations
 
-import json as jsonlib
-from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from throwcollect.cli.options import DatasetArgument, JsonOption
+from throwcollect.cli.printing import print_result, tell
 from throwcollect.errors import DatasetError
 from throwcollect.extras import install_command
 from throwcollect.side_by_side import count_cores
@@ -18,7 +17,7 @@ if TYPE_CHECKING:
     from throwcollect.dataset.reader import Dataset
 
 _SUGGESTED = 100
-"""Throws that are suggested for a replay."""
+"""Number of throws that the message suggests for a replay."""
 
 
 def verify_dataset(
@@ -34,34 +33,28 @@ def verify_dataset(
     from throwcollect.dataset.verify import find_unchecked
     from throwcollect.replay.verification import verify_dataset as verify
 
-    say = partial(typer.echo, err=True)
-    findings = verify(directory, replay=replay, processes=count_cores(), say=say)
-    if json:
-        typer.echo(jsonlib.dumps([finding.as_dict() for finding in findings], indent=2))
-    else:
-        for finding in findings:
-            typer.echo(str(finding))
+    findings = verify(directory, replay=replay, processes=count_cores(), say=tell)
     if findings:
+        print_result([finding.as_dict() for finding in findings], "\n".join(map(str, findings)), json=json)
         raise DatasetError(f"{directory}: {format_count(len(findings), 'finding')}")
     dataset = Dataset.open(directory)
-    if not json:
-        typer.echo(f"{directory}: nothing wrong\n{_describe_unchecked(dataset, replay)}")
+    print_result([], f"{directory}: nothing wrong\n{_describe_unchecked(dataset, replay)}", json=json)
     if left_out := find_unchecked(dataset.config):
         typer.echo(f"not checked without the extra collect: {', '.join(left_out)}", err=json)
         typer.echo(f"  try: {install_command('collect')}", err=json)
 
 
 def _describe_unchecked(dataset: Dataset, replay: int | None) -> str:
-    """What was not looked at in a dataset in which nothing is wrong, and the command that does."""
+    """Say what was not checked in a dataset in which nothing is wrong, and which command checks it."""
     from throwcollect.dataset.verify_plan import CHECKED_AGAIN
     from throwcollect.robots.description import is_available
 
     if replay is not None:
-        told = f"replayed: {format_count(min(replay, len(dataset.recorded)), 'throw')}, the same bit for bit"
+        text = f"replayed: {format_count(min(replay, len(dataset.recorded)), 'throw')}, the same bit for bit"
     else:
         more = command("dataset", "verify", dataset.directory, "--replay", _SUGGESTED)
-        told = f"not checked: whether the simulation gives the same throws again ({more})"
+        text = f"not checked: whether the simulation gives the same throws again ({more})"
     run = len(dataset.plan.trials) - len(dataset.plan.trials.refused)
     if run > CHECKED_AGAIN and is_available(dataset.config):
-        told += f"; whether the robot can do them was checked of {CHECKED_AGAIN} of {run} trials"
-    return told
+        text += f"; whether the robot can do them was checked of {CHECKED_AGAIN} of {run} trials"
+    return text

@@ -1,1 +1,1 @@
-"""`throwcollect ros`: what the commands that look into the ROS graph call and print."""
+"""The commands of `throwcollect ros`."""

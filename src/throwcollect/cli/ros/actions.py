@@ -1,4 +1,4 @@
-"""`throwcollect ros action`: what can be asked for, and one goal, from its acceptance to its result."""
+"""`throwcollect ros action`: lists actions, and sends a goal and waits for its result."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from throwcollect.ros.names import absolute_name, find_interface
 action_app = typer.Typer(help="Actions: list, send.", no_args_is_help=True)
 
 _STATUSES = ("UNKNOWN", "ACCEPTED", "EXECUTING", "CANCELING", "SUCCEEDED", "CANCELED", "ABORTED")
-"""By the numbers of action_msgs/msg/GoalStatus."""
+"""Names of the numbers of action_msgs/msg/GoalStatus."""
 
 
 @action_app.command("list")

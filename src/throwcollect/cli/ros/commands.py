@@ -1,16 +1,18 @@
-"""`throwcollect ros`: a look into the ROS graph with the commands of ROS 2, where there is no ROS 2."""
+"""`throwcollect ros`: commands that look into the ROS graph as `ros2` does, for machines without ROS 2."""
 
 from __future__ import annotations
 
-from typing import Annotated
+import shlex
 
 import typer
 
+from throwcollect.cli.options import RunOption
 from throwcollect.cli.ros.actions import action_app
 from throwcollect.cli.ros.nodes import node_app
 from throwcollect.cli.ros.params import param_app
 from throwcollect.cli.ros.services import service_app
 from throwcollect.cli.ros.topics import topic_app
+from throwcollect.files import write_secret
 
 ros_app = typer.Typer(help="Look into the ROS graph, as the command `ros2` does.", no_args_is_help=True)
 ros_app.add_typer(topic_app, name="topic")
@@ -19,19 +21,22 @@ ros_app.add_typer(service_app, name="service")
 ros_app.add_typer(action_app, name="action")
 ros_app.add_typer(param_app, name="param")
 
+_PROFILE = "fast_dds.xml"
+
 
 @ros_app.command("env")
-def env(
-    run: Annotated[
-        str | None,
-        typer.Option(
-            "--run",
-            metavar="RUN",
-            help="Id of a run, its beginning, or the dataset's directory; by default, the only one.",
-        ),
-    ] = None,
-) -> None:
+def env(run: RunOption = None) -> None:
     """Print the line that lets a shell's ROS 2 nodes join a run: eval "$(throwcollect ros env)"."""
-    from throwcollect.cli.ros.env import show_environment
+    from throwcollect.cli.ros.joining import find_way
+    from throwcollect.ros.fast_dds import PLAIN_DISCOVERY, PROFILE_VARIABLE, client_profile
+    from throwcollect.ros.middleware import RMW_VARIABLE
 
-    show_environment(run)
+    found, connection = find_way(run)
+    middleware = found.record.middleware
+    # The variables name files and hold no secret, because others may read the environment of a process.
+    variables = {**connection.environment(), RMW_VARIABLE: middleware.rmw}
+    if middleware.is_fast_dds:
+        profile = found.key.directory.parent / _PROFILE
+        write_secret(profile, client_profile(connection.endpoint).encode())
+        variables |= {PROFILE_VARIABLE: str(profile), **PLAIN_DISCOVERY}
+    typer.echo("export " + " ".join(f"{name}={shlex.quote(value)}" for name, value in variables.items()))

@@ -1,4 +1,4 @@
-"""`throwcollect ros node`: who is there and has what."""
+"""`throwcollect ros node`: lists nodes, and shows what a node has."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def show_node(node: NodeArgument, hidden: HiddenOption = False, run: RunOption =
         owner = (short, namespace or "/")
         ours = session.node
         print(full_name)
-        for what, found in (
+        for what, names_and_types in (
             ("Subscribers", ours.get_subscriber_names_and_types_by_node(*owner)),
             ("Publishers", ours.get_publisher_names_and_types_by_node(*owner)),
             ("Service Servers", ours.get_service_names_and_types_by_node(*owner)),
@@ -47,6 +47,6 @@ def show_node(node: NodeArgument, hidden: HiddenOption = False, run: RunOption =
             ("Action Clients", ros.get_action_client_names_and_types_by_node(ours, *owner)),
         ):
             print(f"  {what}:")
-            for each, types in sorted(found):
-                if hidden or not is_hidden(each):
-                    print(f"    {each}: {', '.join(types)}")
+            for owned, types in sorted(names_and_types):
+                if hidden or not is_hidden(owned):
+                    print(f"    {owned}: {', '.join(types)}")

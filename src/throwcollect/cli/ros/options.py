@@ -7,10 +7,16 @@ from typing import Annotated
 import typer
 
 
-def _settle(run: str | None) -> str | None:
-    from throwcollect.cli.ros.env import settle
+def _settle_middleware(run: str | None) -> str | None:
+    """Make this process use the middleware of the run; it has to, before it takes any name from `throwcollect.ros`.
 
-    return settle(run)
+    Without a run, the environment decides.
+    """
+    if run is not None:
+        from throwcollect.cli.ros.joining import find_way
+
+        find_way(run)[1].middleware.settle()
+    return run
 
 
 RunOption = Annotated[
@@ -18,7 +24,7 @@ RunOption = Annotated[
     typer.Option(
         "--run",
         metavar="RUN",
-        callback=_settle,
+        callback=_settle_middleware,
         help="Join this run: its id, the beginning of that, or the dataset's directory. By default, the router that "
         "ZENOH_CONFIG_OVERRIDE names, or the one at tcp/localhost:7447.",
     ),

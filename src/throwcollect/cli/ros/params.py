@@ -1,4 +1,4 @@
-"""`throwcollect ros param`: parameters of nodes, read and set."""
+"""`throwcollect ros param`: lists, reads and sets parameters of nodes."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from throwcollect.ros.names import absolute_name, is_hidden
 param_app = typer.Typer(help="Parameters: list, get, set.", no_args_is_help=True)
 
 _SERVICE_S = 5.0
+"""Longest wait for the parameter services of a node."""
 _FIELDS = {
     1: ("Boolean value is:", "bool_value"),
     2: ("Integer value is:", "integer_value"),
@@ -27,7 +28,7 @@ _FIELDS = {
     8: ("Double values are:", "double_array_value"),
     9: ("String values are:", "string_array_value"),
 }
-"""By rcl_interfaces/msg/ParameterType."""
+"""Label and field of each number of rcl_interfaces/msg/ParameterType, with the labels of `ros2 param get`."""
 
 
 @param_app.command("list")
@@ -38,7 +39,7 @@ def list_parameters(
     """List the parameters of a node, or of all nodes."""
     with join_graph(run) as session:
         if node is not None:
-            name = _node(session, node)
+            name = _find_node(session, node)
             _print_sorted(_ask(session, name, "ListParameters").result.names)
             return
         for name in sorted({each for each in session.node_names() if not is_hidden(each)}):
@@ -57,7 +58,7 @@ def show_parameter(node: NodeArgument, name: ParameterArgument, run: RunOption =
     from throwcollect.ros.values import plain
 
     with join_graph(run) as session:
-        owner = _node(session, node)
+        owner = _find_node(session, node)
         values = _ask(session, owner, "GetParameters", names=[name]).values
         if not values:
             require_name("parameter", name, _ask(session, owner, "ListParameters").result.names, of=owner)
@@ -76,17 +77,17 @@ def set_parameter(
     run: RunOption = None,
 ) -> None:
     """Set a parameter."""
-    wanted = _parameter(name, value).to_parameter_msg()
+    parameter = _make_parameter(name, value).to_parameter_msg()
     with join_graph(run) as session:
-        owner = _node(session, node)
-        (result,) = _ask(session, owner, "SetParameters", parameters=[wanted]).results
+        owner = _find_node(session, node)
+        (result,) = _ask(session, owner, "SetParameters", parameters=[parameter]).results
         if not result.successful:
             raise ConfigError(f"setting {name} of {owner} failed: {result.reason}")
         print("Set parameter successful" + (f": {result.reason}" if result.reason else ""))
 
 
-def _parameter(name: str, text: str) -> ros.Parameter:
-    """A parameter of the type that its value has in YAML; what is of no such type is a text."""
+def _make_parameter(name: str, text: str) -> ros.Parameter:
+    """Make a parameter of the type that its value has in YAML; a value of another type becomes a text."""
     from throwcollect.cli.ros.yaml_values import parse
 
     try:
@@ -96,7 +97,7 @@ def _parameter(name: str, text: str) -> ros.Parameter:
         return ros.Parameter(name, value=text)
 
 
-def _node(session: Session, name: str) -> str:
+def _find_node(session: Session, name: str) -> str:
     owner = absolute_name(name)
     require_name("node", owner, session.node_names())
     return owner

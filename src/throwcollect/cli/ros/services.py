@@ -1,4 +1,4 @@
-"""`throwcollect ros service`: what can be called, and a call."""
+"""`throwcollect ros service`: lists services, and calls one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A moment in the ROS graph: how `throwcollect ros` joins it, waits in it and leaves it."""
+"""How a command of `throwcollect ros` joins the ROS graph, waits for answers and leaves."""
 
 from __future__ import annotations
 
@@ -6,21 +6,19 @@ import difflib
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from throwcollect import ros
 from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError, WorkerError
 from throwcollect.ros.names import is_hidden
 from throwcollect.ros.own_name import make_own_name
 
-if TYPE_CHECKING:
-    from throwcollect.ros.connection import Connection
-
 _SLICE_S = 0.2
-"""rclpy looks at signals between two waits only."""
+"""Longest single wait: rclpy handles signals only between two waits."""
 _QUIET_S = 0.5
+"""Time without anything new after which discovery counts as complete."""
 _LOOKING_S = 3.0
-"""Nodes on DDS find each other within a second; the machine may be busy."""
+"""Longest time for discovery: nodes on DDS find each other within a second, and the machine may be busy."""
 _MOST_NAMES = 8
 
 
@@ -37,36 +35,36 @@ class Session:
         self._executor.add_node(self.node)
 
     def spin_until(self, done: Callable[[], bool]) -> None:
-        """Call back until something is true."""
+        """Run callbacks until a condition holds."""
         while not done():
             self._executor.spin_once(timeout_sec=_SLICE_S)
 
     def look_around(self) -> None:
-        """Wait until others are seen and nothing new comes: DDS tells of one thing after another, not of the last."""
-        seen: set[object] = set()
+        """Wait until other nodes are discovered, and nothing new follows for a moment.
+
+        DDS reports each node and topic as it finds it, and never that it has found all of them.
+        """
+        known: set[object] = set()
         start = changed = time.monotonic()
         while (now := time.monotonic()) < start + _LOOKING_S:
             self._executor.spin_once(timeout_sec=_SLICE_S)
             nodes = set(self.node.get_node_names_and_namespaces())
-            sees: set[object] = {*nodes, *(name for name, _ in self.node.get_topic_names_and_types())}
-            if sees != seen:
-                seen, changed = sees, now
+            discovered: set[object] = {*nodes, *(name for name, _ in self.node.get_topic_names_and_types())}
+            if discovered != known:
+                known, changed = discovered, now
             elif len(nodes) > 1 and now > changed + _QUIET_S:
                 return
 
     def answer(self, future: ros.Future, *, alive: Callable[[], bool], who: str) -> Any:
-        """Wait for an answer.
+        """Wait for the answer to a request.
 
         Args:
-            future: What is waited for.
-            alive: Whether somebody is there who may answer.
-            who: Who that is.
-
-        Returns:
-            The answer.
+            future: The future of the answer.
+            alive: Tells whether the node that should answer still exists.
+            who: Name of that node or service, for the message.
 
         Raises:
-            WorkerError: If nobody is there any more.
+            WorkerError: If the node has vanished.
         """
         self.spin_until(lambda: future.done() or not alive())
         if not future.done():
@@ -75,36 +73,44 @@ class Session:
 
     def node_names(self) -> list[str]:
         """Absolute names of all nodes but our own, sorted."""
-        found = self.node.get_node_names_and_namespaces()
+        nodes = self.node.get_node_names_and_namespaces()
         own = self.node.get_name()
-        return sorted(f"{namespace.removesuffix('/')}/{name}" for name, namespace in found if name != own)
+        return sorted(f"{namespace.removesuffix('/')}/{name}" for name, namespace in nodes if name != own)
 
     def close(self) -> None:
-        """Leave."""
+        """Leave the graph."""
         self.node.destroy_node()
         ros.shutdown()
 
 
 @contextmanager
 def join_graph(run: str | None) -> Iterator[Session]:
-    """Join the graph of a run, or of the router that the environment names.
-
-    Args:
-        run: Id of a run, unique beginning of one, or directory of the dataset; None for the environment's router.
-
-    Yields:
-        The session.
+    """Join the graph of a run, or without one that of the router that the environment names.
 
     Raises:
         ConfigError: If there is no such run or no router.
         WorkerError: If the run has no router (any more).
-        Interrupted: If the user leaves; the message is empty, as that is how one leaves.
+        Interrupted: If the user presses Ctrl-C; the message is empty, because that is the normal way to leave.
     """
-    # Here, as every command of throwcollect loads this module, and those load Zenoh.
+    # These load Zenoh, and every command of throwcollect loads this module.
     from throwcollect.ros.middleware import Middleware
 
+    connection = None
     try:
-        _init(None if run is None else _connection(run))
+        if run is not None:
+            from throwcollect.cli.ros.joining import find_way
+
+            connection = find_way(run)[1]
+        try:
+            ros.init(connection=connection)
+        except ConfigError:
+            raise
+        except ThrowcollectError as error:
+            raise ConfigError(
+                error.message,
+                expected="a router there, or another one named in ZENOH_CONFIG_OVERRIDE",
+                hint="--run RUN joins a run; throwcollect ps lists them",
+            ) from error
         session = Session()
         try:
             if Middleware.of_process().is_fast_dds:
@@ -116,48 +122,29 @@ def join_graph(run: str | None) -> Iterator[Session]:
         raise Interrupted("") from None
 
 
-def _connection(run: str) -> Connection:
-    from throwcollect.cli.ros.env import find_way
-
-    return find_way(run).connection
-
-
-def _init(connection: Connection | None) -> None:
-    try:
-        ros.init(connection=connection)
-    except ConfigError:
-        raise
-    except ThrowcollectError as error:
-        raise ConfigError(
-            error.message,
-            expected="a router there, or another one named in ZENOH_CONFIG_OVERRIDE",
-            hint="--run RUN joins a run; throwcollect ps lists them",
-        ) from error
-
-
 def require_name(what: str, name: str, names: Iterable[str], *, of: str = "") -> None:
-    """Refuse a name that is not there.
+    """Refuse a name that does not exist, and propose those that are like it.
 
     Args:
-        what: What it names, such as ``topic``.
+        what: Kind of thing that it names, such as ``topic``.
         name: The name.
-        names: All names that there are.
-        of: Whose it would be; empty for the graph's.
+        names: All names that exist.
+        of: Node that would have it; empty if the graph would.
 
     Raises:
         ConfigError: If it is none of them.
     """
-    there = sorted(set(names))
-    if name in there:
+    existing = sorted(set(names))
+    if name in existing:
         return
-    near = difflib.get_close_matches(name, there, n=3) or [each for each in there if not is_hidden(each)]
+    near = difflib.get_close_matches(name, existing, n=3) or [each for each in existing if not is_hidden(each)]
     listed = ", ".join(near[:_MOST_NAMES]) + (", ..." if len(near) > _MOST_NAMES else "")
     owner = f" of {of}" if of else ""
-    raise ConfigError(f"no {what} {name}{owner}" + ("" if there else "; there is none"), expected=listed or None)
+    raise ConfigError(f"no {what} {name}{owner}" + ("" if existing else "; there is none"), expected=listed or None)
 
 
 def print_names(names_and_types: Iterable[tuple[str, list[str]]], *, types: bool, hidden: bool) -> None:
-    """Print names, one a line, with their types if wanted, without hidden ones if wanted."""
+    """Print names, one a line; `types` adds their types, and `hidden` the hidden names."""
     for name, kinds in names_and_types:
         if hidden or not is_hidden(name):
             print(f"{name} [{', '.join(kinds)}]" if types else name)

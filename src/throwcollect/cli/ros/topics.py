@@ -1,4 +1,4 @@
-"""`throwcollect ros topic`: who publishes and subscribes to what, and what is said."""
+"""`throwcollect ros topic`: lists topics, and shows their publishers, messages and rates."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ from throwcollect.ros.offered_qos import find_offered_qos
 topic_app = typer.Typer(help="Topics: list, echo, hz, info.", no_args_is_help=True)
 
 _DEPTH = 100
+"""Messages that wait for `hz` to count them."""
 _REPORT_NS = 10**9
 
 
@@ -39,7 +40,7 @@ def show_topic(
 ) -> None:
     """Print the type of a topic and who publishes and subscribes to it."""
     with join_graph(run) as session:
-        name, kinds = _types(session, topic)
+        name, kinds = _find_types(session, topic)
         require_name("topic", name, _names(session))
         end = "\n\n" if verbose else "\n"
         print(f"Type: {kinds[0] if len(kinds) == 1 else kinds}", end=end)
@@ -71,29 +72,29 @@ def echo(
     run: RunOption = None,
 ) -> None:
     """Print the messages of a topic as YAML."""
-    from throwcollect.cli.ros.yaml_values import SHORT, shorten, yaml_text
+    from throwcollect.cli.ros.yaml_values import shorten, yaml_text
     from throwcollect.ros.values import plain
 
     end_with_reader()
     with join_graph(run) as session:
-        name, message_type = _message_type(session, topic, kind)
+        name, message_type = _find_message_type(session, topic, kind)
         path = field.split(".") if field else []
         _check_field(message_type, path)
-        heard = False
+        printed = False
 
         def show(message: Any) -> None:
-            nonlocal heard
-            if once and heard:
+            nonlocal printed
+            if once and printed:
                 return
-            heard = True
+            printed = True
             for part in path:
                 message = getattr(message, part)
             value = plain(message)
-            print(yaml_text(value if full else shorten(value, SHORT)), end="---\n", flush=True)
+            print(yaml_text(value if full else shorten(value)), end="---\n", flush=True)
 
         qos = find_offered_qos(session.node, name, ros.ReliabilityPolicy.BEST_EFFORT)
         session.node.create_subscription(message_type, name, show, qos)
-        session.spin_until(lambda: once and heard)
+        session.spin_until(lambda: once and printed)
 
 
 @topic_app.command("hz")
@@ -107,22 +108,22 @@ def show_rate(
     """Print how often messages arrive."""
     end_with_reader()
     with join_graph(run) as session:
-        name, message_type = _message_type(session, topic, None)
+        name, message_type = _find_message_type(session, topic, None)
         arrivals: deque[int] = deque(maxlen=window + 1)
         qos = ros.QoSProfile(depth=_DEPTH, reliability=ros.ReliabilityPolicy.BEST_EFFORT)
         session.node.create_subscription(
             message_type, name, lambda _: arrivals.append(time.monotonic_ns()), qos, raw=True
         )
-        told = time.monotonic_ns()
+        reported = time.monotonic_ns()
         while True:
-            report = told + _REPORT_NS
+            report = reported + _REPORT_NS
             session.spin_until(lambda until=report: time.monotonic_ns() >= until)  # type: ignore[misc]
-            if len(arrivals) > 1 and arrivals[-1] > told:
-                print(_rate(arrivals), flush=True)
-            told = report
+            if len(arrivals) > 1 and arrivals[-1] > reported:
+                print(_describe_rate(arrivals), flush=True)
+            reported = report
 
 
-def _rate(arrivals: deque[int]) -> str:
+def _describe_rate(arrivals: deque[int]) -> str:
     gaps = [(after - before) * 1e-9 for before, after in pairwise(arrivals)]
     mean = statistics.fmean(gaps)
     rate = 1.0 / mean if mean else 0.0
@@ -136,18 +137,18 @@ def _names(session: Session) -> list[str]:
     return [name for name, _ in session.node.get_topic_names_and_types()]
 
 
-def _types(session: Session, topic: str) -> tuple[str, list[str]]:
+def _find_types(session: Session, topic: str) -> tuple[str, list[str]]:
     name = absolute_name(topic)
     return name, dict(session.node.get_topic_names_and_types()).get(name, [])
 
 
-def _message_type(session: Session, topic: str, kind: str | None) -> tuple[str, Any]:
-    """Absolute name and class of a topic.
+def _find_message_type(session: Session, topic: str, kind: str | None) -> tuple[str, Any]:
+    """Find the absolute name of a topic and the class of its messages.
 
     Raises:
         ConfigError: If the topic has several types and none is named, or does not have the one that is.
     """
-    name, kinds = _types(session, topic)
+    name, kinds = _find_types(session, topic)
     if kind is None:
         require_name("topic", name, (each for each in _names(session) if not is_hidden(each) or each == name))
         if len(kinds) > 1:

@@ -1,4 +1,4 @@
-"""Values to YAML and back, in the form of the `ros2` command."""
+"""Converts values to YAML and back, in the form of the `ros2` command."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from ruamel.yaml.error import YAMLError
 
 from throwcollect.errors import ConfigError
 
-SHORT = 128
-"""Longer texts and arrays are cut off unless wanted in full."""
+_SHORT = 128
+"""Length at which texts and arrays are cut off, unless the user asks for all of them."""
 
 
 def parse(text: str, what: str) -> Any:
-    """Value that YAML stands for.
+    """Read a value from YAML.
 
     Args:
         text: The YAML.
-        what: What it is, for the error.
+        what: Name of the argument that holds it, for the message.
 
     Raises:
         ConfigError: If it is no YAML.
@@ -30,23 +30,18 @@ def parse(text: str, what: str) -> Any:
         raise ConfigError(f"{what}: not YAML: {str(error).splitlines()[0]}, got {text!r:.80}") from error
 
 
-def shorten(value: Any, longest: int) -> Any:
-    """Mappings, lists and scalars with texts and lists cut off.
-
-    Args:
-        value: The value.
-        longest: Length at which they are cut off.
-    """
+def shorten(value: Any) -> Any:
+    """Cut off the texts and lists in a value that are longer than 128."""
     if isinstance(value, dict):
-        return {name: shorten(each, longest) for name, each in value.items()}
+        return {name: shorten(each) for name, each in value.items()}
     if isinstance(value, list):
-        items = [shorten(each, longest) for each in value[:longest]]
+        items = [shorten(each) for each in value[:_SHORT]]
         return items if len(items) == len(value) else [*items, "..."]
-    return f"{value[:longest]}..." if isinstance(value, str) and len(value) > longest else value
+    return f"{value[:_SHORT]}..." if isinstance(value, str) and len(value) > _SHORT else value
 
 
 def yaml_text(value: Any) -> str:
-    """YAML text, block style, with fields in their order."""
+    """Write a value as YAML, in block style, with its fields in their order."""
     writer = YAML(typ="safe", pure=True)
     writer.default_flow_style = False
     writer.allow_unicode = True
@@ -55,5 +50,5 @@ def yaml_text(value: Any) -> str:
     stream = io.StringIO()
     writer.dump(value, stream)
     text = stream.getvalue()
-    # After a scalar alone, a line says that the document ends.
+    # ruamel.yaml ends a document that is a single scalar with this line; `ros2` does not.
     return text.removesuffix("...\n") if text.endswith("\n...\n") else text

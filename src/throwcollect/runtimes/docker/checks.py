@@ -9,8 +9,7 @@ from pathlib import Path
 from docker.client import DockerClient
 from docker.errors import ImageNotFound
 
-from throwcollect.config.container_spec import ContainerSpec
-from throwcollect.config.containers import NodeContainerConfig
+from throwcollect.config.containers import ContainerSpec, NodeContainerConfig
 from throwcollect.config.host_paths import DEVICES, SECRETS, is_allowed_device, refusal
 from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError, Problem, WorkerError

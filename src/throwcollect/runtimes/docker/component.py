@@ -11,7 +11,7 @@ from typing import Any
 from docker.client import DockerClient
 from docker.types import EndpointConfig, Mount
 
-from throwcollect.config.container_spec import ContainerSpec
+from throwcollect.config.containers import ContainerSpec
 from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.ros.connection import Connection
 from throwcollect.ros.middleware import RMW_VARIABLE

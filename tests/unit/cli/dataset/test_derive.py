@@ -6,7 +6,7 @@ import pytest
 from tests.unit.dataset.conftest import Collection
 from typer.testing import CliRunner
 
-from throwcollect.cli.dataset.commands import dataset_app
+from throwcollect.cli.main import dataset_app
 
 
 def run(*arguments: str | Path) -> str:

@@ -11,7 +11,7 @@ import pytest
 from tests.unit.dataset.conftest import Collection
 from typer.testing import CliRunner
 
-from throwcollect.cli.dataset.view import numbers
+from throwcollect.cli.dataset.writing import read_trials
 from throwcollect.cli.main import app
 from throwcollect.errors import ConfigError
 
@@ -19,7 +19,7 @@ PAGE = Path(__file__).parents[4] / "docs" / "viewing.md"
 
 
 def test_trials_are_numbers_and_ranges_in_the_order_given() -> None:
-    assert numbers("7-9, 3,5-5") == [7, 8, 9, 3, 5]
+    assert read_trials("7-9, 3,5-5") == [7, 8, 9, 3, 5]
 
 
 @pytest.mark.parametrize(
@@ -36,7 +36,7 @@ def test_trials_are_numbers_and_ranges_in_the_order_given() -> None:
 )
 def test_anything_else_is_refused(text: str, message: str) -> None:
     with pytest.raises(ConfigError, match=f"--trials: {re.escape(message)}"):
-        numbers(text)
+        read_trials(text)
 
 
 def test_the_page_says_what_the_command_writes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,0 +1,129 @@
+"""`throwcollect dataset export`, `report`, `view` and `render`: what is made of a dataset for other programs."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from throwcollect.cli.options import DatasetArgument, JsonOption, OutputArgument
+from throwcollect.cli.printing import print_result
+from throwcollect.errors import ConfigError
+from throwcollect.wording import format_count
+
+
+def export_dataset(
+    directory: DatasetArgument,
+    output: OutputArgument,
+    to: Annotated[str, typer.Option("--to", metavar="parquet|npz|lerobot|hdf5|mat", help="Format.")],
+    rate: Annotated[
+        int | None, typer.Option("--rate", metavar="HZ", help="Samples per second; as recorded if not given.")
+    ] = None,
+    json: JsonOption = False,
+) -> None:
+    """Write a dataset in another format, with a data card."""
+    from throwcollect.export.formats import export
+
+    exported = export(directory, output, to=to, rate_hz=rate)
+    text = (
+        f"{exported.directory}: {format_count(exported.episodes, 'throw')} "
+        f"of {format_count(exported.trials, 'trial')}, "
+        f"{format_count(exported.samples, 'sample')} at {exported.rate_hz} Hz, {exported.size_bytes / 1e6:.1f} MB"
+    )
+    print_result(asdict(exported), text, json=json)
+
+
+def report_dataset(
+    directory: DatasetArgument,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", metavar="FILE", help="HTML file to write; DIR.html beside the dataset if not given."),
+    ] = None,
+    png: Annotated[
+        Path | None,
+        typer.Option("--png", metavar="DIR", help="Also write the main plots as pictures; must be new or empty."),
+    ] = None,
+    model: Annotated[
+        Path | None, typer.Option("--model", metavar="MODEL", help="A model of the dataset, and how it hits.")
+    ] = None,
+    json: JsonOption = False,
+) -> None:
+    """Write a page that shows what a dataset holds, and pictures for papers."""
+    from throwcollect.report.write import write_report
+
+    resolved = directory.resolve()
+    page = output or resolved.with_name(f"{resolved.name}.html")
+    written = write_report(directory, page, pictures=png, model=model)
+    size = written.page.stat().st_size
+    pictures = [str(path) for path in written.pictures]
+    document = {"page": str(written.page), "size_bytes": size, "pictures": pictures}
+    print_result(document, "\n".join([f"{written.page}: {size / 1e6:.1f} MB", *pictures]), json=json)
+
+
+def view_dataset(
+    directory: DatasetArgument,
+    output: OutputArgument,
+    trials: Annotated[
+        str | None, typer.Option("--trials", metavar="3,5,7-9", help="Trials to show; all if not given.")
+    ] = None,
+    json: JsonOption = False,
+) -> None:
+    """Write throws with frames, meshes, markers and a layout, for Foxglove, Rerun and RViz."""
+    from throwcollect.view.viewer_directory import view
+
+    written = view(directory, output, None if trials is None else read_trials(trials))
+    text = (
+        f"{written.recording}: {format_count(written.throws, 'throw')}, {written.duration_s:.0f} s, "
+        f"{written.recording_bytes / 1e6:.1f} MB; meshes beside it: {written.mesh_bytes / 1e6:.1f} MB\n"
+        f"Foxglove  open {written.recording.name}, then import the layout {written.layout}\n"
+        f"Rerun     ROS_PACKAGE_PATH={shlex.quote(str(output.absolute()))} "
+        f"rerun {shlex.quote(str(written.recording))}"
+    )
+    print_result(written.as_dict(), text, json=json)
+
+
+def read_trials(text: str) -> list[int]:
+    """Read numbers of trials such as ``3,5,7-9``, and keep their order.
+
+    Raises:
+        ConfigError: If the text is something else, or names a trial twice.
+    """
+    chosen: list[int] = []
+    for part in text.split(","):
+        match = re.fullmatch(r"\s*([0-9]{1,7})\s*(?:-\s*([0-9]{1,7})\s*)?", part)
+        if match is None:
+            raise ConfigError(f"--trials: {part!r} is no trial", expected="numbers and ranges such as 3,5,7-9")
+        first, last = int(match[1]), int(match[2] or match[1])
+        if last < first:
+            raise ConfigError(f"--trials: {part!r} runs backwards", expected=f"{last}-{first}")
+        chosen += range(first, last + 1)
+    if len(set(chosen)) < len(chosen):
+        raise ConfigError(f"--trials: {text!r} names a trial twice", expected="each trial once")
+    return chosen
+
+
+def render_dataset(
+    directory: DatasetArgument,
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help="Picture to write: .webp or .gif.")],
+    trial: Annotated[
+        int | None,
+        typer.Option("--trial", metavar="K", help="Number of the trial; the first recorded one if not given."),
+    ] = None,
+    slow: Annotated[
+        float, typer.Option("--slow", metavar="FACTOR", min=0.5, max=20, help="How many times slower than it was.")
+    ] = 1.0,
+    json: JsonOption = False,
+) -> None:
+    """Draw a throw as an animated picture, from what was recorded."""
+    from throwcollect.view.animation import render
+
+    written = render(directory, output, trial=trial, slow=slow)
+    text = (
+        f"{written.file}: trial {written.trial}, {written.pictures} pictures, {written.duration_s:.1f} s, "
+        f"{written.size_bytes / 1e6:.2f} MB"
+    )
+    print_result({**vars(written), "file": str(written.file)}, text, json=json)
