@@ -12,7 +12,7 @@ import { Plots } from "./plots.js";
 import { Meshes } from "./robot.js";
 import { Room } from "./room.js";
 import { View } from "./scene.js";
-import { Store, inOrder, lives, steps } from "./state.js";
+import { inOrder, lives, steps } from "./state.js";
 import { Target } from "./target.js";
 import { Watching } from "./watching.js";
 
@@ -51,7 +51,8 @@ function signIn(why) {
 
 /** The page of somebody who has a token. */
 class Page {
-  #store = new Store();
+  /** @type {import("./state.js").Instance[]} runs, as the newest state has them */
+  #instances = [];
   #first = 0;
   #before = 0;
 
@@ -75,7 +76,6 @@ class Page {
     this.room = new Room({ view, map, target: this.target, plots: this.plots, tell, advance: (seconds) => this.#advance(seconds), facts: () => this.#facts() });
     this.controls = new Controls(connection, watch);
     if (matchMedia("(prefers-reduced-motion: reduce)").matches) this.playback.playing = false;
-    this.#store.listen((state) => this.#put(state));
     this.#listen();
     this.#connect();
     requestAnimationFrame((now) => this.#frame(now));
@@ -92,7 +92,7 @@ class Page {
         say("connected", "connected");
         this.models.list();
       },
-      receive: (text) => this.#store.put(JSON.parse(text)),
+      receive: (text) => this.#put(JSON.parse(text)),
       lost: (waitMs) => this.#lost(waitMs),
     });
   }
@@ -112,6 +112,7 @@ class Page {
   }
 
   #put(state) {
+    this.#instances = state.instances;
     this.controls.put(state);
     this.target.put(state);
     const ids = state.instances.filter((each) => lives(each) || each.id === this.watching.id).map(({ id }) => id);
@@ -127,7 +128,7 @@ class Page {
       setChoices(select, [...[...select.options].filter(({ value }) => value).map(({ value }) => [value, value]), [id, id]]);
     }
     select.value = id;
-    const instance = this.#store.instance(id);
+    const instance = this.#instances.find((each) => each.id === id);
     if (this.watching.id !== (instance?.id ?? null)) {
       this.#first = 0;
       this.tell("");
