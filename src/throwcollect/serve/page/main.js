@@ -16,9 +16,9 @@ import { inOrder, lives, steps } from "./state.js";
 import { Target } from "./target.js";
 import { Watching } from "./watching.js";
 
-/** Simulations in a grid; more are on further pages of it. */
+/** Most simulations in a grid; the others are on further pages of it. */
 const MOST_TILES = 16;
-/** Pictures a second at most. */
+/** Most pictures a second. */
 const RATE_HZ = 30;
 
 function say(kind, text) {
@@ -49,7 +49,7 @@ function signIn(why) {
   };
 }
 
-/** The page of somebody who has a token. */
+/** The page of a user who has a token. */
 class Page {
   /** @type {import("./state.js").Instance[]} runs, as the newest state has them */
   #instances = [];
@@ -81,7 +81,7 @@ class Page {
     requestAnimationFrame((now) => this.#frame(now));
   }
 
-  /** @param {string} text what is wrong in the view */
+  /** @param {string} text says what is wrong in the view */
   tell(text) {
     setText(get("view-note"), text);
   }
@@ -121,7 +121,7 @@ class Page {
     this.#watch(ids.includes(wanted) ? wanted : (ids[0] ?? ""));
   }
 
-  /** @param {string} id of the run that is to be seen */
+  /** @param {string} id of the run to show */
   #watch(id) {
     const select = get("watched");
     if (id && ![...select.options].some(({ value }) => value === id)) {
@@ -251,7 +251,7 @@ class Page {
   #frame(now) {
     requestAnimationFrame((next) => this.#frame(next));
     const since = now - this.#before;
-    // As long as a room is seen, the device says when it wants a picture.
+    // In a room, the device asks for pictures by itself.
     if (since < 1000 / RATE_HZ - 4 || this.room.isEntered) return;
     this.#before = now;
     this.#advance(since / 1000);
@@ -265,7 +265,7 @@ class Page {
     this.#showTransport();
   }
 
-  /** What is going on, for where the page cannot be seen. */
+  /** What the info board of a room shows, where the page cannot be seen. */
   #facts() {
     const { instance } = this.watching;
     const place = get("connection");
@@ -295,7 +295,7 @@ class Page {
   }
 }
 
-/** Swept values, with keys as short as tell them. */
+/** Swept values in words, with short keys. */
 function inWords(values) {
   return Object.entries(values).map(([key, value]) => `${key.replace(/^(task|ball|scene)\./, "")} ${Number(value.toPrecision(4))}`).join(", ");
 }
@@ -320,7 +320,7 @@ async function begin() {
     return;
   }
   get("page").hidden = false;
-  // For people who look into it, and for tests.
+  // Tests and curious people reach the page by this name.
   window.throwcollect = new Page(token);
 }
 
