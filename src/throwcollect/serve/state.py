@@ -111,11 +111,7 @@ STATES: TypeAdapter[State] = TypeAdapter(State)
 
 
 class Lookout:
-    """Reads the state; the record of a run that has ended is read again only if it was written since.
-
-    Args:
-        catalogue: The catalogue of components.
-    """
+    """Reads the state; the record of a run that has ended is read again only if it was written since."""
 
     def __init__(self, catalogue: Catalogue) -> None:
         self._catalogue = catalogue

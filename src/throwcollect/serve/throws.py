@@ -70,11 +70,7 @@ def encode_throw(delivery: Delivery, simulation: str, values: Mapping[str, float
 
 
 class PlannedValues:
-    """Swept values of the trials of a run; its plan is read when they are first needed, and again when it has grown.
-
-    Args:
-        directory: Directory of the run's dataset.
-    """
+    """Swept values of the trials of a run; its plan is read when they are first needed, and again when it has grown."""
 
     def __init__(self, directory: Path) -> None:
         self._directory = directory
@@ -91,11 +87,7 @@ class PlannedValues:
 
 
 class ThrowWatch:
-    """Receives the newest throws of one run in a thread of its own, while there are listeners.
-
-    Args:
-        run: The run.
-    """
+    """Receives the newest throws of one run in a thread of its own, while there are listeners."""
 
     def __init__(self, run: Run) -> None:
         self._run = run

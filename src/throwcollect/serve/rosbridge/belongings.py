@@ -24,11 +24,7 @@ ABelonging = TypeVar("ABelonging", bound=Belonging)
 
 
 class Belongings(Generic[ABelonging]):
-    """All belongings of one kind that a client has.
-
-    Args:
-        client: The client.
-    """
+    """All belongings of one kind that a client has."""
 
     def __init__(self, client: Peer) -> None:
         self._client = client

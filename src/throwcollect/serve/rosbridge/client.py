@@ -15,7 +15,7 @@ from throwcollect.serve.rosbridge.goals import Goal, Goals
 from throwcollect.serve.rosbridge.offered_actions import OfferedAction
 from throwcollect.serve.rosbridge.offered_services import OfferedService
 from throwcollect.serve.rosbridge.offers import Offers
-from throwcollect.serve.rosbridge.peer import Level, Part
+from throwcollect.serve.rosbridge.peer import Level
 from throwcollect.serve.rosbridge.publishers import Publishers
 from throwcollect.serve.rosbridge.questions import Questions
 from throwcollect.serve.rosbridge.reassembly import Reassembly
@@ -55,13 +55,7 @@ class Host(Protocol):
 
 
 class Client:
-    """One client. `receive` and `close` may be called in any thread, all else in that of the bridge.
-
-    Args:
-        host: The bridge.
-        send: Takes each frame that leaves.
-        read_only: Whether it may only look.
-    """
+    """One client. `receive` and `close` may be called in any thread, everything else only in that of the bridge."""
 
     def __init__(self, host: Host, send: Callable[[Frame], None], *, read_only: bool) -> None:
         self._host = host
@@ -75,7 +69,7 @@ class Client:
         subscriptions, publishers = Subscriptions(self), Publishers(self)
         services = Offers(self, "service", OfferedService)
         actions = Offers(self, "action", OfferedAction, probe="/_action/send_goal")
-        self._parts: tuple[Part, ...] = (subscriptions, publishers, services, actions, self._questions, self._goals)
+        self._parts = (subscriptions, publishers, services, actions, self._questions, self._goals)
         self._reassembly = Reassembly()
         rosapi = Rosapi(self, self._questions).answers
         self._answers: Mapping[str, Answer] = {**rosapi, GET_FILE: give_file}

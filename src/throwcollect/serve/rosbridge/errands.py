@@ -18,9 +18,6 @@ _WATCH_S = 1.0
 class Errand:
     """One thing that a client has asked of a node; it ends once.
 
-    Args:
-        name: Absolute name of the service or action.
-
     Attributes:
         name: Absolute name of the service or action.
         is_open: Whether it has not ended.

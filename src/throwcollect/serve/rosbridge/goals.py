@@ -21,10 +21,6 @@ _UNKNOWN = 0
 class Goal(Errand):
     """One goal of a client, which gets one result.
 
-    Args:
-        client: The client.
-        request: The client's request.
-
     Attributes:
         id: The client's name for the goal.
         form: How feedback and result are sent to the client.
@@ -63,11 +59,7 @@ class Goal(Errand):
 
 
 class Goals(Errands[Goal]):
-    """All goals that a client has sent and that have not ended.
-
-    Args:
-        client: The client.
-    """
+    """All goals that a client has sent and that have not ended."""
 
     def __init__(self, client: Peer) -> None:
         super().__init__(client, "nobody offers {} with this type", "{}: the action has gone, and no result has come")

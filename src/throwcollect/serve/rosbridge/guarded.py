@@ -10,13 +10,17 @@ from throwcollect.errors import ConfigError
 from throwcollect.ros.names import absolute_name
 from throwcollect.trial.lease import LEASES
 
-_PARAMETER_EVENTS = "parameter_events"
+_GUARDED = {
+    EPISODE_TOPIC: "nobody but the coordinator may have this topic, as whoever is slow would hold the simulation up",
+    "parameter_events": "nobody may have this topic, as it tells the signed leases of trials",
+}
+"""Last part of the name of each topic that clients may not have, and why."""
 _PARAMETER_SERVICES = ("get_parameters", "set_parameters", "set_parameters_atomically")
 
 
 def is_guarded(topic: str) -> bool:
     """Whether clients may not have a topic, given by its absolute name."""
-    return topic.rpartition("/")[2] in (EPISODE_TOPIC, _PARAMETER_EVENTS)
+    return topic.rpartition("/")[2] in _GUARDED
 
 
 def open_topic(given: str) -> str:
@@ -26,13 +30,8 @@ def open_topic(given: str) -> str:
         ConfigError: If ROS does not allow the name, or clients may not have the topic.
     """
     topic = absolute_name(given)
-    short = topic.rpartition("/")[2]
-    if short == EPISODE_TOPIC:
-        raise ConfigError(
-            f"{topic}: nobody but the coordinator may have this topic, as whoever is slow would hold the simulation up"
-        )
-    if short == _PARAMETER_EVENTS:
-        raise ConfigError(f"{topic}: nobody may have this topic, as it tells the signed leases of trials")
+    if is_guarded(topic):
+        raise ConfigError(f"{topic}: {_GUARDED[topic.rpartition('/')[2]]}")
     return topic
 
 

@@ -21,12 +21,7 @@ _numbers = itertools.count(1)
 
 
 class OfferedAction:
-    """An action that a client offers.
-
-    Args:
-        client: The client.
-        given: Its name as the client has it.
-        type_name: Name of its type.
+    """An action that a client offers, made from the client's names for it and for its type.
 
     Raises:
         ConfigError: If there is no such type, or ROS does not allow the name.

@@ -31,16 +31,3 @@ class Peer(Protocol):
 
     def say(self, level: Level, text: str, request: RequestId = None) -> None:
         """Send a status message about a request, if the client wants messages of this level."""
-
-
-class Part(Protocol):
-    """A part of a client that has something in the ROS graph."""
-
-    def lose(self) -> None:
-        """Forget the session, which is gone, and all that it had."""
-
-    def restore(self) -> None:
-        """Make everything again, in a new session."""
-
-    def close(self) -> None:
-        """Withdraw everything."""

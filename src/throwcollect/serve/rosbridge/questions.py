@@ -26,11 +26,7 @@ class _Question(Errand):
 
 
 class Questions(Errands[_Question]):
-    """All requests of one client to services that wait for an answer.
-
-    Args:
-        client: The client.
-    """
+    """All requests of one client to services that wait for an answer."""
 
     def __init__(self, client: Peer) -> None:
         super().__init__(client, "{}: nobody offers the service", "{}: the service has gone and has not answered")

@@ -27,10 +27,6 @@ SET_PARAMETER = "rosapi/set_param"
 class Rosapi:
     """The services of rosapi for one client. They leave out what ROS hides, and topics that clients may not have.
 
-    Args:
-        client: The client.
-        questions: Asks nodes for the client.
-
     Attributes:
         answers: Function that answers each service, by its name without a slash at its beginning.
     """

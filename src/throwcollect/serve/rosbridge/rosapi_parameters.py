@@ -27,12 +27,7 @@ _LIST = "rcl_interfaces/srv/ListParameters"
 
 
 class Parameters:
-    """The services of rosapi for parameters, for one client.
-
-    Args:
-        client: The client.
-        questions: Asks nodes for the client.
-    """
+    """The services of rosapi for parameters, for one client."""
 
     def __init__(self, client: Peer, questions: Questions) -> None:
         self._client = client

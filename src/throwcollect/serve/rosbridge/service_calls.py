@@ -17,11 +17,7 @@ from throwcollect.serve.rosbridge.request import Fields, Form, Request
 
 
 class Call:
-    """One call, which is answered once.
-
-    Args:
-        client: The client that calls.
-        request: The client's request.
+    """One call of a client, which is answered once.
 
     Attributes:
         given: The client's name for the service.

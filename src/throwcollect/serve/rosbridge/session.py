@@ -76,13 +76,7 @@ class Session:
         return name
 
     def listen(self, topic: str, type_name: str, listener: Listener) -> Feed:
-        """Give the messages of a topic to a listener; a latched topic begins with its earlier messages.
-
-        Args:
-            topic: Absolute name of the topic.
-            type_name: Full name of its type.
-            listener: Called with each sample.
-        """
+        """Give the messages of a topic to a listener; a latched topic begins with its earlier messages."""
         # Only ROS has the earlier messages of a latched topic, so a later listener needs a subscription of its own.
         alone = (topic, type_name, listener)
         shared = (topic, type_name, None)

@@ -31,12 +31,7 @@ class Wish:
 
 
 class Pace:
-    """Lets samples through at the rate that a client asks for.
-
-    Args:
-        send: Takes a sample that is let through.
-        later: Calls an action after a time [s].
-    """
+    """Lets samples through to `send` at the rate that a client asks for; `later` calls an action after a time [s]."""
 
     def __init__(self, send: Callable[[Sample], None], later: Callable[[float, Callable[[], None]], None]) -> None:
         self._send = send
@@ -82,13 +77,7 @@ class Pace:
 
 
 class Subscription:
-    """A topic of a client, which may have several subscriptions to it under different ids.
-
-    Args:
-        client: The client.
-        given: The client's name for the topic.
-        type_name: Full name of the type.
-    """
+    """A topic of a client, which may have several subscriptions to it under different ids."""
 
     def __init__(self, client: Peer, given: str, type_name: str) -> None:
         self._client = client

@@ -31,11 +31,7 @@ _DROPPED = json_text(
 
 
 class Outbox:
-    """Frames that wait to be sent; filled in any thread, emptied in that of an event loop.
-
-    Args:
-        loop: The event loop.
-    """
+    """Frames that wait to be sent; filled in any thread, emptied in that of an event loop."""
 
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
         self._loop = loop
