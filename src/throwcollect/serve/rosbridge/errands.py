@@ -1,4 +1,4 @@
-"""What one client has asked of services and actions of nodes, until it is answered or there is no hope of an answer."""
+"""Requests of one client to services and actions of nodes, each until it is answered or cannot be answered any more."""
 
 from __future__ import annotations
 
